@@ -158,7 +158,7 @@ def _fill(
     else:
         files.append(FileRef(**usdz))
     if viewer_dist is not None:
-        files += _copy_viewer(viewer_dist, root)
+        files += copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
@@ -177,7 +177,7 @@ def _fill(
                 report_line(f"{tile.id}/{channel.channel_id}: {channel.edit}")
 
 
-def _copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
+def copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
     """Copy the built viewer; return its files. Raises OutputError on a clash of names."""
     refs = []
     for source in sorted(viewer_dist.rglob("*")):

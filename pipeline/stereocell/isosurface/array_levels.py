@@ -12,6 +12,7 @@ from stereocell.isosurface.channel_level import ChannelLevels, find_levels
 from stereocell.isosurface.level_evidence import (
     MAX_PADDING,
     Counting,
+    TileEvidence,
     denoising_reach,
     find_padding,
     gather_evidence,
@@ -24,6 +25,7 @@ from stereocell.model.image_plane import (
     slices_back,
     slices_first,
 )
+from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 
@@ -46,6 +48,20 @@ class ArrayLevels:
     below: float
 
 
+@dataclass(frozen=True, slots=True)
+class ArrayEvidence:
+    """What one volume shows of its levels.
+
+    background  voxel values, knots in voxels along (slice, row, column); None: none was looked for
+    max_shift   by how much smoothing may move a value of the surface, voxel values; None: by any
+    """
+
+    counting: Counting
+    evidence: TileEvidence
+    background: LatticeField | None
+    max_shift: float | None
+
+
 def find_array_levels(
     volume: Volume, *, smoothing_um: float | None = None, modality: str = ""
 ) -> ArrayLevels:
@@ -62,6 +78,26 @@ def find_array_levels(
     >>> 400 < found.levels.clear[0].value < 700
     True
     """
+    found = gather_array_evidence(volume, smoothing_um=smoothing_um, modality=modality)
+    finest_um = min(volume.spacing_um)
+    levels = find_levels(
+        [found.evidence], counting=found.counting, finest_um=finest_um, modality=modality
+    )
+    axis = find_slice_axis(volume.slice_axis, volume.spacing_um)
+    spacing = first_of_three(volume.spacing_um, axis)
+    turned = Volume(slices_first(volume.voxels, axis), spacing)
+    sigma = finest_um if smoothing_um is None else smoothing_um
+    field, below = denoise(turned, sigma, found.max_shift), 0.0
+    if levels.subtracts and found.background is not None:
+        under = found.background.at(Box((0, 0, 0), turned.voxels.shape))
+        field, below = field - under, float(under.mean(dtype=np.float64))
+    return ArrayLevels(np.ascontiguousarray(slices_back(field, axis)), levels, below)
+
+
+def gather_array_evidence(
+    volume: Volume, *, smoothing_um: float | None = None, modality: str = ""
+) -> ArrayEvidence:
+    """Return what a volume shows of its levels; the arguments are those of `find_array_levels`."""
     axis = find_slice_axis(volume.slice_axis, volume.spacing_um)
     spacing = first_of_three(volume.spacing_um, axis)
     voxels = slices_first(volume.voxels, axis)
@@ -74,26 +110,21 @@ def find_array_levels(
     noise = NoiseSample()
     noise.add(voxels, darkest)
     max_shift = find_max_shift(noise.deviation(), SurfaceOptions().max_shift, None)
-    scale, scale_above, under = Scale.of(voxels, padding), None, None
+    scale, scale_above, lattice = Scale.of(voxels, padding), None, None
+    whole = Box((0, 0, 0), voxels.shape)
     if modality not in _BODIES:
-        whole = Box((0, 0, 0), voxels.shape)
         lattice = find_background(
             voxels, whole, spacing_um=spacing, block_um=_BLOCK * min(spacing), padding=padding
         )
-        under, scale_above = lattice.at(whole), scale.above(lattice)
+        scale_above = scale.above(lattice)
     counting = Counting(scale, scale_above, darkest)
-    slices, rows, columns = (slice(0, n) for n in voxels.shape)
     evidence = gather_evidence(
         field,
         padding,
-        (slices, rows, columns),
+        whole.slices,
         voxels=voxels,
         spacing_um=spacing,
         counting=counting,
-        background=under,
+        background=None if lattice is None else lattice.at(whole),
     )
-    levels = find_levels([evidence], counting=counting, finest_um=min(spacing), modality=modality)
-    field, below = denoise(Volume(voxels, spacing), sigma, max_shift), 0.0
-    if levels.subtracts and under is not None:
-        field, below = field - under, float(under.mean(dtype=np.float64))
-    return ArrayLevels(np.ascontiguousarray(slices_back(field, axis)), levels, below)
+    return ArrayEvidence(counting, evidence, lattice, max_shift)

@@ -97,7 +97,7 @@ def survey_channel(plan: Plan, channel: Channel, chosen: Chosen, window_file: st
             surface=plan.settings.surface,
             spacing_um=plan.spacing_um,
         ),
-        _appearance(plan, channel, chosen),
+        appearance_of(plan, channel, chosen),
         () if found.levels is None else found.levels.ladder,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,
@@ -108,7 +108,8 @@ def survey_channel(plan: Plan, channel: Channel, chosen: Chosen, window_file: st
     return color_vessels(surveyed, modality=plan.modality)
 
 
-def _appearance(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
+def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
+    """Return how a channel is drawn in all tiles."""
     found = chosen.found
     level = found.rungs[chosen.rung] if found.rungs else None
     confidence = float(level is not None)  # a level that the settings state is no guess

@@ -76,12 +76,7 @@ class ChannelSurvey:
     @property
     def is_body(self) -> bool:
         """Whether the surface encloses so much that a cut through the middle shows an inside."""
-        level = self.appearance.iso_normalized
-        if level is None:
-            return True
-        counts = np.asarray(self.statistics.histogram)
-        above = int(counts[int(level * len(counts)) :].sum())
-        return above >= BODY_SHARE * int(counts.sum())
+        return is_body(self.appearance, self.statistics)
 
     @property
     def near_levels(self) -> str:
@@ -111,6 +106,16 @@ class ChannelSurvey:
             f"{plan.settings.surface.max_faces:,} (surface.max_faces): of the planes along z, y, x "
             f"one in {z}, {y}, {x} carries it"
         )
+
+
+def is_body(appearance: Appearance, statistics: ChannelStatistics) -> bool:
+    """Return whether a surface encloses so much that a cut through the middle shows an inside."""
+    level = appearance.iso_normalized
+    if level is None:
+        return True
+    counts = np.asarray(statistics.histogram)
+    above = int(counts[int(level * len(counts)) :].sum())
+    return above >= BODY_SHARE * int(counts.sum())
 
 
 Survey = dict[str, ChannelSurvey]  # by channel ID

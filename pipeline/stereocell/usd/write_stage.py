@@ -57,6 +57,14 @@ _NOTE = """Composition only: see looks/ for colours and transfer functions, tile
 Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
 
 
+# The sides of a patient in the world of a stage: unit vectors (x, y, z)
+PATIENT_SIDES = {
+    "left": (1.0, 0.0, 0.0),
+    "posterior": (0.0, 0.0, -1.0),
+    "superior": (0.0, 1.0, 0.0),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class TileExtent:
     """A tile's place, as in TileContent. All (z, y, x) in um."""
@@ -160,8 +168,16 @@ def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:
 
     boxes  (tiles, 2, 3), lower and upper corners (x, y, z), um, world
     """
-    middle = float(boxes[:, 0, 0].min() + boxes[:, 1, 0].max()) / 2
-    set_attribute(root, OPENING_CUT, Sdf.ValueTypeNames.Double4, Gf.Vec4d(1, 0, 0, middle))
+    normal, offset = opening_plane(boxes)
+    set_attribute(root, OPENING_CUT, Sdf.ValueTypeNames.Double4, Gf.Vec4d(*normal, offset))
+
+
+def opening_plane(boxes: NDArray[np.float64]) -> tuple[Point, float]:
+    """Return the plane that a specimen opens cut by: its normal, and its offset in um.
+
+    boxes  (tiles, 2, 3), lower and upper corners (x, y, z), um, world
+    """
+    return (1.0, 0.0, 0.0), float(boxes[:, 0, 0].min() + boxes[:, 1, 0].max()) / 2
 
 
 def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:
@@ -170,9 +186,8 @@ def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:
     move  (4, 4) for row vectors: from the group's axes to the patient's world, (L, S, -P)
     """
     group.AddAppliedSchema(PATIENT_API)
-    world = {"left": (1, 0, 0), "posterior": (0, 0, -1), "superior": (0, 1, 0)}
     for side, name in SIDES.items():
-        own = np.array(world[side]) @ np.linalg.inv(move[:3, :3])
+        own = np.array(PATIENT_SIDES[side]) @ np.linalg.inv(move[:3, :3])
         set_attribute(group, name, Sdf.ValueTypeNames.Vector3d, Gf.Vec3d(*own.tolist()))
 
 

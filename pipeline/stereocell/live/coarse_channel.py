@@ -1,0 +1,127 @@
+"""Read a channel coarsely: no more voxels than a first view needs, however large the source is."""
+
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.model.tiling import Box
+from stereocell.planning.channels import Channel
+from stereocell.planning.plan import Plan
+from stereocell.read import Dataset
+
+READ_VOXELS = 48_000_000  # most voxels that are read of a channel
+SAMPLED_VOXELS = 6_000_000  # values of a channel, about, that its window is found on
+_Triple = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseChannel:
+    """The means of blocks of a channel's voxels, over the planned region.
+
+    voxels  float32 (z, y, x), voxel values
+    first   (z, y, x), centre of voxel (0, 0, 0), in voxels of the planned level
+    step    (z, y, x), distance between voxels, in voxels of the planned level
+    sample  float32 (n,), values as they were read, without means: what a histogram is made of
+    """
+
+    voxels: NDArray[np.float32]
+    first: tuple[float, float, float]
+    step: tuple[float, float, float]
+    sample: NDArray[np.float32]
+
+    def at(self, places: tuple[NDArray[np.float64], ...]) -> NDArray[np.float32]:
+        """Return the voxels at places on a grid, by linear interpolation; float32 (z, y, x).
+
+        places  the grid's coordinates along z, y and x, in voxels of the planned level; beyond the
+                outermost voxels their values continue
+        """
+        values = self.voxels
+        for axis, along in enumerate(places):
+            last = values.shape[axis] - 1
+            index = np.clip((along - self.first[axis]) / self.step[axis], 0, last)
+            low = np.minimum(index.astype(np.intp), max(last - 1, 0))
+            share = (index - low).astype(np.float32)
+            share = share.reshape([-1 if i == axis else 1 for i in range(3)])
+            below, above = values.take(low, axis), values.take(np.minimum(low + 1, last), axis)
+            values = below + share * (above - below)
+        return values
+
+
+def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> CoarseChannel:
+    """Return a channel by means of blocks of about equal edges in um, at most `voxels` of them.
+
+    Of a source with a pyramid its finest level of at most READ_VOXELS is read. Of a source without
+    one every k-th plane is read, across the axis along which its images lie.
+
+    Raises SourceError where voxels can't be read.
+    """
+    level = plan.level
+    while level + 1 < len(dataset.levels) and prod(_region_at(dataset, plan, level).shape) > max(
+        READ_VOXELS, voxels
+    ):
+        level += 1
+    box = _region_at(dataset, plan, level)
+    spacing = dataset.levels[level].spacing_um
+    factor = _factor(box.shape, spacing, voxels)
+    axis = dataset.slice_axis(level)
+    # of each block of planes the middle ones: all of them, unless there are too many voxels
+    count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
+    blocks, sample = [], []
+    for start in range(box.start[axis], box.stop[axis] - factor[axis] + 1, factor[axis]):
+        middle = start + (factor[axis] - count) // 2
+        read = dataset.read(channel.index, box.slab(axis, middle, middle + count), level).voxels
+        blocks.append(_means(read, tuple(count if i == axis else factor[i] for i in range(3))))
+        sample.append(
+            _spread(read, max(1, READ_VOXELS // 8 // max(1, box.shape[axis] // factor[axis])))
+        )
+    # from voxels of the level to those of the planned one
+    fine = plan.spacing_um
+    scale = tuple(a / b for a, b in zip(spacing, fine, strict=True))
+    origin = dataset.levels[level].origin_um
+    first = tuple(
+        (origin[i] + (box.start[i] + (factor[i] - 1) / 2) * spacing[i] - plan.origin_um[i])
+        / fine[i]
+        for i in range(3)
+    )
+    z, y, x = (float(f * s) for f, s in zip(factor, scale, strict=True))
+    return CoarseChannel(
+        np.concatenate(blocks, axis),
+        (first[0], first[1], first[2]),
+        (z, y, x),
+        np.concatenate(sample),
+    )
+
+
+def _region_at(dataset: Dataset, plan: Plan, level: int) -> Box:
+    """Return the planned region in voxels of a coarser level."""
+    shape, coarse = dataset.levels[plan.level].shape, dataset.levels[level].shape
+    start = [a * n // m for a, n, m in zip(plan.region.start, coarse, shape, strict=True)]
+    stop = [-(-b * n // m) for b, n, m in zip(plan.region.stop, coarse, shape, strict=True)]
+    return Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))
+
+
+def _factor(shape: _Triple, spacing: tuple[float, float, float], voxels: int) -> _Triple:
+    """Return the voxels (z, y, x) of a block, so that at most `voxels` blocks fill a shape."""
+    edge = (prod(n * s for n, s in zip(shape, spacing, strict=True)) / voxels) ** (1 / 3)
+    while True:
+        z, y, x = (min(max(1, round(edge / s)), n) for n, s in zip(shape, spacing, strict=True))
+        if (shape[0] // z) * (shape[1] // y) * (shape[2] // x) <= voxels:
+            return z, y, x
+        edge *= 1.05
+
+
+def _means(voxels: NDArray[np.generic], block: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return the means of whole blocks, float32 (z, y, x)."""
+    counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
+    whole = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
+    z, y, x = counts
+    parts = whole.reshape(z, block[0], y, block[1], x, block[2])
+    return np.asarray(parts.mean(axis=(1, 3, 5), dtype=np.float32))
+
+
+def _spread(voxels: NDArray[np.generic], most: int) -> NDArray[np.float32]:
+    """Return at most so many values, spread evenly over the rows."""
+    every = -(-voxels.size // max(1, most))
+    return voxels.reshape(-1)[:: every + (every % 2 == 0)].astype(np.float32)

@@ -1,0 +1,48 @@
+"""How a channel is drawn before a build has surveyed it.
+
+The rules are those of a build, and the voxels are coarse.
+"""
+
+from dataclasses import replace
+
+from stereocell.isosurface.array_levels import gather_array_evidence
+from stereocell.live.coarse_channel import CoarseChannel
+from stereocell.model.channel import Appearance
+from stereocell.model.tiling import Box, Tile
+from stereocell.model.volume import Volume
+from stereocell.planning.channel_survey import Chosen, appearance_of
+from stereocell.planning.channels import Channel
+from stereocell.planning.level_choice import find_level, level_of_tile
+from stereocell.planning.plan import Plan
+from stereocell.planning.survey import is_body
+from stereocell.steps.find_window import Window
+from stereocell.transfer.channel_statistics import find_statistics
+from stereocell.transfer.windows import parse_window
+
+
+def first_appearance(
+    plan: Plan, channel: Channel, coarse: CoarseChannel
+) -> tuple[Appearance, bool]:
+    """Return a channel's appearance as far as its coarse voxels show it, and whether it is a body.
+
+    The window, the level and the transfer functions follow the rules of a build. A level is chosen
+    without the connected components, which only all voxels show.
+    """
+    spacing = tuple(a * b for a, b in zip(coarse.step, plan.spacing_um, strict=True))
+    z, y, x = spacing
+    volume = Volume(coarse.voxels, (z, y, x))
+    found = gather_array_evidence(volume, modality=plan.modality)
+    given = None
+    if channel.name in plan.settings.windows:
+        given = parse_window(f"--window {channel.name}", plan.settings.windows[channel.name])
+    statistics = find_statistics(
+        coarse.sample.copy(), plan.settings.window, background=found.background, window=given
+    )
+    window = Window(statistics, found.counting, None, found.max_shift)
+    whole = Tile("r0_c0", Box((0, 0, 0), coarse.voxels.shape))
+    # a plan of the coarse voxels: one tile, whose evidence is that of the channel
+    small = replace(plan, spacing_um=(z, y, x), region=whole.box, tiles=(whole,))
+    level = find_level(small, channel, window, {whole.id: found.evidence})
+    iso = {whole.id: level_of_tile(small, whole, level, 0, {})}
+    appearance = appearance_of(small, channel, Chosen(level, 0, {}, iso))
+    return appearance, is_body(appearance, statistics)

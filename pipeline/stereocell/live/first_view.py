@@ -1,0 +1,164 @@
+"""Write the first view of a source: a bundle of coarse volumes, without surfaces.
+
+It has the tiles, channels and files of the bundle that a build writes, by the same code and the
+same schema, so that every viewer of bundles shows it. Its voxels alone are coarse.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.bundle.describe import describe_bundle, write_channel
+from stereocell.bundle.manifest import FILES, MANIFEST
+from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
+from stereocell.bundle.write import copy_viewer
+from stereocell.bundle.write_volume import write_volume
+from stereocell.live.coarse_channel import CoarseChannel, read_coarse
+from stereocell.live.first_appearance import first_appearance
+from stereocell.model.channel import Appearance
+from stereocell.model.errors import SourceError
+from stereocell.model.tile_content import APRON
+from stereocell.model.tiling import Tile
+from stereocell.planning.plan import Plan
+from stereocell.read import Dataset
+from stereocell.storage.file_list import encode
+from stereocell.transfer.joint_histogram import to_eight_bits
+from stereocell.usd.layer import move_box, world_box
+from stereocell.usd.read_appearances import ComposedAppearance, StatedLevel
+from stereocell.usd.read_attributes import Point
+from stereocell.usd.write_appearances import DEFAULT_FUNCTION
+from stereocell.usd.write_stage import PATIENT_SIDES, opening_plane
+
+# Voxels of all channels that a first view has at most: 1 MB or so, compressed
+VOXELS = 4_000_000
+NOT_BUILT = "its surface is not built yet"
+
+
+@dataclass(frozen=True, slots=True)
+class _CoarseVolume:
+    """The place of a tile's coarse volume; see usd.read_volume.ComposedVolume."""
+
+    size: tuple[int, int, int]
+    low: Point
+    high: Point
+    matrix: NDArray[np.float64]
+    apron: int = APRON
+    measured: Path | None = None
+
+
+def write_first_view(plan: Plan, dataset: Dataset, root: Path, viewer: Path | None) -> None:
+    """Write a bundle of a plan's coarse volumes into an empty folder.
+
+    viewer  the folder of the built viewer; None: the bundle has no page
+
+    Raises SourceError where the source can't be read or has no channel, OutputError where a file
+    can't be written.
+    """
+    shared = plan.shared_volumes
+    channels = [channel for channel in plan.channels if channel.id not in shared]
+    if not channels:
+        raise SourceError(f"{plan.name}: objects of a label map are shown once they are built")
+    each = max(10_000, VOXELS // len(channels))
+    read = {one.voxels_id: read_coarse(dataset, plan, one, each) for one in channels}
+    found = [first_appearance(plan, one, read[one.voxels_id]) for one in plan.channels]
+    appearances = [composed(appearance) for appearance, _ in found]
+    tiles = [_write_tile(plan, root, tile, read, appearances) for tile in plan.tiles]
+    files: list[FileRef] = [
+        ref for tile in tiles for channel in tile.channels for ref in channel.files
+    ]
+    entries = []
+    for i, appearance in enumerate(appearances):
+        own = [(tile.id, tile.channels[i]) for tile in tiles]
+        entry, written = write_channel(root, appearance, own)
+        entries.append(entry)
+        files += written
+    if viewer is not None:
+        files += copy_viewer(viewer, root)
+    listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
+    index = write_file(root, FILES, encode(listed))
+    specimen: dict[str, Any] = {
+        "name": plan.name,
+        "modality": plan.modality,
+        "fingerprint": plan.fingerprint,
+    }
+    if plan.has_sides:
+        specimen["sides"] = PATIENT_SIDES
+    if plan.opens_cut and any(is_body for _, is_body in found):
+        normal, offset_um = opening_plane(np.array([(tile.low, tile.high) for tile in tiles]))
+        specimen["cut"] = {"normal": normal, "offset_um": offset_um}
+    manifest = describe_bundle(specimen, tiles, channels=entries, index=index)
+    write_file(root, MANIFEST, manifest)
+
+
+def composed(appearance: Appearance) -> ComposedAppearance:
+    """Return a channel's appearance as the stage of a build states it, but for its surface."""
+    level, stated = appearance.level, None
+    if level is not None:
+        stated = StatedLevel(level.iso, level.background_range, level.smoothing_um)
+    names = sorted(appearance.transfer_functions, key=lambda name: (name != DEFAULT_FUNCTION, name))
+    return ComposedAppearance(
+        appearance.id,
+        appearance.name,
+        appearance.color,
+        appearance.window,
+        appearance.window,
+        appearance.iso_value,
+        "none",
+        appearance.function,
+        {name: appearance.transfer_functions[name] for name in names},
+        appearance.transfer_2d,
+        appearance.threshold,
+        appearance.surface_reason if level is None else NOT_BUILT,
+        stated,
+        appearance.opens,
+    )
+
+
+def _write_tile(
+    plan: Plan,
+    root: Path,
+    tile: Tile,
+    read: dict[str, CoarseChannel],
+    appearances: list[ComposedAppearance],
+) -> BundleTile:
+    lattice = tile.lattice(plan.region)
+    first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])
+    corners = world_box(first, last)
+    low, high = (_point(corner) for corner in corners)
+    matrix = np.array(plan.placement).T  # USD's matrices are for row vectors
+    shared = plan.shared_volumes
+    channels = []
+    for channel, appearance in zip(plan.channels, appearances, strict=True):
+        if channel.id in shared:
+            channels.append(TileChannel(channel.id, (), (), (), None, (), None))
+            continue
+        coarse = read[channel.voxels_id]
+        places = tuple(
+            _places(start, stop - 1, step)
+            for start, stop, step in zip(lattice.start, lattice.stop, coarse.step, strict=True)
+        )
+        voxels = to_eight_bits(coarse.at(places), appearance.window)
+        depth, height, width = voxels.shape
+        volume = _CoarseVolume((width, height, depth), low, high, matrix)
+        entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels)
+        channels.append(TileChannel(channel.id, (), (), (), entry, tuple(files), joint))
+    bounds = move_box(*corners, matrix)
+    return BundleTile(tile.id, "volume", _point(bounds[0]), _point(bounds[1]), tuple(channels))
+
+
+def _places(first: int, last: int, step: float) -> NDArray[np.float64]:
+    """Return places about `step` apart from first to last, and one more beyond each, for the apron.
+
+    All are in voxels of the planned level.
+    """
+    count = max(2, round((last - first) / step) + 1) if last > first else 1
+    apart = (last - first) / (count - 1) if count > 1 else step
+    return np.asarray(first + apart * np.arange(-APRON, count + APRON), np.float64)
+
+
+def _point(values: NDArray[np.float64]) -> Point:
+    x, y, z = (float(n) for n in values)
+    return x, y, z
