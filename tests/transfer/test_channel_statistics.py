@@ -15,13 +15,14 @@ from stereocell.transfer.channel_statistics import find_statistics, make_appeara
 from stereocell.transfer.opacity import (
     AT_SURFACE_OF_MAGNITUDES,
     MAX_SHIFT,
-    NAMES,
     NEAR_SURFACE,
     evaluate,
     make_transfer_functions,
 )
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
+
+NAMES = ("default", "soft", "sharp", "surface")  # functions of a channel without a threshold
 
 
 def test_window_lies_at_the_percentiles() -> None:
