@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple
@@ -115,11 +116,6 @@ def likely_image(paths: Sequence[str]) -> str:
     """Return the first path whose name is not that of a label map, as an example for messages."""
     images = (path for path in paths if not any(word in path.lower() for word in _LABELS))
     return next(images, paths[0])
-
-
-def counted(count: int, word: str) -> str:
-    """Return a number and its word: `1 channel`, `2 channels`."""
-    return f"{count} {word}{'s' * (count != 1)}"
 
 
 def lines(candidates: Sequence[Candidate]) -> tuple[str, ...]:
