@@ -22,6 +22,8 @@ from stereocell.transfer.opacity import (
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
 
+NAMES = ("default", "soft", "sharp", "surface")  # functions of a channel without a threshold
+
 
 def test_window_lies_at_the_percentiles() -> None:
     voxels = np.arange(10001, dtype=np.uint16)

@@ -49,7 +49,7 @@ def make_transfer_functions(
     is_calibrated: bool = False,
     depth_voxels: float = 0.0,
 ) -> dict[str, OpacityPoints]:
-    """Return opacity points by the name of a function, with THRESHOLD where there is one.
+    """Return the opacity points of each function: THRESHOLD only where there is a threshold.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
