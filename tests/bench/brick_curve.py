@@ -28,10 +28,11 @@ from stereocell.cli.__main__ import main as stereocell
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import encode_tree
 from stereocell.formats.ktx2 import decode_finest
-from stereocell.formats.voxel_bvh import build, reassemble
+from stereocell.formats.voxel_bvh import build
 from stereocell.serve.brick_library import BrickLibrary, Volume, invisible_below
 from stereocell.serve.server import BundleServer
 from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
+from support.server.brick_decoder import reassemble
 
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")) / "mri_t1_7t" / "dicoms"
 SHARES = (0.0005, 0.002, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)

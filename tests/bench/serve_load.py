@@ -28,9 +28,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
-from stereocell.formats.brick_stream import BRICKS_FRAME, content_hash, decode_frame, parse_table
+from stereocell.formats.brick_stream import BRICKS_FRAME, content_hash, parse_table
 from support.server.brick_bundles import write_mri
 from support.server.brick_client import look_at
+from support.server.brick_decoder import decode_frame
 
 DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")) / "mri_t1_7t" / "dicoms"
 

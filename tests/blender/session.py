@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from pathlib import Path
+from types import SimpleNamespace
 
 # Blender writes lines of its own to standard output
 ANSWERS = os.fdopen(os.dup(1), "w")
@@ -97,6 +98,12 @@ def surface_color(material):
 
 def step_import(arguments):
     return describe(import_stage(arguments))
+
+
+def step_find_functions(arguments):
+    """Return the names that the file dialog offers for the transfer function."""
+    dialog = SimpleNamespace(filepath=arguments["stage"])
+    return stereocell_import._find_functions(dialog, bpy.context, "")
 
 
 def step_objects(arguments):

@@ -181,6 +181,37 @@ def test_tiles_and_variants_are_chosen_at_the_import(stage_path: Path, tmp_path:
     assert np.allclose(found["functions"][F_ID], FUNCTIONS["sharp"])
 
 
+def test_the_dialog_offers_the_transfer_functions_that_all_channels_have(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    assert run("find_functions", tmp_path, stage=stage_path) == sorted(FUNCTIONS)
+    layer = tmp_path / "over.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths = [str(stage_path)]
+    stage.SetMetadata("metersPerUnit", 1e-6)
+    stage.SetMetadata("upAxis", "Y")
+    *others, last = stage.GetPrimAtPath("/Specimen/Channels").GetChildren()
+
+    def add_bone(channel: Usd.Prim) -> None:
+        variants = channel.GetVariantSet("transferFunction")
+        variants.AddVariant("bone")
+        variants.SetVariantSelection("bone")
+        with variants.GetVariantEditContext():
+            channel.GetAttribute("stereocell:opacityPoints").Set([(0, 0), (0.75, 0.5)])
+        variants.ClearVariantSelection()
+
+    for channel in others:
+        add_bone(channel)
+    stage.Save()
+    assert "bone" not in run("find_functions", tmp_path, stage=layer)
+    add_bone(last)
+    stage.Save()
+    assert "bone" in run("find_functions", tmp_path, stage=layer)
+    found = run("import", tmp_path, stage=layer, transfer_function="bone", representation="volume")
+    assert np.allclose(found["functions"][F_ID], [(0, 0), (0.75, 0.5)])
+    assert run("find_functions", tmp_path, stage=tmp_path / "no.usda") == []
+
+
 def test_volumes_have_their_grid_place_and_transfer_function(
     stage_path: Path, tmp_path: Path
 ) -> None:

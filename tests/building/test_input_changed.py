@@ -266,14 +266,20 @@ def test_a_task_that_fails_because_the_input_changed_is_reported_as_a_change(
     assert "changed while it was read" in last_line(capsys)
 
 
-def test_a_table_that_changes_while_it_is_read_is_reported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
-    table = tmp_path / "cells.csv"
+def planned_with_table(folder: Path) -> tuple[Path, Path]:
+    """Plan a label map with a table; return OUT and the table."""
+    source, out = write_tiff(folder, (BODY > 500).astype(np.uint16)), folder / "out"
+    table = folder / "cells.csv"
     table.write_text("label,kind\n1,first\n")
     plan = ["plan", str(source), "-o", str(out), "--labels", ".", "--table", str(table)]
     assert main(plan) == 0
+    return out, table
+
+
+def test_a_table_that_changes_while_it_is_read_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, table = planned_with_table(tmp_path)
     assert main(["units", str(out), *INLINE]) == 0
     read = tables_module._read
 
@@ -297,11 +303,7 @@ def test_a_table_that_changes_while_it_is_read_is_reported(
 def test_a_table_that_changes_while_units_are_built_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    source, out = write_tiff(tmp_path, (BODY > 500).astype(np.uint16)), tmp_path / "out"
-    table = tmp_path / "cells.csv"
-    table.write_text("label,kind\n1,first\n")
-    plan = ["plan", str(source), "-o", str(out), "--labels", ".", "--table", str(table)]
-    assert main(plan) == 0
+    out, table = planned_with_table(tmp_path)
     with monkeypatch.context() as patch:
         after_the_first_unit(patch, lambda: table.write_text("label,kind\n1,second\n"))
         assert main(["units", str(out), *INLINE]) == 1

@@ -17,7 +17,7 @@ from hypothesis.extra import numpy as npst
 from jsonschema import Draft202012Validator
 
 from stereocell.filters.min_max_bricks import mip_levels
-from stereocell.formats.brick_stream import content_hash, decode_brick, encode_tree, parse_table
+from stereocell.formats.brick_stream import content_hash, encode_tree, parse_table
 from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
 from stereocell.formats.vdb import check_vdb, write_vdb
 from stereocell.formats.vdb_read import read_vdb_head
@@ -32,6 +32,7 @@ from stereocell.read import Level
 from stereocell.storage.assets import schema_path
 from support.ktx2_parser import parse
 from support.sealed_files import seal
+from support.server.brick_decoder import decode_brick
 from support.vdb_reader import read_vdb, value_at
 
 FEW = settings(

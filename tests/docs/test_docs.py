@@ -258,7 +258,9 @@ def test_python_runs(sources: Path) -> None:
     assert (sources / "out" / "mine" / "bundle" / "manifest.json").is_file()
 
 
-def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reader_that_is_shown_works_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "cube.py").write_text(blocks(DOCS / "extending.md", "python")[0])
     monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
     known_formats.cache_clear()
@@ -269,6 +271,11 @@ def test_the_reader_that_is_shown_reads(tmp_path: Path, monkeypatch: pytest.Monk
         dataset = stereocell.open_volume(path, spacing_um=(0.5, 0.2, 0.2))
         assert dataset.name == "f"
         assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
+        # The record of steps does not have the reader yet.
+        out = tmp_path / "out"
+        assert cli.main(["plan", str(path), "-o", str(out), "--spacing-um", "0.5,0.2,0.2"]) == 0
+        made = json.loads((out / "provenance.json").read_bytes())
+        assert "numpy" in made["libraries"]
         path.write_bytes(b"4 4\n" + body.tobytes())
         with pytest.raises(stereocell.StereoCellError, match="expected z, y, x"):
             stereocell.open_volume(path)

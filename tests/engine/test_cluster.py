@@ -24,7 +24,7 @@ from stereocell.storage.lock import alone_in
 from support import ctrl_c, phantoms
 from support.clusters import running_cluster
 from support.exhaustive import examples
-from support.object_store import ObjectStore, serving
+from support.object_store import ObjectStore, serving_bucket
 from support.server.timeouts import PATIENCE_S
 from support.validators import make_assets
 
@@ -41,14 +41,11 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Joined]:
     """The scheduler file of workers, which stand in another folder, and an object store."""
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "objects").mkdir()
-    with serving(folder / "objects") as store, pytest.MonkeyPatch.context() as patch:
-        for name, value in store.environment.items():
-            patch.setenv(name, value)
-        store.files().mkdir("bucket")
-        with running_cluster(
-            folder, examples(2, 1), {**os.environ, "PYTHONPATH": PATHS}
-        ) as started:
-            yield started.file, store
+    with (
+        serving_bucket(folder / "objects") as store,
+        running_cluster(folder, examples(2, 1), {**os.environ, "PYTHONPATH": PATHS}) as started,
+    ):
+        yield started.file, store
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,8 @@
 """The command: the ending chooses, options that can't be are refused, errors leave nothing."""
 
+import argparse
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -11,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from stereocell.cli.__main__ import main
+from stereocell.cli.flags import declare_export
 from stereocell.export import volume_files
 from stereocell.export.options import ExportOptions, parse_region
 from stereocell.export.write import FORMATS, PAGE_TAKES, export_stage
@@ -97,6 +100,19 @@ def test_every_ending_says_its_own_options_in_the_flags_of_the_command() -> None
     known = {field.name for field in fields(ExportOptions)}
     takes = (way.takes for way in FORMATS.values())
     assert PAGE_TAKES.union(*takes) | {"channels"} == known
+
+
+def test_help_of_a_flag_names_all_endings_that_take_it() -> None:
+    parser = argparse.ArgumentParser()
+    declare_export(parser)
+    listing = set()
+    for action in parser._actions:
+        named = set(re.findall(r"\.[a-z0-9]+", action.help or "")) & FORMATS.keys()
+        if len(named) > 1:  # else the help is about one format
+            takers = {one for one, way in FORMATS.items() if action.dest in way.takes}
+            assert named == takers - {".nii.gz"}, action.dest
+            listing.add(action.dest)
+    assert listing == {"units", "unity", "width"}
 
 
 def test_the_command_needs_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

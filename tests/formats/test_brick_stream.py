@@ -21,16 +21,15 @@ from stereocell.formats.brick_stream import (
     BrickFormatError,
     Frame,
     Part,
-    decode_brick,
-    decode_frame,
     encode_frame,
     encode_tree,
     parse_message,
     parse_table,
 )
-from stereocell.formats.voxel_bvh import NODE, build, reassemble
+from stereocell.formats.voxel_bvh import NODE, build
 from stereocell.storage.assets import schema_path
 from support.server.brick_bundles import phantom
+from support.server.brick_decoder import decode_brick, decode_frame, reassemble
 
 SOURCE = bytes(range(16))
 SCHEMA = json.loads(schema_path("brick_stream.schema.json").read_text("utf-8"))

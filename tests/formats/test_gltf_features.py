@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
-from stereocell.formats.gltf_features import MAX_COLUMNS, Features, tile_features
+from stereocell.formats.gltf_features import MAX_COLUMNS, Features
 from stereocell.model.object_table import Column
 from stereocell.storage.assets import find_asset
 from support import object_bundle
 from support.glbs import property_table, read
+from support.object_bundle import tile_features
 
 TABLE = object_bundle.make_table()
 TILE = object_bundle.TILES[1]

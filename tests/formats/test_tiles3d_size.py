@@ -76,7 +76,7 @@ def manifest(rng, tiles, files):
             "clear",
             "default",
             ramps,
-            TransferFunctions2d(1.0, {"arcs": ()}),
+            TransferFunctions2d(gradient_max=1.0, functions={"arcs": ()}),
             iso,
         )
         entry = describe_channel(

@@ -14,11 +14,10 @@ from stereocell.formats.voxel_bvh import (
     STORED,
     STREAM_BRICK,
     build,
-    first_children,
-    reassemble,
     upsampling,
 )
 from support.server.brick_bundles import phantom
+from support.server.brick_decoder import first_children, reassemble
 
 VOLUME = phantom()
 THRESHOLD = 20

@@ -14,7 +14,6 @@ from malformed.cases import Case, copied, edit_json, plan, put, slices
 
 KIND = "arrays"
 FILES = ("f.h5", "f.ims", "f.nrrd", "f.mha", "f.mrc", "f.czi", "f.lif")
-_TEXT = ("f.nrrd", "f.mha")
 
 
 def cases() -> Iterator[Case]:

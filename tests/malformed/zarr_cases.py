@@ -13,7 +13,6 @@ from typing import Any
 from malformed.cases import ODD_NAMES, Case, Change, copied, edit_json, nested, plan, put
 
 KIND = "zarr"
-_V5 = {"group": "zarr.json", "array": "0/zarr.json"}
 _BAIT = "bait.zarr"
 _HUGE = 4 << 30  # bytes that a bomb unpacks to
 _BLOCK = 1 << 20

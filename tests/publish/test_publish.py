@@ -17,7 +17,7 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.publish.targets import AGAIN, FOREVER, FolderTarget
 from support.bundles import write_tiles
-from support.object_store import ObjectStore, serving
+from support.object_store import ObjectStore, serving_bucket
 from support.plain_bundle import FILES, below, write
 
 LIST = "stereocell-published.json"
@@ -221,10 +221,7 @@ def test_every_file_is_fetched_as_browsers_do(
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
-    with serving(tmp_path_factory.mktemp("objects")) as store, pytest.MonkeyPatch.context() as m:
-        for name, value in store.environment.items():
-            m.setenv(name, value)
-        store.files().mkdir("bucket")
+    with serving_bucket(tmp_path_factory.mktemp("objects")) as store:
         yield store
 
 

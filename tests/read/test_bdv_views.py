@@ -15,6 +15,7 @@ from stereocell.planning import input_files
 from stereocell.read import list_series
 from support.array_files import write_n5
 from support.phantoms import f_phantom
+from support.reading import whole
 
 BODY = f_phantom()
 PLAIN = "0.2 0 0 0 0 0.2 0 0 0 0 0.5 0"
@@ -67,10 +68,6 @@ def write(
 ATTRIBUTES = ("channel", "tile", "angle", "illumination", "phase", "displaysettings")
 
 
-def voxels_of(dataset: Any, channel: int = 0) -> Any:
-    return dataset.read(channel, dataset.levels[0].box).voxels
-
-
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
 @pytest.mark.parametrize("attribute", ["tile", "angle", "illumination"])
 def test_views_are_images_of_their_own(tmp_path: Path, kind: str, attribute: str) -> None:
@@ -85,8 +82,8 @@ def test_views_are_images_of_their_own(tmp_path: Path, kind: str, attribute: str
     assert f"{attribute} 1, 16 x 48 x 36 voxels, 2 channels" in listed[1]
     first, second = read.open(path), read.open(path, series=2)
     assert len(first.channels) == len(second.channels) == 2
-    np.testing.assert_array_equal(voxels_of(first, 1), BODY + 1)
-    np.testing.assert_array_equal(voxels_of(second, 1), BODY + 101)
+    np.testing.assert_array_equal(whole(first, 1), BODY + 1)
+    np.testing.assert_array_equal(whole(second, 1), BODY + 101)
     assert any("2 images; building --series 1" in note for note in first.notes)
     assert not any("images" in note for note in second.notes)
     with pytest.raises(UsageError, match="--series: found 3, expected 1 to 2"):
@@ -102,8 +99,8 @@ def test_a_container_named_by_itself_is_read_by_the_views_of_its_xml(tmp_path: P
 
 def test_tiles_of_different_size_are_read_one_by_one(tmp_path: Path) -> None:
     path = write(tmp_path, [{"body": BODY[:8], "tile": 0}, {"body": BODY, "tile": 1}])
-    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
-    np.testing.assert_array_equal(voxels_of(read.open(path, series=1)), BODY[:8])
+    np.testing.assert_array_equal(whole(read.open(path)), BODY)
+    np.testing.assert_array_equal(whole(read.open(path, series=1)), BODY[:8])
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
@@ -132,7 +129,7 @@ def test_registrations_that_agree_with_the_voxel_size_need_no_note(
 ) -> None:
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": affines}]))
     assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
-    np.testing.assert_array_equal(voxels_of(dataset), BODY)
+    np.testing.assert_array_equal(whole(dataset), BODY)
     assert dataset.notes == ()
 
 
@@ -140,7 +137,7 @@ def test_a_mirror_without_a_scale_keeps_the_voxel_size(tmp_path: Path) -> None:
     affine = "1 0 0 0 0 -1 0 47 0 0 1 0"
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": [affine]}]))
     assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
-    np.testing.assert_array_equal(voxels_of(dataset), BODY[:, ::-1])
+    np.testing.assert_array_equal(whole(dataset), BODY[:, ::-1])
     assert len(dataset.notes) == 1  # on the mirror
 
 
@@ -149,8 +146,8 @@ def test_the_registration_of_the_chosen_time_point_is_applied(tmp_path: Path) ->
         write(tmp_path, [{"body": BODY, "affines": [PLAIN]}]), "0.2 0 0 0 0 -0.2 0 9 0 0 1 0"
     )
     first, second = read.open(path), read.open(path, time=1)
-    np.testing.assert_array_equal(voxels_of(first), BODY)
-    np.testing.assert_array_equal(voxels_of(second), BODY[:, ::-1] + 50)
+    np.testing.assert_array_equal(whole(first), BODY)
+    np.testing.assert_array_equal(whole(second), BODY[:, ::-1] + 50)
     assert (first.levels[0].spacing_um[0], second.levels[0].spacing_um[0]) == (0.5, 1.0)
     assert "voxel spacing along z: the registration states 1 um" in second.notes[0]
 
@@ -179,7 +176,7 @@ def test_a_view_that_was_not_taken_is_left_out_at_its_time_point(tmp_path: Path)
     assert len(read.open(path).channels) == 2
     dataset = read.open(path, time=1)
     assert len(dataset.channels) == 1
-    np.testing.assert_array_equal(voxels_of(dataset), BODY + 51)
+    np.testing.assert_array_equal(whole(dataset), BODY + 51)
     assert any("left out: setup 0" in note and "time point 1" in note for note in dataset.notes)
 
 
@@ -190,7 +187,7 @@ def test_a_view_that_was_never_taken_is_refused(tmp_path: Path) -> None:
     path.write_text(text.replace("</SequenceDescription>", f"{missing}</SequenceDescription>"))
     with h5py.File(tmp_path / "a.h5", "a") as file:
         del file["t00000/s01"]
-    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+    np.testing.assert_array_equal(whole(read.open(path)), BODY)
     with pytest.raises(SourceError, match="MissingViews of the XML lists all"):
         read.open(path, series=2)
 
@@ -212,7 +209,7 @@ def test_an_own_attribute_separates_setups_of_one_channel(tmp_path: Path) -> Non
     setups = [{"body": BODY + phase, "channel": 0, "phase": phase} for phase in (0, 1)]
     path = write(tmp_path / "a", setups)
     assert "phase 1" in list_series(path)[1]
-    np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 1)
+    np.testing.assert_array_equal(whole(read.open(path, series=2)), BODY + 1)
     dyes = [{"body": BODY, "channel": n, "phase": n, "displaysettings": n} for n in (0, 1)]
     assert len(read.open(write(tmp_path / "b", dyes)).channels) == 2
 
@@ -221,7 +218,7 @@ def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
     setups = [{"body": BODY + 9 * number, "channel": 0, "tile": 0} for number in (0, 1)]
     path = write(tmp_path, setups)
     assert "setup 1, 16 x 48 x 36" in list_series(path)[1]
-    np.testing.assert_array_equal(voxels_of(read.open(path, series=2)), BODY + 9)
+    np.testing.assert_array_equal(whole(read.open(path, series=2)), BODY + 9)
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
@@ -239,7 +236,7 @@ def test_transforms_compose_with_the_first_one_applied_last(tmp_path: Path) -> N
     affines = ["0 0 1 0 0 1 0 0 -1 0 0 40", "0.2 0 0 0 0 0.2 0 0 0 0 1 0"]
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": affines}]))
     assert dataset.levels[0].spacing_um == (0.2, 0.2, 1.0)
-    np.testing.assert_array_equal(voxels_of(dataset), BODY.transpose(2, 1, 0)[::-1])
+    np.testing.assert_array_equal(whole(dataset), BODY.transpose(2, 1, 0)[::-1])
     assert any("the registration is applied" in note for note in dataset.notes)
     assert dataset.slice_axis(0) == 2
 
@@ -247,22 +244,22 @@ def test_transforms_compose_with_the_first_one_applied_last(tmp_path: Path) -> N
 def test_a_mirror_is_applied(tmp_path: Path) -> None:
     affine = "-0.2 0 0 7 0 0.2 0 0 0 0 0.5 0"
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": [affine]}]))
-    np.testing.assert_array_equal(voxels_of(dataset), BODY[:, :, ::-1])
+    np.testing.assert_array_equal(whole(dataset), BODY[:, :, ::-1])
     assert "stored axes z, y, -x" in dataset.notes[0]
 
 
 def test_a_rotation_or_a_shear_is_not_applied_and_noted(tmp_path: Path) -> None:
     turn = "0.1732 -0.1 0 0 0.1 0.1732 0 0 0 0 0.5 0"
     dataset = read.open(write(tmp_path / "a", [{"body": BODY, "affines": [turn]}]))
-    np.testing.assert_array_equal(voxels_of(dataset), BODY)
+    np.testing.assert_array_equal(whole(dataset), BODY)
     assert "turns the view by 30 degrees" in dataset.notes[0]
     shear = "0.2 0 0.25 0 0 0.2 0 0 0 0 0.433 0"
     sheared = read.open(write(tmp_path / "b", [{"body": BODY, "affines": [shear]}]))
-    np.testing.assert_array_equal(voxels_of(sheared), BODY)
+    np.testing.assert_array_equal(whole(sheared), BODY)
     assert "shears the view by 30 degrees" in sheared.notes[0]
     mirrored = "-0.1732 -0.1 0 0 -0.1 0.1732 0 0 0 0 0.5 0"
     other = read.open(write(tmp_path / "c", [{"body": BODY, "affines": [mirrored]}]))
-    np.testing.assert_array_equal(voxels_of(other), BODY[:, :, ::-1])
+    np.testing.assert_array_equal(whole(other), BODY[:, :, ::-1])
 
 
 def test_channels_that_are_registered_apart_are_noted(tmp_path: Path) -> None:
@@ -298,7 +295,7 @@ def test_channels_of_another_scale_or_direction_are_images_of_their_own(
     other = read.open(path, series=2)
     assert other.levels[0].spacing_um == pytest.approx(spacing)
     mirrored = BODY[:, :, ::-1] if affine.startswith("-") else BODY
-    np.testing.assert_array_equal(voxels_of(other), mirrored + 1)
+    np.testing.assert_array_equal(whole(other), mirrored + 1)
 
 
 @pytest.mark.parametrize("text", ["nan 0 0 0 0 inf 0 0 0 0 1 0", "1 0 0", "a b c"])
@@ -369,8 +366,8 @@ def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
     path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}])
     other = tmp_path / "z.xml"
     other.write_text(path.read_text("utf-8").replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))
-    np.testing.assert_array_equal(voxels_of(read.open(other)), BODY[::-1])
-    np.testing.assert_array_equal(voxels_of(read.open(path)), BODY)
+    np.testing.assert_array_equal(whole(read.open(other)), BODY[::-1])
+    np.testing.assert_array_equal(whole(read.open(path)), BODY)
 
 
 def test_lost_blocks_of_a_view_are_counted(

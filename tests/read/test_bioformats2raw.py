@@ -12,6 +12,7 @@ from stereocell.cli.__main__ import main
 from stereocell.model.errors import UsageError
 from stereocell.read import list_series
 from support.phantoms import f_phantom, write_ome_zarr
+from support.reading import whole
 
 BODY = f_phantom()
 OTHER = BODY[:, ::-1] + 100
@@ -55,10 +56,6 @@ def places(step: float) -> str:
     )
 
 
-def voxels_of(dataset: Any) -> Any:
-    return dataset.read(0, dataset.levels[0].box).voxels
-
-
 def test_positions_of_planes_give_the_spacing_where_the_scale_differs(tmp_path: Path) -> None:
     path = container(tmp_path / "c.zarr", [BODY], [places(0.8)])
     dataset = read.open(path)
@@ -75,8 +72,8 @@ def test_angles_along_z_are_images_of_their_own(
     assert [line.split(",")[0].split()[-1] for line in list_series(path)] == ["0", "90"]
     for source in (path, path / "0"):
         first, second = read.open(source), read.open(source, series=2)
-        np.testing.assert_array_equal(voxels_of(first), BODY)
-        np.testing.assert_array_equal(voxels_of(second), OTHER)
+        np.testing.assert_array_equal(whole(first), BODY)
+        np.testing.assert_array_equal(whole(second), OTHER)
         assert any("ModuloAlongZ: 2 angles" in note for note in first.notes)
     with pytest.raises(UsageError, match="--series: found 3, expected 1 to 2"):
         read.open(path, series=3)

@@ -16,19 +16,14 @@ from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.read.foreign_files import FOREIGN
 from stereocell.read.tables import read_table
+from support.reading import refusing
 
 VOXELS = np.random.default_rng(0).integers(1, 255, (6, 9, 10), np.uint8)
 OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600)
 BIOFORMATS = "Fiji opens it by Bio-Formats"
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        read.open(path)
-    line = str(caught.value)
-    assert "\n" not in line
-    assert "expected " in line
-    return line
+refusal = refusing(read.open)
 
 
 @pytest.mark.parametrize(

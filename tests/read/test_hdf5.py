@@ -8,7 +8,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
@@ -17,6 +16,7 @@ from stereocell.read.hdf5_file import texts as hdf5_texts
 from stereocell.read.hdf5_file.types import require_standard
 from support.array_files import SIZE_UM, characters, write_bdv_xml, write_ims
 from support.phantoms import F_BODY, f_phantom
+from support.reading import refusing, whole
 
 
 def write(path: Path, name: str = "raw", voxels: Any = None, **attributes: Any) -> Path:
@@ -26,16 +26,7 @@ def write(path: Path, name: str = "raw", voxels: Any = None, **attributes: Any) 
     return path
 
 
-def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
-    return dataset.read(channel, dataset.levels[0].box).voxels
-
-
-def refusal(source: str | Path, **options: Any) -> str:
-    with pytest.raises((SourceError, UsageError)) as caught:
-        read.open(source, **options)
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(read.open, SourceError, UsageError)
 
 
 def test_the_only_volume_is_read_and_named(tmp_path: Path) -> None:

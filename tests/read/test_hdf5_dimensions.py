@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from stereocell import read
 from stereocell.model.errors import SourceError
 from support.phantoms import f_phantom
+from support.reading import whole
 
 SPACING = {"z": 0.5, "y": 0.2, "x": 0.25}  # um
 SIZES = dict(zip("zyx", f_phantom().shape, strict=True))
-
-
-def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
-    return dataset.read(channel, dataset.levels[0].box).voxels
 
 
 def turned(axes: str) -> NDArray[Any]:

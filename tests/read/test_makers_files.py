@@ -20,20 +20,12 @@ from support.array_files import SIZE_UM, write_czi, write_lif
 from support.dicom_series import write_f_nifti
 from support.nd2_files import write_nd2
 from support.phantoms import f_phantom
+from support.reading import read_voxels, refusing, whole
 
 BOX = Box((1, 7, 3), (9, 30, 20))
 
 
-def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
-    return dataset.read(channel, dataset.levels[0].box).voxels
-
-
-def refusal(path: Path, **options: Any) -> str:
-    with pytest.raises((SourceError, UsageError)) as caught:
-        whole(read.open(path, **options))
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value) or "needs at least" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(read_voxels, SourceError, UsageError)
 
 
 # CZI

@@ -8,12 +8,12 @@ from typing import Any
 import mrcfile
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from stereocell import read
 from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from support.phantoms import f_phantom
+from support.reading import whole
 
 ANGSTROM = (4.0, 8.0, 10.0)  # x, y, z
 
@@ -26,10 +26,6 @@ def write(path: Path, voxels: Any = None, **fields: Any) -> Path:
         for name, value in fields.items():
             file.header[name] = value
     return path
-
-
-def whole(dataset: read.Dataset) -> NDArray[Any]:
-    return dataset.read(0, dataset.levels[0].box).voxels
 
 
 @pytest.mark.parametrize("name", ["a.mrc", "it's a µ tomogram.REC", "a.map.gz", "a.mrc.bz2"])

@@ -10,30 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from conftest import Server
 from stereocell import read
-from stereocell.model.errors import SourceError
 from stereocell.model.tiling import Box
 from support.array_files import BLOCK, SIZE_UM, write_bdv_xml
 from support.array_files import write_n5 as write
 from support.phantoms import f_phantom
+from support.reading import read_voxels, refusing, whole
 
 BOX = Box((1, 7, 3), (9, 30, 20))
 NM: dict[str, Any] = {"pixelResolution": {"dimensions": [250, 200, 500], "unit": "nm"}}
 
 
-def whole(dataset: read.Dataset, channel: int = 0) -> NDArray[Any]:
-    return dataset.read(channel, dataset.levels[0].box).voxels
-
-
-def refusal(path: Path, **options: Any) -> str:
-    with pytest.raises(SourceError) as caught:
-        whole(read.open(path, **options))
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(read_voxels)
 
 
 @pytest.mark.parametrize("packing", ["raw", "gzip", "zlib", "bzip2", "xz", "blosc", "zstd"])

@@ -12,6 +12,7 @@ import zarr
 from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from support.phantoms import f_phantom, write_ome_zarr
+from support.reading import read_voxels
 
 BODY = f_phantom()
 UM = (0.5, 0.2, 0.25)
@@ -42,11 +43,6 @@ def write_systems(path: Path, steps: Any, systems: Any = None, image_steps: Any 
     return path
 
 
-def voxels_of(path: Path | str, **options: Any) -> Any:
-    dataset = read.open(path, **options)
-    return dataset.read(0, dataset.levels[0].box).voxels
-
-
 @pytest.mark.parametrize(
     ("version", "axes"),
     [("0.1", None), ("0.2", None), ("0.3", list("tczyx")), ("0.3", list("zyx"))],
@@ -68,7 +64,7 @@ def test_an_image_of_0_1_with_three_axes_is_read_by_the_users_axes(tmp_path: Pat
     path = write_early(tmp_path / "a.zarr", "0.1", BODY)
     with pytest.raises(SourceError, match=r"found 3 dimensions, expected 5 .*--axes"):
         read.open(path, spacing_um=UM)
-    np.testing.assert_array_equal(voxels_of(path, spacing_um=UM, axes="zyx"), BODY)
+    np.testing.assert_array_equal(read_voxels(path, spacing_um=UM, axes="zyx"), BODY)
     named = write_early(tmp_path / "b.zarr", "0.3", BODY, list("zyx"))
     with pytest.raises(UsageError, match="names its axes"):
         read.open(named, spacing_um=UM, axes="zyx")
@@ -141,7 +137,7 @@ def test_a_grid_that_is_turned_is_refused_with_a_way_out_that_works(
     path = write_systems(tmp_path / "a.zarr", [step | {"input": "0", "output": "intrinsic"}])
     with pytest.raises(SourceError, match=rf"OME-Zarr 0.6: .*{step['type']}.*{path}/0 --axes zyx"):
         read.open(path)
-    np.testing.assert_array_equal(voxels_of(path / "0", axes="zyx", spacing_um=UM), BODY)
+    np.testing.assert_array_equal(read_voxels(path / "0", axes="zyx", spacing_um=UM), BODY)
 
 
 @pytest.mark.parametrize("name", ["a.ozx", "a.ome.zarr.zip", "a.zip"])
@@ -165,7 +161,7 @@ def test_a_zip_file_is_read_without_unpacking(
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY)
     assert dataset.files == (str(tmp_path / name),)
     assert any("label images" in note for note in dataset.notes)
-    np.testing.assert_array_equal(voxels_of(tmp_path / name / "labels" / "cells"), BODY)
+    np.testing.assert_array_equal(read_voxels(tmp_path / name / "labels" / "cells"), BODY)
 
 
 def test_a_zip_file_that_unpacks_to_more_than_its_array_is_refused(tmp_path: Path) -> None:
@@ -200,10 +196,10 @@ def test_an_unknown_version_is_named_with_a_way_that_works(tmp_path: Path) -> No
     image = group.attrs["ome"]["multiscales"][0]
     group.attrs["ome"] = {"version": "0.9", "multiscales": [image]}
     dataset = read.open(path)
-    np.testing.assert_array_equal(voxels_of(path), BODY)
+    np.testing.assert_array_equal(read_voxels(path), BODY)
     assert any("OME-Zarr 0.9: this version is not known" in note for note in dataset.notes)
     group.attrs["ome"] = {"version": "0.9", "multiscales": [{"levels": [{"path": "0"}]}]}
     with pytest.raises(SourceError, match=r"OME-Zarr 0\.9, a version that is not known") as caught:
         read.open(path)
     assert f"{path}/0 --axes zyx --spacing-um z,y,x" in str(caught.value)
-    np.testing.assert_array_equal(voxels_of(path / "0", axes="zyx", spacing_um=UM), BODY)
+    np.testing.assert_array_equal(read_voxels(path / "0", axes="zyx", spacing_um=UM), BODY)

@@ -18,6 +18,7 @@ from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read import list_series
 from support.phantoms import f_phantom
+from support.reading import refusing
 
 BODY = f_phantom()
 NAMES = ("a.ome.tif", "b.ome.tif")
@@ -81,12 +82,7 @@ def whole(path: Path) -> read.Dataset:
     return dataset
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        whole(path)
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(whole)
 
 
 @pytest.mark.parametrize("stated", [(1, 2), (None, None), (1, None)])

@@ -18,27 +18,15 @@ from conftest import Server
 from malformed.tiff_cases import behind_comment, with_prefix, write_tiff, xml
 from stereocell import read
 from stereocell.cli.__main__ import main
-from stereocell.model.errors import SourceError
 from support.dicom_series import grid, write_f_nifti, write_series
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
+from support.reading import read_levels, refusing
 
 SHAPE = (6, 30, 26)
 _ID = "urn:uuid:00000000-0000-0000-0000-00000000000{}"
 
 
-def read_whole(source: str | Path) -> None:
-    dataset = read.open(source)
-    for index, level in enumerate(dataset.levels):
-        dataset.read(0, level.box, index)
-
-
-def refusal(source: str | Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        read_whole(source)
-    line = str(caught.value)
-    assert "\n" not in line
-    assert "expected" in line
-    return line
+refusal = refusing(read_levels)
 
 
 def tiff_of(path: Path, name: str, written: Callable[[str], str] = str) -> Path:
@@ -100,8 +88,8 @@ def test_the_files_of_a_set_are_found(home: Path) -> None:
     (home / "own").mkdir()
     write_tiff(home / "own" / "b.ome.tif")
     (home / "link.ome.tif").symlink_to("own/b.ome.tif")
-    read_whole(tiff_of(home / "x.ome.tif", "own/b.ome.tif"))
-    read_whole(tiff_of(home / "x.ome.tif", "link.ome.tif"))
+    read_levels(tiff_of(home / "x.ome.tif", "own/b.ome.tif"))
+    read_levels(tiff_of(home / "x.ome.tif", "link.ome.tif"))
 
 
 def test_a_set_is_found_by_a_link_to_it(home: Path) -> None:
@@ -109,14 +97,14 @@ def test_a_set_is_found_by_a_link_to_it(home: Path) -> None:
     tiff_of(home / "x.ome.tif", "b.ome.tif")
     link = home.parent / "mine.ome.tif"
     link.symlink_to(home / "x.ome.tif")
-    read_whole(link)
+    read_levels(link)
 
 
 def test_a_file_that_moved_is_known_by_its_own_id(home: Path) -> None:
     planes = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="/old/x.ome.tif">{_ID.format(2)}'
     text = xml(inside=f"{planes}</UUID></TiffData>")
     write_tiff(home / "x.ome.tif", text.replace("<OME ", f'<OME UUID="{_ID.format(2)}" '))
-    read_whole(home / "x.ome.tif")
+    read_levels(home / "x.ome.tif")
 
 
 def test_the_command_refuses_in_one_line(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -153,7 +141,7 @@ def test_links_within_a_zarr_are_followed(home: Path) -> None:
     (source / "0").rename(source / "finest")
     (source / "0").symlink_to("finest")
     (home / "mine.zarr").symlink_to(source)
-    read_whole(home / "mine.zarr")
+    read_levels(home / "mine.zarr")
 
 
 @pytest.mark.parametrize("path", ["../b.zarr/0", "{}/b.zarr/0", "..\\b.zarr\\0"])
@@ -237,5 +225,5 @@ def test_a_source_named_by_a_link_is_the_user_s_own_choice(home: Path) -> None:
     write_f_nifti(home.parent / "other" / "v.nii", f_phantom(), (0.5, 0.2, 0.2))
     for name in ("v.ome.tif", "v.nii"):
         (home / name).symlink_to(home.parent / "other" / name)
-        read_whole(home / name)
+        read_levels(home / name)
     assert np.prod(read.open(home / "v.nii").levels[0].shape) == f_phantom().size

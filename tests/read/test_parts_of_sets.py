@@ -19,6 +19,7 @@ from stereocell.model.tiling import Box
 from stereocell.planning import input_files
 from support import phantoms
 from support.array_files import characters, write_bdv_xml, write_ims, write_n5
+from support.reading import refusing
 from support.tiff_files import write_ndtiff
 
 BODY = phantoms.f_phantom()
@@ -40,12 +41,7 @@ def whole(path: Path) -> read.Dataset:
     return dataset
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        whole(path)
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(whole)
 
 
 # --- TIFF

@@ -13,12 +13,12 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from stereocell import read
-from stereocell.model.errors import SourceError
 from stereocell.model.rigid_transform import IDENTITY
 from stereocell.model.tiling import Box
 from support.dicom_reading import error, whole
 from support.dicom_series import grid, sample, tilted, turn
 from support.phantoms import f_phantom
+from support.reading import read_voxels, refusing
 
 SHAPE = (22, 30, 26)
 OBLIQUE = turn((1, 2, -0.5), 23.0)
@@ -41,12 +41,7 @@ def write(path: Path, affine: NDArray[np.float64], voxels: Any, *, compress: boo
     return path
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        whole(read.open(path))
-    assert "\n" not in str(caught.value)
-    assert "expected" in str(caught.value)
-    return str(caught.value)
+refusal = refusing(read_voxels)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -10,6 +10,7 @@ import tifffile
 from stereocell import read
 from stereocell.model.errors import SourceError
 from support.phantoms import f_phantom
+from support.reading import whole
 
 BODY = f_phantom()
 UM = (0.5, 0.2, 0.25)
@@ -18,10 +19,6 @@ GDAL = (
     '<GDALMetadata><Item name="SCALE" sample="0" role="scale">{}</Item>'
     '<Item name="OFFSET" sample="0" role="offset">-1024</Item></GDALMetadata>'
 )
-
-
-def voxels_of(dataset: Any, channel: int = 0) -> Any:
-    return dataset.read(channel, dataset.levels[0].box).voxels
 
 
 def write_planes(folder: Path, **of_half: Any) -> Path:
@@ -49,7 +46,7 @@ def test_calibrations_of_planes_are_applied_file_by_file(tmp_path: Path) -> None
     dataset = read.open(write_planes(tmp_path, metadata={"unit": "um", **HU}), spacing_um=UM)
     expected = BODY.astype(np.float32)
     expected[len(BODY) // 2 :] = 2 * expected[len(BODY) // 2 :] - 1024
-    np.testing.assert_array_equal(voxels_of(dataset), expected)
+    np.testing.assert_array_equal(whole(dataset), expected)
     assert any("8 of 16 planes: values: ImageJ's calibration" in one for one in dataset.notes)
 
 
@@ -87,13 +84,13 @@ def test_planes_of_ome_tiff_have_the_size_and_place_of_their_xml(tmp_path: Path,
     dataset = read.open(tmp_path)
     assert dataset.levels[0].spacing_um == pytest.approx((0.5 if unit else 1.0, 0.2, 0.25))
     assert any("PositionZ of the planes" in note for note in dataset.notes)
-    np.testing.assert_array_equal(voxels_of(dataset), BODY)
+    np.testing.assert_array_equal(whole(dataset), BODY)
 
 
 def test_calibrations_of_stacks_are_applied_channel_by_channel(tmp_path: Path) -> None:
     dataset = read.open(write_stacks(tmp_path, [BODY, BODY], [HU, {}]))
-    np.testing.assert_array_equal(voxels_of(dataset, 0), 2 * BODY.astype(np.float32) - 1024)
-    np.testing.assert_array_equal(voxels_of(dataset, 1), BODY)
+    np.testing.assert_array_equal(whole(dataset, 0), 2 * BODY.astype(np.float32) - 1024)
+    np.testing.assert_array_equal(whole(dataset, 1), BODY)
     assert any("'a_c0.tif': values: ImageJ's calibration" in note for note in dataset.notes)
 
 
@@ -137,7 +134,7 @@ def test_the_scale_of_gdal_is_applied(tmp_path: Path, slope: float) -> None:
         extratags=[(42112, "s", 0, GDAL.format(slope), True)],
     )  # fmt: skip
     dataset = read.open(path, spacing_um=UM)
-    np.testing.assert_array_equal(voxels_of(dataset), slope * BODY.astype(np.float32) - 1024)
+    np.testing.assert_array_equal(whole(dataset), slope * BODY.astype(np.float32) - 1024)
     assert any(f"SCALE {slope:g} and OFFSET -1024 of GDAL" in note for note in dataset.notes)
 
 
@@ -150,7 +147,7 @@ def test_the_missing_value_of_gdal_is_no_measurement(tmp_path: Path) -> None:
         extratags=[(42113, "s", 0, "-9999", True)],
     )  # fmt: skip
     dataset = read.open(path, spacing_um=UM)
-    assert voxels_of(dataset).min() == BODY.min() + 5
+    assert whole(dataset).min() == BODY.min() + 5
     assert any("GDAL_NODATA -9999" in note for note in dataset.notes)
 
 

@@ -12,6 +12,7 @@ from stereocell import read
 from stereocell.model.errors import UsageError
 from stereocell.read import list_series
 from support.phantoms import f_phantom
+from support.reading import read_voxels
 
 BODY = f_phantom()
 OTHER = BODY[:, ::-1]
@@ -55,11 +56,6 @@ def places(values: Any, unit: str = "\u00b5m", times: Any = None) -> str:
     )  # fmt: skip
 
 
-def voxels_of(path: Path, channel: int = 0, **options: Any) -> Any:
-    dataset = read.open(path, **options)
-    return dataset.read(channel, dataset.levels[0].box).voxels
-
-
 def upright(stored: Any, orientation: int) -> Any:
     """Return the planes as libtiff draws them, by the wording of TIFF 6.0 for tag 274."""
     row = {1: "t", 2: "t", 3: "b", 4: "b", 5: "l", 6: "r", 7: "r", 8: "l"}[orientation]
@@ -81,7 +77,7 @@ def test_planes_stand_as_the_tag_orientation_states(tmp_path: Path, orientation:
         extratags=[(274, "H", 1, orientation, True)],
     )  # fmt: skip
     dataset = read.open(path)
-    np.testing.assert_array_equal(voxels_of(path), upright(BODY, orientation))
+    np.testing.assert_array_equal(read_voxels(path), upright(BODY, orientation))
     y, x = (0.2, 0.25) if orientation < 5 else (0.25, 0.2)
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, y, x))
     assert any("Orientation" in note for note in dataset.notes) == (orientation > 1)
@@ -131,7 +127,7 @@ def test_a_calibration_of_imagej_is_applied(
         metadata={"axes": "ZYX", "spacing": 0.5, "unit": "um", **function},
     )  # fmt: skip
     dataset = read.open(path)
-    np.testing.assert_array_equal(voxels_of(path), expected)
+    np.testing.assert_array_equal(read_voxels(path), expected)
     notes = [note for note in dataset.notes if "values:" in note]
     assert len(notes) == bool(told)
     assert all(told in note for note in notes)
@@ -170,7 +166,7 @@ def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) ->
 
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:
     path = write_ome(tmp_path / "a.ome.tif", BODY, extratags=[(274, "H", 1, 4, True)])
-    np.testing.assert_array_equal(voxels_of(path), BODY)
+    np.testing.assert_array_equal(read_voxels(path), BODY)
     assert "not applied, as OME-TIFF has it" in read.open(path).notes[0]
 
 
@@ -251,8 +247,8 @@ ALTERNATELY = np.stack([BODY, OTHER], axis=1).reshape(32, 48, 36)
 def test_angles_along_z_are_images_of_their_own(tmp_path: Path, stored: Any, told: str) -> None:
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES)
     first = read.open(path)
-    np.testing.assert_array_equal(voxels_of(path), BODY)
-    np.testing.assert_array_equal(voxels_of(path, series=2), OTHER)
+    np.testing.assert_array_equal(read_voxels(path), BODY)
+    np.testing.assert_array_equal(read_voxels(path, series=2), OTHER)
     assert any("2 angles" in note and told in note for note in first.notes)
     assert first.levels[0].spacing_um == pytest.approx(UM)
     listed = list_series(path)
@@ -267,7 +263,7 @@ def test_positions_tell_how_angles_are_stored(tmp_path: Path) -> None:
     stored = np.stack([BODY, BODY + 1], axis=1).reshape(32, 48, 36)
     planes = places(np.repeat(np.arange(16) * 0.5, 2))
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES, planes=planes)
-    np.testing.assert_array_equal(voxels_of(path, series=2), BODY + 1)
+    np.testing.assert_array_equal(read_voxels(path, series=2), BODY + 1)
 
 
 def test_lifetimes_along_time_are_no_points_in_time(tmp_path: Path) -> None:
@@ -277,7 +273,7 @@ def test_lifetimes_along_time_are_no_points_in_time(tmp_path: Path) -> None:
     path = write_ome(tmp_path / "a.ome.tif", STACKS, sizes={"Z": 16, "T": 2}, after=note)
     dataset = read.open(path, series=2)
     assert dataset.time_points == 1
-    np.testing.assert_array_equal(voxels_of(path, series=2), OTHER)
+    np.testing.assert_array_equal(read_voxels(path, series=2), OTHER)
 
 
 def test_wavelengths_along_c_are_channels_and_phases_are_not(tmp_path: Path) -> None:
@@ -287,7 +283,7 @@ def test_wavelengths_along_c_are_channels_and_phases_are_not(tmp_path: Path) -> 
     phases = MODULO.format('<ModuloAlongC Type="phase" Start="0" End="1" Step="1"/>')
     other = write_ome(tmp_path / "b.ome.tif", STACKS, sizes={"Z": 16, "C": 2}, after=phases)
     assert [one.name for one in read.open(other, series=2).channels] == ["c1"]
-    np.testing.assert_array_equal(voxels_of(other, series=2), OTHER)
+    np.testing.assert_array_equal(read_voxels(other, series=2), OTHER)
 
 
 def test_a_further_axis_of_another_image_or_size_is_not_used(tmp_path: Path) -> None:
@@ -304,7 +300,7 @@ def test_a_plain_tiff_is_one_series(tmp_path: Path) -> None:
     assert len(list_series(path)) == 1
     with pytest.raises(UsageError, match="--series: found 2, expected 1, the only one"):
         read.open(path, series=2)
-    np.testing.assert_array_equal(voxels_of(path, series=1), BODY)
+    np.testing.assert_array_equal(read_voxels(path, series=1), BODY)
 
 
 @pytest.mark.parametrize(("unit", "is_told"), [("CENTIMETER", True), ("INCH", False)])

@@ -12,8 +12,8 @@ import zarr
 from conftest import Server
 from stereocell import read
 from stereocell.cli.__main__ import main
-from stereocell.model.errors import SourceError
 from support.phantoms import f_phantom, write_ome_zarr
+from support.reading import refusing
 
 VERSIONS = ("0.4", "0.5")
 
@@ -53,11 +53,7 @@ def labelled(path: Path, version: str, dtype: Any = np.int32) -> Path:
     return path
 
 
-def refusal(source: Path | str) -> str:
-    with pytest.raises(SourceError) as caught:
-        read.open(source)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+refusal = refusing(read.open)
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -13,6 +13,7 @@ from stereocell import read
 from stereocell.cli.__main__ import main
 from stereocell.planning import input_files
 from support.phantoms import f_phantom, write_ome_zarr
+from support.reading import read_voxels
 
 BODY = f_phantom().astype(np.int16)
 PACKED = {"scale_factor": 2.0, "add_offset": -1024.0}
@@ -27,15 +28,10 @@ def write(path: Path, version: Any, attributes: dict[str, Any], **options: Any) 
     return path
 
 
-def voxels_of(path: Path, **options: Any) -> Any:
-    dataset = read.open(path, **options)
-    return dataset.read(0, dataset.levels[0].box).voxels
-
-
 @pytest.mark.parametrize("version", [2, 3])
 def test_scale_and_offset_of_an_array_are_applied(tmp_path: Path, version: int) -> None:
     path = write(tmp_path / "a.zarr", version, PACKED)
-    np.testing.assert_array_equal(voxels_of(path, spacing_um=(1, 1, 1)), BODY * 2.0 - 1024)
+    np.testing.assert_array_equal(read_voxels(path, spacing_um=(1, 1, 1)), BODY * 2.0 - 1024)
     notes = read.open(path, spacing_um=(1, 1, 1)).notes
     assert any("scale_factor 2 and add_offset -1024" in note for note in notes)
 
@@ -66,14 +62,14 @@ def test_fill_values_are_no_measurements(
     tmp_path: Path, version: int, attributes: dict[str, Any], options: dict[str, Any]
 ) -> None:
     path = write(tmp_path / "a.zarr", version, attributes, **options)
-    assert voxels_of(path, spacing_um=(1, 1, 1)).max() == 100
+    assert read_voxels(path, spacing_um=(1, 1, 1)).max() == 100
     notes = read.open(path, spacing_um=(1, 1, 1)).notes
     assert any("_FillValue 1000" in note for note in notes)
 
 
 def test_the_value_of_absent_chunks_is_a_measurement(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zarr", 2, {}, fill_value=1000)
-    assert voxels_of(path, spacing_um=(1, 1, 1)).max() == 1000
+    assert read_voxels(path, spacing_um=(1, 1, 1)).max() == 1000
 
 
 def test_lost_chunks_of_scaled_voxels_are_counted(

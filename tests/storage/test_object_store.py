@@ -29,7 +29,7 @@ from stereocell.storage.processes import machine, start_of
 from support import phantoms
 from support.digests import digests_of
 from support.faulty_object_store import before
-from support.object_store import ObjectStore, serving
+from support.object_store import ObjectStore, serving_bucket
 from support.sealed_files import seal
 from support.tissue_volumes import blobs
 from support.validators import make_assets
@@ -41,10 +41,7 @@ PARTS = ("units", "stage", "bundle")
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ObjectStore]:
-    with serving(tmp_path_factory.mktemp("objects")) as store, pytest.MonkeyPatch.context() as m:
-        for name, value in store.environment.items():
-            m.setenv(name, value)
-        store.files().mkdir("bucket")
+    with serving_bucket(tmp_path_factory.mktemp("objects")) as store:
         yield store
 
 

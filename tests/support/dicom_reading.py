@@ -1,20 +1,12 @@
 """Reading DICOM files of tests, and where their voxels lie."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.read.dataset import Dataset
-from support.dicom_series import (
-    BODIES,
-    scene,
-)
-
-
-def whole(dataset: Dataset) -> NDArray[Any]:
-    return dataset.read(0, dataset.levels[0].box).voxels
+from support.dicom_series import BODIES, scene
+from support.reading import whole
 
 
 def lps_mm(dataset: Dataset) -> NDArray[np.float64]:

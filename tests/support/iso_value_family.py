@@ -61,15 +61,6 @@ def dice(found: Mask, truth: Mask) -> float:
     return float(2 * (found & truth).sum() / max(1, found.sum() + truth.sum()))
 
 
-def boundary_distance_um(found: Mask, truth: Mask) -> float:
-    """Return the mean distance in um between the boundaries of two solids, both ways."""
-    edges = [solid & ~ndimage.binary_erosion(solid, border_value=1) for solid in (found, truth)]
-    if not all(edge.any() for edge in edges):
-        return float(np.linalg.norm(_EXTENT))
-    away = [ndimage.distance_transform_edt(~edge, SPACING) for edge in edges]
-    return float((away[1][edges[0]].mean() + away[0][edges[1]].mean()) / 2)
-
-
 def _axes() -> tuple[Field, Field, Field]:
     z, y, x = (np.arange(n, dtype=np.float32) * h for n, h in zip(SHAPE, SPACING, strict=True))
     return z[:, None, None], y[:, None], x

@@ -16,7 +16,7 @@ from stereocell.bundle.describe import describe_bundle
 from stereocell.bundle.tile_part import BundleTile, write_file
 from stereocell.bundle.write_objects import write_objects
 from stereocell.formats.gltf import Material, choose_step, encode_glb
-from stereocell.formats.gltf_features import tile_features
+from stereocell.formats.gltf_features import Features
 from stereocell.formats.ktx2 import encode_2d
 from stereocell.formats.tiles3d import TileLod, make_tilesets
 from stereocell.model.mesh import Mesh
@@ -153,6 +153,16 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
         default="cell_type",
         walls=np.array(walls, np.int32),
         wall_um2=np.arange(1, len(walls) + 1, dtype=np.float32),
+    )
+
+
+def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
+    """Return a tile's objects, with the first column and the wanted ones."""
+    rows = table.rows[tile]
+    names = dict.fromkeys((table.columns[0].id, *wanted))
+    found = [column for name in names if (column := table.column(name)) is not None]
+    return Features(
+        table.labels[rows], tuple(replace(column, values=column.values[rows]) for column in found)
     )
 
 

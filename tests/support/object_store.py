@@ -12,6 +12,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 import s3fs
 from zarr.core.sync import _get_loop as zarr_loop
 
@@ -64,6 +65,16 @@ def serving(folder: Path) -> Iterator[ObjectStore]:
         finally:
             _forget_others()
             server.terminate()
+
+
+@contextmanager
+def serving_bucket(folder: Path) -> Iterator[ObjectStore]:
+    """Start a store with an empty `bucket`, which the environment points at."""
+    with serving(folder) as store, pytest.MonkeyPatch.context() as patch:
+        for name, value in store.environment.items():
+            patch.setenv(name, value)
+        store.files().mkdir("bucket")
+        yield store
 
 
 def _await_port(server: subprocess.Popen[bytes], port: int) -> None:

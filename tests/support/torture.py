@@ -41,7 +41,6 @@ PHASES = ("plan", "survey", "units", "stage", "bundle", "report")
 SURVEY = "units/survey.json"
 KINDS = ("command", "session", "worker", "scheduler", "cluster worker")
 STEREOCELL = (sys.executable, "-m", "stereocell.cli")
-QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 PATIENCE_S = 300.0
 ATTEMPTS = 10
 

@@ -1,9 +1,10 @@
-"""A sphere with UVs."""
+"""A sphere with UVs, and a surface without values at its vertices."""
 
 import numpy as np
 import pyvista as pv
 
 from stereocell.model.mesh import Mesh
+from stereocell.textures.bake import FineSurface
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.unwrap import Unwrapped, unwrap
 
@@ -23,3 +24,8 @@ def unwrapped(mesh: Mesh, options: UnwrapOptions = OPTIONS) -> Unwrapped:
     found = unwrap(mesh, options)
     assert isinstance(found, Unwrapped), found
     return found
+
+
+def bare(mesh: Mesh) -> FineSurface:
+    """Return a surface without ambient occlusion and without a sampled channel."""
+    return FineSurface(mesh, np.ones(len(mesh.positions), np.float32))

@@ -20,9 +20,9 @@ from stereocell.report.texture_similarity import sample
 from stereocell.steps.unit import UnitInput, build_unit
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.ambient_occlusion import sphere as directions
-from stereocell.textures.bake import Baker, FineSurface, bake
+from stereocell.textures.bake import Baker, bake
 from stereocell.textures.tangents import make_tangents
-from support.unwrapped import OPTIONS, sphere, unwrapped
+from support.unwrapped import OPTIONS, bare, sphere, unwrapped
 
 FINE = replace(OPTIONS, texel_um=0.1)
 
@@ -98,7 +98,7 @@ def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
     body = sphere()
     fine = replace(body, normals=rippled(body.positions).astype(np.float32))
     done = unwrapped(simplify(body, 0.4), FINE)
-    maps = bake(done.mesh, done.size, Baker(FineSurface.bare(fine)))
+    maps = bake(done.mesh, done.size, Baker(bare(fine)))
     lod = Lod(done.mesh, 0.0, maps.normals)
     every = np.arange(len(done.mesh.triangles))
     for weights in ([1 / 3, 1 / 3, 1 / 3], [0.98, 0.01, 0.01], [0.5, 0.5, 0.0]):
@@ -125,7 +125,7 @@ def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
         np.concatenate([outer.normals, -inner.normals]),
     )
     done = unwrapped(simplify(sphere(), 0.5), FINE)
-    maps = bake(done.mesh, done.size, Baker(FineSurface.bare(shell)))
+    maps = bake(done.mesh, done.size, Baker(bare(shell)))
     assert maps.normals[..., 2].min() > 128 + 50  # no normal is turned away
 
 
@@ -261,6 +261,6 @@ def test_baking_twice_gives_the_same() -> None:
     images = []
     for _ in range(2):
         done = unwrapped(simplify(body, 0.3), FINE)
-        images.append(bake(done.mesh, done.size, Baker(FineSurface.bare(fine))))
+        images.append(bake(done.mesh, done.size, Baker(bare(fine))))
     np.testing.assert_array_equal(images[0].normals, images[1].normals)
     np.testing.assert_array_equal(images[0].openness, images[1].openness)

@@ -22,11 +22,11 @@ from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.planning.settings import Settings
 from stereocell.textures import lod_chain
-from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels, sharpest_angle
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.texture_lod import Texturer, VertexValues
 from support.meshes import ball, crowd, enclosed_volume, joined, kinds, moved, to_mesh
+from support.unwrapped import bare
 
 SPACING = (1.0, 1.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
@@ -201,7 +201,7 @@ def test_coarser_levels_have_the_finest_s_values() -> None:
         np.testing.assert_array_equal(fine.positions[number], mesh.positions)
         height = (mesh.positions[:, 2] / 8 + 0.5).astype(np.float32)
         options = UnwrapOptions().resolved(SPACING)
-        return Texturer(options, VertexValues(height), lambda: FineSurface.bare(fine), Clock())
+        return Texturer(options, VertexValues(height), lambda: bare(fine), Clock())
 
     lods = make_levels(
         fine, (), spacing_um=SPACING, lod=LodOptions((0.1, 0.3)), clock=Clock(),

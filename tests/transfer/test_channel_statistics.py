@@ -15,13 +15,14 @@ from stereocell.transfer.channel_statistics import find_statistics, make_appeara
 from stereocell.transfer.opacity import (
     AT_SURFACE_OF_MAGNITUDES,
     MAX_SHIFT,
-    NAMES,
     NEAR_SURFACE,
     evaluate,
     make_transfer_functions,
 )
 from stereocell.transfer.options import WindowOptions
 from support import phantoms
+
+NAMES = ("default", "soft", "sharp", "surface")  # functions of a channel without a threshold
 
 
 def test_window_lies_at_the_percentiles() -> None:
@@ -108,7 +109,7 @@ def test_every_function_is_legal_for_any_histogram(
     iso: float | None, histogram: np.ndarray
 ) -> None:
     functions = make_transfer_functions((1000 * histogram).astype(np.int64), iso)
-    assert tuple(functions) == NAMES
+    assert {"default", "soft", "sharp", "surface"} <= functions.keys()
     for points in functions.values():
         x, opacity = np.array(points).T
         assert (np.diff(x) >= 0).all()
@@ -127,8 +128,8 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
     sharp = evaluate(functions["sharp"])
     assert sharp[int(0.45 * 255)] == 0
     assert sharp[int(0.55 * 255)] > 0.7
-    for name in NAMES:
-        assert evaluate(functions[name])[30] == 0, name
+    for name, points in functions.items():
+        assert evaluate(points)[30] == 0, name
 
 
 @pytest.mark.parametrize("iso", [0.1, 0.3, 0.6])

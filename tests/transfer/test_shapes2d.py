@@ -50,7 +50,7 @@ SHAPES: Shapes = (
 LOOK = replace(
     spheres.RED,
     transfer_functions={**spheres.RED.transfer_functions, NAME: fall_back(SHAPES)},
-    transfer_2d=TransferFunctions2d(0.37, {NAME: SHAPES}),
+    transfer_2d=TransferFunctions2d(gradient_max=0.37, functions={NAME: SHAPES}),
 )
 APPEARANCES = (LOOK, spheres.BLUE)
 TILES = tuple(spheres.tile(column, APPEARANCES) for column in (0, 1))
@@ -216,7 +216,7 @@ def test_the_stage_gives_back_the_shapes_as_they_were(stage: Path) -> None:
     red, blue = read_appearances(open_stage(stage))
     assert red.transfer_2d == LOOK.transfer_2d
     assert list(red.transfer_functions) == ["default", NAME, "sharp"]
-    assert blue.transfer_2d == TransferFunctions2d(0.5, {})
+    assert blue.transfer_2d == TransferFunctions2d()
 
 
 def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { against, arrowsOf, circles } from "./layers";
+import { against, arrowsOf, circles, partsOf } from "./layers";
 
 const arrow = (from: string, to: string) => ({ from, to });
 
@@ -32,6 +32,16 @@ describe("the layers", () => {
     const sideways = arrow("xr/stereo.ts", "xr/session.ts");
     const up = arrow("math/vec3.ts", "state/reduce.ts");
     expect(against([down, sideways, up])).toEqual([up]);
+  });
+
+  it("find parts by their part.ts, and let no part import another", () => {
+    const parts = partsOf(["slices/part.ts", "ruler/part.ts", "ruler/ticks.ts", "host/part.ts"]);
+    expect([...parts]).toEqual(["slices", "ruler"]);
+    const within = arrow("ruler/part.ts", "ruler/ticks.ts");
+    const fine = [within, arrow("ruler/part.ts", "host/part.ts"), arrow("app/a.ts", "ruler/b.ts")];
+    const wrong = [arrow("ruler/part.ts", "slices/part.ts"), arrow("host/a.ts", "ruler/b.ts")];
+    expect(against([...fine, ...wrong], parts)).toEqual(wrong);
+    expect(against([arrow("app/a.ts", "ruler/b.ts")])).toHaveLength(1);
   });
 
   it("refuse a folder that is none of them", () => {

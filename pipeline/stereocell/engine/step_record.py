@@ -19,11 +19,13 @@ RECORD = Path(__file__).with_name("step_record.json")
 def libraries_of(*names: str) -> dict[str, str]:
     """Return the version of each installed library that steps or readers use.
 
+    A new step or reader has no libraries until `make record-steps`, for which `make lint` asks.
+
     names  of steps' classes, and of formats (read/known_formats.py)
     """
     found: dict[str, str] = {}
     for name in names:
-        for library in _record()[name]["libraries"].split():
+        for library in _record().get(name, {"libraries": ""})["libraries"].split():
             found |= _versions(library)
     return found
 

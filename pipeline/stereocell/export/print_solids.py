@@ -6,7 +6,7 @@ that the specimen fits a hand, if --scale says nothing else.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -57,6 +57,16 @@ class _Part:
     surfaces: dict[tuple[int | None, tuple[float, ...]], _Surface] = field(default_factory=dict)
 
 
+# Writers of bodies by ending, given the name of the specimen and the unit; a new format is a line
+_WRITERS: dict[str, Callable[[Path, Sequence[Body], str, str], None]] = {
+    ".stl": lambda path, bodies, _, unit: write_stl_file(path, bodies, unit=unit),
+    ".3mf": lambda path, bodies, title, unit: write_3mf(path, bodies, title=title, unit=unit),
+    ".ply": lambda path, bodies, _, unit: write_ply(path, bodies, unit=unit),
+    ".obj": lambda path, bodies, _, unit: write_obj(path, bodies, unit=unit),
+}
+PRINT_ENDINGS = tuple(_WRITERS)
+
+
 def write_print(chosen: Chosen, path: Path, level: int) -> str:
     """Write the solids; return a line about them. Raises StageError and OutputError."""
     options = chosen.options
@@ -81,14 +91,7 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
         bodies.append(Body(part.name, (red, green, blue), positions, triangles))
     if not bodies:
         raise chosen.nothing("surface")
-    if ending == ".3mf":
-        write_3mf(path, bodies, title=specimen_name(chosen.stage), unit=unit)
-    elif ending == ".ply":
-        write_ply(path, bodies, unit=unit)
-    elif ending == ".obj":
-        write_obj(path, bodies, unit=unit)
-    else:
-        write_stl_file(path, bodies, unit=unit)
+    _WRITERS[ending](path, bodies, specimen_name(chosen.stage), unit)
     x, y, z = np.ptp(np.concatenate([body.positions for body in bodies]), axis=0).tolist()
     count = sum(len(body.triangles) for body in bodies)
     size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"

@@ -21,7 +21,7 @@ from stereocell.export.pictures import (
     write_picture,
     write_turntable,
 )
-from stereocell.export.print_solids import write_print
+from stereocell.export.print_solids import PRINT_ENDINGS, write_print
 from stereocell.export.scene import MAX_MB, write_scene
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
@@ -69,10 +69,7 @@ _PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
 FORMATS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    ".stl": _PRINT,
-    ".3mf": _PRINT,
-    ".ply": _PRINT,
-    ".obj": _PRINT,
+    **dict.fromkeys(PRINT_ENDINGS, _PRINT),
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
     ".usdc": Format(write_flattened, _USD),
     ".usda": Format(write_flattened, _USD),

@@ -21,7 +21,7 @@ import zstandard
 from jsonschema import Draft202012Validator
 from numpy.typing import NDArray
 
-from stereocell.formats.voxel_bvh import EMPTY, STORED, STREAM_BRICK, Bvh, Bytes3
+from stereocell.formats.voxel_bvh import EMPTY, STORED, STREAM_BRICK, Bvh
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.assets import schema_path
 
@@ -203,21 +203,6 @@ def _check_nodes(nodes: NDArray[np.void], levels: int, stored: int, brick_bytes:
         raise BrickFormatError("bricks don't add up to what the header says")
 
 
-def decode_brick(frame: bytes) -> Bytes3:
-    """Return a brick, uint8 (18, 18, 18), (z, y, x), from its zstd frame.
-
-    Raises BrickFormatError for other bytes.
-    """
-    try:
-        size = zstandard.get_frame_parameters(frame).content_size
-        if size != STORED**3:
-            raise BrickFormatError(f"a brick of {size} bytes, expected {STORED**3}")
-        data = zstandard.decompress(frame)
-    except zstandard.ZstdError as error:
-        raise BrickFormatError(f"a brick that is no zstd frame: {error}") from None
-    return np.frombuffer(data, dtype=np.uint8).reshape(STORED, STORED, STORED)
-
-
 def encode_frame(frame: Frame) -> bytes:
     """Return the bytes of a binary frame; a table's `data` is passed uncompressed."""
     datas, lengths = [], []
@@ -230,28 +215,6 @@ def encode_frame(frame: Frame) -> bytes:
         ENTRY.pack(part.tree, part.at, n) for part, n in zip(frame.parts, lengths, strict=True)
     ]
     return b"".join([head, *entries, *datas])
-
-
-def decode_frame(data: bytes) -> Frame:
-    """Return a binary frame; a table's `data` comes uncompressed. Raises BrickFormatError."""
-    if len(data) < FRAME.size:
-        raise BrickFormatError(f"a frame of {len(data)} bytes, expected {FRAME.size} or more")
-    kind, version, _, sequence, view, count = FRAME.unpack_from(data)
-    if kind not in (TABLE_FRAME, BRICKS_FRAME) or version != VERSION:
-        raise BrickFormatError(f"a frame of kind {kind}, version {version}")
-    end = FRAME.size + count * ENTRY.size
-    if end > len(data):
-        raise BrickFormatError(f"{count} parts in {len(data)} bytes")
-    parts = []
-    for tree, at, length in ENTRY.iter_unpack(data[FRAME.size : end]):
-        content = data[end : end + length]
-        end += length
-        if kind == TABLE_FRAME and end <= len(data):
-            content = zstandard.decompress(content)
-        parts.append(Part(tree, at, content))
-    if end != len(data):
-        raise BrickFormatError(f"parts end at byte {end} of {len(data)}")
-    return Frame(kind, sequence, view, tuple(parts))
 
 
 def parse_message(text: str) -> dict[str, Any]:

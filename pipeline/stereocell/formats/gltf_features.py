@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.formats.meshopt import CompressedBuffers
-from stereocell.model.object_table import MISSING, Column, ObjectTable
+from stereocell.model.object_table import MISSING, Column
 
 MAX_OBJECTS = 1 << 16  # most objects of a file: 16 bits name them
 MAX_COLUMNS = 8  # most columns of a file, besides the label
@@ -30,19 +30,6 @@ class Features:
 
     labels: NDArray[np.uint64]
     columns: tuple[Column, ...]
-
-
-def tile_features(table: ObjectTable, tile: str, *, wanted: tuple[str, ...] = ()) -> Features:
-    """Return a tile's objects, with `volume_um3` and the wanted columns, MAX_COLUMNS at most."""
-    rows = table.rows[tile]
-    first = table.columns[0].id if table.columns else _LABEL
-    names = [name for name in dict.fromkeys((first, *wanted)) if name != _LABEL]
-    found = [column for name in names if (column := table.column(name)) is not None]
-    columns = tuple(
-        Column(c.id, c.name, c.values[rows], c.about, c.unit, c.categories, c.colors)
-        for c in found[:MAX_COLUMNS]
-    )
-    return Features(table.labels[rows], columns)
 
 
 def require_whole(

@@ -91,8 +91,8 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
     >>> volume = np.zeros((20, 20, 20), np.uint8)
     >>> volume[4:8, 4:8, 4:8] = 200
     >>> bvh = build(volume, 10)
-    >>> len(bvh.nodes), bvh.bricks.shape, np.array_equal(reassemble(bvh), volume)
-    (9, (2, 18, 18, 18), True)
+    >>> len(bvh.nodes), bvh.bricks.shape
+    (9, (2, 18, 18, 18))
     """
     if volume.ndim != 3 or not volume.size or max(volume.shape) > STREAM_BRICK << 15:
         raise ValueError(f"a volume of {volume.shape} texels")
@@ -137,35 +137,6 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
         bricks.append(stored)
     z, y, x = volume.shape
     return Bvh((z, y, x), threshold, np.concatenate(nodes), np.concatenate(bricks))
-
-
-def first_children(nodes: NDArray[np.void]) -> NDArray[np.int64]:
-    """Return the index of each node's first child, int64 (n + 1,); at the end, the number of nodes.
-
-    nodes  records of NODE (n,)
-    """
-    counts = np.bitwise_count(nodes["child_mask"]).astype(np.int64)
-    return 1 + np.concatenate([[0], np.cumsum(counts)])
-
-
-def reassemble(bvh: Bvh) -> Bytes3:
-    """Return the volume of the leaves, uint8 (z, y, x); an empty node is filled with `constant`."""
-    volume = np.zeros(bvh.size, dtype=np.uint8)
-    brick = iter(bvh.bricks)
-    for node in bvh.nodes:
-        is_empty = node["flags"] & EMPTY
-        stored = None if is_empty else next(brick)
-        if not is_empty and node["level"] > 0:
-            continue
-        edge = STREAM_BRICK << int(node["level"])
-        box = tuple(slice(int(node[axis]) * edge, (int(node[axis]) + 1) * edge) for axis in "zyx")
-        part = volume[box]
-        if stored is None:
-            part[:] = node["constant"]
-        else:
-            z, y, x = part.shape
-            part[:] = stored[1 : z + 1, 1 : y + 1, 1 : x + 1]
-    return volume
 
 
 def upsampling(level: int, count: int) -> Floats:

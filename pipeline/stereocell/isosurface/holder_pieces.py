@@ -21,6 +21,7 @@ _NO_FLESH_HU = -120.0  # a piece with 95 % of its voxels below holds no flesh, n
 # Volumes in cubed depths of a core: a piece of less volume goes with the holder that it touches,
 # and so does metal of less volume that lies at the skin
 _CRUMB, _CLIP = 0.1, 1.0
+_SHOWN = 3  # most pieces whose sizes are listed
 
 Kind = Literal["plain", "bone", "table", "metal"]
 
@@ -147,12 +148,12 @@ def _clips(
     return np.asarray(is_clip[dense])
 
 
-def sizes_in_words(sizes: list[NDArray[np.float64]], most: int = 3) -> tuple[str, ...]:
+def sizes_in_words(sizes: list[NDArray[np.float64]]) -> tuple[str, ...]:
     """Return the sizes (z, y, x) of pieces in um, largest first, for people."""
     largest = sorted(sizes, key=lambda size: (-float(np.prod(size)), *size))
     words = [
         " x ".join(f"{length / 1000:.0f}" for length in size) + " mm (z, y, x)"
-        for size in largest[:most]
+        for size in largest[:_SHOWN]
     ]
-    more = len(largest) - most
+    more = len(largest) - _SHOWN
     return (*words, f"and {more} smaller") if more > 0 else tuple(words)

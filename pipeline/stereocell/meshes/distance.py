@@ -78,14 +78,6 @@ def measure_enclosure(source: Nearest, target: Nearest) -> float:
     return float(target.holds(source.points).mean())
 
 
-def measure_distance(a: Nearest, b: Nearest) -> float:
-    """Return the distance in um between two meshes: the larger of both ways' 99th percentiles.
-
-    Points spread evenly over the area of each mesh go to the nearest point of the other.
-    """
-    return max(measure_spread(a, b).p99, measure_spread(b, a).p99)
-
-
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
     """Return the distances in um from one mesh to the other.
 

@@ -24,8 +24,6 @@ from stereocell.model.tiling import Box
 SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle at the plane, or a third of those there
 TRIES = 4  # most tries that keep vertices near crossings, before all of the plane stay
 
-Numbers = NDArray[np.int64]
-
 
 def thin_rims(
     mesh: Mesh, distance: NDArray[np.float32], lattice: Lattice, *, error_um: float

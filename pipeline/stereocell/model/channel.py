@@ -80,7 +80,7 @@ class SurfaceLevel:
         return f"{self.iso:.5g}{above}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TransferFunctions2d:
     """A channel's 2D transfer functions, and the numbers that they are read by.
 

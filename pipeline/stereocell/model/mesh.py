@@ -89,7 +89,7 @@ class Lod:
     """One level of detail. `lod0` is the finest.
 
     distance_um  99th percentile of the distances between this mesh and the iso-surface, of points
-                 spread over both: see `measure_distance`
+                 spread over both: see `measure_spread`
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
     quality      None where the writer doesn't know it
     baked        ambient occlusion and sampled channel; None: neither

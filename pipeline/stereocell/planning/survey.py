@@ -5,7 +5,6 @@ pydantic turns the dataclasses into plain values and back, as survey.json holds 
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -119,16 +118,6 @@ def is_body(appearance: Appearance, statistics: ChannelStatistics) -> bool:
 
 
 Survey = dict[str, ChannelSurvey]  # by channel ID
-
-
-def appearance_to_json(appearance: Appearance) -> dict[str, Any]:
-    """Return an appearance as plain values."""
-    return dict(_appearances().dump_python(appearance, mode="json"))
-
-
-@cache
-def _appearances() -> TypeAdapter[Appearance]:
-    return TypeAdapter(Appearance)
 
 
 @cache

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from stereocell.model.axes import AXES, axes_of, is_axes
+from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.axis_names import axes_of_names
-from stereocell.read.series import counted
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _ORDER = Subject("order of the axes", remedy="--axes names another one")

@@ -36,12 +36,10 @@ class FlippedArray:
             for part, size, flip in zip(key, self.shape, self._flips, strict=True)
         ]
         found = np.asarray(self._array[tuple(place)])
-        kept = [flip for part, flip in zip(key, self._flips, strict=True) if _is_slice(part)]
+        kept = [
+            flip for part, flip in zip(key, self._flips, strict=True) if isinstance(part, slice)
+        ]
         return found[tuple(slice(None, None, -1 if flip else 1) for flip in kept)]
-
-
-def _is_slice(part: Any) -> bool:
-    return isinstance(part, slice)
 
 
 def _mirrored(part: Any, size: int) -> Any:

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
+from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple
-
-T = TypeVar("T")
+from stereocell.storage.location import Location
 
 _LABELS = ("label", "mask", "seg", "pred")  # in the names of arrays that number objects
 
@@ -49,25 +49,43 @@ def candidate(
     return Candidate(", ".join(parts), z * y * x if min(shape) > 1 and not others else 0)
 
 
+class OpenFile(Protocol):
+    """An open file of one image or more."""
+
+    def candidates(self) -> Sequence[Candidate]:
+        """Return its images, in the order in which `--series` counts them."""
+
+
+F = TypeVar("F", bound=OpenFile)
+
+
 def read_chosen(
-    where: str,
+    location: Location,
     series: int,
-    opened: Callable[[ExitStack], tuple[T, Sequence[Candidate]]],
-    read: Callable[[T, int, tuple[str, ...], ExitStack], Image],
+    open_file: Callable[[Location, ExitStack], F],
+    read: Callable[[F, int, tuple[str, ...], ExitStack], Image],
 ) -> Image:
     """Return the chosen image of a file, which closes where that fails.
 
-    opened  opens the file, to be closed by the stack, and returns it with its images
-    read    returns the image of an index, with these notes; it keeps the stack open
+    open_file  opens the file, to be closed by the stack
+    read       returns the image of an index, with these notes; it keeps the stack open
     """
     stack = ExitStack()
     try:
-        source, candidates = opened(stack)
-        index, notes = choose(where, candidates, series)
-        return read(source, index, notes, stack)
+        file = open_file(location, stack)
+        index, notes = choose(location.shown, file.candidates(), series)
+        return read(file, index, notes, stack)
     except BaseException:
         stack.close()
         raise
+
+
+def list_images(
+    location: Location, open_file: Callable[[Location, ExitStack], OpenFile]
+) -> tuple[str, ...]:
+    """Return a line for each image of a file, which is opened for it and closed."""
+    with ExitStack() as stack:
+        return lines(open_file(location, stack).candidates())
 
 
 def numbers_of(count: int) -> str:
@@ -98,11 +116,6 @@ def likely_image(paths: Sequence[str]) -> str:
     """Return the first path whose name is not that of a label map, as an example for messages."""
     images = (path for path in paths if not any(word in path.lower() for word in _LABELS))
     return next(images, paths[0])
-
-
-def counted(count: int, word: str) -> str:
-    """Return a number and its word: `1 channel`, `2 channels`."""
-    return f"{count} {word}{'s' * (count != 1)}"
 
 
 def lines(candidates: Sequence[Candidate]) -> tuple[str, ...]:

@@ -120,15 +120,6 @@ class Content:
     is_known: bool = True
 
 
-def describe(head: bytes) -> str:
-    """Return words for a file that begins with these bytes, as `a zip archive (unzip it)`.
-
-    >>> describe(b"<!DOCTYPE html>")
-    'an HTML page (a download that failed, or asked for a login: download it again)'
-    """
-    return identify(head).words
-
-
 def identify(head: bytes, marks: Marks = ()) -> Content:
     """Return the content of a file that begins with these bytes.
 

@@ -34,11 +34,6 @@ class FineSurface:
     openness: NDArray[np.float32]
     paint: NDArray[np.float32] | None = None
 
-    @classmethod
-    def bare(cls, mesh: Mesh) -> "FineSurface":
-        """Return the surface without ambient occlusion and without a sampled channel."""
-        return cls(mesh, np.ones(len(mesh.positions), np.float32))
-
 
 @dataclass(frozen=True, slots=True)
 class Found:

@@ -108,7 +108,8 @@ def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedS
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)
     shapes = suggest_shapes(found)
     functions = {NAME: shapes} if shapes else {}
-    return SuggestedShapes(TransferFunctions2d(gradient_max, functions), found.reason)
+    suggested = TransferFunctions2d(gradient_max=gradient_max, functions=functions)
+    return SuggestedShapes(suggested, found.reason)
 
 
 def find_boundaries(

@@ -89,15 +89,15 @@ def choose_gradient_max(fine: NDArray[np.int64]) -> float:
     return float(np.ceil(1000 * max(found, SMALLEST_MAX) - 1e-9) / 1000)
 
 
-def rebin(fine: NDArray[np.int64], gradient_max: float, *, rows: int = ROWS) -> NDArray[np.int64]:
-    """Return the counts of FINE_ROWS over 0..STEEPEST as those of `rows` over 0..gradient_max.
+def rebin(fine: NDArray[np.int64], gradient_max: float) -> NDArray[np.int64]:
+    """Return the counts of FINE_ROWS over 0..STEEPEST as those of ROWS over 0..gradient_max.
 
     fine    int64 (FINE_ROWS, COLUMNS)
-    result  int64 (rows, COLUMNS)
+    result  int64 (ROWS, COLUMNS)
     """
     steps = np.linspace(0, STEEPEST, len(fine))
-    row = np.minimum(steps / gradient_max * (rows - 1) + 0.5, rows - 1).astype(np.intp)
-    counts = np.zeros((rows, fine.shape[1]), np.int64)
+    row = np.minimum(steps / gradient_max * (ROWS - 1) + 0.5, ROWS - 1).astype(np.intp)
+    counts = np.zeros((ROWS, fine.shape[1]), np.int64)
     np.add.at(counts, row, fine)
     return counts
 

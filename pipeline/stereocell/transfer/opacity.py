@@ -11,7 +11,6 @@ from scipy import ndimage
 
 from stereocell.model.channel import OpacityPoints
 
-NAMES = ("default", "soft", "sharp", "surface")
 SOFT = "soft"  # name of the translucent function
 # Mean optical depth of the whole volume along its shortest edge, at most, by the soft function.
 # Light then crosses it, and bodies show within others, however many voxels the volume has. Chosen
@@ -50,7 +49,7 @@ def make_transfer_functions(
     is_calibrated: bool = False,
     depth_voxels: float = 0.0,
 ) -> dict[str, OpacityPoints]:
-    """Return the opacity points of every name in NAMES, and of THRESHOLD where there is one.
+    """Return the opacity points of each function: THRESHOLD only where there is a threshold.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
     iso_normalized        the iso-value, 0..1; None: the channel has no clear surface

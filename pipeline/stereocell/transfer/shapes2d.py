@@ -20,7 +20,7 @@ from stereocell.model.channel import (
 )
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS
 
-NAME = "arcs"  # name of the proposed function, beside those of transfer.NAMES
+NAME = "arcs"  # name of the proposed function, beside those of transfer/opacity.py
 MAX_SHAPES = 32  # most shapes of one function: more neither fit a link nor a person's eye
 
 

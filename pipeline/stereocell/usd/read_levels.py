@@ -72,12 +72,12 @@ class ComposedLod:
     images: MadeMaps | None = None
 
 
-def read_lods(tile: Usd.Prim, channel_id: str, *, finest: int = 0) -> Iterator[ComposedLod]:
-    """Yield a loaded tile's levels of detail of one channel from `finest` on; none: no surface.
+def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
+    """Yield a loaded tile's levels of detail of one channel; none: no surface.
 
     Raises StageError for a mesh that can't be drawn: no material, a missing normal map.
     """
-    levels = [level for level in lod_levels(tile) if level >= finest]
+    levels = lod_levels(tile)
     for level in levels or [0]:  # a flattened stage has one level, and no variants
         prim = mesh_at(tile, channel_id, level)
         if prim is None:

@@ -14,11 +14,10 @@ from stereocell.formats.brick_stream import (
     TABLE_FRAME,
     Table,
     content_hash,
-    decode_brick,
-    decode_frame,
     parse_table,
 )
 from stereocell.formats.voxel_bvh import EMPTY, STORED, STREAM_BRICK, upsampling
+from support.server.brick_decoder import decode_brick, decode_frame
 
 
 @dataclass

@@ -14,7 +14,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from .choice import AS_STAGED, Choice
+from .choice import AS_STAGED, Choice, open_stage, shared_functions
 from .importing import import_stage
 from .objects import CLASSES
 from .overlay import export_edits
@@ -37,6 +37,14 @@ def _items(*names):
     return [_STAGED, *[(name, name, "") for name in names]]
 
 
+def _find_functions(operator, _context, _text):
+    """Return the names of the transfer functions that all channels of the chosen stage have."""
+    try:
+        return shared_functions(open_stage(operator.filepath))
+    except StageProblem:
+        return []
+
+
 class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     """Import a StereoCell stage, or a layer over one"""
 
@@ -55,8 +63,10 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
         items=_items("lod0", "lod1", "lod2", "lod3"),
     )
     representation: EnumProperty(name="Show", items=_items("mesh", "volume", "both"))
-    transfer_function: EnumProperty(
-        name="Transfer function", items=_items("default", "soft", "sharp", "surface", "threshold")
+    transfer_function: StringProperty(
+        name="Transfer function",
+        description="The name of one that all channels have; empty: as in the stage",
+        search=_find_functions,
     )
     size: EnumProperty(
         name="Size",
@@ -67,7 +77,8 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     )
 
     def execute(self, context):
-        choice = Choice(self.tiles, self.lod, self.representation, self.transfer_function)
+        function = self.transfer_function or AS_STAGED
+        choice = Choice(self.tiles, self.lod, self.representation, function)
         try:
             root = import_stage(context, self.filepath, choice, self.size == "TRUE")
         except StageProblem as problem:

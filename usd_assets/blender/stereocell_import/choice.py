@@ -52,6 +52,13 @@ def open_stage(path):
     return stage
 
 
+def shared_functions(stage):
+    """Return the names of the transfer functions that all channels of a stage have."""
+    channels = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    names = [_functions_of(channel) for channel in channels]
+    return [one for one in names[0] if all(one in others for others in names)] if names else []
+
+
 def write_choice(stage, choice, file):
     """Write a layer over a stage that selects what was chosen.
 
@@ -84,7 +91,7 @@ def write_choice(stage, choice, file):
         tile.Unload()
     if choice.transfer_function != AS_STAGED:
         for channel in stage.GetPrimAtPath(CHANNELS).GetChildren():
-            known = channel.GetVariantSet("transferFunction").GetVariantNames()
+            known = _functions_of(channel)
             if choice.transfer_function not in known:
                 raise StageProblem(
                     f"{channel.GetName()} has no transfer function {choice.transfer_function!r}, "
@@ -95,6 +102,10 @@ def write_choice(stage, choice, file):
     if not layer.Export(str(file)):
         raise StageProblem(f"{file}: can't be written")
     return staged
+
+
+def _functions_of(channel):
+    return channel.GetVariantSet("transferFunction").GetVariantNames()
 
 
 def _fits(name, patterns):

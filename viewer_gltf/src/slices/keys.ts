@@ -2,7 +2,7 @@
 
 import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
 import { setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
-import { isSliced, SLICE_NUMBERS, SLICE_PICTURES, SLICE_PLANES } from "../state/parameters/slices";
+import { isSliced, SLICE_NUMBERS, SLICES } from "../state/parameters/slices";
 import { REFUSED } from "../state/refusals";
 import { STRAIGHT } from "./section";
 
@@ -20,8 +20,7 @@ function turn(steps: number): Key["to"] {
 }
 
 const KEYS: readonly Key[] = [
-  ...keysOf(SLICE_PICTURES),
-  ...keysOf(SLICE_PLANES),
+  ...SLICES.flatMap(keysOf),
   key("^", "Next setting of the slices: where they meet, how they are turned", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);

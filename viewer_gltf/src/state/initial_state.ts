@@ -2,10 +2,8 @@
 import type { Manifest } from "../bundle/generated/bundle";
 import type { ClipPlane } from "../math/clip";
 import { START_CHANNEL } from "./parameters/channel";
-import { START_LIGHT } from "./parameters/light";
-import { START_SLICES } from "./parameters/slices";
-import { START_TOOLS } from "./parameters/tools";
-import { type Mode, START_VOLUMES } from "./parameters/volumes";
+import { START_SETTINGS } from "./parameters/settings";
+import type { Mode } from "./parameters/volumes";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** Most tiles that open as volumes; of a larger specimen the chosen tile does. */
@@ -40,10 +38,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const opened = (maps.length > 0 ? maps : images).slice(0, MAX_CHANNELS);
   const shown = new Set(opened.map(({ id }) => id));
   return {
-    ...START_VOLUMES,
-    ...START_TOOLS,
-    ...START_LIGHT,
-    ...START_SLICES,
+    ...START_SETTINGS,
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,

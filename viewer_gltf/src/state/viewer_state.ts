@@ -9,10 +9,7 @@ import type { KeptView } from "./kept_views";
 import type { Measuring } from "./measurements";
 import type { ObjectViews } from "./objects";
 import type { ChannelSettings } from "./parameters/channel";
-import type { LightSettings } from "./parameters/light";
-import type { SliceSettings } from "./parameters/slices";
-import type { ToolSettings } from "./parameters/tools";
-import type { VolumeSettings } from "./parameters/volumes";
+import type { Settings } from "./parameters/settings";
 import type { Functions } from "./transfer_functions_2d";
 
 /**
@@ -45,10 +42,7 @@ export type Representation = Manifest["tiles"][number]["representation"];
 /** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
 export type TileState = Readonly<{ id: string; representation: Representation }>;
 
-export type ViewerState = VolumeSettings &
-  ToolSettings &
-  LightSettings &
-  SliceSettings &
+export type ViewerState = Settings &
   Measuring &
   Readonly<{
     channels: readonly ChannelState[];

@@ -7,7 +7,6 @@ round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
 import os
 import struct
 from contextlib import ExitStack
-from functools import partial
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -20,7 +19,7 @@ from stereocell.read.format import Format, Guide, Library
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.plane_positions import falling_notes
-from stereocell.read.series import Candidate, candidate, lines, read_chosen
+from stereocell.read.series import Candidate, candidate, list_images, read_chosen
 from stereocell.read.spacing import Grid, Triple
 from stereocell.storage.first_bytes import Mark
 from stereocell.storage.library_errors import one_line
@@ -54,32 +53,31 @@ _COLORS = {
 
 def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
-    return read_chosen(
-        location.shown,
-        series,
-        partial(_images, location),
-        lambda images, index, notes, stack: _image(location.shown, images[index], notes, stack),
-    )
+    return read_chosen(location, series, _File, _image)
 
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each image. Raises SourceError."""
-    with ExitStack() as stack:
-        return lines(_images(location, stack)[1])
+    return list_images(location, _File)
 
 
-def _images(location: Location, stack: ExitStack) -> tuple[list[Any], list[Candidate]]:
-    """Return the images of the file, and what a list says of each."""
-    import liffile as library
+class _File:
+    """An open file and its images."""
 
-    with one_line(location.shown, "a LIF file that is whole"):
-        path = os.path.realpath(location.path)
-        _require_whole(path, location.shown)
-        images = list(stack.enter_context(library.LifFile(path)).images)
-        candidates = [_candidate(image) for image in images]  # the library reads the XML here
-    if not images:
-        raise SourceError(f"{location.shown}: found no image, expected one")
-    return images, candidates
+    def __init__(self, location: Location, stack: ExitStack) -> None:
+        import liffile as library
+
+        self.where = location.shown
+        with one_line(self.where, "a LIF file that is whole"):
+            path = os.path.realpath(location.path)
+            _require_whole(path, self.where)
+            self.images: list[Any] = list(stack.enter_context(library.LifFile(path)).images)
+            self._candidates = [_candidate(one) for one in self.images]  # reads the XML
+        if not self.images:
+            raise SourceError(f"{self.where}: found no image, expected one")
+
+    def candidates(self) -> list[Candidate]:
+        return self._candidates
 
 
 def _require_whole(path: str, where: str) -> None:
@@ -163,7 +161,8 @@ def _other_axes(image: Any) -> dict[str, int]:
     return {axis: int(size) for axis, size in sizes if axis not in "TCZYX" and size > 1}
 
 
-def _image(where: str, image: Any, notes: tuple[str, ...], stack: ExitStack) -> Image:
+def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) -> Image:
+    where, image = file.where, file.images[index]
     for axis, size in _other_axes(image).items():
         raise SourceError(
             f"{where}: found {size} {_OTHERS.get(axis, f'of axis {axis}')}, expected z, y, x, "

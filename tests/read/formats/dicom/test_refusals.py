@@ -8,20 +8,15 @@ import pydicom
 import pytest
 
 from stereocell import read
-from stereocell.model.errors import SourceError
 from support.dicom_reading import whole
 from support.dicom_series import grid, image, save, write_enhanced
+from support.reading import refusing
 
 SHAPE = (4, 8, 9)
 CLASSES = "1.2.840.10008.5.1.4.1.1."
 
 
-def refusal(path: Path) -> str:
-    with pytest.raises(SourceError) as caught:
-        read.open(path)
-    line = str(caught.value)
-    assert "\n" not in line
-    return line
+refusal = refusing(read.open)
 
 
 @pytest.mark.parametrize(

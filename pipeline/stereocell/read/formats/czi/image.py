@@ -27,7 +27,7 @@ from stereocell.read.formats.czi.file import CziFacts, CziFile, Rectangle
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.repeats import record_xml
-from stereocell.read.series import Candidate, candidate, lines, read_chosen
+from stereocell.read.series import Candidate, candidate, list_images, read_chosen
 from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.child_process import Child
@@ -105,18 +105,12 @@ class _File:
 
 def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
-    return read_chosen(location.shown, series, partial(_opened, location), _image)
-
-
-def _opened(location: Location, stack: ExitStack) -> tuple[_File, list[Candidate]]:
-    file = _File(location, stack)
-    return file, file.candidates()
+    return read_chosen(location, series, _File, _image)
 
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each scene. Raises SourceError."""
-    with ExitStack() as stack:
-        return lines(_opened(location, stack)[1])
+    return list_images(location, _File)
 
 
 def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) -> Image:

@@ -14,7 +14,7 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.formats.nd2.frames import BEGIN, Nd2Frames
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
-from stereocell.read.series import Candidate, candidate, lines, read_chosen
+from stereocell.read.series import Candidate, candidate, list_images, read_chosen
 from stereocell.read.spacing import PartialTriple, grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
@@ -77,18 +77,12 @@ def _require_end(path: str, where: str) -> None:
 
 def read_image(location: Location, *, series: int = 0) -> Image:
     """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
-    return read_chosen(location.shown, series, partial(_opened, location), _image)
-
-
-def _opened(location: Location, stack: ExitStack) -> tuple[_File, list[Candidate]]:
-    file = _File(location, stack)
-    return file, file.candidates()
+    return read_chosen(location, series, _File, _image)
 
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each position. Raises SourceError."""
-    with ExitStack() as stack:
-        return lines(_opened(location, stack)[1])
+    return list_images(location, _File)
 
 
 def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack) -> Image:
