@@ -98,11 +98,17 @@ def _shortened(line: str) -> str:
 def _run(options: argparse.Namespace) -> int:
     """Run a command; one that writes into OUT locks it: storage/lock.py, workspace.py."""
     out, name = getattr(options, "out", None), options.command
-    options.shown = out
+    options.shown, options.is_source = out, False
+    if name in SHOWERS:
+        from stereocell.live.show_source import is_source
+
+        options.is_source = is_source(options.out)
     if name not in LIGHT:
         require_address_space(name)
         options.places = _given_places(options)
     with ExitStack() as stack:
+        if options.is_source:
+            return commands.answer(options, options.handler(options))
         if PLACES[name].writes:
             from stereocell.storage.overwriting import AT_A_PROMPT, forcing
 
@@ -171,7 +177,7 @@ def _parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             if PLACES[name].writes:
                 command.add_argument("--force", action="store_true", help=FORCE)
         command.set_defaults(handler=handler, command=name)
-        told = "one JSON object" if name not in ("view", "serve") else "JSON objects, one a line,"
+        told = "one JSON object" if name not in SHOWERS else "JSON objects, one a line,"
         command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")
     return parser
 
@@ -250,13 +256,13 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.check,
     ),
     "view": (
-        "serve the bundle and open a browser; with --lan for phones in this network",
-        "view out/mine --lan",
+        "show a build, or a source at once, in a browser; with --lan on phones in this network",
+        "view my.ome.tif; stereocell view out/mine --lan",
         flags.declare_view,
         commands.view,
     ),
     "serve": (
-        "serve the bundle and stream its volumes by view, here or (--lan) to phones",
+        "serve a build, or a source at once, here or (--lan) to phones",
         "serve out/mine --lan",
         flags.declare_serve,
         commands.serve,
@@ -291,6 +297,8 @@ READERS = {
     "view": "bundle",
     "serve": "bundle",
 }
+# Commands that show a build, or a source that is not built
+SHOWERS = frozenset({"view", "serve"})
 # Commands that import no large library
 LIGHT = frozenset({"settings", "doctor"})
 

@@ -417,15 +417,31 @@ def serve(options: argparse.Namespace) -> Answer:
 def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     from stereocell.serve.server import serve
 
-    try:
+    def run(folder: Path) -> None:
         serve(
-            options.out,
+            folder,
             options.port,
             lan=options.lan,
             open_browser=open_browser,
             for_program=options.json,
             frames=tuple(options.allow_frame),
         )
+
+    try:
+        if options.is_source:
+            _show_source(options, run)
+        else:
+            run(options.out)
     except BrokenPipeError as error:  # the reader of the address has gone
         raise StdoutLost(error) from error
     return Answer()
+
+
+def _show_source(options: argparse.Namespace, run: Callable[[Path], None]) -> None:
+    """Serve the first view of a source that is not built."""
+    from stereocell.live.show_source import show_source
+    from stereocell.planning.preset_choice import load_for
+
+    source = str(options.out)
+    wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
+    show_source(source, wanted, choice, run)

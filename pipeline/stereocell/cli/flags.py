@@ -44,6 +44,11 @@ def declare_source(parser: argparse.ArgumentParser) -> None:
         "PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, MRC, MGH, CZI, "
         "...; or an http(s):// or s3:// address of OME-Zarr, TIFF or N5",
     )
+    declare_how_to_read(parser)
+
+
+def declare_how_to_read(parser: argparse.ArgumentParser) -> None:
+    """Declare how a source is read and what is built of it: preset, channels, spacing, time."""
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")
     for flag, _, field in _settings():
@@ -365,7 +370,12 @@ def declare_view(parser: argparse.ArgumentParser) -> None:
 
 def declare_serve(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `serve`."""
-    declare_out(parser)
+    parser.add_argument(
+        "out",
+        type=_place,
+        metavar="OUT|SOURCE",
+        help="folder of a build, or its s3:// address; or a source: all that `build` takes",
+    )
     parser.add_argument("--port", type=_port, default=8000, help="default 8000; 0: any free one")
     parser.add_argument(
         "--lan",
@@ -381,6 +391,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
         "given several times",
     )
+    declare_how_to_read(parser)
 
 
 def declare_export(parser: argparse.ArgumentParser) -> None:
