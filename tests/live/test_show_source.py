@@ -1,0 +1,78 @@
+"""`stereocell view SOURCE` shows a source at once, and leaves nothing behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from stereocell.live.show_source import is_source
+from support.phantoms import f_phantom, write_ome_tiff
+
+
+@pytest.mark.slow
+def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Path) -> None:
+    source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    command = [
+        sys.executable,
+        "-m",
+        "stereocell.cli",
+        "view",
+        str(source),
+        "--json",
+        "--no-browser",
+    ]
+    with subprocess.Popen(
+        [*command, "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(scratch)},
+    ) as server:
+        assert server.stdout is not None
+        try:
+            address = json.loads(server.stdout.readline())["address"]
+            with urllib.request.urlopen(f"{address}manifest.json") as answer:
+                manifest = json.load(answer)
+            assert manifest["specimen"]["name"] == "f"
+            assert manifest["channels"][0]["tileset"] is None
+            with urllib.request.urlopen(address) as answer:
+                assert b"<html" in answer.read()
+            assert len(list(scratch.iterdir())) == 1
+        finally:
+            server.send_signal(signal.SIGINT)
+            _, told = server.communicate(timeout=60)
+    assert server.returncode == 0
+    assert "first view: f after" in told
+    assert list(scratch.iterdir()) == []
+    assert sorted(tmp_path.iterdir()) == [source, scratch]
+
+
+def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
+    source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
+    build, bundle, planes = (tmp_path / name for name in ("out", "sent", "planes"))
+    build.mkdir()
+    (build / "plan.json").write_text("{}")
+    bundle.mkdir()
+    for name in ("manifest.json", "files.json"):
+        (bundle / name).write_text("{}")
+    (bundle / "channels").mkdir()
+    planes.mkdir()
+    (planes / "0001.png").write_bytes(b"\x89PNG")
+    assert is_source(source)
+    assert is_source(planes)
+    assert is_source("https://host/any")
+    assert is_source("s3://bucket/image.ome.zarr")
+    assert is_source(tmp_path / "missing.nii.gz")
+    assert not is_source(build)
+    assert not is_source(bundle)
+    assert not is_source(tmp_path / "missing")
+    assert not is_source("s3://bucket/out")
+    assert not is_source(Path(tempfile.mkdtemp(dir=tmp_path)))
