@@ -90,10 +90,11 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await front.stop();
   });
 
-  test("what is tapped is told, and what Python picks is marked", async () => {
-    const front = await open();
+  test("in the frame of another host, as in Colab and VS Code, a tap is told and a pick is marked", async () => {
+    const front = await open({ isForeign: true });
     const frame = await front.viewer();
     // straight on to the large ball, of radius 9
+    await inPython("len(viewer.channels) > 0").toBe(true);
     await moveTo("(48, -24, 70)", "(48, -24, 12)");
     const canvas = frame.locator(".stage canvas").first();
     const box = await canvas.boundingBox();
@@ -141,13 +142,6 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     // pictures may come, files not
     const files = kernel.told.slice(before).filter((text) => /"ask":"(file|page)"/.test(text));
     expect(new Set(files).size).toBe(files.length);
-    await front.stop();
-  });
-
-  test("it shows in the frame of another host, as in Colab and VS Code", async () => {
-    const front = await open({ isForeign: true });
-    await front.viewer();
-    await inPython("len(viewer.channels) > 0").toBe(true);
     await front.stop();
   });
 
