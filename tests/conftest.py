@@ -1,7 +1,9 @@
 """Fixtures that several test modules share: tiny sources on disk, and servers on loopback."""
 
 import gc
+import os
 import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -20,6 +22,7 @@ from support import phantoms
 from support.exhaustive import IS_EXHAUSTIVE
 from support.long_files import LONG_FILES
 from support.object_store import VERSITYGW
+from support.small_viewer import write_small_viewer
 
 # Python's collector finds nothing among modules and tests while these are read, and takes a third
 # of the time; what has been read is never looked through again
@@ -60,6 +63,21 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     )
     for reason, count in sorted(reasons.items()):
         terminalreporter.write_line(f"skipped {count}: {reason}")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Spare builds the two costs that no test looks at: flushing files, and the whole viewer.
+
+    A test waits longer for the disk than for anything else, and the built viewer is 145 files
+    that each bundle copies and hashes. Commands in a process of their own do both.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda file: None)
+        if sys.modules.keys() & {"stereocell.cli.__main__", "stereocell.building.phases"}:
+            folder = write_small_viewer(tmp_path_factory.mktemp("viewer"))
+            patch.setattr("stereocell.building.phases.viewer_dist", lambda: folder)
+        yield
 
 
 @pytest.fixture
