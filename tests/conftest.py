@@ -66,17 +66,19 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def quick_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Spare builds the two costs that no test looks at: flushing files, and the whole viewer.
+def quick_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Spare builds in this process three costs: flushing files, the whole viewer, and workers.
 
-    A test waits longer for the disk than for anything else, and the built viewer is 145 files
-    that each bundle copies and hashes. Commands in a process of their own do both.
+    Tests waited longer for the disk than for anything else. The built viewer is 145 files that
+    each bundle copies and hashes. Worker processes import everything again, so a command starts
+    them only where its test says `--workers`.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda file: None)
         if sys.modules.keys() & {"stereocell.cli.__main__", "stereocell.building.phases"}:
             folder = write_small_viewer(tmp_path_factory.mktemp("viewer"))
             patch.setattr("stereocell.building.phases.viewer_dist", lambda: folder)
+            patch.setattr("stereocell.cli.flags.cores", lambda: 0)
         yield
 
 
