@@ -89,6 +89,12 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def without_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checks start no Node, twice a check: the rules of glTF and KTX2 are for tests/verify."""
+    monkeypatch.setattr("stereocell.verify.node_validators._run_node", lambda script, paths: "")
+
+
+@pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """An empty file system of 400 kB; it takes root."""
     disk = tmp_path / "disk"

@@ -25,6 +25,8 @@ from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
 
+pytestmark = pytest.mark.usefixtures("without_node")
+
 # names with a space and an apostrophe; the second has no surface
 NAMES = ["Alice's F", "empty"]
 F = "Alice_x27_s_x20_F"
@@ -302,6 +304,8 @@ def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
     line = _line(out, "stage hashes")
     assert f"stage/{name}: changed since it was written: edited in place, or dam" in line.detail
     assert "edits belong in a layer of your own" in line.detail
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
+    assert (manifest["channels"][0]["color"] == [1, 0, 0]) == (change is _recolour)
 
 
 @pytest.mark.parametrize("silent", sweep([False, True], kept=[True]))
