@@ -25,7 +25,7 @@ from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
 
-pytestmark = pytest.mark.usefixtures("without_node")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
 # names with a space and an apostrophe; the second has no surface
 NAMES = ["Alice's F", "empty"]

@@ -17,7 +17,7 @@ from support.digests import digests_of
 from support.exhaustive import sweep
 from support.outputs import make_build, make_source
 
-pytestmark = pytest.mark.usefixtures("without_node")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
 SOURCE = "f.ome.tif"
 # the documents of each part that a command may depend on
@@ -137,7 +137,6 @@ def _names(out: Path) -> list[str]:
 
 
 # one damage a kind of file, in turn; all of them in the sweep
-@pytest.mark.slow
 @pytest.mark.parametrize("turn", sweep([0, 1, 2], kept=[0]))
 def test_remedies_that_check_prints_mend_what_they_name(
     built: Path, tmp_path: Path, turn: int

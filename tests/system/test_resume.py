@@ -20,6 +20,8 @@ from support.digests import digests_of
 from support.exhaustive import sweep
 from support.server.timeouts import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 BUILD = ["--workers", "0", "--grid", "2x1"]
 UNIT = "r0_c0", "F_x20_body"
 
@@ -244,7 +246,6 @@ sys.exit(main(["bundle", str(out), "--workers", "1"]))
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "kind", "code"),
     [

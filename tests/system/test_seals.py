@@ -19,7 +19,7 @@ from support import phantoms
 from support.error_lines import error_line
 from support.sealed_files import edit_sealed
 
-pytestmark = pytest.mark.usefixtures("without_node")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
 
 RECORDS = ("plan.json", "provenance.json", SETTINGS, "phases.json", "report/index.html")
 OF_UNITS = ("units/plan.key", "units/done.json", "units/survey.json")
