@@ -264,16 +264,6 @@ def test_damaged_manifest_is_named_and_made_anew(out: Path, built: Path) -> None
     assert _assets(out) == _assets(built)
 
 
-def test_remedy_that_check_names_mends_the_bundle(out: Path, built: Path) -> None:
-    _go_on(out)
-    file = out / "bundle" / "volumes" / "r0_c0" / f"{F}.ktx2"
-    _flip(file, silent=True)
-    assert "remove what is damaged and run `stereocell bundle OUT`" in _line(out, "hashes").detail
-    file.unlink()
-    _go_on(out)
-    assert _assets(out) == _assets(built)
-
-
 def _recolour(layer_file: Path) -> None:
     layer = Sdf.Layer.OpenAsAnonymous(str(layer_file))
     layer.GetAttributeAtPath(f"/Specimen/Channels/{F}.inputs:color").default = (1, 0, 0)

@@ -71,16 +71,6 @@ def _same(out: Path, built: Path) -> bool:
     return all(digests_of(out / part) == digests_of(built / part) for part in ("stage", "bundle"))
 
 
-def test_lost_files_are_made_again(out: Path, built: Path) -> None:
-    lost = _unit(out) / "lod1.npz"
-    lost.unlink()
-    (out / "stage" / "tiles" / "r0_c1" / "tile.usdc").unlink()
-    shutil.rmtree(out / "bundle" / "volumes")
-    _go_on(out)
-    assert lost.is_file()
-    assert _same(out, built)
-
-
 @pytest.mark.parametrize(
     "name",
     [

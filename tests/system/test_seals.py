@@ -99,26 +99,6 @@ def test_changed_record_is_named_with_what_was_found_and_expected(out: Path, nam
     assert "run `stereocell" in told
 
 
-def _thicker(file: Path) -> None:
-    """Double the spacing along z, as a person would who takes the plan for a settings file."""
-    plan = json.loads(file.read_bytes())
-    plan["spacing_um"][0] *= 2
-    file.write_text(json.dumps(plan, indent=1))
-
-
-@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
-def test_no_phase_builds_from_a_plan_that_was_edited_by_hand(
-    out: Path, capfd: pytest.CaptureFixture[str], command: list[str]
-) -> None:
-    _thicker(out / "plan.json")
-    before = {f: f.read_bytes() for f in out.rglob("*") if f.is_file()}
-    assert main([command[0], str(out), *command[1:]]) == 1
-    line = error_line(capfd)
-    assert f"{out / 'plan.json'}: damaged or changed by hand" in line
-    assert f"remove it and run `stereocell plan INPUT -o {out}`" in line
-    assert {f: f.read_bytes() for f in out.rglob("*") if f.is_file()} == before
-
-
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     out: Path, built: Path, capfd: pytest.CaptureFixture[str], command: list[str]
