@@ -1,7 +1,9 @@
 """Fixtures that several test modules share: tiny sources on disk, and servers on loopback."""
 
 import gc
+import os
 import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -20,6 +22,7 @@ from support import phantoms
 from support.exhaustive import IS_EXHAUSTIVE
 from support.long_files import LONG_FILES
 from support.object_store import VERSITYGW
+from support.small_viewer import write_small_viewer
 
 # Python's collector finds nothing among modules and tests while these are read, and takes a third
 # of the time; what has been read is never looked through again
@@ -62,10 +65,33 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"skipped {count}: {reason}")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def quick_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Spare builds in this process three costs: flushing files, the whole viewer, and workers.
+
+    Tests waited longer for the disk than for anything else. The built viewer is 145 files that
+    each bundle copies and hashes. Worker processes import everything again, so a command starts
+    them only where its test says `--workers`.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda file: None)
+        if sys.modules.keys() & {"stereocell.cli.__main__", "stereocell.building.phases"}:
+            folder = write_small_viewer(tmp_path_factory.mktemp("viewer"))
+            patch.setattr("stereocell.building.phases.viewer_dist", lambda: folder)
+            patch.setattr("stereocell.cli.flags.cores", lambda: 0)
+        yield
+
+
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Builds draw no report: where no test opens it, it is most of what a small one takes."""
     monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
+
+
+@pytest.fixture
+def without_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checks start no Node, twice a check: the rules of glTF and KTX2 are for tests/verify."""
+    monkeypatch.setattr("stereocell.verify.node_validators._run_node", lambda script, paths: "")
 
 
 @pytest.fixture

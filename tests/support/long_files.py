@@ -13,7 +13,6 @@ LONG_FILES = [
         "preview/test_iso_value",
         "report/test_page",
         "system/test_doctor",
-        "system/test_integrity",
         "verify/test_formats",
     )
 ]

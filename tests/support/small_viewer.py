@@ -8,7 +8,7 @@ import pytest
 from stereocell.bundle import blob_page
 
 _FILES = {
-    "index.html": b"",
+    "index.html": b"<!doctype html>",
     "assets/index-1.css": b"style",
     "assets/viewer-1.js": b"plain",
     "assets/viewer-1.js.gz": gzip.compress(b"plain", mtime=0),
@@ -16,10 +16,16 @@ _FILES = {
 }
 
 
-def use_small_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Write the viewer's files into a folder, and let pages in one file be made of them."""
+def write_small_viewer(folder: Path) -> Path:
+    """Write the viewer's files into a folder; return it."""
     for name, content in _FILES.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
+    return folder
+
+
+def use_small_viewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let pages in one file be made of a small viewer, written into this folder."""
+    write_small_viewer(folder)
     monkeypatch.setattr(blob_page, "viewer_dist", lambda: folder)
     blob_page.files.cache_clear()

@@ -2,10 +2,9 @@
 
 import ast
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -149,11 +148,9 @@ def test_files_that_begin_since_they_take_long_exist() -> None:
     assert [file for file in LONG_FILES if not file.is_file()] == []
 
 
-@pytest.mark.slow
-def test_long_files_begin() -> None:
-    files = ["filters/test_background.py", "isosurface/test_channel_level.py"]
-    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-o", "addopts="]
-    command += ["--import-mode=importlib", *(str(TESTS / file) for file in files)]
-    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    names = re.findall(r"^tests/(.*?\.py)::", found, re.MULTILINE)
-    assert list(dict.fromkeys(names)) == files[::-1]
+def test_long_files_begin(request: pytest.FixtureRequest) -> None:
+    files = [TESTS / "filters/test_background.py", TESTS / "isosurface/test_channel_level.py"]
+    items = [Mock(path=file, **{"get_closest_marker.return_value": None}) for file in files]
+    plugin = request.config.pluginmanager.get_plugin(str(TESTS / "conftest.py"))
+    plugin.pytest_collection_modifyitems(request.config, items)
+    assert [item.path for item in items] == files[::-1]

@@ -21,6 +21,8 @@ from support.exhaustive import sweep
 from support.sealed_files import edit_sealed
 from support.validators import make_assets
 
+pytestmark = pytest.mark.slow
+
 BUILD = ["--workers", "0", "--grid", "2x1"]
 
 
@@ -108,7 +110,6 @@ def asset_digests(out: Path) -> dict[str, str]:
     }
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("workers", sweep(["1", "2"], kept=["2"]))
 def test_number_of_workers_does_not_change_the_bytes(

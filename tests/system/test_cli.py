@@ -13,6 +13,7 @@ import pytest
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.cli.__main__ import COMMANDS, main
+from stereocell.storage.processes import cores
 from support import phantoms, plain_bundle
 
 
@@ -120,9 +121,10 @@ def test_workers_are_the_cores_that_we_may_run_on(
 ) -> None:
     from stereocell.cli import __main__ as cli
 
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
-    assert cli._parser().parse_args(["units", "out"]).workers == 1
-    monkeypatch.undo()
+    monkeypatch.setattr("stereocell.cli.flags.cores", cores)  # tests build without workers
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
+        assert cli._parser().parse_args(["units", "out"]).workers == 1
     assert 1 <= cli._parser().parse_args(["units", "out"]).workers <= (os.cpu_count() or 1)
     # a container with half of a core's time
     monkeypatch.setattr("dask.system._try_extract_cgroup_cpu_quota", lambda: (50_000, 100_000))

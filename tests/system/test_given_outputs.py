@@ -11,6 +11,8 @@ from stereocell.cli.places import PLACES
 from stereocell.serve.server import BundleServer
 from support.outputs import Outputs, make_outputs
 
+pytestmark = pytest.mark.slow
+
 VOLUMES = {"the sample mri", "the sample brain-cells", "exported .nrrd", "exported .nii.gz"}
 BUNDLES = {"a build", "OUT/bundle", "a published page"}
 # command -> how an output is given to it, and the outputs that it takes

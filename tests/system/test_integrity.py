@@ -25,6 +25,8 @@ from support import phantoms
 from support.digests import digests_of
 from support.exhaustive import sweep
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
+
 # names with a space and an apostrophe; the second has no surface
 NAMES = ["Alice's F", "empty"]
 F = "Alice_x27_s_x20_F"
@@ -262,16 +264,6 @@ def test_damaged_manifest_is_named_and_made_anew(out: Path, built: Path) -> None
     assert _assets(out) == _assets(built)
 
 
-def test_remedy_that_check_names_mends_the_bundle(out: Path, built: Path) -> None:
-    _go_on(out)
-    file = out / "bundle" / "volumes" / "r0_c0" / f"{F}.ktx2"
-    _flip(file, silent=True)
-    assert "remove what is damaged and run `stereocell bundle OUT`" in _line(out, "hashes").detail
-    file.unlink()
-    _go_on(out)
-    assert _assets(out) == _assets(built)
-
-
 def _recolour(layer_file: Path) -> None:
     layer = Sdf.Layer.OpenAsAnonymous(str(layer_file))
     layer.GetAttributeAtPath(f"/Specimen/Channels/{F}.inputs:color").default = (1, 0, 0)
@@ -302,6 +294,8 @@ def test_layer_edited_in_place_stays_and_is_called_edited_or_damaged(
     line = _line(out, "stage hashes")
     assert f"stage/{name}: changed since it was written: edited in place, or dam" in line.detail
     assert "edits belong in a layer of your own" in line.detail
+    manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
+    assert (manifest["channels"][0]["color"] == [1, 0, 0]) == (change is _recolour)
 
 
 @pytest.mark.parametrize("silent", sweep([False, True], kept=[True]))

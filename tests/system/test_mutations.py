@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from support.exhaustive import examples
+
 SWEEP = Path(__file__).parents[1] / "malformed" / "sweep.py"
-COUNT = 2  # changes of each source
+COUNT = examples(2, 1)  # changes of each source
 
 
 @pytest.mark.slow

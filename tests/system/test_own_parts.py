@@ -14,6 +14,8 @@ from support.digests import digests_of
 from support.error_lines import error_line
 from support.outputs import make_build, make_source
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
+
 WORK = "years of work"
 FLAGS = ["--workers", "0"]
 

@@ -17,6 +17,8 @@ from support.digests import digests_of
 from support.exhaustive import sweep
 from support.outputs import make_build, make_source
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_node")]
+
 SOURCE = "f.ome.tif"
 # the documents of each part that a command may depend on
 DOCUMENTS = {
@@ -71,7 +73,7 @@ def _trials() -> Iterator[tuple[str, str]]:
             yield from ((command, name) for name in DOCUMENTS[part])
 
 
-@pytest.mark.parametrize("damage", ["changed", "lost"])
+@pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize(("command", "name"), list(_trials()))
 def test_command_refuses_a_build_whose_documents_are_damaged(
     out: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], *,
@@ -135,13 +137,10 @@ def _names(out: Path) -> list[str]:
 
 
 # one damage a kind of file, in turn; all of them in the sweep
-@pytest.mark.slow
 @pytest.mark.parametrize("turn", sweep([0, 1, 2], kept=[0]))
 def test_remedies_that_check_prints_mend_what_they_name(
-    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, turn: int
+    built: Path, tmp_path: Path, turn: int
 ) -> None:
-    for validator in ("check_meshes", "check_textures"):  # by node, which takes a second
-        monkeypatch.setattr(formats, validator, lambda _: "")
     unnoticed = []
     for i, name in enumerate(_names(built)):
         out = shutil.copytree(built, tmp_path / "out")
@@ -158,7 +157,7 @@ def test_remedies_that_check_prints_mend_what_they_name(
     assert {Path(name).name for name in unnoticed} <= kept
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("damage", sweep(DAMAGES, kept=["changed"]))
 def test_damaged_record_of_the_phases_has_one_remedy(
     out: Path, built: Path, damage: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import numpy as np
+import pytest
 import tifffile
 
 from support import ctrl_c
@@ -39,6 +40,7 @@ def start(folder: Path, *commands: list[str]) -> subprocess.Popen[str]:
     )
 
 
+@pytest.mark.slow
 def test_all_runs_on_what_windows_has(tmp_path: Path) -> None:
     z, y, x = np.indices((12, 24, 24))
     body = np.where((z - 6) ** 2 + ((y - 12) / 2) ** 2 + ((x - 12) / 2) ** 2 < 12, 200, 20)

@@ -59,7 +59,7 @@ def test_a_build_without_maps_does_not_depend_on_the_packages_of_the_extra(
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
-    command = ["build", source, "-o", str(out), "--workers", "1"]
+    command = ["build", source, "-o", str(out), "--workers", "0"]
     assert main(command) == 0
     there = keys(out)
     for package in PACKAGES:
@@ -67,9 +67,9 @@ def test_a_build_without_maps_does_not_depend_on_the_packages_of_the_extra(
     monkeypatch.setattr(map_packages, "version_of", lambda package: "")
     assert main(command) == 0
     assert keys(out) == there
-    assert main([*command[:3], str(tmp_path / "anew"), "--workers", "1"]) == 0
+    assert main([*command[:3], str(tmp_path / "anew"), "--workers", "0"]) == 0
     assert keys(tmp_path / "anew")[0] == there[0]
-    assert main(["check", "--deep", "--workers", "1", str(tmp_path / "anew")]) == 0
+    assert main(["check", "--deep", "--workers", "0", str(tmp_path / "anew")]) == 0
 
 
 @pytest.mark.slow
@@ -77,7 +77,7 @@ def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    command = ["build", source, "-o", str(out), "--workers", "1", "--maps"]
+    command = ["build", source, "-o", str(out), "--workers", "0", "--maps"]
     assert main(command) == 0
     units, bundle = keys(out)
     monkeypatch.setattr("stereocell.building.bundle_inputs.encoder_version", lambda: "99")
@@ -93,8 +93,8 @@ def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again
     monkeypatch.setattr("stereocell.planning.unit_steps.unwrapper_version", unwrapper_version)
     capsys.readouterr()
     for phase in ("bundle", "units"):
-        assert main([phase, str(out), "--workers", "1"]) == 2
+        assert main([phase, str(out), "--workers", "0"]) == 2
         assert capsys.readouterr().err.endswith("pip install 'stereocell[maps]'\n")
-    assert main(["check", "--deep", "--workers", "1", str(out)]) == 1
+    assert main(["check", "--deep", "--workers", "0", str(out)]) == 1
     told = capsys.readouterr()
     assert "a surface with baked maps takes the package alktx2" in told.out + told.err

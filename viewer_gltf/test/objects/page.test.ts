@@ -1,6 +1,7 @@
 /** Objects of a label map in the page: coloured, left out, picked, cut, found, in a link, as a file. */
 import { expect, it } from "vitest";
 import { project } from "../support/browser/camera";
+import { restBetweenFrames } from "../support/browser/chromium";
 import { hasColor, isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -58,7 +59,7 @@ describeInChromium("the objects of a label map", () => {
     await stand.viewer.settled();
   };
 
-  it("open in the colours of the table's own column, in one draw call a tile", async () => {
+  it("open in the colours of the table's own column, in one draw call a tile, in a panel for names of any length", async () => {
     await open();
     await stand.viewer.settled();
     const picture = await takePicture(stand.viewer.page);
@@ -83,11 +84,8 @@ describeInChromium("the objects of a label map", () => {
       .evaluateAll((found) => found.map((each) => (each as HTMLElement).dataset.section));
     expect(sections).toContain("objects");
     for (const id of ["volumes", "light", "slices"]) expect(sections).not.toContain(id);
-  });
 
-  it("have columns of any name: a long one makes the panel no wider", async () => {
-    await open();
-    await stand.viewer.settled();
+    // A column with a long name makes the panel no wider.
     const [wide, inside] = await control("color-by").evaluate((found) => {
       const select = found as HTMLSelectElement;
       select.options[1].text = "Intensity_MeanIntensityEdge_OrigNuclei_of_a_long_name";
@@ -136,7 +134,7 @@ describeInChromium("the objects of a label map", () => {
     expect(brightness(rowAt(1, 4, 1, 1))).toBeGreaterThan(brightness(rowAt(0, 0, 1, 1)) + 40);
   });
 
-  it("are left out by category and by range, and what is left is counted", async () => {
+  it("are left out by category and by range, counted, and draw in from their walls by the gap", async () => {
     await open();
     await stand.viewer.settled();
     const row = rowAt(0, 3, 1, 1); // 23, of category 2
@@ -158,6 +156,21 @@ describeInChromium("the objects of a label map", () => {
     await control("all").click();
     await stand.viewer.settled();
     expect(await shown()).toContain(`${COUNT} of ${COUNT}`);
+
+    // All of them draw in from their walls by the gap.
+    const drawn = async () =>
+      (await takePicture(stand.viewer.page)).count((pixel) => !isBackground(pixel));
+    const before = await drawn();
+    await control("gap").fill("20");
+    await stand.viewer.settled();
+    expect((await view()).gap_um).toBeCloseTo(2, 1); // half of its 40 steps, of half a ball's width
+    expect(await drawn()).toBeLessThan(0.75 * before);
+    const aside = rowAt(0, 0, 1, 1); // nothing lies to the left of it
+    const [x, y, z] = centerOf(aside);
+    await tap([x - 3.5, y, z]); // of a radius of 4 um, 3 are left
+    expect((await view()).picked).toBeNull();
+    await tap([x - 2.5, y, z]);
+    expect((await view()).picked).toBe(aside);
   });
 
   it("open their card by a tap, with all columns; a hidden one lets the tap through", async () => {
@@ -210,9 +223,10 @@ describeInChromium("the objects of a label map", () => {
   });
 
   it("open their card by a gaze that rests, which is no step to undo", async () => {
+    const { page } = stand.viewer;
+    await restBetweenFrames(page);
     await open();
     await stand.viewer.settled();
-    const { page } = stand.viewer;
     await page.locator('[data-action="split"]').dispatchEvent("click");
     await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
     // the specimen is moved until a ball is straight ahead: 10 um a step
@@ -276,24 +290,6 @@ describeInChromium("the objects of a label map", () => {
       const apart = Math.max(...cap[0].map((v, i) => Math.abs(v - cap[2][i])));
       expect(apart, "flat").toBeLessThan(12);
     }
-  });
-
-  it("draw in from their walls by the gap", async () => {
-    await open();
-    await stand.viewer.settled();
-    const drawn = async () =>
-      (await takePicture(stand.viewer.page)).count((pixel) => !isBackground(pixel));
-    const before = await drawn();
-    await control("gap").fill("20");
-    await stand.viewer.settled();
-    expect((await view()).gap_um).toBeCloseTo(2, 1); // half of its 40 steps, of half a ball's width
-    expect(await drawn()).toBeLessThan(0.75 * before);
-    const aside = rowAt(0, 0, 1, 1); // nothing lies to the left of it
-    const [x, y, z] = centerOf(aside);
-    await tap([x - 3.5, y, z]); // of a radius of 4 um, 3 are left
-    expect((await view()).picked).toBeNull();
-    await tap([x - 2.5, y, z]);
-    expect((await view()).picked).toBe(aside);
   });
 
   it("are selected by a lasso in the plot, saved as a file, and all of it is in the link", async () => {

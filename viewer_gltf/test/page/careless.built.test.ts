@@ -41,6 +41,17 @@ const WARM_ROUNDS = IS_EXHAUSTIVE ? 20 : 3;
 const LATE_OBJECTS = Math.max(2, Math.floor((ROUNDS - WARM_ROUNDS) / 10));
 /** Of the JavaScript heap: the steps that can be undone, and compiled code. */
 const HEAP_SLACK_BYTES = 3 * 1024 * 1024;
+const PATIENT = { timeout: 30_000, interval: 1000 };
+
+/** The figures that have grown by more than their bounds, each with both values. */
+function growth(before: Figures, after: Figures): readonly string[] {
+  const names = Object.keys(before) as (keyof Figures)[];
+  return names.flatMap((name) => {
+    const slack = name === "heap_bytes" ? HEAP_SLACK_BYTES : LATE_OBJECTS;
+    const isHeld = after[name] > before[name] + slack;
+    return isHeld ? [`${name}: ${before[name]} before, ${after[name]} after`] : [];
+  });
+}
 
 /** Words of notices about faults; a careless reader meets none. */
 const FAULT = /failed|expected|can't|damaged|broke|answered|dropped/;
@@ -186,7 +197,14 @@ describeInChromium("careless use", () => {
     const before = await figured.now();
     const shown = (await viewer.snapshot()).state;
     for (let i = WARM_ROUNDS; i < ROUNDS; i++) await round();
-    const after = await figured.now();
+    let after = await figured.now();
+    // On a busy machine the page lets go of some objects only a while after the last act.
+    await expect
+      .poll(async () => {
+        after = await figured.now();
+        return growth(before, after);
+      }, PATIENT)
+      .toEqual([]);
     process.stdout.write(
       `${ROUNDS} rounds: ${JSON.stringify(before)} to ${JSON.stringify(after)}\n`,
     );
@@ -197,13 +215,11 @@ describeInChromium("careless use", () => {
         { state, look: { position: [0, 0, 0], target: [0, 0, 0] } },
       ),
     ).toEqual([]);
-    const { heap_bytes, ...held } = after;
-    for (const [name, value] of Object.entries(held)) {
-      expect(value, name).toBeLessThanOrEqual(before[name as keyof Figures] + LATE_OBJECTS);
-    }
-    expect(heap_bytes).toBeLessThan(before.heap_bytes + HEAP_SLACK_BYTES);
-    await page.evaluate(() => addEventListener("leak", () => undefined));
-    expect((await figured.now()).listeners).toBe(after.listeners + 1); // one would be seen
+    // A leak of listeners would be seen, also where the page has let go of some others by now.
+    await page.evaluate(() => {
+      for (let i = 0; i < 200; i++) addEventListener("leak", () => undefined);
+    });
+    expect(growth(after, await figured.now())).toEqual([expect.stringMatching(/^listeners: /)]);
     expect(faults).toEqual([]);
   });
 });

@@ -36,6 +36,19 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
   const channels = () => kernel.ask<Record<string, Look>>("viewer.channels");
   const inPython = (expression: string) => expect.poll(() => kernel.ask(expression));
 
+  /** How many messages pass in a while, both ways. */
+  const heardIn = (duration_ms: number) => async () => {
+    const before = kernel.heard;
+    await new Promise((resolve) => setTimeout(resolve, duration_ms));
+    return kernel.heard - before;
+  };
+  /** Moves the eye, and waits until the page has moved it and both sides have told each other all of it. */
+  const moveTo = async (eye_um: string, target_um: string) => {
+    kernel.run(`viewer.view = {'eye_um': ${eye_um}, 'target_um': ${target_um}}`);
+    await inPython("'eye=' in viewer.link").toBe(true);
+    await expect.poll(heardIn(1000)).toBe(0);
+  };
+
   test("the page shows without a server, and both sides have its state", async () => {
     const front = await open();
     const frame = await front.viewer();
@@ -58,9 +71,8 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
       .toMatchObject({ shown: true, color: [0, 1, 0], opacity: 0.25 });
     await inPython(`viewer.channels["${second}"]["window"][0] > -1e9`).toBe(true);
 
-    kernel.run("viewer.view = {'eye_um': (30, 40, 50), 'target_um': (4, -4, 2)}");
+    await moveTo("(30, 40, 50)", "(4, -4, 2)");
     await inPython("viewer.view['eye_um']").toEqual([30, 40, 50]);
-    await inPython("'eye=' in viewer.link").toBe(true);
     const link = await kernel.ask<string>("viewer.link");
 
     // a link is the whole view
@@ -74,21 +86,16 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
 
     // at rest nobody says anything
     await inPython("len(viewer._picture) > 100").toBe(true);
-    const heardInAWhile = async () => {
-      const before = kernel.heard;
-      await new Promise((resolve) => setTimeout(resolve, 2000));
-      return kernel.heard - before;
-    };
-    await expect.poll(heardInAWhile).toBe(0);
+    await expect.poll(heardIn(2000)).toBe(0);
     await front.stop();
   });
 
-  test("what is tapped is told, and what Python picks is marked", async () => {
-    const front = await open();
+  test("in the frame of another host, as in Colab and VS Code, a tap is told and a pick is marked", async () => {
+    const front = await open({ isForeign: true });
     const frame = await front.viewer();
     // straight on to the large ball, of radius 9
-    kernel.run("viewer.view = {'eye_um': (48, -24, 70), 'target_um': (48, -24, 12)}");
-    await inPython("'eye=' in viewer.link").toBe(true);
+    await inPython("len(viewer.channels) > 0").toBe(true);
+    await moveTo("(48, -24, 70)", "(48, -24, 12)");
     const canvas = frame.locator(".stage canvas").first();
     const box = await canvas.boundingBox();
     if (box === null) throw new Error("no canvas");
@@ -117,8 +124,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
   test("a view that comes again is as it was left, and asks for no file twice", async () => {
     const front = await open();
     await front.viewer();
-    kernel.run("viewer.view = {'eye_um': (30, 40, 50), 'target_um': (4, -4, 2)}");
-    await inPython("'eye=' in viewer.link").toBe(true);
+    await moveTo("(30, 40, 50)", "(4, -4, 2)");
     const asked = () => kernel.told.filter((text) => text.includes('"ask":"')).length;
     await inPython("len(viewer._picture) > 100").toBe(true);
     const before = asked();
@@ -136,13 +142,6 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     // pictures may come, files not
     const files = kernel.told.slice(before).filter((text) => /"ask":"(file|page)"/.test(text));
     expect(new Set(files).size).toBe(files.length);
-    await front.stop();
-  });
-
-  test("it shows in the frame of another host, as in Colab and VS Code", async () => {
-    const front = await open({ isForeign: true });
-    await front.viewer();
-    await inPython("len(viewer.channels) > 0").toBe(true);
     await front.stop();
   });
 

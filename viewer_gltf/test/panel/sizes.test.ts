@@ -114,11 +114,12 @@ describeInChromium("sizes", () => {
   const page = () => stand.viewer.page;
 
   describe.each(SIZES)("at %i x %i", (width, height) => {
-    it("of all targets are at least 24 px, in the panel, over the picture and in dialogs", async () => {
+    it("of all targets are at least 24 px, also in dialogs, and lists leave room for their longest choice", async () => {
       await page().setViewportSize({ width, height });
       await stand.open("&mode=disc");
       expect(await page().evaluate(smallTargets, TARGET_PX)).toEqual([]);
       await openAllSections(stand.viewer);
+      expect(await page().evaluate(narrowLists)).toEqual([]);
       await page().keyboard.press("\\");
       await page().locator(".slices .enlarge").first().waitFor();
       await page().keyboard.press("l");
@@ -135,13 +136,6 @@ describeInChromium("sizes", () => {
         await page().keyboard.press("Escape");
         await page().locator(dialog).waitFor({ state: "hidden" });
       }
-    });
-
-    it("of lists leave room for their longest choice", async () => {
-      await page().setViewportSize({ width, height });
-      await stand.open("&mode=disc");
-      await openAllSections(stand.viewer);
-      expect(await page().evaluate(narrowLists)).toEqual([]);
     });
 
     it("of texts grow with the reader's font size, and no text is cut or covered", async () => {

@@ -2,6 +2,7 @@
 import { describe, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand, type Stand } from "../support/browser/stand";
+import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { prepareObjects } from "../support/object_bundle";
 import { hasPython } from "../support/python";
 
@@ -88,26 +89,31 @@ describe.each([
   describeInChromium("with sections open", () => {
     const stand = prepareStand({ viewport, isBlind: true, isFirstVisit: true });
 
-    it("stay while modes, slices and channels change, and the swatch of a hidden channel works", async () => {
-      const { page } = stand.viewer;
-      await page.addInitScript(watchRows);
-      await stand.open();
-      for (const section of SECTIONS) await stand.viewer.unfold(section);
-      await stand.viewer.openCard("F_x20_body");
-      await stand.viewer.settled();
-      await page.waitForTimeout(FIGURES_MS);
-      await movedIn(stand);
-      for (const key of ["m", "m", "m", "m", "m", "S", "S", "D", "D", "v", "v", "1", "\\", "\\"]) {
-        await page.keyboard.press(key);
+    // The rows are the same at both sizes, and the narrow panel is the one that has less room for them.
+    const isKept = IS_EXHAUSTIVE || width === 390;
+    it.runIf(isKept)(
+      "stay while modes, slices and channels change, and the swatch of a hidden channel works",
+      async () => {
+        const { page } = stand.viewer;
+        await page.addInitScript(watchRows);
+        await stand.open();
+        for (const section of SECTIONS) await stand.viewer.unfold(section);
+        await stand.viewer.openCard("F_x20_body");
+        await stand.viewer.settled();
         await page.waitForTimeout(FIGURES_MS);
-        expect(await movedIn(stand), key).toEqual([]);
-      }
-      const hidden = (await stand.viewer.snapshot()).state.channels[0];
-      expect(hidden.shown).toBe(false);
-      await stand.viewer.recolor(hidden.id, "#ff00ff");
-      expect((await stand.viewer.snapshot()).state.channels[0].color).toEqual([1, 0, 1]);
-      expect(await movedIn(stand)).toEqual([]);
-    });
+        await movedIn(stand);
+        for (const key of "mmmmmSSDDvv1\\\\") {
+          await page.keyboard.press(key);
+          await page.waitForTimeout(FIGURES_MS);
+          expect(await movedIn(stand), key).toEqual([]);
+        }
+        const hidden = (await stand.viewer.snapshot()).state.channels[0];
+        expect(hidden.shown).toBe(false);
+        await stand.viewer.recolor(hidden.id, "#ff00ff");
+        expect((await stand.viewer.snapshot()).state.channels[0].color).toEqual([1, 0, 1]);
+        expect(await movedIn(stand)).toEqual([]);
+      },
+    );
   });
 });
 

@@ -1,9 +1,8 @@
 /** The bundle of a label map that tests/support/object_bundle.py writes, and where its cells are. */
-import { mkdtempSync } from "node:fs";
-import { rm } from "node:fs/promises";
+import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { afterAll, beforeAll } from "vitest";
+import { beforeAll } from "vitest";
 import { askPython } from "./python";
 
 type Vec3 = readonly [number, number, number];
@@ -39,12 +38,29 @@ export function centerOf(row: number): Vec3 {
 export const rowAt = (tile: number, x: number, y: number, z: number) =>
   PER_TILE * tile + x + GRID[0] * (y + GRID[1] * z);
 
-/** Its folder, written before the tests of a `describe`; to be used inside it, before the stand. */
+type Written = Readonly<{ folder: string; write: () => Promise<unknown> }>;
+
+/** Bundles by their flags. All files of tests that one process runs share them, and no test changes them. */
+const bundles = new Map<string, Written>();
+
+/** The bundle's folder. It is written before the tests of a `describe`; to be used inside it, before the stand. */
 export function prepareObjects(...flags: readonly string[]): string {
-  const folder = mkdtempSync(join(tmpdir(), "stereocell-objects-"));
+  const key = flags.join(" ");
+  const { folder, write } = bundles.get(key) ?? writtenOnce(flags);
+  bundles.set(key, { folder, write });
   beforeAll(async () => {
-    await askPython("object_bundle", [folder, ...flags], "");
+    await write();
   });
-  afterAll(() => rm(folder, { recursive: true, force: true }));
   return folder;
+}
+
+function writtenOnce(flags: readonly string[]): Written {
+  const folder = mkdtempSync(join(tmpdir(), "stereocell-objects-"));
+  process.once("exit", () => rmSync(folder, { recursive: true, force: true }));
+  let writing: Promise<unknown> | undefined;
+  const write = () => {
+    writing ??= askPython("object_bundle", [folder, ...flags], "");
+    return writing;
+  };
+  return { folder, write };
 }

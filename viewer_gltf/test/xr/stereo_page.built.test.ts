@@ -1,7 +1,7 @@
 /** The whole page in stereo: what hands and gaze do to it, and how it ends. */
 import type { Page } from "playwright-core";
 import { expect, it } from "vitest";
-import { addHeadset } from "../support/browser/chromium";
+import { addHeadset, restBetweenFrames } from "../support/browser/chromium";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { isBackground, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -13,6 +13,8 @@ type Headset = import("iwer").XRDevice;
 /** To the floor, or straight ahead. */
 const DOWN = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2] as const;
 const AHEAD = [0, 0, 0, 1] as const;
+/** Time, ms, after which a press is no second one of a double press, which does nothing. */
+const PRESS_APART_MS = 500;
 
 /** Both controllers of the page's headset, beside the head. */
 function pointHands(page: Page, turn: readonly [number, number, number, number]): Promise<void> {
@@ -95,6 +97,14 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(gazed).toBe(tile);
   });
 
+  /** Wait until so many frames have begun and ended. A busy machine takes longer for one than a press lasts. */
+  async function drawFrames(count: number): Promise<void> {
+    const { page } = stand.viewer;
+    const before = await page.evaluate(() => window.stereocell?.frames ?? 0);
+    const least = before + count;
+    await page.waitForFunction((n) => (window.stereocell?.frames ?? 0) > n, least);
+  }
+
   it("selects by the trigger, and isolates by the next", async () => {
     await open("&mode=off", true);
     const press = async () => {
@@ -103,12 +113,13 @@ describeInChromium("the page in stereo", () => {
           const { headset } = window as unknown as { headset: Headset };
           headset.controllers.right?.updateButtonValue("trigger", each);
         }, value);
-        await stand.viewer.page.waitForTimeout(300);
+        await drawFrames(2);
       }
     };
     await press();
     await expect.poll(async () => (await state()).selected).not.toBeNull();
     expect(await undo().isDisabled()).toBe(false);
+    await stand.viewer.page.waitForTimeout(PRESS_APART_MS);
     await press();
     await expect.poll(async () => (await state()).isolated).not.toBeNull();
   });
@@ -144,6 +155,7 @@ describeInChromium("the page in stereo", () => {
       };
       Object.assign(DeviceOrientationEvent, { requestPermission });
     }, answer);
+    await restBetweenFrames(stand.viewer.page);
     await stand.open("&mode=off");
     await stand.viewer.unfold("stereo");
   }
@@ -189,6 +201,7 @@ describeInChromium("the page in stereo", () => {
   });
 
   it("splits the screen without WebXR, and goes back by Escape", async () => {
+    await restBetweenFrames(stand.viewer.page);
     await addClock(stand.viewer.page);
     await stand.viewer.page.addInitScript(() =>
       Object.defineProperty(Navigator.prototype, "wakeLock", { value: undefined }),
@@ -235,6 +248,7 @@ describeInChromium("the page in stereo", () => {
 
   it("says how to go about for 5 s, however few frames these are", async () => {
     const { page } = stand.viewer;
+    await restBetweenFrames(page);
     await addClock(page);
     await page.addInitScript(() => localStorage.removeItem("stereocell-told"));
     await stand.open("&mode=off");

@@ -1,6 +1,7 @@
 """A series that holds several kinds of frames falls apart into one volume for each kind."""
 
 from collections.abc import Callable, Iterable
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from stereocell.model.errors import SourceError, UsageError
 from support.dicom_kinds import AFFINE, SHAPE, added, image_type, private, write_kind
 from support.dicom_reading import whole
 from support.dicom_series import Change, grid, setting, write_enhanced, write_series
+from support.exhaustive import sweep
 
 PARTS: dict[str, tuple[Change, Change]] = {
     "Siemens": (image_type("P", "ND"), image_type("M", "ND")),
@@ -42,7 +44,7 @@ def test_magnitude_is_built_and_phase_is_a_series_of_its_own(tmp_path: Path, mak
     assert "MR, magnitude, axial, 10 x 12 x 14" in first
     assert "MR, phase, axial, 10 x 12 x 14" in second
     dataset = read.open(tmp_path)
-    assert (dataset.time_points, added(tmp_path), added(tmp_path, 2)) == (1, 300, 100)
+    assert (dataset.time_points, whole(dataset).min(), added(tmp_path, 2)) == (1, 300, 100)
     note = "10 images of the same series (phase), because they are of another kind; --series 2"
     assert any(note in one for one in dataset.notes)
 
@@ -69,30 +71,33 @@ def test_a_phase_series_of_its_own_follows_a_smaller_magnitude_series(tmp_path: 
     assert "magnitude, axial, 6 x" in read.list_series(tmp_path)[0]
 
 
+ROLES = {
+    ("AXIAL", "MIP"): "maximum intensity projection",
+    ("AXIAL", "CT_SOM5 MIP"): "maximum intensity projection",
+    ("MIN_IP",): "minimum intensity projection",
+    ("PROJECTION IMAGE",): "projection",
+    ("MPR",): "reformatted",
+    ("REFORMATTED", "AVERAGE"): "reformatted",
+    ("ADC",): "parametric map",
+    ("SCREEN SAVE",): "screen save",
+}
+FEW, ALL = (0.5, 3.5, 6.5), range(10)
+
+
 @pytest.mark.parametrize(
-    ("words", "role"),
-    [
-        (("AXIAL", "MIP"), "maximum intensity projection"),
-        (("AXIAL", "CT_SOM5 MIP"), "maximum intensity projection"),
-        (("MIN_IP",), "minimum intensity projection"),
-        (("PROJECTION IMAGE",), "projection"),
-        (("MPR",), "reformatted"),
-        (("REFORMATTED", "AVERAGE"), "reformatted"),
-        (("ADC",), "parametric map"),
-        (("SCREEN SAVE",), "screen save"),
-    ],
+    ("words", "indices"),
+    sweep(product(ROLES, (FEW, ALL)), kept=[*product(ROLES, [FEW]), (("ADC",), ALL)]),
 )
-@pytest.mark.parametrize("indices", [[0.5, 3.5, 6.5], range(10)])
 def test_derived_images_are_no_slices_of_the_originals(
-    tmp_path: Path, words: tuple[str, ...], role: str, indices: Iterable[float]
+    tmp_path: Path, words: tuple[str, ...], indices: Iterable[float]
 ) -> None:
     write_kind(tmp_path, 100, setting(ImageType=["ORIGINAL", "PRIMARY", "AXIAL"]))
     derived = setting(ImageType=["DERIVED", "SECONDARY", *words])
     write_kind(tmp_path, 900, derived, indices=indices, first_number=50)
     dataset = read.open(tmp_path)
     assert dataset.levels[0].shape == (12, 10, 14)
-    assert added(tmp_path) == 100
-    assert any(f"({role}), because" in note for note in dataset.notes)
+    assert whole(dataset).min() == 100
+    assert any(f"({ROLES[words]}), because" in note for note in dataset.notes)
     assert not any("uneven" in note for note in dataset.notes)
 
 
@@ -138,8 +143,13 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", PROPERTIES)
-@pytest.mark.parametrize("shift", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("name", "shift"),
+    sweep(
+        product(PROPERTIES, (0.0, 0.5)),
+        kept=[*product(PROPERTIES, [0.0]), ("kernel", 0.5), ("echo time", 0.5)],
+    ),
+)
 def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     tmp_path: Path, name: str, shift: float
 ) -> None:
@@ -152,10 +162,11 @@ def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
     assert len(lines) == 2
     assert sum(words in line for line in lines) == 1
     number = 1 + next(i for i, line in enumerate(lines) if words in line)
-    assert added(tmp_path, number) == 300
-    assert added(tmp_path, 3 - number) == 100
-    assert read.open(tmp_path).levels[0].spacing_um[1] == pytest.approx(3000)
-    assert "Jane" not in "".join((*lines, *read.open(tmp_path).notes))
+    first_shown = read.open(tmp_path, series=1)
+    shown = [float(whole(one).min()) for one in (first_shown, read.open(tmp_path, series=2))]
+    assert shown == ([300, 100] if number == 1 else [100, 300])
+    assert first_shown.levels[0].spacing_um[1] == pytest.approx(3000)
+    assert "Jane" not in "".join((*lines, *first_shown.notes))
 
 
 @pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])
@@ -211,8 +222,13 @@ PHASES: dict[str, Callable[[int], Change]] = {
 }
 
 
-@pytest.mark.parametrize("name", PHASES)
-@pytest.mark.parametrize("rest", [range(8), range(3, 10)])
+@pytest.mark.parametrize(
+    ("name", "rest"),
+    sweep(
+        product(PHASES, (range(8), range(3, 10))),
+        kept=[*product(PHASES, [range(8)]), ("TriggerTime", range(3, 10))],
+    ),
+)
 def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
     tmp_path: Path, name: str, rest: range
 ) -> None:
@@ -221,7 +237,7 @@ def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
                    first_number=1 + 10 * time)  # fmt: skip
     dataset = read.open(tmp_path)
     assert dataset.time_points == 2
-    assert [added(tmp_path, time=time) for time in (0, 1)] == [100, 200]
+    assert [whole(dataset).min(), added(tmp_path, time=1)] == [100, 200]
     note = f"1 of 3 points in time ({name}), because slices are missing ({len(rest)} of 10 are"
     assert any(note in one for one in dataset.notes)
     assert "incomplete point in time 3" in read.list_series(tmp_path)[1]

@@ -1,5 +1,6 @@
 """A source without plain images says so: phases, projections and the like alone are no anatomy."""
 
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from stereocell import read
 from support.dicom_kinds import AFFINE, SHAPE, image_type, write_kind
 from support.dicom_series import Change, setting, write_series
+from support.exhaustive import sweep
 
 
 def derived(*words: str) -> Change:
@@ -49,8 +51,17 @@ ALONE: dict[str, tuple[str, Change, Change, str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ALONE)
-@pytest.mark.parametrize("beside", ["alone", "same series", "other series"])
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    sweep(
+        product(ALONE, ("alone", "same series", "other series")),
+        kept=[
+            *product(ALONE, ["alone"]),
+            *product(("phase", "projection", "uncorrected"), ["same series"]),
+            *product(("opposed phase", "localizer"), ["other series"]),
+        ],
+    ),
+)
 def test_a_kind_is_noted_where_the_images_that_it_belongs_to_are_absent(
     tmp_path: Path, name: str, beside: str
 ) -> None:

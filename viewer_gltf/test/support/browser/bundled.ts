@@ -1,7 +1,18 @@
 /** A module of the tests with all that it imports, as one classic script for a page. */
 import { build } from "vite";
 
-export async function bundled(entry: URL): Promise<string> {
+/** Scripts by their entry: several files of tests share a harness, and each build takes seconds. */
+const scripts = new Map<string, Promise<string>>();
+
+export function bundled(entry: URL): Promise<string> {
+  const known = scripts.get(entry.href);
+  if (known !== undefined) return known;
+  const script = bundle(entry);
+  scripts.set(entry.href, script);
+  return script;
+}
+
+async function bundle(entry: URL): Promise<string> {
   const built = await build({
     configFile: false,
     logLevel: "error",

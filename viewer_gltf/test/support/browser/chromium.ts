@@ -175,8 +175,8 @@ export async function addHeadset(page: Page, needsFrames = false): Promise<void>
 /** Time between frames, to that of a frame. */
 const REST = 3;
 
-/** Leave most of the time to what goes on beside. */
-async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
+/** Leave most of the time to what goes on beside. It must be called before the page opens. */
+export async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
   await pages.addInitScript((rest) => {
     const next = window.requestAnimationFrame.bind(window);
     const cancelled = new Set<number>();
