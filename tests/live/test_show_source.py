@@ -59,7 +59,7 @@ def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
     build, bundle, planes = (tmp_path / name for name in ("out", "sent", "planes"))
     build.mkdir()
-    (build / "plan.json").write_text("{}")
+    (build / "plan.json").write_text('{"format": "stereocell-plan"}')
     bundle.mkdir()
     for name in ("manifest.json", "files.json"):
         (bundle / name).write_text("{}")

@@ -31,8 +31,8 @@ GIVEN: dict[str, tuple[Callable[[Path, Path], list[object]], set[str]]] = {
     "export": (lambda given, new: ["export", given, f"{new}.usda"], {"a build"}),
     "publish": (lambda given, new: ["publish", given, new], BUNDLES),
     "check": (lambda given, _: ["check", given], BUNDLES | {"exported .html"}),
-    "view": (lambda given, _: ["view", given, "--no-browser", "--port", "0"], BUNDLES),
-    "serve": (lambda given, _: ["serve", given, "--port", "0"], BUNDLES),
+    "view": (lambda given, _: ["view", given, "--no-browser", "--port", "0"], BUNDLES | VOLUMES),
+    "serve": (lambda given, _: ["serve", given, "--port", "0"], BUNDLES | VOLUMES),
 }
 NOT_GIVEN = {"sample", "doctor", "settings"}  # they read nothing
 
