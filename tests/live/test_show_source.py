@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from stereocell.cli.__main__ import main
 from stereocell.live.show_source import is_source
 from support.phantoms import f_phantom, write_ome_tiff
 
@@ -76,3 +77,16 @@ def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
     assert not is_source(tmp_path / "missing")
     assert not is_source("s3://bucket/out")
     assert not is_source(Path(tempfile.mkdtemp(dir=tmp_path)))
+
+
+def test_flags_of_a_source_are_refused_for_a_build(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "plan.json").write_text('{"format": "stereocell-plan"}')
+    for command in ("view", "serve"):
+        assert main([command, str(tmp_path), "--channels", "CD31"]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line == (
+            f"stereocell: --channels says how a source is read, and {tmp_path} is a build: "
+            "leave it out, or name the source"
+        )

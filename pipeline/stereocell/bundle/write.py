@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from stereocell.bundle.copy_viewer import copy_viewer
 from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.gather_table import gather_table
 from stereocell.bundle.manifest import FILES, MANIFEST, require_bundle
@@ -175,16 +176,3 @@ def _fill(
         for channel in tile.channels:
             if channel.edit:
                 report_line(f"{tile.id}/{channel.channel_id}: {channel.edit}")
-
-
-def copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
-    """Copy the built viewer; return its files. Raises OutputError on a clash of names."""
-    refs = []
-    for source in sorted(viewer_dist.rglob("*")):
-        if not source.is_file():
-            continue
-        path = source.relative_to(viewer_dist).as_posix()
-        if path in (MANIFEST, FILES) or (root / path).exists():
-            raise OutputError(f"{source}: the bundle has a {path} of its own")
-        refs.append(write_file(root, path, source.read_bytes()))
-    return refs

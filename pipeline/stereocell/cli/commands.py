@@ -15,8 +15,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stereocell.cli.flags import flags_of, numbers
-from stereocell.model.errors import shortened
+from stereocell.cli.flags import flags_of, given_flags, numbers
+from stereocell.model.errors import UsageError, shortened
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
@@ -182,7 +182,6 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
 def _workers_of(options: argparse.Namespace) -> "tuple[Path, Engine]":
     """Return OUT as the workers reach it, and the workers. Raises UsageError."""
     from stereocell.engine.run import Engine
-    from stereocell.model.errors import UsageError
     from stereocell.storage.claim import LOCK
 
     scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
@@ -276,8 +275,7 @@ def sample(options: argparse.Namespace) -> Answer:
     if options.name == "cycif":
         columns, _, rows = options.grid.partition("x")
         if not (columns.isdecimal() and rows.isdecimal() and int(columns) and int(rows)):
-            from stereocell.model.errors import UsageError
-
+        
             raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
         z, y, x = numbers(options.tile_size, int, "--tile-size")
         samples.write_cycif(
@@ -431,10 +429,20 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
         if options.is_source:
             _show_source(options, run)
         else:
+            _require_no_source_flags(options)
             run(options.out)
     except BrokenPipeError as error:  # the reader of the address has gone
         raise StdoutLost(error) from error
     return Answer()
+
+
+def _require_no_source_flags(options: argparse.Namespace) -> None:
+    """Raise UsageError for flags that say how a source is read, where a build is shown."""
+    if given := given_flags(options):
+        raise UsageError(
+            f"{given[0]} says how a source is read, and {options.shown} is a build: leave it out, "
+            "or name the source"
+        )
 
 
 def _show_source(options: argparse.Namespace, run: Callable[[Path], None]) -> None:

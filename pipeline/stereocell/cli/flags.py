@@ -88,10 +88,13 @@ def as_typed(options: argparse.Namespace, line: str) -> str:
         return line
     from stereocell.planning.setting_names import in_flags
 
-    flags = (flag.name for flag, _, _ in _settings())
-    return in_flags(
-        line, [name for name in flags if getattr(options, _attribute(name)) is not None]
-    )
+    return in_flags(line, given_flags(options))
+
+
+def given_flags(options: argparse.Namespace) -> list[str]:
+    """Return the flags, among those that say how a source is read and built, that were given."""
+    names = ["--preset", "--config", *(flag.name for flag, _, _ in _settings())]
+    return [name for name in names if getattr(options, _attribute(name)) is not None]
 
 
 def _attribute(flag: str) -> str:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.bundle.copy_viewer import copy_viewer
 from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
-from stereocell.bundle.write import copy_viewer
 from stereocell.bundle.write_volume import write_volume
 from stereocell.live.coarse_channel import CoarseChannel, read_coarse
 from stereocell.live.first_appearance import first_appearance

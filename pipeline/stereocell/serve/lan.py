@@ -13,8 +13,6 @@ import ssl
 from collections.abc import Sequence
 
 import idna
-import segno
-import trustme
 
 from stereocell.model.errors import StereoCellError
 
@@ -62,6 +60,8 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     trustme passes the key to OpenSSL in a file of the temporary folder, which it removes at once.
     """
     names = [name for name in names if _can_be_certified(name)]
+    import trustme  # only here: most servers serve this machine alone, and the import is slow
+
     leaf = trustme.CA(organization_name="StereoCell", organization_unit_name="this run").issue_cert(
         *names, organization_name="StereoCell", organization_unit_name="this run"
     )
@@ -76,6 +76,8 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
 def draw_qr(address: str, *, encoding: str = "utf-8") -> str:
     """Return a QR code for a terminal, of half blocks; where its encoding lacks them, of spaces
     with escape codes for the background."""
+    import segno
+
     code = segno.make(address, error="l", micro=False)
     text = io.StringIO()
     code.terminal(text, border=2, compact=True)
