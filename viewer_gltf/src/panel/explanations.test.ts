@@ -32,9 +32,12 @@ function functionsOfPipeline(): readonly string[] {
   );
   return sources.flatMap((name) => {
     const text = readFileSync(new URL(name, folder), "utf8");
-    const names = [...text.matchAll(/^(?:NAMES?|THRESHOLD) = (.+)$/gm)].map(([, value]) => value);
+    const names = [...text.matchAll(/^(?:NAME|SOFT|THRESHOLD) = (.+)$/gm)].map(
+      ([, value]) => value,
+    );
+    const plain = /^ {4}functions = \{\n([^}]*)^ {4}\}/m.exec(text)?.[1] ?? "";
     const tissues = /^TISSUES[^{]*\{([^}]*)\}/m.exec(text)?.[1] ?? "";
-    const keys = [...tissues.matchAll(/"(\w+)":/g)].map(([, key]) => key);
+    const keys = [...`${plain}${tissues}`.matchAll(/"(\w+)":/g)].map(([, key]) => key);
     return [
       ...names.flatMap((value) => [...value.matchAll(/"(\w+)"/g)].map(([, each]) => each)),
       ...keys,
