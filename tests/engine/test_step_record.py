@@ -51,6 +51,7 @@ def reaches() -> dict[str, set[Path]]:
         ("formats/exr.py", {"WriteStageTile", "WriteStage", "WriteBundle"}, TILES),
         ("formats/gltf.py", {"WriteBundle"}, TILES),
         ("objects/extents.py", OBJECTS, TILES),
+        ("storage/open_hdf5.py", {"hdf5", "ims", "bdv"}, TILES | {"tiff"}),
     ],
 )
 def test_a_step_reaches_the_modules_that_can_change_its_result(

@@ -11,7 +11,7 @@ from stereocell.bundle.tile_part import BundleTile, FileRef
 from stereocell.formats.tiles3d import TILESET, TileLod, make_tilesets
 from stereocell.model.channel import TransferFunctions2d
 from stereocell.storage.assets import schema_path
-from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.composed_appearance import ComposedAppearance
 
 COLUMNS, ROWS, CHANNELS, LODS = 22, 11, 70, 4
 EDGE_UM = np.array([512, 512, 194]) * [0.14, 0.14, 0.28]  # x, y, z of a tile

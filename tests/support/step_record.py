@@ -55,6 +55,8 @@ NEUTRAL = (
     "read.file_kind",
     "read.remarks",
 )
+# modules of neutral packages that read values
+COUNTED = ("stereocell.storage.open_hdf5",)
 # import name of a library -> those of the libraries that it loads by itself; `*`: any ending
 BEHIND = {
     "bioio": ("bioio_*",),
@@ -167,7 +169,8 @@ def reach(module: str, left_out: Iterable[str] = NEUTRAL) -> tuple[list[Path], l
             continue
         file = _modules().get(name)  # None for the name of something inside a module
         parts = (f"{PACKAGE.name}.{part}" for part in left_out)
-        if file is None or any(f"{name}.".startswith(f"{part}.") for part in parts):
+        is_neutral = any(f"{name}.".startswith(f"{part}.") for part in parts)
+        if file is None or (is_neutral and name not in COUNTED):
             continue
         assets, imports = _needs(file)
         files |= {file, *assets}

@@ -15,7 +15,7 @@ from stereocell.model.version import GENERATOR
 from stereocell.storage.file_list import to_json
 from stereocell.storage.json_files import compact_json, sealed
 from stereocell.transfer.opacity import evaluate
-from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.composed_appearance import ComposedAppearance
 
 
 def describe_bundle(

@@ -14,11 +14,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import OutputError
+from stereocell.model.tile_content import Representation
+from stereocell.model.world_box import WorldPoint
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.file_list import sizes_of
 from stereocell.storage.json_files import read_json, write_json
-from stereocell.usd.read_attributes import Point
-from stereocell.usd.read_variants import Representation
 
 _RECORD = "tile.json"
 
@@ -87,8 +87,8 @@ class BundleTile:
 
     id: str
     representation: Representation
-    low: Point
-    high: Point
+    low: WorldPoint
+    high: WorldPoint
     channels: tuple[TileChannel, ...]
 
 

@@ -13,7 +13,7 @@ from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import VdbValues
 from stereocell.model.errors import StageError
 from stereocell.transfer.joint_histogram import to_eight_bits
-from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.read_volume import ComposedVolume
 from stereocell.usd.written_files import AsWritten
 

@@ -33,9 +33,9 @@ from stereocell.formats.gltf_features import Features
 from stereocell.formats.tiles3d import TileLod
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
+from stereocell.model.world_box import move_box
 from stereocell.storage.atomic_write import replacing_folder
-from stereocell.usd.layer import move_box
-from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.read_attributes import Point
 from stereocell.usd.read_levels import ComposedLod, mesh_at
 from stereocell.usd.read_objects import read_columns, read_tile_objects

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.formats.ktx2 import encode_2d
+from stereocell.model.world_box import WorldPoint
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
-from stereocell.usd.read_appearances import ComposedAppearance
-from stereocell.usd.read_attributes import Point
+from stereocell.usd.composed_appearance import ComposedAppearance
 
 COUNTED_VOXELS = 4_000_000  # voxels of a tile; a larger tile is counted in part
 _STORED = np.dtype("<u4")
@@ -36,9 +36,9 @@ class PlacedVolume(Protocol):
     @property
     def apron(self) -> int: ...
     @property
-    def low(self) -> Point: ...
+    def low(self) -> WorldPoint: ...
     @property
-    def high(self) -> Point: ...
+    def high(self) -> WorldPoint: ...
     @property
     def matrix(self) -> NDArray[np.float64]: ...
 

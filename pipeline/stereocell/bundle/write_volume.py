@@ -13,7 +13,7 @@ from stereocell.bundle.write_transfer2d import PlacedVolume, count_tile
 from stereocell.filters.min_max_bricks import min_max_bricks, mip_levels
 from stereocell.formats.ktx2 import encode_3d
 from stereocell.storage.file_list import measure
-from stereocell.usd.read_appearances import ComposedAppearance
+from stereocell.usd.composed_appearance import ComposedAppearance
 
 
 def write_volume(

@@ -20,9 +20,10 @@ from stereocell.formats.gltf import Material
 from stereocell.meshes.clip import clip_mesh
 from stereocell.model.errors import StageError, UsageError
 from stereocell.model.mesh import Mesh
-from stereocell.usd.layer import move_box
+from stereocell.model.world_box import move_box
+from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer_units import note_missing
-from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_levels import count_faces, mesh_at
 from stereocell.usd.read_objects import TileObjects, read_columns, read_tile_objects
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, tile_prims

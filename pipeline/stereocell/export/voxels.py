@@ -20,8 +20,8 @@ from stereocell.export.options import UNITS_M, Region
 from stereocell.formats.exr import read_atlas
 from stereocell.formats.voxel_grid import VoxelGrid
 from stereocell.model.errors import StageError, UsageError
+from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer import METERS_PER_UNIT
-from stereocell.usd.read_appearances import ComposedAppearance
 from stereocell.usd.read_stage import sides_of
 from stereocell.usd.read_volume import ComposedVolume
 

@@ -18,19 +18,17 @@ from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_
 from stereocell.bundle.write_volume import write_volume
 from stereocell.live.coarse_channel import CoarseChannel, read_coarse
 from stereocell.live.first_appearance import first_appearance
-from stereocell.model.channel import Appearance
+from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
 from stereocell.model.errors import SourceError
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Tile
+from stereocell.model.world_box import WorldPoint, move_box, world_box
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
 from stereocell.transfer.joint_histogram import to_eight_bits
-from stereocell.usd.layer import move_box, world_box
-from stereocell.usd.read_appearances import ComposedAppearance, StatedLevel
-from stereocell.usd.read_attributes import Point
-from stereocell.usd.write_appearances import DEFAULT_FUNCTION
-from stereocell.usd.write_stage import PATIENT_SIDES, opening_plane
+from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
+from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
 # Voxels of all channels that a first view has at most: 1 MB or so, compressed
 VOXELS = 4_000_000
@@ -42,8 +40,8 @@ class _CoarseVolume:
     """The place of a tile's coarse volume; see usd.read_volume.ComposedVolume."""
 
     size: tuple[int, int, int]
-    low: Point
-    high: Point
+    low: WorldPoint
+    high: WorldPoint
     matrix: NDArray[np.float64]
     apron: int = APRON
     measured: Path | None = None
@@ -159,6 +157,6 @@ def _places(first: int, last: int, step: float) -> NDArray[np.float64]:
     return np.asarray(first + apart * np.arange(-APRON, count + APRON), np.float64)
 
 
-def _point(values: NDArray[np.float64]) -> Point:
+def _point(values: NDArray[np.float64]) -> WorldPoint:
     x, y, z = (float(n) for n in values)
     return x, y, z

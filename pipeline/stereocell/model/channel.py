@@ -11,6 +11,7 @@ from stereocell.model.lattice_field import LatticeField
 
 SurfaceConfidence = Literal["clear", "unsure", "none"]
 LOW_CONFIDENCE = 0.6  # 0..1; half of the surfaces below were right (docs/decisions/levels.md)
+DEFAULT_FUNCTION = "default"  # the transfer function of a stage that selects none
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from stereocell.model.spacing import Point, Spacing
 
 APRON = 1  # voxels added around a volume on every side; trilinear filtering reads them
 Provenance = dict[str, Any]
+Representation = Literal["mesh", "volume", "both"]  # what is drawn of a tile
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.model.channel import Appearance
+from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
 from stereocell.model.counted import counted
 from stereocell.model.errors import UsageError
 from stereocell.model.identifiers import to_identifier
@@ -27,8 +27,7 @@ from stereocell.planning.stopped_levels import told_of_stopped
 from stereocell.read.tables import Table, read_table
 from stereocell.read.tables.table import TableColumn, listed
 from stereocell.steps.labels import Labels
-from stereocell.usd.write_appearances import DEFAULT_FUNCTION
-from stereocell.usd.write_objects import RESERVED
+from stereocell.usd.primvar_names import RESERVED
 
 _ENDS_IN_NUMBER = re.compile(r"_\d+$")  # an ID of which the second column of a name may be
 NAMES = "name"  # the column of the names that a label map's own file gives

@@ -9,11 +9,10 @@ import hashlib
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pxr import Gf, Plug, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
 from stereocell.model.errors import OutputError
-from stereocell.model.volume import zyx_to_xyz
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing
 
@@ -113,30 +112,6 @@ def hash_shape(mesh: UsdGeom.Mesh) -> str:
 def vec3f(points: ArrayLike) -> Vt.Vec3fArray:
     """Return (n, 3) numbers of any dtype as USD's array of float32."""
     return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points, dtype=np.float32))
-
-
-def world_box(
-    first_um: ArrayLike, last_um: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lower and upper corner (x, y, z), world um, of the box between two points.
-
-    first_um, last_um  (z, y, x), um
-    """
-    corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # adding 0.0 turns -0.0 into 0.0
-    return corners.min(axis=0), corners.max(axis=0)
-
-
-def move_box(
-    low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the axis-aligned box around a moved box: lower and upper corner (x, y, z), world um.
-
-    low, high  corners (x, y, z), um
-    matrix     (4, 4) for row vectors
-    """
-    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
-    corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
-    return corners.min(axis=0), corners.max(axis=0)
 
 
 def vec3d(point: ArrayLike) -> Gf.Vec3d:

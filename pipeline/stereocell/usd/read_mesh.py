@@ -14,10 +14,10 @@ from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
+from stereocell.usd.primvar_names import PAINT
 from stereocell.usd.read_attributes import require_still
 from stereocell.usd.read_objects import objects_of
 from stereocell.usd.typed_values import read_as, require_type
-from stereocell.usd.write_objects import PAINT
 
 # Most corners of a face. All its triangles meet at one corner, so the time to look for crossings
 # among them grows with the square of the number. Measured with `bundle` on 2 cores of an Intel Xeon

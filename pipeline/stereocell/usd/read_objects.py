@@ -11,6 +11,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, SharedWalls
 from stereocell.usd.layer import CHANNELS, PAINTED_BY
+from stereocell.usd.primvar_names import OBJECT_ID
 from stereocell.usd.typed_values import read_as, require_type, text_of
 from stereocell.usd.write_objects import (
     COLUMN,
@@ -19,7 +20,6 @@ from stereocell.usd.write_objects import (
     HIDDEN,
     LABELS,
     NAMES,
-    OBJECT_ID,
     TOUCHING,
     WALL_UM2,
 )

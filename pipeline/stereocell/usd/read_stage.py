@@ -13,17 +13,10 @@ from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.model.errors import StageError
+from stereocell.model.world_box import move_box
 from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
-from stereocell.usd.layer import (
-    CHANNELS,
-    OPENING_CUT,
-    PATIENT_API,
-    ROOT,
-    SIDES,
-    TILES,
-    move_box,
-)
+from stereocell.usd.layer import CHANNELS, OPENING_CUT, PATIENT_API, ROOT, SIDES, TILES
 from stereocell.usd.layer_units import require_units
 from stereocell.usd.read_attributes import (
     Point,

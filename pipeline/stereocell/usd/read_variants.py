@@ -2,14 +2,13 @@
 
 import re
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from pxr import Usd, UsdGeom, UsdVol
 
 from stereocell.model.errors import StageError
+from stereocell.model.tile_content import Representation
 from stereocell.usd.write_tile import DEFAULT_LOD
-
-Representation = Literal["mesh", "volume", "both"]
 
 _LOD = re.compile(r"lod(\d+)")
 

@@ -42,7 +42,6 @@ from stereocell.usd.layer import (
 from stereocell.usd.numbers2d import write_numbers
 from stereocell.usd.write_objects import write_columns
 
-DEFAULT_FUNCTION = "default"  # what a stage that selects no function is drawn with
 _STORM = "glslfx"  # Storm's name among the render contexts of materials
 ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 

@@ -18,9 +18,8 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, ObjectTable, SharedWalls
 from stereocell.objects.table import color_objects
 from stereocell.usd.layer import CLASSES, set_attribute
+from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 
-OBJECT_ID = "objectId"  # primvar: the place of a face's object in LABELS
-PAINT = "paint"  # primvar: intensity of the sampled channel at each vertex, 0..1
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
 NAMES = "stereocell:objectNames"  # on a tile's mesh, too
 TOUCHING = "stereocell:objectWalls"  # there, too: pairs of labels that share a wall
@@ -28,20 +27,6 @@ WALL_UM2 = "stereocell:objectWallAreas"  # and the area of each of these walls, 
 HIDDEN = "stereocell:hiddenObjects"  # on a channel's prim, by an edit: labels that are left out
 COLUMNS, DEFAULT = "stereocell:columns", "stereocell:defaultColumn"
 COLUMN = "stereocell:column:"
-# names of primvars that mean something else on a mesh, to us or to DCC tools
-RESERVED = frozenset(
-    (
-        OBJECT_ID,
-        PAINT,
-        "displayColor",
-        "displayOpacity",
-        "normals",
-        "occlusion",
-        "st",
-        "tangents",
-        "points",
-    )
-)
 MAX_CLASSES = 32  # categories that are GeomSubsets: each is a prim in each level of each tile
 _FAMILY = UsdShade.Tokens.materialBind
 

@@ -27,6 +27,7 @@ from stereocell.model.object_table import ObjectTable
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tile_content import Provenance, TileContent
+from stereocell.model.world_box import move_box, world_box
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.workspace import cached
@@ -41,12 +42,11 @@ from stereocell.usd.layer import (
     TILES,
     export,
     is_layer,
-    move_box,
     new_stage,
     set_attribute,
     vec3f,
-    world_box,
 )
+from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 from stereocell.usd.write_appearances import write_appearances
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import STAGE_NAME
@@ -55,14 +55,6 @@ __all__ = ["LAYER_SUFFIXES", "TileExtent", "is_layer", "write_stage", "write_til
 
 _NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
 Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
-
-
-# The sides of a patient in the world of a stage: unit vectors (x, y, z)
-PATIENT_SIDES = {
-    "left": (1.0, 0.0, 0.0),
-    "posterior": (0.0, 0.0, -1.0),
-    "superior": (0.0, 1.0, 0.0),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,14 +162,6 @@ def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:
     """
     normal, offset = opening_plane(boxes)
     set_attribute(root, OPENING_CUT, Sdf.ValueTypeNames.Double4, Gf.Vec4d(*normal, offset))
-
-
-def opening_plane(boxes: NDArray[np.float64]) -> tuple[Point, float]:
-    """Return the plane that a specimen opens cut by: its normal, and its offset in um.
-
-    boxes  (tiles, 2, 3), lower and upper corners (x, y, z), um, world
-    """
-    return (1.0, 0.0, 0.0), float(boxes[:, 0, 0].min() + boxes[:, 1, 0].max()) / 2
 
 
 def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:

@@ -30,6 +30,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.identifiers import from_identifier
 from stereocell.model.mesh import Lod
 from stereocell.model.tile_content import APRON, ChannelContent, TileContent
+from stereocell.model.world_box import world_box
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.file_list import FileList, measure
 from stereocell.usd.layer import (
@@ -45,7 +46,6 @@ from stereocell.usd.layer import (
     set_attribute,
     vec3d,
     vec3f,
-    world_box,
 )
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_primvar, feed_vertices
 from stereocell.usd.write_objects import define_objects, write_objects

@@ -15,7 +15,8 @@ from stereocell.bundle.manifest import read_manifest
 from stereocell.bundle.write_transfer2d import sum_tiles
 from stereocell.transfer.joint_histogram import log_scaled
 from stereocell.transfer.opacity import evaluate
-from stereocell.usd.read_appearances import ComposedAppearance, read_appearances
+from stereocell.usd.composed_appearance import ComposedAppearance
+from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_provenance import fingerprint_of
 from stereocell.usd.read_stage import modality_of, open_stage, specimen_name, tile_prims
 from stereocell.verify.bundle_files import (
