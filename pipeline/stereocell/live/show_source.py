@@ -1,4 +1,4 @@
-"""Show a source that is not built: `stereocell view SOURCE`."""
+"""Show a source that is not built: `stereocell view INPUT`."""
 
 import shlex
 import tempfile
