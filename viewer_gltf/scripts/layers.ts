@@ -56,7 +56,7 @@ export function partsOf(files: readonly string[]): ReadonlySet<string> {
   return new Set(rooms.filter((room) => !LAYERS.includes(room)));
 }
 
-/** Those that lead from a layer to a higher one, from a part to another, or to a folder that is in no layer. */
+/** Returns the imports that lead to a higher layer, from one part to another, or to a folder in no layer. */
 export function against(
   arrows: readonly Arrow[],
   parts: ReadonlySet<string> = new Set(),

@@ -426,6 +426,9 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
 
     try:
         if options.is_source:
+            options.input = str(options.out)
+            if listed := _series(options):
+                return listed
             _show_source(options, run)
         else:
             _require_no_source_flags(options)

@@ -50,7 +50,7 @@ class ArrayLevels:
 
 @dataclass(frozen=True, slots=True)
 class ArrayEvidence:
-    """What one volume shows of its levels.
+    """The evidence for the levels of one volume.
 
     background  voxel values, knots in voxels along (slice, row, column); None: none was looked for
     max_shift   by how much smoothing may move a value of the surface, voxel values; None: by any

@@ -11,8 +11,8 @@ from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 
-READ_VOXELS = 48_000_000  # most voxels that are read of a channel
-SAMPLED_VOXELS = 6_000_000  # values of a channel, about, that its window is found on
+READ_VOXELS = 48_000_000  # most voxels of a channel that are read
+SAMPLED_VOXELS = 6_000_000  # approximate number of values on which a window is found
 _Triple = tuple[int, int, int]
 
 
@@ -66,17 +66,15 @@ def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> 
     spacing = dataset.levels[level].spacing_um
     factor = _factor(box.shape, spacing, voxels)
     axis = dataset.slice_axis(level)
-    # of each block of planes the middle ones: all of them, unless there are too many voxels
+    # All planes of a block are read, or its middle ones where there are too many voxels.
     count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
     blocks, sample = [], []
     for start in range(box.start[axis], box.stop[axis] - factor[axis] + 1, factor[axis]):
         middle = start + (factor[axis] - count) // 2
         read = dataset.read(channel.index, box.slab(axis, middle, middle + count), level).voxels
         blocks.append(_means(read, tuple(count if i == axis else factor[i] for i in range(3))))
-        sample.append(
-            _spread(read, max(1, READ_VOXELS // 8 // max(1, box.shape[axis] // factor[axis])))
-        )
-    # from voxels of the level to those of the planned one
+        sample.append(_spread(read, SAMPLED_VOXELS * factor[axis] // box.shape[axis]))
+    # Places are converted from voxels of this level to voxels of the planned level.
     fine = plan.spacing_um
     scale = tuple(a / b for a, b in zip(spacing, fine, strict=True))
     origin = dataset.levels[level].origin_um

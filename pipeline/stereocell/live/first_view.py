@@ -30,7 +30,7 @@ from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
-# Voxels of all channels that a first view has at most: 1 MB or so, compressed
+# Largest number of voxels in a first view, all channels together: about 1 MB compressed
 VOXELS = 4_000_000
 NOT_BUILT = "its surface is not built yet"
 

@@ -50,7 +50,7 @@ def show_source(
     if viewer is None:
         raise OutputError("the viewer is not built: run `make setup`")
     plan = settle(source, settings, choice)
-    dataset = open_source(as_asked(plan.source, settings.plan))
+    dataset = open_source(as_asked(plan.source, plan.settings.plan))
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
         root = Path(folder) / "bundle"
         root.mkdir()
