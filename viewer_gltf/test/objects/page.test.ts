@@ -232,7 +232,7 @@ describeInChromium("the objects of a label map", () => {
     // the specimen is moved until a ball is straight ahead: 10 um a step
     for (const key of ["Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowLeft", "Shift+ArrowLeft"]) {
       await page.keyboard.press(key);
-      await page.waitForTimeout(200);
+      await stand.viewer.drawn(2);
     }
     const ahead = rowAt(0, 3, 0, 1);
     await page.waitForTimeout(2500); // what has come under a resting gaze was not looked for
@@ -242,7 +242,9 @@ describeInChromium("the objects of a label map", () => {
         const turn = { alpha: degrees, beta: 90, gamma: 0 };
         dispatchEvent(new DeviceOrientationEvent("deviceorientation", turn));
       }, alpha);
+      await stand.viewer.drawn(2);
       await page.waitForTimeout(700); // the first time so that it is ahead
+      await stand.viewer.drawn(2);
     }
     await expect.poll(async () => (await view())?.picked).toBe(ahead);
     expect((await stand.viewer.snapshot()).told).toContain(`Object ${labelOf(ahead)}`);

@@ -47,6 +47,14 @@ export class ViewerPage {
     return this.page.url();
   }
 
+  /** Wait until so many frames were drawn, since a busy machine may draw none for a second. */
+  async drawn(frames: number): Promise<void> {
+    await this.page.evaluate(async (count) => {
+      for (let i = 0; i < count; i++)
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+    }, frames);
+  }
+
   async snapshot(): Promise<Snapshot> {
     const snapshot = await this.page.evaluate(() => window.stereocell?.snapshot());
     if (snapshot === undefined) throw new Error("the page has no window.stereocell");
