@@ -1,6 +1,6 @@
 """Write what a channel of a bundle has once, and describe channels and bundle for the manifest."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ def describe_bundle(
     channels: Sequence[dict[str, Any]],
     index: FileRef,
     ar: dict[str, Any] | None = None,
+    unfinished: Collection[str] = (),
 ) -> bytes:
     """Return manifest.json, with its hash.
 
@@ -32,6 +33,7 @@ def describe_bundle(
     channels  as `describe_channel` returns them
     index     files.json
     ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
+    unfinished  IDs of the tiles whose surfaces are not built yet, which volumes stand for
     """
     manifest = {
         "format": "stereocell-bundle",
@@ -39,7 +41,12 @@ def describe_bundle(
         "generator": GENERATOR,
         "specimen": {**specimen, "bounds_um": _bounds(tiles)},
         "tiles": [
-            {"id": tile.id, "representation": tile.representation, "bounds_um": _bounds([tile])}
+            {
+                "id": tile.id,
+                "representation": tile.representation,
+                "bounds_um": _bounds([tile]),
+                **({"unfinished": True} if tile.id in unfinished else {}),
+            }
             for tile in tiles
         ],
         "channels": channels,

@@ -52,20 +52,23 @@ def _main(words: Sequence[str]) -> int:
         options = _parser(words).parse_args(prepared(words))
         with answering_sigterm():
             return _run(options)
-    except StereoCellError as error:
-        from stereocell.storage.shell_commands import fill_in
-
-        line = fill_in(flags.as_typed(options, str(error)), getattr(options, "places", {}))
-        return _fail(options, line, error.exit_code)
-    except (MemoryError, RuntimeError, ImportError, OSError) as error:
-        return _fail(options, _reason(error), 1)
+    except (StereoCellError, MemoryError, RuntimeError, ImportError, OSError) as error:
+        code = error.exit_code if isinstance(error, StereoCellError) else 1
+        return _fail(options, _line_of(options, error), code)
     except KeyboardInterrupt as stop:
         code = 143 if isinstance(stop, Terminated) else 130
         return _fail(options, "stopped; the same command goes on from here", code)
 
 
-def _reason(error: Exception) -> str:
-    """Return one line for a lack of this machine; all other errors are bugs, and raised again."""
+def _line_of(options: argparse.Namespace, error: Exception) -> str:
+    """Return one line for an error of the input or a lack of this machine.
+
+    All other errors are bugs, and raised again.
+    """
+    if isinstance(error, StereoCellError):
+        from stereocell.storage.shell_commands import fill_in
+
+        return fill_in(flags.as_typed(options, str(error)), getattr(options, "places", {}))
     if words := shortage(error):
         return words
     if isinstance(error, ModuleNotFoundError):
@@ -79,6 +82,19 @@ def _reason(error: Exception) -> str:
         place = f"{error.filename}: " if error.filename else ""
         return f"{place}{error.strerror or error}"
     raise error
+
+
+def run_to_line(options: argparse.Namespace) -> str:
+    """Run a command behind another one, and return the line of its error; empty: it went well.
+
+    Raises KeyboardInterrupt where it is stopped.
+    """
+    try:
+        with answering_sigterm():
+            _run(options)
+    except (StereoCellError, MemoryError, RuntimeError, ImportError, OSError) as error:
+        return _line_of(options, error)
+    return ""
 
 
 def _fail(options: argparse.Namespace, line: str, code: int) -> int:
@@ -103,6 +119,7 @@ def _run(options: argparse.Namespace) -> int:
         from stereocell.live.show_source import is_source
 
         options.is_source = is_source(options.out)
+        options.run_to_line = run_to_line
     if name not in LIGHT:
         require_address_space(name)
         options.places = _given_places(options)

@@ -20,6 +20,7 @@ from stereocell.model.errors import UsageError, shortened
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
+    from stereocell.live.build_process import BuildProcess
     from stereocell.verify.check_line import CheckLine
 
 
@@ -192,7 +193,9 @@ def _workers_of(options: argparse.Namespace) -> "tuple[Path, Engine]":
             "copy its stage/ there"
         )
     out = options.out.absolute() if scheduler else options.out  # workers may have another folder
-    return out, Engine(getattr(options, "workers", 0), scheduler, None if is_kept else out / LOCK)
+    shared = None if is_kept else out / LOCK
+    watch = getattr(options, "watch", None)
+    return out, Engine(getattr(options, "workers", 0), scheduler, shared, watch)
 
 
 def _run_phases(
@@ -211,6 +214,7 @@ def _run_phases(
         else:
             from stereocell.report import phase  # slow to import: it draws
 
+            engine.watch("report", 0, 1, "")
             phase.run_report(out)
     seconds = {name: phase["seconds"] for name, phase in OutFolder(out).phases().items()}
     results = {
@@ -412,9 +416,9 @@ def serve(options: argparse.Namespace) -> Answer:
 
 
 def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
-    from stereocell.serve.server import serve
+    from stereocell.serve.server import Live, serve
 
-    def run(folder: Path) -> None:
+    def run(folder: Path, build: "BuildProcess | None" = None, tiles: int = 0) -> None:
         serve(
             folder,
             options.port,
@@ -422,6 +426,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             open_browser=open_browser,
             for_program=options.json,
             frames=tuple(options.allow_frame),
+            live=None if build is None else Live(build, tiles),
         )
 
     try:
@@ -440,18 +445,27 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
 
 def _require_no_source_flags(options: argparse.Namespace) -> None:
     """Raise UsageError for flags that say how a source is read, where a build is shown."""
-    if given := given_flags(options):
+    given = given_flags(options)
+    if options.no_build:
+        given.append("--no-build")
+    if options.build_out is not None:
+        given.append("--out")
+    if given:
         raise UsageError(
             f"{given[0]} says how a source is read, and {options.shown} is a build: leave it out, "
             "or name the source"
         )
 
 
-def _show_source(options: argparse.Namespace, run: Callable[[Path], None]) -> None:
-    """Serve the first view of a source that is not built."""
-    from stereocell.live.show_source import show_source
+def _show_source(
+    options: argparse.Namespace, run: "Callable[[Path, BuildProcess | None, int], None]"
+) -> None:
+    """Serve the first view of a source that is not built, and build it behind the page."""
+    from stereocell.cli.build_behind import build_behind
+    from stereocell.live.show_source import Behind, show_source
     from stereocell.planning.preset_choice import load_for
 
     source = str(options.out)
     wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
-    show_source(source, wanted, choice, run)
+    behind = None if options.no_build else Behind(build_behind(options, build), options.build_out)
+    show_source(source, wanted, choice, run, behind)

@@ -394,6 +394,18 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
         "given several times",
     )
+    behind = parser.add_argument_group("a source")
+    behind.add_argument(
+        "--no-build", action="store_true", help="only look: don't build the source behind the page"
+    )
+    behind.add_argument(
+        "-o",
+        "--out",
+        dest="build_out",
+        type=_file,
+        metavar="OUT",
+        help="folder of the build (default: NAME.stereocell here, by the specimen's name)",
+    )
     declare_how_to_read(parser)
 
 

@@ -35,6 +35,9 @@ from stereocell.storage.processes import shortage
 
 T = TypeVar("T")
 R = TypeVar("R")
+# is given the label of running tasks, how many are done and how many there are, and the name of the
+# task that has just ended; empty: none has ended yet
+Watch = Callable[[str, int, int, str], None]
 
 _END_S = 30  # s for a cluster's client to close
 _PACE_S = 10  # s that tasks have run before their pace is told
@@ -57,10 +60,18 @@ class Engine:
     workers    processes on this machine; 0: none, tasks run inline (for debugging)
     scheduler  address (`tcp://...`) or scheduler file of a running cluster, used instead
     shared     a file that the cluster's workers must see: it lies in OUT
+    watch      is called as tasks begin and whenever one has ended; None: nobody watches
     """
 
-    def __init__(self, workers: int, scheduler: str = "", shared: Path | None = None) -> None:
+    def __init__(
+        self,
+        workers: int,
+        scheduler: str = "",
+        shared: Path | None = None,
+        watch: Watch | None = None,
+    ) -> None:
         self.workers = workers
+        self.watch: Watch = watch or (lambda *_: None)
         self._scheduler = scheduler
         self._shared = shared
         self._client: Any = None  # of the cluster
@@ -93,6 +104,7 @@ class Engine:
         results: dict[int, R] = {}
         failures: dict[int, str] = {}
         try:
+            self.watch(label, 0, len(tasks), "")
             with _progress(label, len(tasks)) as advance:
                 for place, result, error in self._outcomes(
                     function, [task for _, task in tasks], needs
@@ -102,6 +114,7 @@ class Engine:
                     else:
                         failures[place] = _in_words(error)
                     advance(tasks[place][0], error is not None)
+                    self.watch(label, len(results) + len(failures), len(tasks), tasks[place][0])
         except KeyboardInterrupt:
             self.close()  # at once: workers would write into folders that are being removed
             raise

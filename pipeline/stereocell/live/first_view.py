@@ -4,6 +4,7 @@ It has the tiles, channels and files of the bundle that a build writes, by the s
 same schema, so that every viewer of bundles shows it. Its voxels alone are coarse.
 """
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,23 +48,62 @@ class _CoarseVolume:
     measured: Path | None = None
 
 
-def write_first_view(plan: Plan, dataset: Dataset, root: Path, viewer: Path | None) -> None:
-    """Write a bundle of a plan's coarse volumes into an empty folder.
+def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
+    """Return the coarse voxels of a plan's channels, by the ID of their voxels.
 
-    viewer  the folder of the built viewer; None: the bundle has no page
-
-    Raises SourceError where the source can't be read or has no channel, OutputError where a file
-    can't be written.
+    Raises SourceError where the source can't be read or has no channel.
     """
     shared = plan.shared_volumes
     channels = [channel for channel in plan.channels if channel.id not in shared]
     if not channels:
         raise SourceError(f"{plan.name}: objects of a label map are shown once they are built")
     each = max(10_000, VOXELS // len(channels))
-    read = {one.voxels_id: read_coarse(dataset, plan, one, each) for one in channels}
+    return {one.voxels_id: read_coarse(dataset, plan, one, each) for one in channels}
+
+
+def write_first_view(
+    plan: Plan, read: Mapping[str, CoarseChannel], root: Path, viewer: Path | None
+) -> None:
+    """Write a bundle of a plan's coarse volumes into an empty folder.
+
+    read    see `read_channels`
+    viewer  the folder of the built viewer; None: the bundle has no page
+
+    Raises OutputError where a file can't be written.
+    """
     found = [first_appearance(plan, one, read[one.voxels_id]) for one in plan.channels]
     appearances = [composed(appearance) for appearance, _ in found]
-    tiles = [_write_tile(plan, root, tile, read, appearances) for tile in plan.tiles]
+    tiles = write_coarse_tiles(plan, root, read, appearances)
+    is_cut = plan.opens_cut and any(is_body for _, is_body in found)
+    write_view(plan, root, appearances, tiles, is_cut=is_cut, viewer=viewer)
+
+
+def write_coarse_tiles(
+    plan: Plan,
+    root: Path,
+    read: Mapping[str, CoarseChannel],
+    appearances: Sequence[ComposedAppearance],
+) -> list[BundleTile]:
+    """Write the coarse volumes of all tiles into a bundle, and return the tiles."""
+    return [_write_tile(plan, root, tile, read, appearances) for tile in plan.tiles]
+
+
+def write_view(
+    plan: Plan,
+    root: Path,
+    appearances: Sequence[ComposedAppearance],
+    tiles: Sequence[BundleTile],
+    *,
+    is_cut: bool,
+    viewer: Path | None,
+    finished: Collection[str] = (),
+) -> None:
+    """Write what a bundle has once, where the files of its tiles lie already.
+
+    is_cut    whether the specimen opens cut
+    viewer    as in `write_first_view`
+    finished  IDs of the tiles that have their surfaces
+    """
     files: list[FileRef] = [
         ref for tile in tiles for channel in tile.channels for ref in channel.files
     ]
@@ -84,10 +124,16 @@ def write_first_view(plan: Plan, dataset: Dataset, root: Path, viewer: Path | No
     }
     if plan.has_sides:
         specimen["sides"] = PATIENT_SIDES
-    if plan.opens_cut and any(is_body for _, is_body in found):
+    if is_cut:
         normal, offset_um = opening_plane(np.array([(tile.low, tile.high) for tile in tiles]))
         specimen["cut"] = {"normal": normal, "offset_um": offset_um}
-    manifest = describe_bundle(specimen, tiles, channels=entries, index=index)
+    manifest = describe_bundle(
+        specimen,
+        tiles,
+        channels=entries,
+        index=index,
+        unfinished={tile.id for tile in tiles} - set(finished),
+    )
     write_file(root, MANIFEST, manifest)
 
 
@@ -119,8 +165,8 @@ def _write_tile(
     plan: Plan,
     root: Path,
     tile: Tile,
-    read: dict[str, CoarseChannel],
-    appearances: list[ComposedAppearance],
+    read: Mapping[str, CoarseChannel],
+    appearances: Sequence[ComposedAppearance],
 ) -> BundleTile:
     lattice = tile.lattice(plan.region)
     first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])

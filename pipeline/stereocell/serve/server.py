@@ -18,6 +18,7 @@ import sys
 import webbrowser
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import uvicorn
@@ -26,6 +27,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
 from stereocell.bundle.manifest import MANIFEST, read_manifest
+from stereocell.live.build_process import BuildProcess
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.access import Access, Gate
 from stereocell.serve.brick_library import BrickLibrary
@@ -34,12 +36,21 @@ from stereocell.serve.http_protocol import GuardedHttp
 from stereocell.serve.lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
+from stereocell.serve.live_app import LiveApp
 from stereocell.serve.measured_values import VALUES_HEADER, MeasuredValues
 from stereocell.serve.static_files import BRICKS_HEADER, BundleFiles, ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
 _OWN_NAMES = (LOCALHOST, "localhost")  # with any port: it may be forwarded
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """A build behind the first view of its source, which has so many tiles."""
+
+    build: BuildProcess
+    tiles: int
 
 
 def serve(
@@ -50,12 +61,15 @@ def serve(
     open_browser: bool,
     for_program: bool = False,
     frames: tuple[str, ...] = (),
+    live: Live | None = None,
 ) -> None:
     """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
 
     for_program  print lines of JSON in place of texts for a person: first the address, then, with
                  `lan`, an address that admits one device, a new one after each admission
     frames       origins whose pages may hold the viewer in a frame
+    live         the build behind the bundle, which is the first view of its source; None: there is
+                 no such build. It is started, and stopped at the end
 
     Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
     once at a second Ctrl+C; StereoCellError where there is no bundle, its manifest was changed, the
@@ -64,7 +78,7 @@ def serve(
     bundle, _ = _places(out)
     if (bundle / MANIFEST).is_file():
         read_manifest(bundle)  # raises where it was changed
-    server = BundleServer(out, port, lan, for_program, frames)
+    server = BundleServer(out, port, lan, for_program, frames, live)
     # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
@@ -72,10 +86,14 @@ def serve(
         server.invite()
         if open_browser:
             webbrowser.open(server.address)
+        if live is not None:
+            live.build.start()
         with suppress(KeyboardInterrupt):
             server.run()
     finally:
         signal.signal(signal.SIGTERM, before)
+        if live is not None:
+            live.build.stop()
     if server.was_forced:
         raise KeyboardInterrupt
 
@@ -88,6 +106,7 @@ def make_app(
     names: tuple[str, ...],
     gate: Gate | None,
     frames: tuple[str, ...] = (),
+    live: Live | None = None,
 ) -> ASGIApp:
     """Return the application: the bundle's files, `/bricks` and `/values`.
 
@@ -96,7 +115,20 @@ def make_app(
     names    the hosts that it answers to, in lower case
     gate     tokens and sessions on the LAN; None: all clients of this machine have access
     frames   origins whose pages may hold the viewer in a frame
+    live     the build behind the bundle; None: there is none
     """
+    if live is None:
+        return Access(_bundle_app(bundle, library, stage), names, gate, frames)
+
+    def built(bundle: Path) -> ASGIApp:
+        out = bundle.parent
+        return _bundle_app(bundle, BrickLibrary(bundle, out / "bricks"), out / "stage")
+
+    return Access(LiveApp(bundle, live.build, live.tiles, built), names, gate, frames)
+
+
+def _bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) -> ASGIApp:
+    """Return the application without its checks of access; see `make_app`."""
     values = None if library is None or stage is None else MeasuredValues(library, stage)
     endpoint = None if library is None else BrickEndpoint(library)
     announced = ({} if endpoint is None else BRICKS_HEADER) | (
@@ -117,7 +149,7 @@ def make_app(
         routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
     app = Starlette(routes=routes, lifespan=lifespan)
     app.router.redirect_slashes = False  # paths with a line break match no route
-    return Access(app, names, gate, frames)
+    return app
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:
@@ -144,6 +176,7 @@ class BundleServer:
         lan: bool,
         for_program: bool = False,
         frames: tuple[str, ...] = (),
+        live: Live | None = None,
     ) -> None:
         """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
         bundle, bricks = _places(out)
@@ -151,7 +184,7 @@ class BundleServer:
         if bricks is not None:
             library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
         self.bundle, self.has_bricks = bundle, bricks is not None
-        self.for_program = for_program
+        self.for_program, self.is_live = for_program, live is not None
         for name in (MANIFEST, "index.html"):
             if not (bundle / name).is_file():
                 raise StereoCellError(
@@ -173,7 +206,7 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(bundle, library, stage, names=names, gate=self.gate, frames=frames),
+            make_app(bundle, library, stage, names=names, gate=self.gate, frames=frames, live=live),
             log_config=None,
             log_level="error",
             access_log=False,
@@ -202,8 +235,12 @@ class BundleServer:
             about = {"bundle": str(self.bundle), "bricks": self.has_bricks}
             _print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
             return
-        alone = "" if self.has_bricks else " (a bundle by itself: its volumes come whole)"
-        print(f"{self.address} shows {self.bundle}{alone}; Ctrl+C ends it", flush=True)
+        shown = str(self.bundle)
+        if self.is_live:
+            shown = "the first view, and what is built of it"
+        elif not self.has_bricks:
+            shown += " (a bundle by itself: its volumes come whole)"
+        print(f"{self.address} shows {shown}; Ctrl+C ends it", flush=True)
 
     def invite(self) -> None:
         """Print the QR code for the next device on the LAN, and an explanation of its warning."""

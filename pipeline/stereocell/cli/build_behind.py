@@ -1,0 +1,31 @@
+"""Build a source behind the page that shows it: `build` with the flags of `view`, in a process."""
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from stereocell.engine.run import Watch
+from stereocell.storage.processes import cores
+
+RunToLine = Callable[[argparse.Namespace], str]  # returns the line of an error; empty: it went well
+
+
+def build_behind(
+    options: argparse.Namespace, handler: Callable[[argparse.Namespace], object]
+) -> Callable[[Path, Watch], str]:
+    """Return the build of a source, with the flags that `view` or `serve` has been given.
+
+    handler  of the command `build`
+
+    It is called with OUT and is watched, in a process of its own: it is picklable, and so is all
+    that it holds. It returns the line of its error; empty: it went well.
+    """
+    build = {"command": "build", "handler": handler, "input": str(options.out), "force": False}
+    return partial(_build, options.run_to_line, {**vars(options), **build})
+
+
+def _build(run: RunToLine, given: dict[str, Any], out: Path, watch: Watch) -> str:
+    given = {**given, "out": out, "workers": cores(), "scheduler": "", "watch": watch}
+    return run(argparse.Namespace(**given))

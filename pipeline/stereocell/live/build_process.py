@@ -1,0 +1,250 @@
+"""Build a source in a process of its own, of lower priority, behind the page that shows it.
+
+The two processes talk over a pipe: the build reports its tasks and the views that it writes; it is
+asked to pause, to continue and to end. A pause begins when the running tasks have ended.
+"""
+
+import multiprocessing
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Literal
+
+from stereocell.engine.run import Watch
+from stereocell.live.partial_view import PartialView
+from stereocell.model.errors import StereoCellError
+
+Command = Literal["pause", "continue", "cancel"]
+COMMANDS: tuple[Command, ...] = ("pause", "continue", "cancel")
+Doing = Literal["building", "pausing", "paused", "cancelled", "failed", "complete"]
+# builds, and is watched; returns the line of an error, empty where there is none
+Build = Callable[[Watch], str]
+
+# Share of each part of a build in its time: of one tile of 194 x 512 x 512 voxels, three channels
+SHARES = {
+    "windows": 0.08,
+    "evidence": 0.13,
+    "components": 0.08,
+    "units": 0.3,
+    "stage": 0.2,
+    "bundle": 0.08,
+    "report": 0.13,
+}
+_NICE = 10  # of 19, the lowest priority
+_END_S = 15  # s that a cancelled build has to remove what is half written
+_KILLED = "the build was stopped from outside"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What is known of a build.
+
+    label, done, total  its running tasks
+    tiles               how many tiles have their surfaces
+    share               how much of the build is done, 0..1
+    left_s              s until its end; None: not known yet
+    folder              of the newest view, as `g2/`; empty: the first view, or the bundle
+    line                why it has failed; or empty
+    """
+
+    doing: Doing = "building"
+    label: str = ""
+    done: int = 0
+    total: int = 0
+    tiles: int = 0
+    share: float = 0.0
+    left_s: float | None = None
+    folder: str = ""
+    line: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    label: str
+    done: int
+    total: int
+    tiles: int
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    line: str
+
+
+class BuildProcess:
+    """A build behind a page. All methods may be called from any thread."""
+
+    def __init__(self, build: Build, view: PartialView, out: Path) -> None:
+        """build: picklable; out: the folder that it writes."""
+        self._build, self._view, self.out = build, view, out
+        self._changed = threading.Condition()
+        self._state = State()
+        self._views: dict[str, Path] = {}
+        self._has_bundle = False
+        self._process: Any = None
+        self._pipe: Connection[Any, Any] | None = None
+        self._began_s = self._paused_s = 0.0
+
+    @property
+    def state(self) -> State:
+        """The newest state."""
+        return self._state
+
+    @property
+    def views(self) -> dict[str, Path]:
+        """The folder of each view by its name, as `g2`, but for the first view."""
+        return self._views
+
+    @property
+    def bundle(self) -> Path | None:
+        """The finished bundle; None: there is none yet."""
+        return self.out / "bundle" if self._has_bundle else None
+
+    def start(self) -> None:
+        """Begin to build, or go on with a build that has ended early."""
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_run, args=(self._build, self._view, theirs))
+        process.start()
+        theirs.close()
+        self._process, self._pipe = process, ours
+        self._began_s, self._paused_s = time.monotonic(), 0.0
+        self._set(doing="building", line="", left_s=None)
+        threading.Thread(target=self._hear, args=(ours,), daemon=True).start()
+
+    def do(self, command: Command) -> None:
+        """Carry out what a user asks for; a command that does not fit the state does nothing."""
+        doing = self.state.doing
+        if command == "pause" and doing == "building":
+            self._send("pause")
+            self._set(doing="pausing", left_s=None)
+        elif command == "continue" and doing in ("pausing", "paused"):
+            self._send("continue")
+            self._set(doing="building")
+        elif command == "continue" and doing in ("cancelled", "failed"):
+            self.start()
+        elif command == "cancel" and doing in ("building", "pausing", "paused"):
+            self._set(doing="cancelled", left_s=None)
+            self.stop()
+
+    def stop(self) -> None:
+        """End the process, and wait for it; what is finished stays."""
+        process = self._process
+        if process is None or not process.is_alive():
+            return
+        process.terminate()
+        process.join(_END_S)
+        if process.is_alive():
+            process.kill()
+            process.join()
+
+    def _send(self, command: str) -> None:
+        with suppress(OSError):  # it has ended
+            if self._pipe is not None:
+                self._pipe.send(command)
+
+    def _set(self, **news: Any) -> None:
+        with self._changed:
+            self._state = replace(self._state, **news)
+            self._changed.notify_all()
+
+    def _hear(self, pipe: "Connection[Any, Any]") -> None:
+        """Take what a build reports until it ends."""
+        while True:
+            try:
+                told = pipe.recv()
+            except (EOFError, OSError):
+                if self.state.doing not in ("cancelled", "failed", "complete"):
+                    self._set(doing="failed", line=_KILLED, left_s=None)
+                return
+            if isinstance(told, _Task):
+                self._take(told)
+            elif isinstance(told, _View):
+                self._views[told.folder.name] = told.folder
+                self._set(folder=f"{told.folder.name}/")
+            elif isinstance(told, _End) and self.state.doing != "cancelled":
+                if told.line:
+                    self._set(doing="failed", line=told.line, left_s=None)
+                else:
+                    self._has_bundle = True
+                    self._set(doing="complete", share=1.0, left_s=0.0, folder="")
+            elif told == "paused" and self.state.doing == "pausing":
+                self._set(doing="paused")
+            elif isinstance(told, float):
+                self._paused_s += told
+
+    def _take(self, task: _Task) -> None:
+        share = _share_of(task)
+        spent_s = time.monotonic() - self._began_s - self._paused_s
+        left_s = spent_s * (1 - share) / share if share > 0.05 else None
+        if task.label == "report":  # the bundle is whole before the report
+            self._has_bundle = True
+        self._set(
+            label=task.label,
+            done=task.done,
+            total=task.total,
+            tiles=task.tiles,
+            share=share,
+            left_s=left_s if self.state.doing == "building" else None,
+            **({"folder": ""} if self._has_bundle else {}),
+        )
+
+
+def _share_of(task: _Task) -> float:
+    """Return how much of a build is done, 0..1, when a part of it has got so far."""
+    if task.label not in SHARES:
+        return 0.0
+    names = list(SHARES)
+    before = sum(SHARES[name] for name in names[: names.index(task.label)])
+    return before + SHARES[task.label] * task.done / max(1, task.total)
+
+
+def _run(build: Build, view: PartialView, pipe: "Connection[Any, Any]") -> None:
+    """Build, in the process of its own."""
+    _lower_priority()
+    with suppress(BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
+        pipe.send(_End(build(_Watcher(view, pipe))))
+
+
+class _Watcher:
+    """Called by the build after each task: reports it, writes views, and pauses."""
+
+    def __init__(self, view: PartialView, pipe: "Connection[Any, Any]") -> None:
+        self._view, self._pipe = view, pipe
+
+    def __call__(self, label: str, done: int, total: int, name: str) -> None:
+        if label == "units":
+            with suppress(StereoCellError, OSError):  # the build itself reports what is amiss
+                folder = self._view.add(name.split("/")[0] if name else None)
+                if folder is not None:
+                    self._pipe.send(_View(folder))
+        self._pipe.send(_Task(label, done, total, self._view.finished))
+        if self._pipe.poll() and self._pipe.recv() == "pause":
+            self._pipe.send("paused")
+            began_s = time.monotonic()
+            while self._pipe.recv() != "continue":
+                pass
+            self._pipe.send(time.monotonic() - began_s)
+
+
+def _lower_priority() -> None:
+    """Let whoever looks at the page go first; the workers of the build inherit it."""
+    if sys.platform == "win32":
+        import ctypes
+
+        below_normal = 0x4000
+        kernel = ctypes.windll.kernel32
+        kernel.SetPriorityClass(kernel.GetCurrentProcess(), below_normal)
+    else:
+        os.nice(_NICE)

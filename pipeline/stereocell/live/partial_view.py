@@ -1,0 +1,177 @@
+"""The views of a source while it is built: surfaces of finished tiles, coarse volumes elsewhere.
+
+Each view is a bundle in a folder of its own, so that a page may go on with an older one. Files that
+two views share are hard links.
+"""
+
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder
+from stereocell.building.survey_file import read_survey
+from stereocell.bundle.tile_part import BundleTile, TileChannel
+from stereocell.bundle.write_tile import export_tile
+from stereocell.formats.gltf import choose_step
+from stereocell.live.coarse_channel import CoarseChannel
+from stereocell.live.first_view import write_coarse_tiles, write_view
+from stereocell.model.tiling import Tile
+from stereocell.planning.plan import Plan
+from stereocell.planning.stage_steps import stage_step, stage_tile_step
+from stereocell.planning.unit_steps import unit_steps
+from stereocell.steps.unit_files import is_whole
+from stereocell.steps.write_stage_tile import StageTile
+from stereocell.usd.composed_appearance import ComposedAppearance
+from stereocell.usd.read_appearances import read_appearances
+from stereocell.usd.read_stage import hinted_box, open_stage, tile_prims
+from stereocell.usd.written_files import STAGE_NAME
+
+
+@dataclass(frozen=True, slots=True)
+class _Survey:
+    """What is the same for all views of a build, once its survey is known."""
+
+    plan: Plan
+    units: Mapping[str, Path]
+    appearances: tuple[ComposedAppearance, ...]
+    step_m: float
+    is_cut: bool
+    coarse: Mapping[str, BundleTile]
+
+
+class PartialView:
+    """Writes a view whenever a tile has been finished.
+
+    plan     of the first view
+    read     the coarse voxels that it shows, by the ID of the voxels
+    out      the folder of the build
+    scratch  the folder of the views
+    """
+
+    def __init__(
+        self, plan: Plan, read: Mapping[str, CoarseChannel], out: Path, scratch: Path
+    ) -> None:
+        self._plan, self._read, self._out, self._scratch = plan, read, out, scratch
+        self._survey: _Survey | None = None
+        self._finished: dict[str, BundleTile] = {}
+        self._views = 0
+
+    @property
+    def finished(self) -> int:
+        """How many tiles are finished."""
+        return len(self._finished)
+
+    def add(self, tile_id: str | None) -> Path | None:
+        """Return the folder of a new view if a tile has just got its surfaces; None: none has.
+
+        tile_id  the tile to which a unit has come; None: all tiles are looked at, as at the start
+
+        A build of another plan than that of the first view has no views of its own: the source or
+        what is known of it has changed meanwhile.
+        """
+        survey = self._survey or self._begin()
+        if survey is None:
+            return None
+        news = [
+            tile
+            for tile in survey.plan.tiles
+            if tile_id in (None, tile.id)
+            and tile.id not in self._finished
+            and all(is_whole(folder) for folder in _units_of(survey, tile))
+        ]
+        for tile in news:
+            self._finished[tile.id] = self._export(survey, tile)
+        return self._write(survey) if news else None
+
+    def _begin(self) -> _Survey | None:
+        """Prepare the views: write the stage that all tiles share, and the coarse volumes anew.
+
+        The windows of the survey are those of all voxels, and hold from now on.
+        """
+        out_folder = OutFolder(self._out)
+        plan = replace(out_folder.plan(), labels=())
+        if (plan.fingerprint, plan.region) != (self._plan.fingerprint, self._plan.region):
+            return None
+        survey = read_survey(out_folder)
+        steps = unit_steps(plan, survey)
+        units = {name: out_folder.unit_dir(name, step.key) for name, step in steps.items()}
+        tiles = [stage_tile_step(plan, tile, units, {}) for tile in plan.tiles]
+        stage_step(plan, survey, tiles, {}).write(self._stage.parent)
+        stage = open_stage(self._stage)
+        appearances = tuple(read_appearances(stage))
+        boxes = [hinted_box(prim) for prim in tile_prims(stage)]
+        coarse = write_coarse_tiles(plan, self._scratch / "coarse", self._read, appearances)
+        self._survey = _Survey(
+            plan,
+            units,
+            appearances,
+            choose_step(float(max((high - low).max() for low, high in boxes))),
+            plan.opens_cut and any(survey[one.id].is_body for one in plan.channels),
+            {tile.id: tile for tile in coarse},
+        )
+        return self._survey
+
+    @property
+    def _stage(self) -> Path:
+        return self._scratch / "stage" / STAGE_NAME
+
+    def _export(self, survey: _Survey, tile: Tile) -> BundleTile:
+        """Return a tile with its surfaces, written by way of the stage, and its coarse volumes."""
+        step = stage_tile_step(survey.plan, tile, survey.units, {})
+        # without volumes, which are most of the work: the coarse ones stay
+        step = replace(step, shared=frozenset(unit.channel_id for unit in step.units))
+        record = self._scratch / "records" / f"{tile.id}.json"
+        StageTile(step, record, self._stage.parent).keep()
+        parts = self._scratch / "parts"
+        export = partial(export_tile, self._stage, parts, appearances=survey.appearances)
+        built, _ = export(tile.id, step_m=survey.step_m)
+        shutil.rmtree(self._stage.parent / "tiles" / tile.id)
+        coarse = survey.coarse[tile.id]
+        merged = map(_merge, built.channels, coarse.channels)
+        return replace(coarse, representation="mesh", channels=tuple(merged))
+
+    def _write(self, survey: _Survey) -> Path:
+        self._views += 1
+        root = self._scratch / f"g{self._views}"
+        tiles = [self._finished.get(tile.id, survey.coarse[tile.id]) for tile in survey.plan.tiles]
+        for tile in tiles:
+            for ref in (ref for channel in tile.channels for ref in channel.files):
+                own = self._scratch / "parts" / tile.id / ref.path
+                _link(own if own.exists() else self._scratch / "coarse" / ref.path, root / ref.path)
+        write_view(
+            survey.plan,
+            root,
+            survey.appearances,
+            tiles,
+            is_cut=survey.is_cut,
+            viewer=None,
+            finished=self._finished,
+        )
+        return root
+
+
+def _units_of(survey: _Survey, tile: Tile) -> list[Path]:
+    return [survey.units[f"{tile.id}/{channel.id}"] for channel in survey.plan.channels]
+
+
+def _merge(built: TileChannel, coarse: TileChannel) -> TileChannel:
+    """Return a tile's channel with the surfaces of the one and the volume of the other."""
+    return replace(
+        coarse,
+        lods=built.lods,
+        triangles=built.triangles,
+        distances=built.distances,
+        files=(*built.files, *coarse.files),
+    )
+
+
+def _link(file: Path, place: Path) -> None:
+    """Put a file at a second place, as a copy where the system allows no link."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, place)
+    except OSError:
+        shutil.copyfile(file, place)

@@ -1,0 +1,142 @@
+"""Serve a source while it is built: `/live`, the views in folders of their own, and the bundle.
+
+    /               the first view; once the build has a bundle, that with its bricks and values
+    /manifest.json  of the newest view, whose folder the header Stereocell-Live names
+    /g1/, /g2/      the views that came later: surfaces where a tile is finished
+    /live           a websocket with the state of the build, which takes commands
+
+The server sends the state whenever it changes, at most four times a second, as schemas describe no
+more of it than this:
+
+    {"doing": "building", "label": "units", "done": 3, "total": 20, "tiles": 1, "all_tiles": 10,
+     "share": 0.41, "left_s": 38.5, "folder": "g1/", "line": "", "may_control": true}
+
+A client may send `pause`, `continue` or `cancel` as text. Only clients of this machine may: on the
+LAN a phone that looks on can't stop the build.
+"""
+
+import asyncio
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict
+from ipaddress import ip_address
+from pathlib import Path
+
+from starlette.requests import Request
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from stereocell.bundle.manifest import MANIFEST
+from stereocell.live.build_process import COMMANDS, BuildProcess
+from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
+from stereocell.serve.static_files import BundleFiles
+
+LIVE_HEADER = "Stereocell-Live"
+_EACH_S = 0.25  # s between two states
+
+
+class LiveApp:
+    """The application over a build that runs."""
+
+    def __init__(
+        self, first: Path, build: BuildProcess, tiles: int, built: Callable[[Path], ASGIApp]
+    ) -> None:
+        """Wrap a build.
+
+        first  the folder of the first view
+        tiles  how many there are
+        built  returns the application that serves a whole bundle
+        """
+        self._build, self._tiles, self._first, self._make_built = build, tiles, first, built
+        self._built: ASGIApp | None = None
+        self._sockets = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or talk over a websocket."""
+        if scope["type"] == "lifespan":
+            await self._live_through(receive, send)
+        elif scope["type"] == "websocket" and scope["path"] == "/live":
+            await self._talk(WebSocket(scope, receive, send))
+        elif (app := self._find_built()) is not None and self._folder_of(scope) is None:
+            await app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await WebSocket(scope, receive, send).close()
+        else:
+            await self._answer(scope, receive, send)
+
+    def _find_built(self) -> ASGIApp | None:
+        bundle = self._build.bundle
+        if self._built is None and bundle is not None:
+            self._built = self._make_built(bundle)
+        return self._built
+
+    def _folder_of(self, scope: Scope) -> Path | None:
+        """Return the folder of the later view that a path names; None: it names none."""
+        return self._build.views.get(scope["path"].lstrip("/").partition("/")[0])
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer from the folder of a view."""
+        path, folder, headers = scope["path"].lstrip("/"), self._folder_of(scope), {}
+        if folder is not None:
+            path = path.partition("/")[2]
+        elif path == MANIFEST:
+            newest = self._build.state.folder
+            folder = self._build.views.get(newest.rstrip("/"))
+            headers = {LIVE_HEADER: f"version=1; folder={newest if folder else ''}"}
+        files = BundleFiles(folder or self._first, headers)
+        if scope["method"] not in ("GET", "HEAD"):
+            await send({"type": "http.response.start", "status": 405, "headers": []})
+            await send({"type": "http.response.body"})
+            return
+        answer = await files.answer(Request({**scope, "path": f"/{path}"}, receive))
+        await answer(scope, receive, send)
+
+    async def _talk(self, socket: WebSocket) -> None:
+        """Send one client the state until it leaves, and take its commands."""
+        await socket.accept()
+        if self._sockets >= min(MAX_CONNECTIONS, 4 * CLIENT_SOCKETS):
+            await socket.close(1013, "too many connections are open, try again later")
+            return
+        self._sockets += 1
+        may_control = _is_here(socket)
+        heard = asyncio.ensure_future(socket.receive_text())
+        sent = ""
+        try:
+            while True:
+                about = {"all_tiles": self._tiles, "may_control": may_control}
+                text = json.dumps({**asdict(self._build.state), **about})
+                if text != sent:
+                    await socket.send_text(text)
+                    sent = text
+                await asyncio.wait([heard], timeout=_EACH_S)
+                if not heard.done():
+                    continue
+                command = heard.result()
+                known = next((one for one in COMMANDS if one == command), None)
+                if known is None or not may_control:
+                    await socket.close(1008, "expected pause, continue or cancel, of this machine")
+                    return
+                await asyncio.to_thread(self._build.do, known)
+                heard = asyncio.ensure_future(socket.receive_text())
+        except (WebSocketDisconnect, KeyError, RuntimeError):  # it has left, or has sent bytes
+            pass
+        finally:
+            self._sockets -= 1
+            heard.cancel()
+
+    async def _live_through(self, receive: Receive, send: Send) -> None:
+        while True:
+            message = await receive()
+            if message["type"] == "lifespan.startup":
+                await send({"type": "lifespan.startup.complete"})
+            elif message["type"] == "lifespan.shutdown":
+                await send({"type": "lifespan.shutdown.complete"})
+                return
+
+
+def _is_here(socket: WebSocket) -> bool:
+    """Return whether a client is on this machine."""
+    with suppress(ValueError):
+        return socket.client is not None and ip_address(socket.client.host).is_loopback
+    return False
