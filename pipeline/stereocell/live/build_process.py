@@ -36,6 +36,7 @@ SHARES = {
     "bundle": 0.08,
     "report": 0.13,
 }
+_TELLING = 0.15  # share of a build from which its pace tells when it ends: it starts slowly
 _NICE = 10  # of 19, the lowest priority
 _END_S = 15  # s that a cancelled build has to remove what is half written
 _KILLED = "the build was stopped from outside"
@@ -49,7 +50,8 @@ class State:
     tiles               how many tiles have their surfaces
     share               how much of the build is done, 0..1
     left_s              s until its end; None: not known yet
-    folder              of the newest view, as `g2/`; empty: the first view, or the bundle
+    folder              of the newest view, as `g2/`; empty: the first view is the newest
+    has_bundle          whether OUT/bundle is whole, which then is the newest view
     line                why it has failed; or empty
     """
 
@@ -61,6 +63,7 @@ class State:
     share: float = 0.0
     left_s: float | None = None
     folder: str = ""
+    has_bundle: bool = False
     line: str = ""
 
 
@@ -91,7 +94,6 @@ class BuildProcess:
         self._changed = threading.Condition()
         self._state = State()
         self._views: dict[str, Path] = {}
-        self._has_bundle = False
         self._process: Any = None
         self._pipe: Connection[Any, Any] | None = None
         self._began_s = self._paused_s = 0.0
@@ -109,7 +111,7 @@ class BuildProcess:
     @property
     def bundle(self) -> Path | None:
         """The finished bundle; None: there is none yet."""
-        return self.out / "bundle" if self._has_bundle else None
+        return self.out / "bundle" if self.state.has_bundle else None
 
     def start(self) -> None:
         """Begin to build, or go on with a build that has ended early."""
@@ -177,8 +179,7 @@ class BuildProcess:
                 if told.line:
                     self._set(doing="failed", line=told.line, left_s=None)
                 else:
-                    self._has_bundle = True
-                    self._set(doing="complete", share=1.0, left_s=0.0, folder="")
+                    self._set(doing="complete", share=1.0, left_s=0.0, has_bundle=True)
             elif told == "paused" and self.state.doing == "pausing":
                 self._set(doing="paused")
             elif isinstance(told, float):
@@ -187,9 +188,7 @@ class BuildProcess:
     def _take(self, task: _Task) -> None:
         share = _share_of(task)
         spent_s = time.monotonic() - self._began_s - self._paused_s
-        left_s = spent_s * (1 - share) / share if share > 0.05 else None
-        if task.label == "report":  # the bundle is whole before the report
-            self._has_bundle = True
+        left_s = spent_s * (1 - share) / share if share > _TELLING else None
         self._set(
             label=task.label,
             done=task.done,
@@ -197,7 +196,7 @@ class BuildProcess:
             tiles=task.tiles,
             share=share,
             left_s=left_s if self.state.doing == "building" else None,
-            **({"folder": ""} if self._has_bundle else {}),
+            has_bundle=self.state.has_bundle or task.label == "report",  # which comes after it
         )
 
 

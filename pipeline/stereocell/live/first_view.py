@@ -190,7 +190,7 @@ def _write_tile(
         entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels)
         channels.append(TileChannel(channel.id, (), (), (), entry, tuple(files), joint))
     bounds = move_box(*corners, matrix)
-    return BundleTile(tile.id, "volume", _point(bounds[0]), _point(bounds[1]), tuple(channels))
+    return BundleTile(tile.id, "mesh", _point(bounds[0]), _point(bounds[1]), tuple(channels))
 
 
 def _places(first: int, last: int, step: float) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ two views share are hard links.
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from stereocell.bundle.tile_part import BundleTile, TileChannel
 from stereocell.bundle.write_tile import export_tile
 from stereocell.formats.gltf import choose_step
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import write_coarse_tiles, write_view
+from stereocell.live.first_view import NOT_BUILT, write_coarse_tiles, write_view
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -131,7 +131,7 @@ class PartialView:
         shutil.rmtree(self._stage.parent / "tiles" / tile.id)
         coarse = survey.coarse[tile.id]
         merged = map(_merge, built.channels, coarse.channels)
-        return replace(coarse, representation="mesh", channels=tuple(merged))
+        return replace(coarse, channels=tuple(merged))
 
     def _write(self, survey: _Survey) -> Path:
         self._views += 1
@@ -144,7 +144,7 @@ class PartialView:
         write_view(
             survey.plan,
             root,
-            survey.appearances,
+            [_as_far_as_built(one, i, tiles) for i, one in enumerate(survey.appearances)],
             tiles,
             is_cut=survey.is_cut,
             viewer=None,
@@ -155,6 +155,15 @@ class PartialView:
 
 def _units_of(survey: _Survey, tile: Tile) -> list[Path]:
     return [survey.units[f"{tile.id}/{channel.id}"] for channel in survey.plan.channels]
+
+
+def _as_far_as_built(
+    appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile]
+) -> ComposedAppearance:
+    """Return a channel's appearance in a view: without a surface as long as no tile has one."""
+    if appearance.surface == "none" or any(tile.channels[channel].lods for tile in tiles):
+        return appearance
+    return replace(appearance, surface="none", surface_reason=NOT_BUILT)
 
 
 def _merge(built: TileChannel, coarse: TileChannel) -> TileChannel:

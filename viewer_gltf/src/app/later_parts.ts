@@ -14,16 +14,17 @@ export type Later = Readonly<{
 
 /**
  * @param opened the view that the address has opened
- * @param keptToo addresses of files that are kept for a visit without a network, though the page does not fetch them
+ * @param keptToo addresses of files that are kept for a visit without a network, though the page does not fetch them;
+ *   null: nothing is kept, since the bundle is not whole yet
  */
 export function startLater(
   host: PartHost,
   opened: Opened,
   say: (text: string) => void,
-  keptToo: readonly string[],
+  keptToo: readonly string[] | null,
 ): Later {
   if (pixelShare() < 1) say(FEWER_PIXELS);
-  void OfflinePart.start(host, say, keptToo);
+  if (keptToo !== null) void OfflinePart.start(host, say, keptToo);
   const isFollowed = hasAddress() && follows(location.search, window.parent !== window);
   return { addressBar: isFollowed ? new AddressBar(host, opened) : null };
 }

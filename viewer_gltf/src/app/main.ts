@@ -9,6 +9,7 @@ import { bundleAddress, pageAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import { fileAddress } from "../bundle/fetch";
 import type { Manifest } from "../bundle/generated/bundle";
+import type { LiveHost } from "../bundle/live_host";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
@@ -102,6 +103,9 @@ function followSystem(host: Host, search: string): void {
   dress();
 }
 
+/** Whether someone has taken the page in hand. */
+let wasTouched = false;
+
 async function open(parent: HTMLElement): Promise<Host> {
   dressPage();
   checkWebGl2();
@@ -112,6 +116,40 @@ async function open(parent: HTMLElement): Promise<Host> {
     loadBundle(bundleAddress(page)),
     loadLink(withTyped(hash)),
   ]);
+  const made = await openIn(parent, bundle, (host) => openAddress(host, search, readLink));
+  if (bundle.live !== undefined) followBuild(bundle, bundle.live);
+  return made;
+}
+
+/** Follows the build behind the page: each newer view takes the place of the one before. */
+function followBuild({ base }: Bundle, live: LiveHost): void {
+  const root = base.slice(0, base.length - live.folder.length);
+  void Promise.all([import("../live/watch_build"), import("./exchange")]).then(
+    ([{ watchBuild }, { exchange }]) =>
+      watchBuild(live, root, live.folder === "" ? "" : base, async (newer) => {
+        await ready;
+        const bundle = await loadBundle(newer);
+        if (host === null) return;
+        const over = said.root.parentElement;
+        host = await exchange(host, async (parent) => {
+          const made = await openIn(parent, bundle, () => undefined);
+          over?.append(said.root); // the words stay with the picture that is shown
+          return made;
+        });
+        host.view.append(said.root);
+        later?.addressBar?.dispose();
+        await beginLater(host, newer === root);
+      }),
+  );
+}
+
+/** Makes the page of a bundle in an element. `place` brings it to the view with which it opens. */
+async function openIn(
+  parent: HTMLElement,
+  bundle: Bundle,
+  place: (host: Host) => void,
+): Promise<Host> {
+  const { search } = new URL(pageAddress());
   document.title = `${bundle.manifest.specimen.name} · StereoCell`;
   const isFramed = window.parent !== window;
   document.documentElement.dataset.panel = panelOf(search);
@@ -121,7 +159,7 @@ async function open(parent: HTMLElement): Promise<Host> {
   host.panel.learn({ subtitle: describeSize(bundle.manifest) });
   const ofPage = new Page(host, parent, said);
   host.add(ofPage);
-  openAddress(host, search, readLink);
+  place(host);
   const { viewpoint, renderer } = host.display;
   openedAs = { state: host.state, camera: viewpoint.cameraView };
   renderer.domElement.addEventListener("webglcontextlost", () => {
@@ -130,7 +168,9 @@ async function open(parent: HTMLElement): Promise<Host> {
     );
   });
   hint.update(host.state);
+  if (wasTouched) hint.leave();
   whenTouched(() => {
+    wasTouched = true;
     viewpoint.stopTurning();
     hint.leave();
   });
@@ -260,11 +300,15 @@ void opened.then(
   },
   () => undefined, // reported above
 );
+/** @param isKept whether the bundle is whole, and kept for a visit without a network */
+async function beginLater(of: Host, isKept: boolean): Promise<void> {
+  const { startLater } = await import("./later_parts");
+  if (openedAs === null) return;
+  later = startLater(of, openedAs, (text) => said.say(text), isKept ? alsoKept(of) : null);
+}
 void ready
   .then(async () => {
-    const { startLater } = await import("./later_parts");
-    if (host === null || openedAs === null) return;
-    later = startLater(host, openedAs, (text) => said.say(text), alsoKept(host));
+    if (host !== null) await beginLater(host, host.bundle.live === undefined);
   })
   .catch(() => undefined); // without these parts the page shows all the same
 watchWaiting((jobs) => host?.noteWaiting(jobs));
@@ -285,7 +329,7 @@ const api: StereoCellApi = {
   get frames() {
     return host?.display.frames ?? 0;
   },
-  settled: async () => (await opened).display.settled(),
+  settled: async () => (host ?? (await opened)).display.settled(),
   snapshot() {
     if (host === null) throw new Error("nothing is open yet: await ready");
     return host.display.snapshot();

@@ -6,6 +6,7 @@ import type { FileRef, Manifest } from "./generated/bundle";
 import type { ChannelTransfer2D } from "./generated/transfer2d";
 import type { TileVolume } from "./generated/volumes";
 import { readLevel, readTexture } from "./ktx2";
+import { type LiveHost, liveHost } from "./live_host";
 import { checkManifest, checkTransfer2d, checkVolumes } from "./schema_check";
 import { COLUMNS, ROWS } from "./transfer_2d";
 import { valuesAddress } from "./values_host";
@@ -17,6 +18,8 @@ export type Bundle = Readonly<{
   bricks?: string;
   /** Address of the values as measured; absent: the host has none. */
   values?: string;
+  /** The build behind this view of a source; absent: there is none, and the bundle is whole. */
+  live?: LiveHost;
 }>;
 
 /** Load and check the bundle in the folder `base`. Throws BundleError. */
@@ -27,11 +30,13 @@ export async function loadBundle(base: string): Promise<Bundle> {
   const manifest = checkManifest(parseJson(text, path));
   const bricks = bricksAddress(response.headers, base);
   const values = valuesAddress(response.headers, base);
+  const live = liveHost(response.headers, base);
   return {
-    base,
+    base: live === null ? base : new URL(live.folder, base).href,
     manifest,
     ...(bricks === null ? {} : { bricks }),
     ...(values === null ? {} : { values }),
+    ...(live === null ? {} : { live }),
   };
 }
 

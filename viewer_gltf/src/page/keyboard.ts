@@ -33,7 +33,8 @@ export class Keyboard {
     host.announced.subscribe(() => {
       this.accident = null;
     });
-    listenForKeys((name) => this.press(name), signal);
+    // the keys are for the page that is shown, not for one that is prepared behind it
+    listenForKeys((name) => !parent.inert && this.press(name), signal);
   }
 
   /** Takes back the change of the newest key; false: there is none to take back. */

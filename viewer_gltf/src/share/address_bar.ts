@@ -79,6 +79,10 @@ export class AddressBar {
     }
   }
 
+  dispose(): void {
+    clearInterval(this.timer);
+  }
+
   private look(): void {
     const { now, seen } = this;
     this.seen = now;

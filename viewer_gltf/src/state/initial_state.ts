@@ -61,6 +61,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     tiles: manifest.tiles.map((tile) => ({
       id: tile.id,
       representation: asStaged.has(tile) ? tile.representation : "mesh",
+      ...(tile.unfinished ? { isUnfinished: true } : {}),
     })),
     middle: ordered[0].id,
     objects: {},

@@ -47,6 +47,7 @@ export function representationOf(
 ): Representation | null {
   if (!channel.shown || (state.isolated !== null && tile.id !== state.isolated)) return null;
   if (!channel.volume || state.mode === "off") return "mesh";
+  if (tile.isUnfinished) return "volume"; // there is nothing else, and its volume is small
   if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
   if (isTraced(state) || isMarched(state, tile.id, focusTiles)) return "volume";
   if (!prefersVolume(channel)) return "mesh";
@@ -59,7 +60,7 @@ function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): bo
     case "tile":
       return tile === marchedTile(state, focusTiles);
     case "disc":
-      return focusTiles.disc.includes(tile);
+      return !isUnfinished(state) && focusTiles.disc.includes(tile);
     case "all":
       return true;
     case "stage":
@@ -77,7 +78,12 @@ export function marchedTile(state: ViewerState, focusTiles: FocusTiles): string 
 
 /** Whether a channel's volumes show in the disc alone. */
 export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
-  return state.mode === "disc" && !prefersVolume(channel);
+  return state.mode === "disc" && !prefersVolume(channel) && !isUnfinished(state);
+}
+
+/** Whether volumes still stand for surfaces that are being built: then nothing else cuts into surfaces. */
+function isUnfinished({ tiles }: ViewerState): boolean {
+  return tiles.some((tile) => tile.isUnfinished);
 }
 
 /** The tiles that are marched, those in the disc first; where light is followed, until that has come. */

@@ -40,7 +40,12 @@ export type ChannelState = Functions &
 export type Representation = Manifest["tiles"][number]["representation"];
 
 /** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
-export type TileState = Readonly<{ id: string; representation: Representation }>;
+export type TileState = Readonly<{
+  id: string;
+  representation: Representation;
+  /** Its surfaces are not built yet; absent: they are. */
+  isUnfinished?: true;
+}>;
 
 export type ViewerState = Settings &
   Measuring &

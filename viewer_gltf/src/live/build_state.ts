@@ -1,0 +1,95 @@
+/** What a server reports of the build behind the page. Pure. */
+
+const DOINGS = ["building", "pausing", "paused", "cancelled", "failed", "complete"] as const;
+
+export type BuildState = Readonly<{
+  doing: (typeof DOINGS)[number];
+  /** The running part of the build, as `units`, and how far it is; empty: it has not begun. */
+  label: string;
+  done: number;
+  total: number;
+  /** Tiles that have their surfaces, and all tiles. */
+  tiles: number;
+  allTiles: number;
+  /** How much of the build is done, 0..1. */
+  share: number;
+  /** s until the end; null: not known. */
+  left_s: number | null;
+  /** The folder of the newest view, below the page; empty: it is the page's own. */
+  folder: string;
+  /** Whether the bundle is whole, which the page's own address then leads to. */
+  hasBundle: boolean;
+  /** Why the build has failed; or empty. */
+  line: string;
+  mayControl: boolean;
+}>;
+
+/** Reads a message of the server; null: it is none that this page knows. */
+export function readBuildState(text: string): BuildState | null {
+  let found: Record<string, unknown>;
+  try {
+    found = JSON.parse(text);
+  } catch {
+    return null;
+  }
+  const doing = DOINGS.find((each) => each === found?.doing);
+  if (doing === undefined) return null;
+  const number = (name: string) => Number(found[name]) || 0;
+  const words = (name: string) => String(found[name] ?? "");
+  return {
+    doing,
+    label: words("label"),
+    done: number("done"),
+    total: number("total"),
+    tiles: number("tiles"),
+    allTiles: number("all_tiles"),
+    share: Math.min(1, Math.max(0, number("share"))),
+    left_s: typeof found.left_s === "number" ? found.left_s : null,
+    folder: /^g\d+\/$/.test(words("folder")) ? words("folder") : "",
+    hasBundle: found.has_bundle === true,
+    line: words("line"),
+    mayControl: found.may_control === true,
+  };
+}
+
+/** The parts of a build, in words of a person who looks on. */
+const PARTS: Readonly<Record<string, string>> = {
+  windows: "Finding windows",
+  evidence: "Looking for surfaces",
+  components: "Choosing surfaces",
+  objects: "Finding objects",
+  units: "Building surfaces",
+  stage: "Writing the stage",
+  bundle: "Writing the bundle",
+  report: "Writing the report",
+};
+
+/** The state in one line, as `Building surfaces: 3 of 10 tiles, about 40 s left`. */
+export function wordsOf(state: BuildState): string {
+  switch (state.doing) {
+    case "failed":
+      return `The build has stopped: ${state.line}. The picture stays.`;
+    case "cancelled":
+      return "The build was cancelled. What is finished is kept.";
+    case "complete":
+      return "Complete: all surfaces are built.";
+    case "paused":
+      return `Paused${tilesOf(state)}.`;
+    case "pausing":
+      return "Pausing after the running tasks.";
+    case "building":
+      return `${PARTS[state.label] ?? "Reading the source"}${tilesOf(state)}${leftOf(state)}`;
+  }
+}
+
+function tilesOf({ tiles, allTiles, label, done, total }: BuildState): string {
+  if (label === "units") return `: ${tiles} of ${allTiles} ${allTiles === 1 ? "tile" : "tiles"}`;
+  return total > 1 ? `: ${done} of ${total}` : "";
+}
+
+function leftOf({ left_s }: BuildState): string {
+  if (left_s === null) return "";
+  if (left_s < 90) return `, about ${Math.max(5, Math.ceil(left_s / 5) * 5)} s left`;
+  if (left_s < 5400) return `, about ${Math.round(left_s / 60)} min left`;
+  return `, about ${Math.round(left_s / 3600)} h left`;
+}

@@ -1,0 +1,56 @@
+/** A slim line at the foot of the page: how far the build is, and buttons that pause and end it. */
+import { element, setText } from "../dom/element";
+import type { Command } from "./build_feed";
+import { type BuildState, wordsOf } from "./build_state";
+
+const GONE = "The server does not answer: the picture stays, and the page goes on trying.";
+
+export class ProgressLine {
+  private readonly fill = element("div", { className: "fill" });
+  private readonly words = element("span", { role: "status" }, { live: "words" });
+  private readonly buttons: Readonly<Record<Command, HTMLButtonElement>>;
+  private readonly close = element(
+    "button",
+    { type: "button", textContent: "×", ariaLabel: "Dismiss" },
+    { live: "dismiss" },
+  );
+  readonly root: HTMLElement;
+
+  constructor(onCommand: (command: Command) => void) {
+    const button = (command: Command, textContent: string) =>
+      element(
+        "button",
+        { type: "button", textContent, onclick: () => onCommand(command) },
+        { live: command },
+      );
+    this.buttons = {
+      pause: button("pause", "Pause"),
+      continue: button("continue", "Continue"),
+      cancel: button("cancel", "Cancel"),
+    };
+    this.close.onclick = () => this.root.remove();
+    this.root = element(
+      "aside",
+      { className: "build", ariaLabel: "The build" },
+      {},
+      element("div", { className: "track" }, {}, this.fill),
+      this.words,
+      ...Object.values(this.buttons),
+      this.close,
+    );
+  }
+
+  /** @param state null: the server does not answer */
+  update(state: BuildState | null): void {
+    const doing = state?.doing ?? null;
+    setText(this.words, state === null ? GONE : wordsOf(state));
+    if (state !== null) this.fill.style.width = `${100 * state.share}%`;
+    this.root.dataset.doing = doing ?? "gone";
+    const may = state?.mayControl === true;
+    this.buttons.pause.hidden = !may || doing !== "building";
+    this.buttons.continue.hidden =
+      !may || !["paused", "pausing", "cancelled", "failed"].includes(doing ?? "");
+    this.buttons.cancel.hidden = !may || !["building", "pausing", "paused"].includes(doing ?? "");
+    this.close.hidden = doing !== "complete" && doing !== "cancelled";
+  }
+}
