@@ -21,7 +21,12 @@ from stereocell.planning.survey_steps import window_step
 from stereocell.read import Dataset
 from stereocell.steps.open_source import open_source
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
-from support.small_viewer import write_small_viewer
+
+
+def write_view_of(source: Path, root: Path, **flags: dict[str, Any]) -> Plan:
+    plan, dataset = planned(source, **flags)
+    first_view.write_first_view(plan, first_view.read_channels(plan, dataset), root)
+    return plan
 
 
 def planned(source: Path, **flags: dict[str, Any]) -> tuple[Plan, Dataset]:
@@ -48,10 +53,8 @@ def test_coarse_voxels_lie_where_the_source_has_them(
     f_tiff: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(first_view, "VOXELS", 16_000)
-    plan, dataset = planned(f_tiff, plan={"tile_size": (32, 48, 40)})
     root = tmp_path / "view"
-    root.mkdir()
-    first_view.write_first_view(plan, dataset, root, None)
+    plan = write_view_of(f_tiff, root, plan={"tile_size": (32, 48, 40)})
     (channel,) = manifest_of(root)["channels"]
     entries = volumes_of(root, channel)
     assert [entry["tile"] for entry in entries] == [tile.id for tile in plan.tiles]
@@ -79,21 +82,18 @@ def test_a_first_view_passes_the_checks_of_a_bundle(
     f_tiff: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     root = tmp_path / "view"
-    root.mkdir()
-    first_view.write_first_view(*planned(f_tiff), root, write_small_viewer(tmp_path / "viewer"))
+    write_view_of(f_tiff, root)
     assert main(["check", str(root)]) == 0
     manifest = manifest_of(root)
     (channel,) = manifest["channels"]
     assert channel["tileset"] is None
     assert (channel["surface"], channel["surface_reason"]) == ("none", first_view.NOT_BUILT)
-    assert [tile["representation"] for tile in manifest["tiles"]] == ["volume"]
+    assert [tile["unfinished"] for tile in manifest["tiles"]] == [True]
 
 
 def test_windows_and_level_are_near_those_of_a_build(f_tiff: Path, tmp_path: Path) -> None:
-    plan, dataset = planned(f_tiff)
     root = tmp_path / "view"
-    root.mkdir()
-    first_view.write_first_view(plan, dataset, root, None)
+    plan = write_view_of(f_tiff, root)
     (channel,) = manifest_of(root)["channels"]
     low, high = window_step(plan, plan.channels[0]).run().statistics.window
     assert channel["window"] == pytest.approx([low, high], abs=0.02 * (high - low))

@@ -29,6 +29,7 @@ def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Pat
         str(source),
         "--json",
         "--no-browser",
+        "--no-build",
     ]
     with subprocess.Popen(
         [*command, "--port", "0"],

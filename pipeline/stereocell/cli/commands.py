@@ -20,7 +20,7 @@ from stereocell.model.errors import UsageError, shortened
 
 if TYPE_CHECKING:
     from stereocell.engine.run import Engine
-    from stereocell.live.build_process import BuildProcess
+    from stereocell.live.show_source import Live
     from stereocell.verify.check_line import CheckLine
 
 
@@ -416,9 +416,9 @@ def serve(options: argparse.Namespace) -> Answer:
 
 
 def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
-    from stereocell.serve.server import Live, serve
+    from stereocell.serve.server import serve
 
-    def run(folder: Path, build: "BuildProcess | None" = None, tiles: int = 0) -> None:
+    def run(folder: Path, live: "Live | None" = None) -> None:
         serve(
             folder,
             options.port,
@@ -426,7 +426,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             open_browser=open_browser,
             for_program=options.json,
             frames=tuple(options.allow_frame),
-            live=None if build is None else Live(build, tiles),
+            live=live,
         )
 
     try:
@@ -434,7 +434,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             options.input = str(options.out)
             if listed := _series(options):
                 return listed
-            _show_source(options, run)
+            _show_source(options, lambda live: run(live.bundle, live))
         else:
             _require_no_source_flags(options)
             run(options.out)
@@ -457,9 +457,7 @@ def _require_no_source_flags(options: argparse.Namespace) -> None:
         )
 
 
-def _show_source(
-    options: argparse.Namespace, run: "Callable[[Path, BuildProcess | None, int], None]"
-) -> None:
+def _show_source(options: argparse.Namespace, run: "Callable[[Live], None]") -> None:
     """Serve the first view of a source that is not built, and build it behind the page."""
     from stereocell.cli.build_behind import build_behind
     from stereocell.live.show_source import Behind, show_source

@@ -9,16 +9,20 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from stereocell.engine.run import Watch
-from stereocell.live.partial_view import PartialView
+from stereocell.engine.run import Watch, console
+from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.model.errors import StereoCellError
+from stereocell.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from stereocell.live.partial_view import PartialView
 
 Command = Literal["pause", "continue", "cancel"]
 COMMANDS: tuple[Command, ...] = ("pause", "continue", "cancel")
@@ -85,12 +89,23 @@ class _End:
     line: str
 
 
+@dataclass(frozen=True, slots=True)
+class Coarse:
+    """What the views of a build are made of; see `partial_view.PartialView`."""
+
+    plan: Plan
+    read: Mapping[str, CoarseChannel]
+    out: Path
+    scratch: Path
+
+
 class BuildProcess:
     """A build behind a page. All methods may be called from any thread."""
 
-    def __init__(self, build: Build, view: PartialView, out: Path) -> None:
+    def __init__(self, build: Build, out: Path) -> None:
         """build: picklable; out: the folder that it writes."""
-        self._build, self._view, self.out = build, view, out
+        self._build, self.out = build, out
+        self._coarse: Coarse | None = None
         self._changed = threading.Condition()
         self._state = State()
         self._views: dict[str, Path] = {}
@@ -113,11 +128,17 @@ class BuildProcess:
         """The finished bundle; None: there is none yet."""
         return self.out / "bundle" if self.state.has_bundle else None
 
-    def start(self) -> None:
-        """Begin to build, or go on with a build that has ended early."""
+    def start(self, coarse: Coarse | None = None) -> None:
+        """Begin to build, or go on with a build that has ended early.
+
+        coarse  what the first view is made of; None: as at the first start
+        """
+        self._coarse = coarse or self._coarse
+        if self._coarse is None:
+            return
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_run, args=(self._build, self._view, theirs))
+        process = context.Process(target=_run, args=(self._build, self._coarse, theirs))
         process.start()
         theirs.close()
         self._process, self._pipe = process, ours
@@ -209,9 +230,12 @@ def _share_of(task: _Task) -> float:
     return before + SHARES[task.label] * task.done / max(1, task.total)
 
 
-def _run(build: Build, view: PartialView, pipe: "Connection[Any, Any]") -> None:
+def _run(build: Build, coarse: Coarse, pipe: "Connection[Any, Any]") -> None:
     """Build, in the process of its own."""
+    from stereocell.live.partial_view import PartialView  # it imports USD, and the page waits
+
     _lower_priority()
+    view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch)
     with suppress(BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
         pipe.send(_End(build(_Watcher(view, pipe))))
 
@@ -219,15 +243,12 @@ def _run(build: Build, view: PartialView, pipe: "Connection[Any, Any]") -> None:
 class _Watcher:
     """Called by the build after each task: reports it, writes views, and pauses."""
 
-    def __init__(self, view: PartialView, pipe: "Connection[Any, Any]") -> None:
-        self._view, self._pipe = view, pipe
+    def __init__(self, view: "PartialView", pipe: "Connection[Any, Any]") -> None:
+        self._view, self._pipe, self._has_failed = view, pipe, False
 
     def __call__(self, label: str, done: int, total: int, name: str) -> None:
         if label == "units":
-            with suppress(StereoCellError, OSError):  # the build itself reports what is amiss
-                folder = self._view.add(name.split("/")[0] if name else None)
-                if folder is not None:
-                    self._pipe.send(_View(folder))
+            self._look(name.split("/")[0] if name else None)
         self._pipe.send(_Task(label, done, total, self._view.finished))
         if self._pipe.poll() and self._pipe.recv() == "pause":
             self._pipe.send("paused")
@@ -235,6 +256,19 @@ class _Watcher:
             while self._pipe.recv() != "continue":
                 pass
             self._pipe.send(time.monotonic() - began_s)
+
+    def _look(self, tile_id: str | None) -> None:
+        """Write a new view where a tile is finished. Without one the build goes on all the same."""
+        if self._has_failed:
+            return
+        try:
+            folder = self._view.add(tile_id)
+        except (StereoCellError, OSError) as error:
+            self._has_failed = True
+            console.print(f"views: {error}: the page shows surfaces at the end", markup=False)
+            return
+        if folder is not None:
+            self._pipe.send(_View(folder))
 
 
 def _lower_priority() -> None:

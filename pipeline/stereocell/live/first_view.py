@@ -5,6 +5,7 @@ same schema, so that every viewer of bundles shows it. Its voxels alone are coar
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.bundle.copy_viewer import copy_viewer
 from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
@@ -27,6 +27,7 @@ from stereocell.model.world_box import WorldPoint, move_box, world_box
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
+from stereocell.storage.processes import cores
 from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
@@ -58,24 +59,26 @@ def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
     if not channels:
         raise SourceError(f"{plan.name}: objects of a label map are shown once they are built")
     each = max(10_000, VOXELS // len(channels))
-    return {one.voxels_id: read_coarse(dataset, plan, one, each) for one in channels}
+    with ThreadPoolExecutor(cores()) as pool:
+        read = pool.map(lambda one: read_coarse(dataset, plan, one, each), channels)
+        return {one.voxels_id: coarse for one, coarse in zip(channels, read, strict=True)}
 
 
-def write_first_view(
-    plan: Plan, read: Mapping[str, CoarseChannel], root: Path, viewer: Path | None
-) -> None:
-    """Write a bundle of a plan's coarse volumes into an empty folder.
+def write_first_view(plan: Plan, read: Mapping[str, CoarseChannel], root: Path) -> None:
+    """Write a bundle of a plan's coarse volumes, without a page, into a folder.
 
     read    see `read_channels`
-    viewer  the folder of the built viewer; None: the bundle has no page
 
     Raises OutputError where a file can't be written.
     """
-    found = [first_appearance(plan, one, read[one.voxels_id]) for one in plan.channels]
+    with ThreadPoolExecutor(cores()) as pool:
+        found = list(
+            pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
+        )
     appearances = [composed(appearance) for appearance, _ in found]
     tiles = write_coarse_tiles(plan, root, read, appearances)
     is_cut = plan.opens_cut and any(is_body for _, is_body in found)
-    write_view(plan, root, appearances, tiles, is_cut=is_cut, viewer=viewer)
+    write_view(plan, root, appearances, tiles, is_cut=is_cut)
 
 
 def write_coarse_tiles(
@@ -85,7 +88,10 @@ def write_coarse_tiles(
     appearances: Sequence[ComposedAppearance],
 ) -> list[BundleTile]:
     """Write the coarse volumes of all tiles into a bundle, and return the tiles."""
-    return [_write_tile(plan, root, tile, read, appearances) for tile in plan.tiles]
+    with ThreadPoolExecutor(cores()) as pool:
+        return list(
+            pool.map(lambda tile: _write_tile(plan, root, tile, read, appearances), plan.tiles)
+        )
 
 
 def write_view(
@@ -95,13 +101,11 @@ def write_view(
     tiles: Sequence[BundleTile],
     *,
     is_cut: bool,
-    viewer: Path | None,
     finished: Collection[str] = (),
 ) -> None:
     """Write what a bundle has once, where the files of its tiles lie already.
 
     is_cut    whether the specimen opens cut
-    viewer    as in `write_first_view`
     finished  IDs of the tiles that have their surfaces
     """
     files: list[FileRef] = [
@@ -113,8 +117,6 @@ def write_view(
         entry, written = write_channel(root, appearance, own)
         entries.append(entry)
         files += written
-    if viewer is not None:
-        files += copy_viewer(viewer, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     specimen: dict[str, Any] = {

@@ -147,7 +147,6 @@ class PartialView:
             [_as_far_as_built(one, i, tiles) for i, one in enumerate(survey.appearances)],
             tiles,
             is_cut=survey.is_cut,
-            viewer=None,
             finished=self._finished,
         )
         return root

@@ -3,17 +3,18 @@
 import re
 import shlex
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
-from stereocell.live.build_process import BuildProcess
+from stereocell.live.build_process import BuildProcess, Coarse
 from stereocell.live.first_view import read_channels, write_first_view
-from stereocell.live.partial_view import PartialView
 from stereocell.model.errors import OutputError
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
@@ -54,48 +55,84 @@ class Behind:
     out: Path | None
 
 
-Serve = Callable[[Path, BuildProcess | None, int], None]
+@dataclass(frozen=True, slots=True)
+class Live:
+    """A source that is shown.
+
+    page    the folder of the viewer
+    bundle  the folder of the first view, once `first` has a result
+    first   done once the first view is written; its error is why that can't be
+    tiles   how many there are
+    build   the build behind the view; None: it is only looked at
+    """
+
+    page: Path
+    bundle: Path
+    first: Future[None]
+    tiles: int
+    build: BuildProcess | None
 
 
 def show_source(
-    source: str, settings: Settings, choice: Sequence[str], serve: Serve, behind: Behind | None
+    source: str,
+    settings: Settings,
+    choice: Sequence[str],
+    serve: Callable[[Live], None],
+    behind: Behind | None,
 ) -> None:
-    """Write the first view of a source into a folder of its own, and serve it until that returns.
+    """Serve a source: its first view, which is written meanwhile, and then what is built of it.
 
     choice  notes on how the settings were chosen; see `load_for`
-    serve   serves a folder with a bundle, the build behind it, and its number of tiles
+    serve   serves until it is stopped, or until there can be no first view
     behind  how the source is built meanwhile; None: it is only looked at
 
-    Raises StereoCellError where the source can't be read. The folder is removed at the end.
+    Raises StereoCellError where the source can't be read. The views are removed at the end.
     """
     began_s = time.monotonic()
-    viewer = viewer_dist()
-    if viewer is None:
+    page = viewer_dist()
+    if page is None:
         raise OutputError("the viewer is not built: run `make setup`")
     plan = settle(source, settings, choice)
     dataset = open_source(as_asked(plan.source, plan.settings.plan))
-    with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
-        scratch = Path(folder)
-        root = scratch / "bundle"
-        root.mkdir()
-        read = read_channels(plan, dataset)
-        write_first_view(plan, read, root, viewer)
-        seconds = time.monotonic() - began_s
-        build, so = None, f"For surfaces: stereocell build {shlex.quote(source)} -o OUT"
-        if behind is None:
-            print_notes(plan)  # a build prints them itself
-        else:
-            out = default_out(plan) if behind.out is None else behind.out
-            require_build_or_nothing(out, source)
-            view = PartialView(plan, read, out, scratch)
-            build = BuildProcess(partial(behind.build, out), view, out)
-            so = f"It is built behind the page, into {printable(str(out))} (--no-build: only shown)"
-        console.print(
-            f"first view: {printable(plan.name)} after {seconds:.1f} s, by coarse volumes. {so}",
-            markup=False,
-            soft_wrap=True,
-        )
-        serve(root, build, len(plan.tiles))
+    build = None
+    if behind is not None:
+        out = default_out(plan) if behind.out is None else behind.out
+        require_build_or_nothing(out, source)
+        build = BuildProcess(partial(behind.build, out), out)
+    else:
+        print_notes(plan)  # a build prints them itself
+    with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
+        scratch, first = Path(folder), Future[None]()
+        live = Live(page, scratch / "bundle", first, len(plan.tiles), build)
+
+        def write() -> None:
+            try:
+                read = read_channels(plan, dataset)
+                write_first_view(plan, read, live.bundle)
+            except BaseException as error:  # the command raises it
+                first.set_exception(error)
+                return
+            first.set_result(None)
+            seconds = time.monotonic() - began_s
+            _print(f"first view: {printable(plan.name)} after {seconds:.1f} s, by coarse volumes")
+            if build is None:
+                _print(f"for surfaces: stereocell build {shlex.quote(source)} -o OUT")
+            else:
+                _print(f"built behind the page into {build.out}; --no-build only shows")
+                build.start(Coarse(plan, read, build.out, scratch))
+
+        threading.Thread(target=write, daemon=True).start()
+        try:
+            serve(live)
+        finally:
+            if build is not None:
+                build.stop()
+        if first.done():
+            first.result()
+
+
+def _print(line: str) -> None:
+    console.print(line, markup=False, soft_wrap=True)
 
 
 def default_out(plan: Plan) -> Path:

@@ -1,15 +1,17 @@
 """Serve a source while it is built: `/live`, the views in folders of their own, and the bundle.
 
-    /               the first view; once the build has a bundle, that with its bricks and values
+    /               the page and the first view, whose files wait until they are written; once the
+                    build has a bundle, that with its bricks and values
     /manifest.json  of the newest view, whose folder the header Stereocell-Live names
     /g1/, /g2/      the views that came later: surfaces where a tile is finished
     /live           a websocket with the state of the build, which takes commands
 
-The server sends the state whenever it changes, at most four times a second, as schemas describe no
-more of it than this:
+The server sends the state whenever it changes, at most four times a second: see
+`build_process.State`.
 
-    {"doing": "building", "label": "units", "done": 3, "total": 20, "tiles": 1, "all_tiles": 10,
-     "share": 0.41, "left_s": 38.5, "folder": "g1/", "line": "", "may_control": true}
+    {"doing": "building", "label": "units", "done": 3, "total": 20, "tiles": 1, "share": 0.41,
+     "left_s": 38.5, "folder": "g1/", "has_bundle": false, "line": "", "all_tiles": 10,
+     "may_control": true}
 
 A client may send `pause`, `continue` or `cancel` as text. Only clients of this machine may: on the
 LAN a phone that looks on can't stop the build.
@@ -24,11 +26,14 @@ from ipaddress import ip_address
 from pathlib import Path
 
 from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from stereocell.bundle.manifest import MANIFEST
-from stereocell.live.build_process import COMMANDS, BuildProcess
+from stereocell.live.build_process import COMMANDS
+from stereocell.live.show_source import Live
+from stereocell.model.errors import StereoCellError
 from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
 from stereocell.serve.static_files import BundleFiles
 
@@ -39,16 +44,9 @@ _EACH_S = 0.25  # s between two states
 class LiveApp:
     """The application over a build that runs."""
 
-    def __init__(
-        self, first: Path, build: BuildProcess, tiles: int, built: Callable[[Path], ASGIApp]
-    ) -> None:
-        """Wrap a build.
-
-        first  the folder of the first view
-        tiles  how many there are
-        built  returns the application that serves a whole bundle
-        """
-        self._build, self._tiles, self._first, self._make_built = build, tiles, first, built
+    def __init__(self, live: Live, built: Callable[[Path], ASGIApp]) -> None:
+        """built: returns the application that serves a whole bundle."""
+        self._live, self._build, self._make_built = live, live.build, built
         self._built: ASGIApp | None = None
         self._sockets = 0
 
@@ -66,34 +64,59 @@ class LiveApp:
             await self._answer(scope, receive, send)
 
     def _find_built(self) -> ASGIApp | None:
-        bundle = self._build.bundle
+        bundle = None if self._build is None else self._build.bundle
         if self._built is None and bundle is not None:
             self._built = self._make_built(bundle)
         return self._built
 
     def _folder_of(self, scope: Scope) -> Path | None:
         """Return the folder of the later view that a path names; None: it names none."""
+        if self._build is None:
+            return None
         return self._build.views.get(scope["path"].lstrip("/").partition("/")[0])
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer from the folder of a view."""
+        if scope["method"] not in ("GET", "HEAD"):
+            await PlainTextResponse("expected GET", 405)(scope, receive, send)
+            return
         path, folder, headers = scope["path"].lstrip("/"), self._folder_of(scope), {}
         if folder is not None:
             path = path.partition("/")[2]
-        elif path == MANIFEST:
+        elif path == MANIFEST and self._build is not None:
             newest = self._build.state.folder
             folder = self._build.views.get(newest.rstrip("/"))
             headers = {LIVE_HEADER: f"version=1; folder={newest if folder else ''}"}
-        files = BundleFiles(folder or self._first, headers)
-        if scope["method"] not in ("GET", "HEAD"):
-            await send({"type": "http.response.start", "status": 405, "headers": []})
-            await send({"type": "http.response.body"})
-            return
-        answer = await files.answer(Request({**scope, "path": f"/{path}"}, receive))
+        answer = await self._file(folder, path, headers, scope, receive)
         await answer(scope, receive, send)
+
+    async def _file(
+        self,
+        folder: Path | None,
+        path: str,
+        headers: dict[str, str],
+        scope: Scope,
+        receive: Receive,
+    ) -> Response:
+        """Return a file of a view; of the first one, where `folder` is None, or of the page."""
+        request = Request({**scope, "path": f"/{path}"}, receive)
+        if folder is None:
+            of_page = await BundleFiles(self._live.page, {}).answer(request)
+            if of_page.status_code != 404:
+                return of_page
+            try:
+                await asyncio.shield(asyncio.wrap_future(self._live.first))
+            except StereoCellError:  # the command reports it, and ends
+                return PlainTextResponse("the source can't be shown: see the terminal", 503)
+            folder = self._live.bundle
+        return await BundleFiles(folder, headers).answer(request)
 
     async def _talk(self, socket: WebSocket) -> None:
         """Send one client the state until it leaves, and take its commands."""
+        if self._build is None:
+            await socket.close()
+            return
+        build = self._build
         await socket.accept()
         if self._sockets >= min(MAX_CONNECTIONS, 4 * CLIENT_SOCKETS):
             await socket.close(1013, "too many connections are open, try again later")
@@ -104,8 +127,8 @@ class LiveApp:
         sent = ""
         try:
             while True:
-                about = {"all_tiles": self._tiles, "may_control": may_control}
-                text = json.dumps({**asdict(self._build.state), **about})
+                about = {"all_tiles": self._live.tiles, "may_control": may_control}
+                text = json.dumps({**asdict(build.state), **about})
                 if text != sent:
                     await socket.send_text(text)
                     sent = text
@@ -117,7 +140,7 @@ class LiveApp:
                 if known is None or not may_control:
                     await socket.close(1008, "expected pause, continue or cancel, of this machine")
                     return
-                await asyncio.to_thread(self._build.do, known)
+                await asyncio.to_thread(build.do, known)
                 heard = asyncio.ensure_future(socket.receive_text())
         except (WebSocketDisconnect, KeyError, RuntimeError):  # it has left, or has sent bytes
             pass

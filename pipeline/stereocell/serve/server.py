@@ -17,8 +17,8 @@ import ssl
 import sys
 import webbrowser
 from collections.abc import AsyncIterator
+from concurrent.futures import Future
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import uvicorn
@@ -27,7 +27,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
 from stereocell.bundle.manifest import MANIFEST, read_manifest
-from stereocell.live.build_process import BuildProcess
+from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.access import Access, Gate
 from stereocell.serve.brick_library import BrickLibrary
@@ -45,14 +45,6 @@ LOCALHOST = "127.0.0.1"
 _OWN_NAMES = (LOCALHOST, "localhost")  # with any port: it may be forwarded
 
 
-@dataclass(frozen=True, slots=True)
-class Live:
-    """A build behind the first view of its source, which has so many tiles."""
-
-    build: BuildProcess
-    tiles: int
-
-
 def serve(
     out: Path,
     port: int,
@@ -68,8 +60,8 @@ def serve(
     for_program  print lines of JSON in place of texts for a person: first the address, then, with
                  `lan`, an address that admits one device, a new one after each admission
     frames       origins whose pages may hold the viewer in a frame
-    live         the build behind the bundle, which is the first view of its source; None: there is
-                 no such build. It is started, and stopped at the end
+    live         a source whose first view is the bundle, and is written meanwhile; None: the bundle
+                 is there
 
     Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
     once at a second Ctrl+C; StereoCellError where there is no bundle, its manifest was changed, the
@@ -87,13 +79,11 @@ def serve(
         if open_browser:
             webbrowser.open(server.address)
         if live is not None:
-            live.build.start()
+            live.first.add_done_callback(lambda first: _stop_after(first, server))
         with suppress(KeyboardInterrupt):
             server.run()
     finally:
         signal.signal(signal.SIGTERM, before)
-        if live is not None:
-            live.build.stop()
     if server.was_forced:
         raise KeyboardInterrupt
 
@@ -115,7 +105,7 @@ def make_app(
     names    the hosts that it answers to, in lower case
     gate     tokens and sessions on the LAN; None: all clients of this machine have access
     frames   origins whose pages may hold the viewer in a frame
-    live     the build behind the bundle; None: there is none
+    live     see `serve`
     """
     if live is None:
         return Access(_bundle_app(bundle, library, stage), names, gate, frames)
@@ -124,7 +114,7 @@ def make_app(
         out = bundle.parent
         return _bundle_app(bundle, BrickLibrary(bundle, out / "bricks"), out / "stage")
 
-    return Access(LiveApp(bundle, live.build, live.tiles, built), names, gate, frames)
+    return Access(LiveApp(live, built), names, gate, frames)
 
 
 def _bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) -> ASGIApp:
@@ -186,7 +176,7 @@ class BundleServer:
         self.bundle, self.has_bricks = bundle, bricks is not None
         self.for_program, self.is_live = for_program, live is not None
         for name in (MANIFEST, "index.html"):
-            if not (bundle / name).is_file():
+            if live is None and not (bundle / name).is_file():
                 raise StereoCellError(
                     f"{bundle / name}: expected a built bundle, found no such file; "
                     "`stereocell bundle OUT` writes it"
@@ -271,6 +261,12 @@ class BundleServer:
     def stop(self) -> None:
         """Make run() end soon; thread-safe."""
         self._server.should_exit = True
+
+
+def _stop_after(first: "Future[None]", server: BundleServer) -> None:
+    """Stop a server where there can be no first view."""
+    if first.exception() is not None:
+        server.stop()
 
 
 def _print_json(content: dict[str, object]) -> None:

@@ -1,0 +1,77 @@
+"""A build behind a page: it is watched, paused, continued, cancelled and started again."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stereocell.live.build_process import BuildProcess, Coarse, State
+from support import fake_build
+
+PATIENCE_S = 120
+
+
+@pytest.fixture
+def begin(tmp_path: Path) -> Iterator[Callable[[Any], BuildProcess]]:
+    """Begin a build that computes nothing; the process is stopped at the end."""
+    started: list[BuildProcess] = []
+
+    def start(build: Any) -> BuildProcess:
+        process = BuildProcess(partial(build, tmp_path), tmp_path / "out")
+        started.append(process)
+        nothing: Any = None  # there is no view to write
+        process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path))
+        return process
+
+    yield start
+    for process in started:
+        process.stop()
+
+
+def until(process: BuildProcess, holds: Callable[[State], bool]) -> State:
+    end = time.monotonic() + PATIENCE_S
+    while not holds(state := process.state):
+        assert time.monotonic() < end, state
+        time.sleep(0.02)
+    return state
+
+
+@pytest.mark.slow
+def test_a_build_is_paused_cancelled_and_continued(
+    begin: Callable[[Any], BuildProcess], tmp_path: Path
+) -> None:
+    process = begin(fake_build.steady)
+    assert process.bundle is None
+    until(process, lambda state: state.done >= 3)
+    process.do("continue")  # it runs already
+    process.do("pause")
+    assert process.state.doing in ("pausing", "paused")
+    paused = until(process, lambda state: state.doing == "paused")
+    time.sleep(0.5)
+    assert process.state == paused
+    process.do("pause")  # once is enough
+    process.do("continue")
+    until(process, lambda state: state.done > paused.done + 2)
+    process.do("cancel")
+    assert process.state.doing == "cancelled"
+    process.do("pause")
+    assert process.state.doing == "cancelled"
+    process.do("continue")
+    end = until(process, lambda state: state.doing == "complete")
+    assert (end.share, end.has_bundle, end.line) == (1.0, True, "")
+    assert process.bundle == tmp_path / "out" / "bundle"
+    assert (tmp_path / "starts").read_text() == "**"
+
+
+@pytest.mark.slow
+def test_an_error_and_a_kill_are_reported_in_a_line(begin: Callable[[Any], BuildProcess]) -> None:
+    ended = until(begin(fake_build.refused), lambda state: state.doing == "failed")
+    assert ended.line == "f.tif: changed since the plan: run it again"
+    if sys.platform != "win32":
+        ended = until(begin(fake_build.killed), lambda state: state.doing == "failed")
+        assert ended.line == "the build was stopped from outside"
+        assert not ended.has_bundle

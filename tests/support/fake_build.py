@@ -1,0 +1,32 @@
+"""Builds for tests of `BuildProcess`: they report tasks, and compute nothing."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from stereocell.engine.run import Watch
+
+
+def steady(folder: Path, watch: Watch) -> str:
+    """Report 60 tasks of 50 ms, and keep count of the starts in a file."""
+    with (folder / "starts").open("a") as starts:
+        starts.write("*")
+    for done in range(61):
+        watch("evidence", done, 60, f"r0_c{done}/A" if done else "")
+        time.sleep(0.05)
+    watch("report", 0, 1, "")
+    return ""
+
+
+def refused(_: Path, watch: Watch) -> str:
+    """End with the line of an error."""
+    watch("windows", 0, 1, "")
+    return "f.tif: changed since the plan: run it again"
+
+
+def killed(_: Path, watch: Watch) -> str:
+    """Be killed, as for want of memory."""
+    watch("windows", 0, 1, "")
+    os.kill(os.getpid(), signal.SIGKILL)
+    return ""
