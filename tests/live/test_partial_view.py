@@ -1,4 +1,4 @@
-"""While a source is built, each view is a bundle: finished tiles have their surfaces, the others volumes."""
+"""While a source is built, each view is a bundle: finished tiles have their surfaces."""
 
 import json
 from pathlib import Path
@@ -13,8 +13,8 @@ from stereocell.planning.input_files import as_asked
 from stereocell.planning.preset_choice import load_for
 from stereocell.planning.settle import settle
 from stereocell.steps.open_source import open_source
+from support.digests import digests_of
 from support.phantoms import f_phantom, write_ome_tiff
-from support.same_files import files_of
 
 FLAGS = ["--tile-size", "32,48,72"]
 
@@ -83,7 +83,7 @@ def test_each_finished_tile_brings_a_view_and_the_bundle_is_that_of_a_plain_buil
                 assert in_view.read_bytes() == in_bundle.read_bytes()
     assert build(source, tmp_path / "plain") == ""
     for part in ("stage", "bundle"):
-        assert files_of(out / part) == files_of(tmp_path / "plain" / part)
+        assert digests_of(out / part) == digests_of(tmp_path / "plain" / part)
 
 
 @pytest.mark.slow
