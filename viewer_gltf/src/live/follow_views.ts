@@ -1,0 +1,45 @@
+/** Which view of a source the page shows while the source is built: always the newest, one after the other. */
+import type { BuildState } from "./build_state";
+
+/** Time after which a view that could not be shown is tried again, ms. */
+const AGAIN_MS = 3000;
+
+export class ViewFollower {
+  private newest: string;
+  private isShowing = false;
+
+  /**
+   * @param root the page's own folder
+   * @param shown the address of the view that the page shows; empty: the first one, which the root leads to
+   * @param show puts another view in its place; it may wait until nobody would notice
+   */
+  constructor(
+    private readonly root: string,
+    private shown: string,
+    private readonly show: (base: string) => Promise<void>,
+    private readonly again_ms = AGAIN_MS,
+  ) {
+    this.newest = shown;
+  }
+
+  take({ hasBundle, folder }: Pick<BuildState, "hasBundle" | "folder">): void {
+    if (hasBundle) this.newest = this.root;
+    else if (folder !== "") this.newest = new URL(folder, this.root).href;
+    void this.follow();
+  }
+
+  private async follow(): Promise<void> {
+    if (this.isShowing) return;
+    this.isShowing = true;
+    while (this.newest !== this.shown) {
+      const next = this.newest;
+      try {
+        await this.show(next);
+        this.shown = next;
+      } catch {
+        await new Promise((resolve) => setTimeout(resolve, this.again_ms)); // the server may be back by then
+      }
+    }
+    this.isShowing = false;
+  }
+}
