@@ -68,6 +68,24 @@ def test_a_build_is_paused_cancelled_and_continued(
 
 
 @pytest.mark.slow
+def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
+    nothing: Any = None
+    coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path)
+    process = BuildProcess(partial(fake_build.steady, tmp_path), tmp_path / "out")
+    process.do("cancel")
+    process.start(coarse)
+    assert process.state.doing == "cancelled"
+    assert not (tmp_path / "starts").exists()
+    process = BuildProcess(partial(fake_build.steady, tmp_path), tmp_path / "out")
+    process.do("pause")
+    process.start(coarse)
+    try:
+        assert until(process, lambda state: state.doing == "paused").done == 0
+    finally:
+        process.stop()
+
+
+@pytest.mark.slow
 def test_an_error_and_a_kill_are_reported_in_a_line(begin: Callable[[Any], BuildProcess]) -> None:
     ended = until(begin(fake_build.refused), lambda state: state.doing == "failed")
     assert ended.line == "f.tif: changed since the plan: run it again"

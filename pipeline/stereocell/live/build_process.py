@@ -106,7 +106,8 @@ class BuildProcess:
         """build: picklable; out: the folder that it writes."""
         self._build, self.out = build, out
         self._coarse: Coarse | None = None
-        self._changed = threading.Condition()
+        self._asked = threading.Lock()  # one start or command at a time
+        self._changed = threading.Lock()
         self._state = State()
         self._views: dict[str, Path] = {}
         self._process: Any = None
@@ -132,9 +133,16 @@ class BuildProcess:
         """Begin to build, or go on with a build that has ended early.
 
         coarse  what the first view is made of; None: as at the first start
+
+        A build that a user has paused or cancelled before its start begins so.
         """
-        self._coarse = coarse or self._coarse
-        if self._coarse is None:
+        with self._asked:
+            self._start(coarse)
+
+    def _start(self, coarse: Coarse | None) -> None:
+        is_first, self._coarse = self._coarse is None, coarse or self._coarse
+        doing = self.state.doing if is_first else "building"
+        if self._coarse is None or doing == "cancelled":
             return
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
@@ -143,11 +151,17 @@ class BuildProcess:
         theirs.close()
         self._process, self._pipe = process, ours
         self._began_s, self._paused_s = time.monotonic(), 0.0
-        self._set(doing="building", line="", left_s=None)
+        self._set(doing=doing, line="", left_s=None)
+        if doing == "pausing":
+            self._send("pause")
         threading.Thread(target=self._hear, args=(ours,), daemon=True).start()
 
     def do(self, command: Command) -> None:
         """Carry out what a user asks for; a command that does not fit the state does nothing."""
+        with self._asked:
+            self._do(command)
+
+    def _do(self, command: Command) -> None:
         doing = self.state.doing
         if command == "pause" and doing == "building":
             self._send("pause")
@@ -156,7 +170,7 @@ class BuildProcess:
             self._send("continue")
             self._set(doing="building")
         elif command == "continue" and doing in ("cancelled", "failed"):
-            self.start()
+            self._start(None)
         elif command == "cancel" and doing in ("building", "pausing", "paused"):
             self._set(doing="cancelled", left_s=None)
             self.stop()
@@ -180,7 +194,6 @@ class BuildProcess:
     def _set(self, **news: Any) -> None:
         with self._changed:
             self._state = replace(self._state, **news)
-            self._changed.notify_all()
 
     def _hear(self, pipe: "Connection[Any, Any]") -> None:
         """Take what a build reports until it ends."""

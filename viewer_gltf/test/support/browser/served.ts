@@ -5,9 +5,12 @@ export const STEREOCELL =
   process.env.STEREOCELL_COMMAND ??
   new URL("../../../../.venv/bin/stereocell", import.meta.url).pathname;
 
-/** `stereocell serve OUT` on a free port, and its address. */
-export async function serve(out: string): Promise<Readonly<{ address: string; stop: () => void }>> {
-  const child: ChildProcess = spawn(STEREOCELL, ["serve", out, "--port", "0"]);
+/** `stereocell serve` of a build or a source on a free port, and its address. */
+export async function serve(
+  out: string,
+  flags: readonly string[] = [],
+): Promise<Readonly<{ address: string; stop: (signal?: NodeJS.Signals) => void }>> {
+  const child: ChildProcess = spawn(STEREOCELL, ["serve", out, "--port", "0", ...flags]);
   const address = await new Promise<string>((resolve, reject) => {
     let said = "";
     const hear = (data: Buffer) => {
@@ -19,5 +22,5 @@ export async function serve(out: string): Promise<Readonly<{ address: string; st
     child.stderr?.on("data", hear);
     child.on("exit", (code) => reject(new Error(`serve ended with ${code}: ${said}`)));
   });
-  return { address, stop: () => child.kill("SIGKILL") };
+  return { address, stop: (signal = "SIGKILL") => child.kill(signal) };
 }
