@@ -29,7 +29,7 @@ def begin(tmp_path: Path) -> Iterator[Callable[[Any], BuildProcess]]:
 
     yield start
     for process in started:
-        process.stop()
+        process.close()
 
 
 def until(process: BuildProcess, holds: Callable[[State], bool]) -> State:
@@ -82,7 +82,7 @@ def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
     try:
         assert until(process, lambda state: state.doing == "paused").done == 0
     finally:
-        process.stop()
+        process.close()
 
 
 @pytest.mark.slow

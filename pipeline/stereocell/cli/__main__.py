@@ -273,7 +273,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.check,
     ),
     "view": (
-        "show a build, or a source at once, in a browser; with --lan on phones in this network",
+        "show a build, or a source that is built meanwhile, in a browser; --lan: on phones, too",
         "view my.ome.tif; stereocell view out/mine --lan",
         flags.declare_view,
         commands.view,

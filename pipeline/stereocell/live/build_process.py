@@ -106,6 +106,7 @@ class BuildProcess:
         """build: picklable; out: the folder that it writes."""
         self._build, self.out = build, out
         self._coarse: Coarse | None = None
+        self._is_closed = False
         self._asked = threading.Lock()  # one start or command at a time
         self._changed = threading.Lock()
         self._state = State()
@@ -142,7 +143,7 @@ class BuildProcess:
     def _start(self, coarse: Coarse | None) -> None:
         is_first, self._coarse = self._coarse is None, coarse or self._coarse
         doing = self.state.doing if is_first else "building"
-        if self._coarse is None or doing == "cancelled":
+        if self._coarse is None or doing == "cancelled" or self._is_closed:
             return
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
@@ -173,10 +174,15 @@ class BuildProcess:
             self._start(None)
         elif command == "cancel" and doing in ("building", "pausing", "paused"):
             self._set(doing="cancelled", left_s=None)
-            self.stop()
+            self._stop()
 
-    def stop(self) -> None:
-        """End the process, and wait for it; what is finished stays."""
+    def close(self) -> None:
+        """End the process for good, and wait for it; what is finished stays."""
+        with self._asked:
+            self._is_closed = True
+            self._stop()
+
+    def _stop(self) -> None:
         process = self._process
         if process is None or not process.is_alive():
             return

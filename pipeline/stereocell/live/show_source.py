@@ -126,7 +126,7 @@ def show_source(
             serve(live)
         finally:
             if build is not None:
-                build.stop()
+                build.close()
         if first.done():
             first.result()
 
