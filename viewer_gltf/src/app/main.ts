@@ -122,9 +122,9 @@ async function open(parent: HTMLElement): Promise<Host> {
   const ofPage = new Page(host, parent, said);
   host.add(ofPage);
   openAddress(host, search, readLink);
-  const { viewpoint, renderer } = host.display;
+  const { viewpoint } = host;
   openedAs = { state: host.state, camera: viewpoint.cameraView };
-  renderer.domElement.addEventListener("webglcontextlost", () => {
+  host.canvas.addEventListener("webglcontextlost", () => {
     void import("../page/lost_context").then(({ offerReload }) =>
       offerReload(host, () => later?.addressBar?.write()),
     );
@@ -209,7 +209,7 @@ async function offerBench(
     import("../bench/bench_card"),
     import("../bench/bench_subject"),
   ]);
-  const { stereo } = host.display;
+  const { stereo } = host;
   const card = benchCard(flight_s, {
     subject: subjectOf(host),
     stereo: hasHeadset ? ["headset", "split"] : ["split"],
@@ -225,9 +225,9 @@ async function offerBench(
 }
 
 /** Load the part of the page that shows stereo, once there is a picture and the page has nothing else to do. */
-async function prepareStereo({ display }: Host): Promise<void> {
+async function prepareStereo({ display, stereo }: Host): Promise<void> {
   await overviewShown(display);
-  const prepare = () => void display.stereo.prepare().catch(() => undefined); // a start reports it
+  const prepare = () => void stereo.prepare().catch(() => undefined); // a start reports it
   if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
   else setTimeout(prepare, AFTER_PICTURE_MS);
 }

@@ -1,5 +1,5 @@
 /** All that draws the specimen: the scene, its contents, the eyes before it, and the loop of frames. */
-import type { WebGLRenderer } from "three";
+import type { Object3D, WebGLRenderer } from "three";
 import type { Bundle } from "../bundle/load";
 import { shownBox } from "../math/pick";
 import { Reading } from "../probe/probe_reader";
@@ -127,6 +127,15 @@ export class GpuDisplay implements Display {
   async settled(): Promise<void> {
     await this.background.settled;
     return this.loop.settled();
+  }
+
+  lightBy(file: File): Promise<void> {
+    return this.contents.traced.lightBy(file);
+  }
+
+  /** The object of the scene that holds the specimen: from um to the room. */
+  get specimen(): Object3D {
+    return this.room.specimen.group;
   }
 
   setScreen(perInch: number | null): void {

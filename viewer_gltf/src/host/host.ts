@@ -1,11 +1,13 @@
 /** The host of the viewer's parts: the state, its history, the parts, and what draws them. */
-import type { Vector2 } from "three";
+import type { Object3D, Vector2 } from "three";
 import type { Bundle } from "../bundle/load";
+import type { ValuesHost } from "../bundle/values_host";
 import { isSameLook } from "../interaction/orbit_camera";
 import type { Ray } from "../math/vec3";
 import type { Lenses } from "../panel/controls";
 import type { KeyTable } from "../panel/keys";
 import type { WaysOn } from "../panel/ways_on";
+import type { Reading } from "../probe/probe_reader";
 import type { Theme } from "../render/theme";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
@@ -14,6 +16,9 @@ import { initialState } from "../state/initial_state";
 import { newNotice, reduce } from "../state/reduce";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
+import type { SurfaceSet } from "../surfaces/surface_set";
+import type { VolumeSet } from "../volumes/volume_set";
+import type { Stereo } from "../xr/stereo";
 import { makeRenderer } from "./canvas";
 import { DROPPED, Faults } from "./faults";
 import { GpuDisplay } from "./gpu_display";
@@ -23,6 +28,7 @@ import { Parts } from "./parts";
 import type { Services } from "./services";
 import { Taps } from "./taps";
 import { Undo } from "./undo";
+import type { Viewpoint } from "./viewpoint";
 
 /** Commands before which the place from which the specimen is seen is a step of its own. */
 const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
@@ -159,7 +165,39 @@ export class Host implements PartHost {
   }
 
   get isInRoom(): boolean {
-    return this.display.stereo.kind !== null;
+    return this.stereo.kind !== null;
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.display.renderer.domElement;
+  }
+
+  get specimen(): Object3D {
+    return this.display.specimen;
+  }
+
+  get viewpoint(): Viewpoint {
+    return this.display.viewpoint;
+  }
+
+  get stereo(): Stereo {
+    return this.display.stereo;
+  }
+
+  get reading(): Reading {
+    return this.display.reading;
+  }
+
+  get surfaces(): SurfaceSet {
+    return this.display.contents.surfaces;
+  }
+
+  get volumes(): VolumeSet {
+    return this.display.contents.volumes;
+  }
+
+  get values(): ValuesHost | null {
+    return this.display.contents.values;
   }
 
   get doubleTapped(): Signal<void> {

@@ -57,10 +57,8 @@ export class PanelModel {
   view: PanelView = START_VIEW;
   /** In the source's values, by channel. */
   readonly ranges: Ranges;
-  /** The panel in the page has to show something else. */
-  readonly changed = new Signal<void>();
-  /** The panel in the page shows the present state. */
-  readonly refreshed = new Signal<void>();
+  private readonly changed = new Signal<void>();
+  private readonly shownByPage = new Signal<void>();
   private page: PageFacts = {
     ...{ subtitle: "", canScan: false, hasRoom: false },
     stereo: { isAvailable: false, reason: "" },
@@ -72,6 +70,26 @@ export class PanelModel {
   ) {
     const unit = unitOf(manifest);
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
+  }
+
+  /** Calls back when the panel in the page has to show something else. */
+  onChange(listener: () => void): void {
+    this.changed.subscribe(listener);
+  }
+
+  /** Makes the panel in the page show its content anew. */
+  refresh(): void {
+    this.changed.emit();
+  }
+
+  /** Calls back when the panel in the page shows the present state. */
+  onShown(listener: () => void): void {
+    this.shownByPage.subscribe(listener);
+  }
+
+  /** The panel in the page shows the present state. */
+  noteShown(): void {
+    this.shownByPage.emit();
   }
 
   get facts(): PageFacts {

@@ -1,6 +1,7 @@
 /** The interface between the host and the features of the viewer, its parts. */
 import type { Matrix4, Object3D, PerspectiveCamera, Vector2, Vector3, WebGLRenderer } from "three";
 import type { Bundle } from "../bundle/load";
+import type { ValuesHost } from "../bundle/values_host";
 import type { Target } from "../interaction/ray_pointer";
 import type { Sight } from "../marks/style";
 import type { ClipPlane } from "../math/clip";
@@ -15,8 +16,9 @@ import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
+import type { SurfaceSet } from "../surfaces/surface_set";
+import type { VolumeSet } from "../volumes/volume_set";
 import type { Stereo } from "../xr/stereo";
-import type { Contents } from "./contents";
 import type { PanelModel } from "./panel_model";
 import type { Services } from "./services";
 import type { Snapshot } from "./snapshot";
@@ -87,7 +89,10 @@ export type TapAnswer = "used" | "met" | null;
 /** Functions by the name of the command. One that returns false leaves the command to others. */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 
-/** One feature of the viewer. The host calls these; a part never calls the host's other parts. */
+/**
+ * One feature of the viewer. The host calls these; a part never calls the host's other parts. What a part asks of the
+ * host is at most two dots away from it: scripts/reach.ts holds that.
+ */
 export interface Part {
   readonly id: string;
   /** Called once, when all parts of the list are made. */
@@ -131,10 +136,6 @@ export type PartDefinition = Readonly<{
 /** The scene and all that draws it. */
 export interface Display {
   readonly renderer: WebGLRenderer;
-  readonly contents: Contents;
-  readonly reading: Reading;
-  readonly viewpoint: Viewpoint;
-  readonly stereo: Stereo;
   readonly studio: StillMaker;
   /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
   readonly cssPixelsPerInch: number | null;
@@ -155,6 +156,8 @@ export interface Display {
   settled(): Promise<void>;
   readonly isLoading: boolean;
   snapshot(): Snapshot;
+  /** Lights the path-traced picture by a file of the user's; the state then has to hold "own". */
+  lightBy(file: File): Promise<void>;
 }
 
 /** The host as the parts see it. */
@@ -163,9 +166,19 @@ export interface PartHost {
   readonly state: ViewerState;
   /** Holds the canvas. */
   readonly stage: HTMLElement;
+  readonly canvas: HTMLCanvasElement;
   /** The part of the page with the stage. */
   readonly view: HTMLElement;
   readonly display: Display;
+  /** The object of the scene that holds the specimen: from um to the room. */
+  readonly specimen: Object3D;
+  readonly viewpoint: Viewpoint;
+  readonly stereo: Stereo;
+  readonly reading: Reading;
+  readonly surfaces: SurfaceSet;
+  readonly volumes: VolumeSet;
+  /** Voxels as they were measured; null: the page's host has none. */
+  readonly values: ValuesHost | null;
   readonly panel: PanelModel;
   readonly undo: Undo;
   readonly keys: KeyTable;

@@ -49,7 +49,7 @@ export class PictureMessage {
 
   private get content(): Content {
     const { opening, host } = this;
-    const { surfaces, volumes } = host.display.contents;
+    const { surfaces, volumes } = host;
     return {
       opening,
       tiles: host.bundle.manifest.tiles,
@@ -68,7 +68,7 @@ export class PictureMessage {
   private ask(channel: string): void {
     if (this.asked.has(channel)) return;
     this.asked.add(channel);
-    const { volumes } = this.host.display.contents;
+    const { volumes } = this.host;
     void volumes.sourcesOf(channel).then((sources) => {
       if (sources === null) return;
       this.known.add(channel);

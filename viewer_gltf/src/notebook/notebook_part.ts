@@ -2,7 +2,6 @@
  * This part shares the view with the notebook or the page that holds this one. It sends each change through a
  * port, and shows the changes that come back. Lengths are micrometres of the specimen, windows are values of the source.
  */
-import { Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Part, PartHost, Tap } from "../host/part";
 import { fromHex, toHex } from "../math/color";
@@ -119,7 +118,7 @@ export class NotebookPart implements Part {
   ) {
     const { display } = host;
     this.manifest = host.bundle.manifest;
-    display.viewpoint.stopTurning(); // it would be news without end
+    host.viewpoint.stopTurning(); // it would be news without end
     host.changed.subscribe(() => this.note());
     host.drawn.subscribe(() => this.note());
     port.addEventListener("message", ({ data }: MessageEvent) => {
@@ -147,11 +146,10 @@ export class NotebookPart implements Part {
 
   private get shared(): Shared {
     const { host, ranges } = this;
-    const { viewpoint } = host.display;
-    const toSpecimen = viewpoint.specimen.clone().invert();
-    const { position, target } = viewpoint.navigation.lookNow;
+    const { viewpoint } = host;
+    const { position, target } = viewpoint.lookNow;
     const [eye_um, target_um] = [position, target].map((place) => {
-      const [x, y, z] = new Vector3(...place).applyMatrix4(toSpecimen).toArray().map(rounded);
+      const [x, y, z] = viewpoint.toSpecimen(place).map(rounded);
       return [x, y, z] as const;
     });
     return {
@@ -184,7 +182,7 @@ export class NotebookPart implements Part {
   private follow(asked: Asked): void {
     const { host } = this;
     this.known = { ...this.known, ...(asked as Partial<Shared>) };
-    host.display.viewpoint.stopTurning();
+    host.viewpoint.stopTurning();
     this.followLooks(asked);
     if (asked.link !== undefined && asked.link !== this.shared.link) {
       this.openLink(asked.link);
@@ -200,7 +198,7 @@ export class NotebookPart implements Part {
 
   private followLooks(asked: Asked): void {
     const { host, ranges } = this;
-    const { viewpoint } = host.display;
+    const { viewpoint } = host;
     for (const channel of host.state.channels) {
       const look = asked.channels?.[channel.id];
       const range = ranges.get(channel.id) ?? [0, 1];
@@ -210,10 +208,9 @@ export class NotebookPart implements Part {
     }
     const { eye_um, target_um } = { ...this.shared.view, ...asked.view };
     if (asked.view !== undefined && !isSame({ eye_um, target_um }, this.shared.view)) {
-      const inRoom = (place: Vec3) =>
-        new Vector3(...place).applyMatrix4(viewpoint.specimen).toArray() as Vec3;
+      const [position, target] = [eye_um, target_um].map((point) => viewpoint.toScene(point));
       const specimen = viewpoint.cameraView?.specimen ?? null;
-      viewpoint.lookFrom({ position: inRoom(eye_um), target: inRoom(target_um), specimen });
+      viewpoint.lookFrom({ position, target, specimen });
     }
   }
 
@@ -223,13 +220,13 @@ export class NotebookPart implements Part {
     host.dispatch({ type: "restore", state: initialState(this.manifest) });
     const { actions, camera } = readLink(link, host.state, bounds_um);
     for (const action of actions) host.dispatch(action);
-    if (camera !== null) host.display.viewpoint.lookFrom(camera);
+    if (camera !== null) host.viewpoint.lookFrom(camera);
     else host.run("reset");
   }
 
   private async look(ray: Ray): Promise<void> {
     const hit = this.host.objectAlong(ray);
-    const met = await this.host.display.reading.probe(ray);
+    const met = await this.host.reading.probe(ray);
     if (met === null) return;
     const [x, y, z] = met.point.map(rounded);
     const { tile } = met;

@@ -34,8 +34,7 @@ class ObjectsPart implements Part, ObjectMaps {
   private makeItems: MakeItems = () => [];
 
   constructor(private readonly host: PartHost) {
-    const { surfaces } = host.display.contents;
-    surfaces.surfaceLoaded.subscribe(({ channel, surface: { scene, tile, blend } }) =>
+    host.surfaces.onLoaded(({ channel, surface: { scene, tile, blend } }) =>
       this.objects.get(channel)?.adopt(scene, tile, blend),
     );
   }
@@ -74,14 +73,13 @@ class ObjectsPart implements Part, ObjectMaps {
   }
 
   private get options(): Omit<Parameters<typeof Objects.load>[0], "channel" | "file"> {
-    const { bundle, display } = this.host;
-    const { surfaces } = display.contents;
+    const { bundle, display, viewpoint, surfaces, specimen } = this.host;
     return {
       ...{ base: bundle.base, manifest: bundle.manifest, surfaces },
-      specimen: surfaces.group.parent ?? surfaces.group,
+      specimen,
       dispatch: (change, isStep) => this.host.dispatch(change, isStep),
       onAim: (box, isSeen) => {
-        const isFree = display.viewpoint.flyTo(box, isSeen);
+        const isFree = viewpoint.flyTo(box, isSeen);
         if (!isFree) this.host.announce(BEHIND_OTHERS);
       },
       onChange: () => display.requestFrame(),

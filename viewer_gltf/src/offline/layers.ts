@@ -53,9 +53,9 @@ export class OfflineLayers {
   }
 
   private volumesOf(channel: string): Layer {
-    const { bundle, display } = this.host;
+    const { bundle, volumes } = this.host;
     return bundle.manifest.tiles.flatMap(({ id }) => {
-      const source = display.contents.volumes.source(id, channel);
+      const source = volumes.source(id, channel);
       return source === null ? [] : [{ tile: id, levels: levelsOf(bundle.base, source) }];
     });
   }

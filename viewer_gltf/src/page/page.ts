@@ -43,7 +43,7 @@ export class Page implements Part, PagePanel {
     host.announced.subscribe((text) => said.say(text));
     host.revealed.subscribe((control) => this.html.reveal(control));
     host.changed.subscribe(() => this.refresh());
-    host.panel.changed.subscribe(() => this.refresh());
+    host.panel.onChange(() => this.refresh());
     host.drawn.subscribe(() => this.refreshSoon());
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal });
@@ -56,7 +56,7 @@ export class Page implements Part, PagePanel {
     const { panel } = this.host;
     this.html.update(panel.layOutPage());
     if (this.keyboard.update()) this.said.withdraw();
-    panel.refreshed.emit();
+    panel.noteShown();
   }
 
   /** Brings the figures to the newest frame now and then. */
@@ -69,7 +69,7 @@ export class Page implements Part, PagePanel {
     if (typeof wish === "string") host.run(wish);
     else if ("refusal" in wish) void this.explain(wish);
     else if ("panel" in wish) {
-      if (wish.panel === "hide" && host.display.stereo.togglePanel()) return;
+      if (wish.panel === "hide" && host.stereo.togglePanel()) return;
       host.panel.change(wish);
       rememberChange(wish, host.panel.view);
       if (wish.panel === "reveal") this.html.reveal(wish.control);
@@ -111,9 +111,8 @@ export class Page implements Part, PagePanel {
   private async lightByFile(): Promise<void> {
     const file = await chooseFile(".hdr,.exr");
     if (file === null) return;
-    const { traced } = this.host.display.contents;
     try {
-      await traced.lightBy(file);
+      await this.host.display.lightBy(file);
       this.host.dispatch(setTo(ENVIRONMENT, "own"));
       this.host.announce(`Lit by ${file.name}`);
     } catch (error) {

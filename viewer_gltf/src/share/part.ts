@@ -33,7 +33,7 @@ class SharePart implements Part {
     if (hasAddress() && !isPassingStep()) writeAddress(address);
     host.panel.show({ link: address.href });
     host.panel.unfold("share");
-    host.display.stereo.showInPanel({ link: address.href });
+    host.stereo.showInPanel({ link: address.href });
     const without = leftOutOfLink(host);
     const but =
       without === 0

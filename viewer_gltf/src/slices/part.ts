@@ -38,8 +38,7 @@ class SlicesPart implements Part {
   }
 
   private async load(): Promise<void> {
-    const { bundle, view, display } = this.host;
-    const { volumes, values } = display.contents;
+    const { bundle, view, display, volumes, values } = this.host;
     try {
       const { Slices } = await import("./slices").catch((cause) => {
         throw new TemporaryError(NOT_LOADED, { cause });

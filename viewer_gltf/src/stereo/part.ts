@@ -48,16 +48,16 @@ class StereoPart implements Part {
   }
 
   private toggleHeadset(): void {
-    const { display, panel, isInRoom } = this.host;
+    const { stereo, panel, isInRoom } = this.host;
     const { isAvailable, reason } = panel.facts.stereo;
-    if (isInRoom) display.stereo.end();
+    if (isInRoom) stereo.end();
     else if (isAvailable) void this.enter("immersive-vr");
     else this.host.announce(reason);
   }
 
   private toggleRoom(): void {
-    const { display, panel, isInRoom } = this.host;
-    if (isInRoom) display.stereo.end();
+    const { stereo, panel, isInRoom } = this.host;
+    if (isInRoom) stereo.end();
     else if (panel.facts.hasRoom) void this.enter("immersive-ar");
     else this.host.announce(NO_ROOM);
   }
@@ -66,7 +66,7 @@ class StereoPart implements Part {
   private async enter(mode: ImmersiveMode): Promise<void> {
     if (navigator.xr === undefined) return;
     try {
-      await this.host.display.stereo.startHeadset(navigator.xr, mode);
+      await this.host.stereo.startHeadset(navigator.xr, mode);
     } catch (error) {
       if (!(error instanceof DOMException || error instanceof BundleError)) throw error;
       const text = `Stereo could not start: ${error.message}`;
@@ -77,7 +77,7 @@ class StereoPart implements Part {
   private splitScreen(): void {
     const { host } = this;
     const { lenses, code } = host.panel.view;
-    host.display.stereo.showInPanel({ lenses, code });
+    host.stereo.showInPanel({ lenses, code });
     this.withProfile((profile) => {
       startSplit(host, profile).catch((error) => host.report(error));
     });
@@ -86,7 +86,7 @@ class StereoPart implements Part {
   /** In stereo: the phone is in another viewer. */
   private changeLenses(lenses: Lenses): void {
     this.host.panel.change({ panel: "lenses", lenses });
-    this.withProfile((profile) => this.host.display.stereo.setLenses(profile));
+    this.withProfile((profile) => this.host.stereo.setLenses(profile));
   }
 
   private withProfile(use: (profile: Profile) => void): void {

@@ -4,6 +4,6 @@ import type { Profile } from "../xr/cardboard/viewer_profile";
 
 /** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
 export async function startSplit(host: PartHost, profile: Profile): Promise<void> {
-  const problems = await host.display.stereo.startSplit(profile);
+  const problems = await host.stereo.startSplit(profile);
   for (const text of problems) host.dispatch({ type: "notify", text });
 }

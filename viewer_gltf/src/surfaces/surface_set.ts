@@ -27,6 +27,9 @@ export const ERROR_TARGET_PX = 2;
 /** The presence of a volume from which the thin rests beside it are left out, 0..1. */
 const RESTS_GO_AT = 0.5;
 
+/** A surface that has come, and its channel. */
+export type LoadedSurface = Readonly<{ channel: string; surface: Surface }>;
+
 const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
 export class SurfaceSet {
@@ -42,8 +45,7 @@ export class SurfaceSet {
   private errorTarget_px = ERROR_TARGET_PX;
   /** Since a device draws no more triangles in time. */
   private coarser = FINEST;
-  /** A surface has come. */
-  readonly surfaceLoaded = new Signal<Readonly<{ channel: string; surface: Surface }>>();
+  private readonly loaded = new Signal<LoadedSurface>();
 
   constructor(
     private readonly bundle: Bundle,
@@ -121,6 +123,11 @@ export class SurfaceSet {
     return found;
   }
 
+  /** Calls back when a surface has come. */
+  onLoaded(listener: (loaded: LoadedSurface) => void): void {
+    this.loaded.subscribe(listener);
+  }
+
   /** Volumes came, went, or fade. */
   dressAll(): void {
     for (const [id, { surfaces }] of this.shown()) {
@@ -170,7 +177,7 @@ export class SurfaceSet {
       this.budget.surfaces,
       (surface) => {
         this.dress(id, surface);
-        this.surfaceLoaded.emit({ channel: id, surface });
+        this.loaded.emit({ channel: id, surface });
       },
       this.onChange,
       this.onError,
