@@ -21,6 +21,7 @@ export const LAYERS: readonly string[] = [
   "dom",
   "bundle",
   "state",
+  "voxels",
   "volumes",
   "surfaces",
   "pathtrace",

@@ -19,10 +19,10 @@ import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
 import { SurfaceLoader } from "../surfaces/gltf_loader";
 import { SurfaceSet } from "../surfaces/surface_set";
-import { BrickService } from "../volumes/bricks/brick_service";
-import type { BrickView } from "../volumes/bricks/protocol";
 import { TransferFunctions2dLoader } from "../volumes/transfer_functions_loader";
 import { VolumeSet } from "../volumes/volume_set";
+import { BrickService } from "../voxels/bricks/brick_service";
+import type { BrickView } from "../voxels/bricks/protocol";
 
 export type ContentsOptions = Readonly<{
   bundle: Bundle;

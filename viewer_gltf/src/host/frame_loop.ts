@@ -7,7 +7,7 @@ import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
 import { ERROR_TARGET_PX } from "../surfaces/surface_set";
-import { MAX_STEPS, REST_STEPS } from "../volumes/march_frame";
+import { MAX_STEPS, REST_STEPS } from "../voxels/march_frame";
 import { Pulse } from "./pulse";
 import { SceneFrame, type SceneFrameOptions } from "./scene_frame";
 import { Studio } from "./studio";

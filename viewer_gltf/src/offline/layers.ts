@@ -6,7 +6,7 @@ import type { PartHost } from "../host/part";
 import { wantsSurface } from "../state/representation";
 import { volumeChannels } from "../state/viewer_state";
 import { contentHashes, TilesetFiles } from "../surfaces/fetch_content";
-import type { VolumeSource } from "../volumes/volume_source";
+import type { VolumeSource } from "../voxels/volume_source";
 import type { Layer, Levels } from "./coverage";
 
 export class OfflineLayers {

@@ -9,7 +9,7 @@ import type { Eyes } from "../gpu/eyes";
 import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
-import type { MarchLight } from "../volumes/march_frame";
+import type { MarchLight } from "../voxels/march_frame";
 import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import type { MediumAppearance } from "./extinction";

@@ -6,7 +6,7 @@ import { clipInto, type MarchClip, noCorner } from "../gpu/clip_uniforms";
 import type { Eyes } from "../gpu/eyes";
 import { nothing } from "../gpu/float_targets";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
-import { tableUniforms } from "../volumes/transfer_table_2d";
+import { tableUniforms } from "../voxels/transfer_table_2d";
 import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
