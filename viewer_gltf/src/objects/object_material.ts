@@ -20,7 +20,7 @@ import {
 } from "three";
 import { includeChunks } from "../gpu/glsl_include";
 import type { Rgb } from "../math/color";
-import type { SurfacePart } from "../surfaces/blend_material";
+import type { SurfacePart } from "../render/blend_material";
 import objectGap from "./chunks/object_gap.glsl?raw";
 import objectLight from "./chunks/object_light.glsl?raw";
 import objectStain from "./chunks/object_stain.glsl?raw";

@@ -2,10 +2,10 @@
 import { fileAddress } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Asked } from "../bundle/request_log";
+import { contentHashes, TilesetFiles } from "../bundle/tileset_files";
 import type { PartHost } from "../host/part";
 import { wantsSurface } from "../state/representation";
 import { volumeChannels } from "../state/viewer_state";
-import { contentHashes, TilesetFiles } from "../surfaces/fetch_content";
 import type { VolumeSource } from "../voxels/volume_source";
 import type { Layer, Levels } from "./coverage";
 

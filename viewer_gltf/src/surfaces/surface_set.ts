@@ -4,7 +4,9 @@ import type { Bundle } from "../bundle/load";
 import type { MemoryBudget } from "../gpu/memory_budget";
 import { surfaceColor } from "../math/color";
 import type { Vec3 } from "../math/vec3";
+import type { BlendedScene, SurfaceFrame } from "../render/blend_material";
 import type { ShownSurface } from "../state/on_screen";
+import { overview, type Progress } from "../state/overview_progress";
 import {
   type FocusTiles,
   isInDisc,
@@ -15,9 +17,7 @@ import {
 } from "../state/representation";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
-import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
-import { overview, type Progress } from "./overview_progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
 import { type Face, faceTowards } from "./thin_rests";
 import { coarserFor, FINEST } from "./triangle_budget";

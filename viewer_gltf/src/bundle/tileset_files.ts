@@ -1,8 +1,8 @@
 /** Fetch and check what a tileset is made of: its JSON, external ones too, and its glb files. */
-import { BundleError } from "../bundle/errors";
-import { fetchFile, fileAddress, parseJson, readBody, request } from "../bundle/fetch";
-import type { FileRef } from "../bundle/generated/bundle";
-import { checkHash, SHA_256_128 } from "../bundle/hash";
+import { BundleError } from "./errors";
+import { fetchFile, fileAddress, parseJson, readBody, request } from "./fetch";
+import type { FileRef } from "./generated/bundle";
+import { checkHash, SHA_256_128 } from "./hash";
 
 /** glTF 2.0, section 4.4.2: magic, version, and length of the whole file. */
 const HEADER_BYTES = 12;

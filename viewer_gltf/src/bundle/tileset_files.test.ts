@@ -1,6 +1,6 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
 import { contentHash, sha256 } from "../../test/support/fixture/swap";
-import { checkGlb, checkTileset, contentHashes, TilesetFiles } from "./fetch_content";
+import { checkGlb, checkTileset, contentHashes, TilesetFiles } from "./tileset_files";
 
 const PATH = "channels/A/r0_c0/lod0.glb";
 
