@@ -35,7 +35,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
     const options = {
       manifest: bundle.manifest,
       reading: host.reading,
-      surfaces: () => host.surfaces.meshes,
+      surfaces: () => host.service("surfaces")?.meshes ?? [],
       dispatch: host.dispatch.bind(host),
       announce: host.announce.bind(host),
       onChange: () => display.requestFrame(),

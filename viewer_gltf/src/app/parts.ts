@@ -1,9 +1,13 @@
 /** The parts of the viewer, a line each. Without its line, and its folder, a part is gone and the others still work. */
 export { annotations } from "../annotations/part";
 export { capture } from "../capture/part";
+export { channels } from "../channels/part";
 export { messages } from "../messages/part";
 export { objects } from "../objects/part";
+export { pathTrace } from "../pathtrace/part";
 export { share } from "../share/part";
 export { slices } from "../slices/part";
 export { stereo } from "../stereo/part";
+export { surfaces } from "../surfaces/part";
 export { tapCard } from "../tap_card/part";
+export { volumes } from "../volumes/part";

@@ -24,7 +24,7 @@ export function subjectOf(host: PartHost): Subject {
     canTrace: host.state.canTrace,
     edges: async () => {
       const [first] = volumeChannels(host.state);
-      const sources = first && (await host.volumes.sourcesOf(first.id));
+      const sources = first && (await host.service("volumes")?.sourcesOf(first.id));
       // of the tile with most voxels: those at a specimen's end have fewer
       const sizes = [...(sources?.values() ?? [])].map(({ volume }) =>
         volume.levels.map(({ size }) => Math.max(...size)),

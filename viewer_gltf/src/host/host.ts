@@ -16,15 +16,14 @@ import { initialState } from "../state/initial_state";
 import { newNotice, reduce } from "../state/reduce";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
-import type { SurfaceSet } from "../surfaces/surface_set";
-import type { VolumeSet } from "../volumes/volume_set";
 import type { Stereo } from "../xr/stereo";
 import { makeRenderer } from "./canvas";
 import { DROPPED, Faults } from "./faults";
+import type { Focus } from "./form";
 import { GpuDisplay } from "./gpu_display";
 import { PanelModel } from "./panel_model";
-import type { CommandTable, Hit, Part, PartDefinition, PartHost } from "./part";
-import { Parts } from "./parts";
+import type { CommandTable, Hit, Part, PartDefinition, PartHost, SharedFrame } from "./part";
+import { inOrder, Parts } from "./parts";
 import type { Services } from "./services";
 import { Taps } from "./taps";
 import { Undo } from "./undo";
@@ -59,13 +58,16 @@ export class Host implements PartHost {
     const { manifest } = bundle;
     const { signal } = this.disposed;
     const renderer = makeRenderer(stage);
-    const canTrace = renderer.getContext().getExtension("EXT_color_buffer_float") !== null;
-    this.state = initialState(manifest, canTrace);
+    const gl = renderer.getContext();
+    this.state = initialState(
+      manifest,
+      definitions.some(({ canTrace }) => canTrace?.(gl) ?? false),
+    );
     this.parts = new Parts(definitions);
     this.faults = new Faults({
       state: () => this.state,
       dispatch: (action) => this.dispatch(action),
-      isIncomplete: () => this.display.contents.isIncomplete,
+      isIncomplete: () => this.display.forms.isIncomplete,
     });
     this.display = this.makeDisplay(renderer);
     this.undo = new Undo({
@@ -78,7 +80,7 @@ export class Host implements PartHost {
     });
     this.panel = this.makePanel();
     this.taps = new Taps(this, this.parts, signal);
-    for (const { create } of definitions) this.parts.add(create(this));
+    for (const { create } of inOrder(definitions)) this.parts.add(create(this));
     this.listen(renderer.domElement, signal);
     this.display.start();
     this.parts.begin();
@@ -188,16 +190,16 @@ export class Host implements PartHost {
     return this.display.reading;
   }
 
-  get surfaces(): SurfaceSet {
-    return this.display.contents.surfaces;
-  }
-
-  get volumes(): VolumeSet {
-    return this.display.contents.volumes;
-  }
-
   get values(): ValuesHost | null {
-    return this.display.contents.values;
+    return this.display.values;
+  }
+
+  get frame(): SharedFrame {
+    return this.display.frame;
+  }
+
+  get focus(): Focus {
+    return this.display.focus;
   }
 
   get doubleTapped(): Signal<void> {
@@ -258,7 +260,7 @@ export class Host implements PartHost {
     return new PanelModel(manifest, () => ({
       ...{ manifest, state: this.state, stereo: this.display.stereo, undo: this.undo },
       snapshot: () => this.display.snapshot(),
-      histogram: (channel) => this.display.contents.transferFunctions2d.histogram(channel),
+      histogram: (channel) => this.service("histograms")?.histogram(channel) ?? null,
       objects: this.service("objects"),
       sections: (view) => this.parts.sections(view),
     }));
@@ -285,7 +287,6 @@ export class Host implements PartHost {
   /** Asks again for all that has failed. */
   private retry(): void {
     this.dispatch({ type: "dismiss", texts: this.state.mendable });
-    this.display.contents.retryFailed();
     this.parts.retryFailed();
     this.follow();
   }

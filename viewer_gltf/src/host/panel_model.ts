@@ -4,6 +4,7 @@ import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
 import {
   changePanel,
+  type Histogram,
   type Layout,
   type PanelChange,
   type PanelView,
@@ -16,7 +17,6 @@ import { unitOf } from "../probe/measure";
 import { Signal } from "../state/signal";
 import type { XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
-import type { Histogram } from "../volumes/transfer_functions_loader";
 import { faultOfCode } from "../xr/cardboard/viewer_profile";
 import type { Stereo } from "../xr/stereo";
 import type { ObjectMaps } from "./services";

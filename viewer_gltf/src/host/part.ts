@@ -12,13 +12,13 @@ import type { KeyTable } from "../panel/keys";
 import type { WaysOn } from "../panel/ways_on";
 import type { Cone, Probed } from "../probe/probe";
 import type { Reading } from "../probe/probe_reader";
+import type { FrameRenderer } from "../render/frame_renderer";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
-import type { SurfaceSet } from "../surfaces/surface_set";
-import type { VolumeSet } from "../volumes/volume_set";
 import type { Stereo } from "../xr/stereo";
+import type { Focus, Form } from "./form";
 import type { PanelModel } from "./panel_model";
 import type { Services } from "./services";
 import type { Snapshot } from "./snapshot";
@@ -118,6 +118,8 @@ export interface Part {
   readonly pageCommands?: CommandTable;
   panel?(view: PanelView): readonly PartSection[];
   readonly services?: Partial<Services>;
+  /** A way to draw the specimen. */
+  readonly form?: Form;
   readonly isLoading?: boolean;
   /** Asks again for what has failed. */
   retryFailed?(): void;
@@ -128,6 +130,10 @@ export interface Part {
 export type PartDefinition = Readonly<{
   id: string;
   keys?: readonly KeyGroup[];
+  /** Place among the parts that are made and follow changes first; absent: after those. */
+  rank?: number;
+  /** Whether the part traces paths of light on a device. */
+  canTrace?: (gl: WebGLRenderingContext | WebGL2RenderingContext) => boolean;
   /** Buttons that lead on from the part's refusals. */
   waysOn?: WaysOn;
   create: (host: PartHost) => Part;
@@ -156,9 +162,10 @@ export interface Display {
   settled(): Promise<void>;
   readonly isLoading: boolean;
   snapshot(): Snapshot;
-  /** Lights the path-traced picture by a file of the user's; the state then has to hold "own". */
-  lightBy(file: File): Promise<void>;
 }
+
+/** What the shaders of a frame share, by reference, and where a form adds what it lays over the scene. */
+export type SharedFrame = Pick<FrameRenderer, "marchFrame" | "surfaceFrame" | "sceneDepth" | "add">;
 
 /** The host as the parts see it. */
 export interface PartHost {
@@ -175,8 +182,8 @@ export interface PartHost {
   readonly viewpoint: Viewpoint;
   readonly stereo: Stereo;
   readonly reading: Reading;
-  readonly surfaces: SurfaceSet;
-  readonly volumes: VolumeSet;
+  readonly focus: Focus;
+  readonly frame: SharedFrame;
   /** Voxels as they were measured; null: the page's host has none. */
   readonly values: ValuesHost | null;
   readonly panel: PanelModel;

@@ -2,9 +2,18 @@
  * Services that a part offers to the others, by name. A part that uses one asks the host for it and gets null if no
  * part offers it, so that every part can be left out of the viewer.
  */
+import type { Object3D } from "three";
 import type { HandleId } from "../marks/clip_handles";
-import type { Refusal, Wish } from "../panel/controls";
+import type { Vec3 } from "../math/vec3";
+import type { Histogram, Refusal, Wish } from "../panel/controls";
+import type { BlendedSurface } from "../render/blend_material";
 import type { ObjectView } from "../state/objects";
+import type { ShownSurface } from "../state/on_screen";
+import type { ViewerState } from "../state/viewer_state";
+import type { BrickService } from "../voxels/bricks/brick_service";
+import type { Appearance } from "../voxels/march_tables";
+import type { VolumeLimits } from "../voxels/mip_levels";
+import type { VolumeSource } from "../voxels/volume_source";
 
 /** `column`: the name of the one that colours. Of a row, one colour, or a palette's from end to end; none: words alone. */
 export type ColorLegend = Readonly<{
@@ -60,7 +69,55 @@ export interface MessageButtons {
   buttonFor(refusal: string): Promise<Readonly<{ label: string; act: () => void }> | null>;
 }
 
+/** The channels' volumes. */
+export interface Volumes {
+  /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
+  source(tile: string, channel: string): VolumeSource | null;
+  /** The same, once it is known; null also after a fault, which was reported. */
+  sourceOf(tile: string, channel: string): Promise<VolumeSource | null>;
+  /** All volumes of a channel, by tile; null: its list has not come, which was reported. */
+  sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null>;
+  /** Outermost points (um, world) of what a channel shows as volumes; null: not all has come. */
+  outline(channel: string): readonly Vec3[] | null;
+  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  presence(tile: string, channel: string): number;
+  /** Whether all that is marched shows in the disc alone. */
+  readonly isInDisc: boolean;
+  readonly appearances: Readonly<{ of: (state: ViewerState, channel: string) => Appearance }>;
+}
+
+/** What the texels of volumes may take, and where they come from. */
+export type VolumeTexels = Readonly<{
+  limits: VolumeLimits;
+  /** From a host that sends bricks by view; null: volumes come as files. */
+  bricks: BrickService | null;
+}>;
+
+export type LoadedSurface = Readonly<{ scene: Object3D; tile: string; blend: BlendedSurface }>;
+
+/** The channels' surfaces. */
+export interface Surfaces {
+  /** The meshes on screen. */
+  readonly meshes: readonly ShownSurface[];
+  /** All that have come of a channel. */
+  of(channel: string): readonly LoadedSurface[];
+  /** Calls back when another one has come. */
+  onLoaded(listener: (channel: string, surface: LoadedSurface) => void): void;
+  /** Outermost points (um, world) of a channel's surfaces; null: not known yet. */
+  outline(channel: string): readonly Vec3[] | null;
+}
+
+/** The channels' voxels by value and gradient. */
+export interface Histograms {
+  /** null: it has not come; then it is fetched. */
+  histogram(channel: string): Histogram | null;
+}
+
 export type Services = Readonly<{
+  volumes: Volumes;
+  texels: VolumeTexels;
+  surfaces: Surfaces;
+  histograms: Histograms;
   objects: ObjectMaps;
   posters: PosterMaker;
   handles: HandleLights;

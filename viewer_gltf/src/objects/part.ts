@@ -34,9 +34,11 @@ class ObjectsPart implements Part, ObjectMaps {
   private makeItems: MakeItems = () => [];
 
   constructor(private readonly host: PartHost) {
-    host.surfaces.onLoaded(({ channel, surface: { scene, tile, blend } }) =>
-      this.objects.get(channel)?.adopt(scene, tile, blend),
-    );
+    host
+      .service("surfaces")
+      ?.onLoaded((channel, { scene, tile, blend }) =>
+        this.objects.get(channel)?.adopt(scene, tile, blend),
+      );
   }
 
   sync(state: ViewerState): void {
@@ -73,7 +75,8 @@ class ObjectsPart implements Part, ObjectMaps {
   }
 
   private get options(): Omit<Parameters<typeof Objects.load>[0], "channel" | "file"> {
-    const { bundle, display, viewpoint, surfaces, specimen } = this.host;
+    const { bundle, display, viewpoint, specimen } = this.host;
+    const surfaces = this.host.service("surfaces");
     return {
       ...{ base: bundle.base, manifest: bundle.manifest, surfaces },
       specimen,

@@ -53,9 +53,10 @@ export class OfflineLayers {
   }
 
   private volumesOf(channel: string): Layer {
-    const { bundle, volumes } = this.host;
+    const { bundle } = this.host;
+    const volumes = this.host.service("volumes");
     return bundle.manifest.tiles.flatMap(({ id }) => {
-      const source = volumes.source(id, channel);
+      const source = volumes?.source(id, channel) ?? null;
       return source === null ? [] : [{ tile: id, levels: levelsOf(bundle.base, source) }];
     });
   }

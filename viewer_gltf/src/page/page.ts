@@ -1,5 +1,4 @@
 /** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
-import { chooseFile } from "../dom/choose_file";
 import { toggleFullScreen } from "../dom/full_screen";
 import type { Part, PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
@@ -7,8 +6,6 @@ import type { Refusal, Wish } from "../panel/controls";
 import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { withKeys } from "../panel/keys";
-import { setTo } from "../state/parameters/kinds";
-import { ENVIRONMENT } from "../state/parameters/light";
 import { Keyboard } from "./keyboard";
 import { rememberChange, rememberedView } from "./remembered";
 
@@ -23,7 +20,6 @@ export class Page implements Part, PagePanel {
     undo: () => this.keyboard.undo(),
     find: () => this.find(),
     "full-screen": () => void this.toggleFullScreen(),
-    "own-light": () => void this.lightByFile(),
   };
   private readonly html: Panel;
   private readonly keyboard: Keyboard;
@@ -105,19 +101,6 @@ export class Page implements Part, PagePanel {
   private async toggleFullScreen(): Promise<void> {
     const isDone = await toggleFullScreen();
     if (!isDone) this.host.announce(NO_FULL_SCREEN);
-  }
-
-  /** Lights the traced picture by a file of the user's. */
-  private async lightByFile(): Promise<void> {
-    const file = await chooseFile(".hdr,.exr");
-    if (file === null) return;
-    try {
-      await this.host.display.lightBy(file);
-      this.host.dispatch(setTo(ENVIRONMENT, "own"));
-      this.host.announce(`Lit by ${file.name}`);
-    } catch (error) {
-      this.host.report(error);
-    }
   }
 
   dispose(): void {

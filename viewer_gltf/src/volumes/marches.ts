@@ -1,7 +1,7 @@
 /** The marches of all tiles whose volumes have come: a box each, with the textures and tables of its channels. */
 import { Group, type Matrix4, Scene, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
-import type { MarchClip } from "../gpu/clip_uniforms";
+import type { DrawnMarches, MarchView } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { canBeShaded, isTraced } from "../state/parameters/volumes";
 import type { ViewerState } from "../state/viewer_state";
@@ -18,16 +18,7 @@ import { LaterShading } from "./light/later_shading";
 import type { Residency, Resident } from "./residency";
 import { TileMarch } from "./tile_raymarch";
 
-/** Where a frame is seen from: um, world. The disc's cone has an apex and an axis; `lamp` is the direction towards it. */
-export type MarchView = Readonly<{
-  eye: Vector3;
-  apex: Vector3;
-  axis: Vector3;
-  clip: MarchClip;
-  lamp: Vector3;
-}>;
-
-export class Marches {
+export class Marches implements DrawnMarches {
   readonly scene = new Scene();
   private readonly group = new Group();
   private readonly occupancy = new OccupancyClient();

@@ -1,7 +1,9 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
+import type { Volumes } from "../host/services";
 import type { Vec3 } from "../math/vec3";
+import type { MarchedVolumes, MarchView, VolumeStatus } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { isTraced } from "../state/parameters/volumes";
 import type { WantedTile } from "../state/representation";
@@ -15,21 +17,14 @@ import type { VolumeSource } from "../voxels/volume_source";
 import { stride } from "../voxels/volume_texture";
 import { ChannelAppearances } from "./channel_appearances";
 import { ChannelLists } from "./channel_volumes";
-import { Marches, type MarchView } from "./marches";
+import { Marches } from "./marches";
 import { Residency, type Resident } from "./residency";
 
 const PARALLEL_LOADS = 4;
 /** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
 const STAND_IN_BYTES = 2 ** 21;
 
-export type VolumeStatus = Readonly<{
-  tile: string;
-  channel: string;
-  /** Mip level on screen, 0 is the finest; null: none yet. */
-  level: number | null;
-}>;
-
-export class VolumeSet {
+export class VolumeSet implements MarchedVolumes, Volumes {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;

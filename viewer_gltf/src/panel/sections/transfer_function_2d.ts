@@ -7,8 +7,7 @@ import { REFUSED } from "../../state/refusals";
 import { editedName } from "../../state/transfer_functions_2d";
 import { removeShape, replaceShape, resize } from "../../state/transfer_shapes";
 import type { ChannelState } from "../../state/viewer_state";
-import type { Histogram } from "../../volumes/transfer_functions_loader";
-import type { Control, PanelView } from "../controls";
+import type { Control, Histogram, PanelView } from "../controls";
 import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../edit_shapes";
 import { PALETTES } from "../palettes";
 

@@ -7,13 +7,7 @@ import type { FileRef } from "../bundle/generated/bundle";
 import type { Bundle } from "../bundle/load";
 import { loadHistogram, loadTransfer2d } from "../bundle/load";
 import type { Transfer2d } from "../bundle/transfer_2d";
-
-export type Histogram = Readonly<{
-  /** 256 x 64 bytes, row 0 is gradient 0: the logarithm of the number of voxels. */
-  cells: Uint8Array;
-  /** A panel distinguishes pictures by their text: a name is enough. */
-  toJSON: () => string;
-}>;
+import type { Histogram } from "../panel/controls";
 
 export class TransferFunctions2dLoader {
   private readonly refs = new Map<string, FileRef>();
