@@ -9,8 +9,8 @@ import { parseSync } from "vite";
 const MOST_DOTS = 2;
 /** Plain data, which may be read as deep as it goes. */
 const PLAIN: ReadonlySet<string> = new Set([
-  ...["bundle", "state"], // of the host
-  ...["facts", "view"], // of the panel
+  ...["bundle", "focus", "state"], // of the host
+  ...["facts", "ranges", "view"], // of the panel
   ...["cameraView", "lookNow"], // of the viewpoint
 ]);
 /** Types of the host as a parameter has them. */

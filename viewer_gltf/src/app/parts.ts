@@ -10,4 +10,5 @@ export { slices } from "../slices/part";
 export { stereo } from "../stereo/part";
 export { surfaces } from "../surfaces/part";
 export { tapCard } from "../tap_card/part";
+export { tiles } from "../tiles/part";
 export { volumes } from "../volumes/part";

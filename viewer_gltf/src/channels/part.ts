@@ -1,17 +1,17 @@
-/** The channels as a part of the viewer: their two-dimensional transfer functions. */
+/** The channels as a part of the viewer: their cards, their keys, and their two-dimensional transfer functions. */
 import type { Part, PartDefinition, PartHost } from "../host/part";
-import type { Histograms } from "../host/services";
-import type { Histogram } from "../panel/controls";
+import type { PanelView, PartSection } from "../panel/controls";
 import { isTwoD } from "../state/transfer_functions_2d";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
+import { CHANNEL_KEYS } from "./keys";
+import { channelSections } from "./section";
 import { TransferFunctions2dLoader } from "./transfer_functions_loader";
 
-class ChannelsPart implements Part, Histograms {
+class ChannelsPart implements Part {
   readonly id = "channels";
-  readonly services = { histograms: this };
   private readonly loader: TransferFunctions2dLoader;
 
-  constructor(host: PartHost) {
+  constructor(private readonly host: PartHost) {
     this.loader = new TransferFunctions2dLoader(
       host.bundle,
       (channel, transfer2d) => host.dispatch({ type: "learn-transfer-2d", channel, transfer2d }),
@@ -30,8 +30,14 @@ class ChannelsPart implements Part, Histograms {
     return this.loader.isLoading;
   }
 
-  histogram(channel: string): Histogram | null {
-    return this.loader.histogram(channel);
+  panel(view: PanelView): readonly PartSection[] {
+    const { state, panel } = this.host;
+    const { ranges } = panel;
+    const { isHistogramOpen, picked } = view;
+    const isSeen = isHistogramOpen && picked !== null && ranges.has(picked);
+    const histogram = isSeen ? this.loader.histogram(picked) : null;
+    const objectColors = this.host.service("objects")?.colors;
+    return channelSections(state, { ranges, histogram, objectColors }, view);
   }
 
   retryFailed(): void {
@@ -43,5 +49,6 @@ class ChannelsPart implements Part, Histograms {
 
 export const channels: PartDefinition = {
   id: "channels",
+  keys: CHANNEL_KEYS,
   create: (host) => new ChannelsPart(host),
 };

@@ -3,8 +3,8 @@ import type { Camera } from "three";
 import type { Vec3 } from "../math/vec3";
 import type { BlendedScene } from "../render/blend_material";
 import type { MarchedVolumes, TracedVolumes } from "../render/drawn_forms";
+import type { FocusState } from "../state/focus_tiles";
 import type { Progress } from "../state/overview_progress";
-import type { FocusTiles } from "../state/representation";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 
 /** Screen-space error, in pixels, down to which surfaces are refined where frames come in time. */
@@ -12,7 +12,7 @@ export const ERROR_TARGET_PX = 2;
 
 /** Which tiles the gaze makes volumes of, and which volumes may come. */
 export type Focus = Readonly<{
-  focusTiles: FocusTiles;
+  focusTiles: FocusState;
   /** Whether the gaze has rested, so that finer levels may be fetched. */
   mayRefine: boolean;
   /** Whether all tiles have their first picture: volumes come after it. */

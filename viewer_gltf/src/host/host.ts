@@ -258,10 +258,8 @@ export class Host implements PartHost {
   private makePanel(): PanelModel {
     const { manifest } = this.bundle;
     return new PanelModel(manifest, () => ({
-      ...{ manifest, state: this.state, stereo: this.display.stereo, undo: this.undo },
+      ...{ manifest, state: this.state, undo: this.undo },
       snapshot: () => this.display.snapshot(),
-      histogram: (channel) => this.service("histograms")?.histogram(channel) ?? null,
-      objects: this.service("objects"),
       sections: (view) => this.parts.sections(view),
     }));
   }

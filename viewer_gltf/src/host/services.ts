@@ -5,7 +5,7 @@
 import type { Object3D } from "three";
 import type { HandleId } from "../marks/clip_handles";
 import type { Vec3 } from "../math/vec3";
-import type { Histogram, Refusal, Wish } from "../panel/controls";
+import type { Refusal, Wish } from "../panel/controls";
 import type { BlendedSurface } from "../render/blend_material";
 import type { ObjectView } from "../state/objects";
 import type { ShownSurface } from "../state/on_screen";
@@ -107,17 +107,10 @@ export interface Surfaces {
   outline(channel: string): readonly Vec3[] | null;
 }
 
-/** The channels' voxels by value and gradient. */
-export interface Histograms {
-  /** null: it has not come; then it is fetched. */
-  histogram(channel: string): Histogram | null;
-}
-
 export type Services = Readonly<{
   volumes: Volumes;
   texels: VolumeTexels;
   surfaces: Surfaces;
-  histograms: Histograms;
   objects: ObjectMaps;
   posters: PosterMaker;
   handles: HandleLights;

@@ -3,7 +3,7 @@ import { Vector2 } from "three";
 import { listenForClicks } from "../interaction/rays";
 import { pickTile, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
-import { chosenTile } from "../panel/layout";
+import { chosenTile } from "../state/chosen_tile";
 import { Signal } from "../state/signal";
 import type { PartHost } from "./part";
 import type { Parts } from "./parts";

@@ -2,9 +2,12 @@
 import { chooseFile } from "../dom/choose_file";
 import type { Form } from "../host/form";
 import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { PanelView, PartSection } from "../panel/controls";
 import { setTo } from "../state/parameters/kinds";
 import { ENVIRONMENT } from "../state/parameters/light";
 import type { ViewerState } from "../state/viewer_state";
+import { LIGHT_KEYS } from "./keys";
+import { lightSections } from "./section";
 import { TracedVolume } from "./traced_volume";
 
 class PathTracePart implements Part, Form {
@@ -35,6 +38,11 @@ class PathTracePart implements Part, Form {
 
   sync(state: ViewerState): void {
     this.volume?.follow(state);
+  }
+
+  panel(view: PanelView): readonly PartSection[] {
+    const { state, isInRoom } = this.host;
+    return lightSections(state, view, isInRoom);
   }
 
   get isLoading(): boolean {
@@ -80,6 +88,7 @@ class PathTracePart implements Part, Form {
 export const pathTrace: PartDefinition = {
   id: "pathtrace",
   rank: 20,
+  keys: LIGHT_KEYS,
   canTrace: (gl) => gl.getExtension("EXT_color_buffer_float") !== null,
   create: (host) => new PathTracePart(host),
 };

@@ -2,12 +2,20 @@
 import { BundleError } from "../bundle/errors";
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
-import type { Lenses } from "../panel/controls";
+import type { Lenses, PanelView, PartSection } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
+import type { XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
-import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
+import {
+  BUILT_IN,
+  faultOfCode,
+  type Profile,
+  ProfileError,
+  parseProfile,
+} from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
+import { STEREO_KEYS } from "./keys";
 import {
   rememberEyes,
   rememberedEyes,
@@ -16,8 +24,11 @@ import {
   rememberLens,
   rememberScreen,
 } from "./remembered";
+import { stereoSections } from "./section";
 import { startSplit } from "./start_split";
 
+/** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
+const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 
 class StereoPart implements Part {
@@ -45,6 +56,19 @@ class StereoPart implements Part {
 
   sync(state: ViewerState, previous: ViewerState): void {
     rememberEyes(state, previous);
+  }
+
+  panel(view: PanelView): readonly PartSection[] {
+    const { state, isInRoom, panel, stereo } = this.host;
+    const { facts } = panel;
+    const facing = {
+      stereo: facts.stereo,
+      split: stereo.kind === "headset" ? null : SPLIT,
+      canScan: facts.canScan,
+      hasRoom: facts.hasRoom && !isInRoom,
+      faultOfCode,
+    };
+    return stereoSections(state, { ...facing, isStereo: isInRoom }, view);
   }
 
   private toggleHeadset(): void {
@@ -146,5 +170,6 @@ class StereoPart implements Part {
 
 export const stereo: PartDefinition = {
   id: "stereo",
+  keys: STEREO_KEYS,
   create: (host) => new StereoPart(host),
 };

@@ -4,11 +4,15 @@ import { memoryBudget } from "../gpu/memory_budget";
 import type { Form, StreamView } from "../host/form";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { Vec3 } from "../math/vec3";
+import type { PartSection } from "../panel/controls";
+import { discLimit } from "../state/focus_tiles";
 import { wantedTiles, wantsSurface } from "../state/representation";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { BrickService } from "../voxels/bricks/brick_service";
 import type { BrickView } from "../voxels/bricks/protocol";
 import type { VolumeLimits } from "../voxels/mip_levels";
+import { VOLUME_KEYS } from "./keys";
+import { volumeSections } from "./section";
 import { VolumeSet } from "./volume_set";
 
 class VolumesPart implements Part, Form {
@@ -36,6 +40,11 @@ class VolumesPart implements Part, Form {
   sync(state: ViewerState): void {
     const { focusTiles, mayRefine, hasOverview } = this.host.focus;
     this.marched.follow(state, hasOverview ? wantedTiles(state, focusTiles) : [], mayRefine);
+  }
+
+  panel(): readonly PartSection[] {
+    const { state, focus } = this.host;
+    return volumeSections(state, discLimit(focus.focusTiles, state.discRadius_deg));
   }
 
   get isLoading(): boolean {
@@ -101,5 +110,6 @@ function limitsOf(canvas: HTMLCanvasElement): VolumeLimits {
 export const volumes: PartDefinition = {
   id: "volumes",
   rank: 10,
+  keys: VOLUME_KEYS,
   create: (host) => new VolumesPart(host),
 };

@@ -15,6 +15,7 @@ import {
   START_CANVAS,
   WIDTH,
 } from "../../panel/canvas/page";
+import { keepPlaces } from "../../panel/channel_cards";
 import {
   changePanel,
   type Layout,
@@ -22,7 +23,6 @@ import {
   type PanelView,
   START_VIEW,
 } from "../../panel/controls";
-import { keepPlaces } from "../../panel/sections/channels";
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import { START_VOLUMES } from "../../state/parameters/volumes";

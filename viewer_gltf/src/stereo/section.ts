@@ -1,27 +1,33 @@
-/** The panel's stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
+/** The panel's sections of stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
 
-import { SCREEN_STEREO, STEREO_PARAMETERS } from "../../state/parameters/tools";
-import type { StereoSupport, XrSupport } from "../../state/stereo";
-import type { ViewerState } from "../../state/viewer_state";
-import { command, controlOf, controlsOf, inline } from "../control_templates";
-import type { Button, Control, Lenses, PanelView } from "../controls";
+import { command, controlOf, controlsOf, inline } from "../panel/control_templates";
+import type { Button, Control, PanelView, PartSection } from "../panel/controls";
+import { LENS_NAMES, LENSES } from "../panel/lenses";
+import { MOVES } from "../panel/moves";
+import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";
+import type { StereoSupport, XrSupport } from "../state/stereo";
+import type { ViewerState } from "../state/viewer_state";
 
-export const LENS_NAMES: Readonly<Record<Lenses, string>> = {
-  v1: "Cardboard v1 (2014)",
-  v2: "Cardboard v2 (2015)",
-  own: "another",
-};
-export const LENSES = ["v1", "v2", "own"] as const;
+/** The stereo that there is, and whether the panel is in it. */
+export type StereoFacts = StereoSupport & Readonly<{ isStereo: boolean }>;
+
+export function stereoSections(
+  state: ViewerState,
+  facts: StereoFacts,
+  view: PanelView,
+): readonly PartSection[] {
+  return [
+    { rank: 80, id: "stereo", label: "Stereo", items: stereoItems(state, facts, view) },
+    // a screen has fingers, wheel and arrow keys for it
+    { rank: 20, id: "move", label: "Move", isDeeper: true, items: facts.isStereo ? MOVES : [] },
+  ];
+}
 
 function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
   return { refusal: isAvailable ? "" : reason || "It can't be had here.", showsReason: true };
 }
 
-export function stereoItems(
-  state: ViewerState,
-  facts: StereoSupport & Readonly<{ isStereo: boolean }>,
-  view: PanelView,
-): readonly Control[] {
+function stereoItems(state: ViewerState, facts: StereoFacts, view: PanelView): readonly Control[] {
   return [
     ...(facts.isStereo ? [] : [controlOf(SCREEN_STEREO, state)]),
     { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },

@@ -2,8 +2,8 @@
  * The page by which a head and one button move the specimen: each button goes on while it is held or
  * gazed at. Words are of the specimen, which is what moves in a room; commands are of the eye. Pure.
  */
-import type { Command } from "../../state/commands";
-import type { Button } from "../controls";
+import type { Command } from "../state/commands";
+import type { Button } from "./controls";
 
 function move(id: string, label: string, name: string, to: Command): Button {
   return { kind: "button", id, label, name, repeats: to, to: () => to };

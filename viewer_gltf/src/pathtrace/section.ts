@@ -1,5 +1,8 @@
-/** The panel's part for the path-traced picture: its light, its medium, and what comes after. Pure. */
-import { setTo } from "../../state/parameters/kinds";
+/** The panel's section of the path-traced picture: its light, its medium, and what comes after. Pure. */
+
+import { command, controlOf, controlsOf, paletteOf } from "../panel/control_templates";
+import type { Button, Group, PanelView, PartSection, Section } from "../panel/controls";
+import { setTo } from "../state/parameters/kinds";
 import {
   AFTER,
   LAMP,
@@ -8,12 +11,10 @@ import {
   MEDIUM,
   ROOM,
   TRACED_ALONE,
-} from "../../state/parameters/light";
-import { isTraced, MODE } from "../../state/parameters/volumes";
-import { REFUSED } from "../../state/refusals";
-import type { ViewerState } from "../../state/viewer_state";
-import { command, controlOf, controlsOf, paletteOf } from "../control_templates";
-import type { Button, Group, PanelView, Section } from "../controls";
+} from "../state/parameters/light";
+import { isTraced, MODE } from "../state/parameters/volumes";
+import { REFUSED } from "../state/refusals";
+import { hasVolumes, type ViewerState } from "../state/viewer_state";
 
 function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelView): Group {
   const { id, name, color, isOn, numbers } = lamp;
@@ -70,4 +71,14 @@ function settingsOf(
     ...LAMP.map((lamp) => lampGroup(lamp, state, view)),
     ...controlsOf(AFTER, state),
   ];
+}
+
+export function lightSections(
+  state: ViewerState,
+  view: PanelView,
+  isStereo: boolean,
+): readonly PartSection[] {
+  if (!hasVolumes(state)) return [];
+  const items = lightItems(state, view, isStereo);
+  return [{ rank: 50, id: "light", label: "Path tracing", isDeeper: true, items }];
 }

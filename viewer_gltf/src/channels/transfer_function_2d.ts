@@ -1,15 +1,15 @@
 /** The editor of a channel's two-dimensional transfer function, in its card. Pure. */
 
-import { MAX_SHAPES, type Shape, type Shapes } from "../../bundle/transfer_2d";
-import { fromHex, toHex } from "../../math/color";
-import type { Action } from "../../state/actions";
-import { REFUSED } from "../../state/refusals";
-import { editedName } from "../../state/transfer_functions_2d";
-import { removeShape, replaceShape, resize } from "../../state/transfer_shapes";
-import type { ChannelState } from "../../state/viewer_state";
-import type { Control, Histogram, PanelView } from "../controls";
-import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../edit_shapes";
-import { PALETTES } from "../palettes";
+import { MAX_SHAPES, type Shape, type Shapes } from "../bundle/transfer_2d";
+import { fromHex, toHex } from "../math/color";
+import type { Control, Histogram, PanelView } from "../panel/controls";
+import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../panel/edit_shapes";
+import { PALETTES } from "../panel/palettes";
+import type { Action } from "../state/actions";
+import { REFUSED } from "../state/refusals";
+import { editedName } from "../state/transfer_functions_2d";
+import { removeShape, replaceShape, resize } from "../state/transfer_shapes";
+import type { ChannelState } from "../state/viewer_state";
 
 /** White leaves the channel's own. */
 const SHAPE_COLORS = PALETTES.slice(1).map(({ colors }) => ({

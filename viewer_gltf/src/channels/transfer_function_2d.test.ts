@@ -1,23 +1,23 @@
 import { describe, expect, it } from "vitest";
-import { SPECIMEN_BOX, sampleManifest } from "../../../test/support/fixture/manifest";
-import { KEYS } from "../../../test/support/panel/whole_panel";
-import { MAX_SHAPES } from "../../bundle/transfer_2d";
-import type { Action } from "../../state/actions";
-import { initialState } from "../../state/initial_state";
-import { reduce } from "../../state/reduce";
-import { OWN, shapesOf } from "../../state/transfer_functions_2d";
-import { makeShape } from "../../state/transfer_shapes";
-import type { ChannelState, ViewerState } from "../../state/viewer_state";
-import { blocksOf } from "../canvas/controls";
+import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
+import { KEYS } from "../../test/support/panel/whole_panel";
+import { MAX_SHAPES } from "../bundle/transfer_2d";
+import { blocksOf } from "../panel/canvas/controls";
 import {
   changePanel,
   type HistogramEditor,
   type PanelView,
   START_VIEW,
   type Wish,
-} from "../controls";
-import { isRefusal } from "../key";
-import { spokenFeedback } from "../spoken_feedback";
+} from "../panel/controls";
+import { isRefusal } from "../panel/key";
+import { spokenFeedback } from "../panel/spoken_feedback";
+import type { Action } from "../state/actions";
+import { initialState } from "../state/initial_state";
+import { reduce } from "../state/reduce";
+import { OWN, shapesOf } from "../state/transfer_functions_2d";
+import { makeShape } from "../state/transfer_shapes";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
 const RECTANGLE = makeShape("rectangle", { value: 0.5, gradient: 0.5 });

@@ -1,10 +1,10 @@
 /** The keys of cutting open, sharing and of the panel itself. Pure. */
 
-import { groupNotices } from "../../state/notice_groups";
-import { REFUSED } from "../../state/refusals";
-import { chosenClipPart, clipPartName, clipPartsOf, moveClipPart } from "../clip_by_key";
-import { type Key, key, neighbour, no } from "../key";
-import { middleBox, middlePlane } from "../layout";
+import { groupNotices } from "../state/notice_groups";
+import { REFUSED } from "../state/refusals";
+import { chosenClipPart, clipPartName, clipPartsOf, moveClipPart } from "./clip_by_key";
+import { type Key, key, neighbour, no } from "./key";
+import { middleBox, middlePlane } from "./layout";
 
 const NOT_CUT = no(REFUSED.cut);
 

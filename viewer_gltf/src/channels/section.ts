@@ -1,19 +1,27 @@
 /**
- * The channels' part of the panel. A few channels have a card each, in the bundle's order. Of many, the
+ * The panel's section of the channels. A few channels have a card each, in the bundle's order. Of many, the
  * cards of those that are shown come first; the others are a list to add from, by name, and a page at a
  * time: there may be seventy. No row changes its place when a channel is shown or hidden, since the next
  * row would slide under the pointer or the gaze. Pure.
  */
 
-import { toHex } from "../../math/color";
-import { valueText } from "../../probe/measure";
-import { CHANNEL, COLOR, OPACITY, VOLUME } from "../../state/parameters/channel";
-import { REFUSED } from "../../state/refusals";
-import type { ChannelState, ViewerState } from "../../state/viewer_state";
-import { colourOf, controlOf, paletteOf } from "../control_templates";
-import type { Colour, Control, Group, Histogram, PanelView, Section } from "../controls";
-import { freeColours } from "../palettes";
-import { transferTitle } from "../transfer_titles";
+import { toHex } from "../math/color";
+import { colourOf, controlOf, paletteOf } from "../panel/control_templates";
+import type {
+  Colour,
+  Control,
+  Group,
+  Histogram,
+  PanelView,
+  PartSection,
+  Section,
+} from "../panel/controls";
+import { freeColours } from "../panel/palettes";
+import { transferTitle } from "../panel/transfer_titles";
+import { intensityText, type Ranges, windowTexts } from "../panel/window_texts";
+import { CHANNEL, COLOR, OPACITY, VOLUME } from "../state/parameters/channel";
+import { REFUSED } from "../state/refusals";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Largest number of channels that all have a card. */
@@ -23,14 +31,10 @@ export const PAGE = 6;
 /** Steps of a window's slider: the volumes have 8 bits. */
 const WINDOW_STEPS = 255;
 
-/** The voxel values of the source that are 0 and 255 in a volume, and their unit, where there is one. */
-export type Range = readonly [start: number, end: number, unit?: string];
-/** By channel. */
-export type Ranges = ReadonlyMap<string, Range>;
-
-/** What the channels' part takes of what is known beside the state. */
-type ChannelFacts = Readonly<{
+/** What is known of the channels beside the state. */
+export type ChannelFacts = Readonly<{
   ranges: Ranges;
+  /** Of the channel with the open joint histogram, if it has come. */
   histogram?: Histogram | null;
   /** Some colours of each label map's objects. */
   objectColors?: ReadonlyMap<string, readonly string[]>;
@@ -50,22 +54,6 @@ function shownToggle({ id, name, shown }: ChannelState): Control {
     value: shown,
     to: (value) => ({ type: "show", channel: id, shown: value }),
   };
-}
-
-/** A share of the intensities as the source counts them. */
-function intensityText(share: number, range: Range | undefined): string {
-  if (range === undefined) return `${Math.round(100 * share)} %`;
-  const [start, end] = range;
-  return valueText(start + (end - start) * share, [start, end]);
-}
-
-/** Both ends of a window, the unit behind the upper one. */
-export function windowTexts(
-  [low, high]: readonly [number, number],
-  range: Range | undefined,
-): readonly [string, string] {
-  const unit = range?.[2] ?? "";
-  return [intensityText(low, range), `${intensityText(high, range)} ${unit}`.trim()];
 }
 
 /** The channel's colour, with those that no other channel has. */
@@ -221,17 +209,15 @@ function rowOf(card: Group): Group {
   return { ...card, isCompact: true, more: canOpen ? card.more : [] };
 }
 
-export function channelItems(
-  state: ViewerState,
-  facts: ChannelFacts,
-  view: PanelView,
-): Section["items"] {
+function channelItems(state: ViewerState, facts: ChannelFacts, view: PanelView): Section["items"] {
   const cards = withCards(state, view).map((channel) => cardOf(channel, state, facts, view));
   return [...cards, ...addingOf(state, facts, view)];
 }
 
-/** Give the channels that are shown now their cards, which keep their places until the section is opened again. */
-export function keepPlaces(view: PanelView, { channels }: ViewerState): PanelView {
-  if (view.channelsWithCard !== null) return view;
-  return { ...view, channelsWithCard: channels.filter(({ shown }) => shown).map(({ id }) => id) };
+export function channelSections(
+  state: ViewerState,
+  facts: ChannelFacts,
+  view: PanelView,
+): readonly PartSection[] {
+  return [{ rank: 10, id: "channels", label: "Channels", items: channelItems(state, facts, view) }];
 }

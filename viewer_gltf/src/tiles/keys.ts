@@ -1,10 +1,10 @@
 /** The keys of the tiles. Pure. */
 
-import { setTo } from "../../state/parameters/kinds";
-import { SCREEN_STEREO } from "../../state/parameters/tools";
-import { REFUSED } from "../../state/refusals";
-import { type Key, key, neighbour, no } from "../key";
-import { chosenTile } from "./tiles";
+import { type Key, type KeyGroup, key, neighbour, no } from "../panel/key";
+import { chosenTile } from "../state/chosen_tile";
+import { setTo } from "../state/parameters/kinds";
+import { SCREEN_STEREO } from "../state/parameters/tools";
+import { REFUSED } from "../state/refusals";
 
 function nextTile(by: number): Key["to"] {
   return ({ state }) => {
@@ -15,7 +15,7 @@ function nextTile(by: number): Key["to"] {
   };
 }
 
-export const TILE_KEYS: readonly Key[] = [
+const KEYS: readonly Key[] = [
   key("t", "Next tile", nextTile(1)),
   key("T", "Previous tile", nextTile(-1)),
   key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
@@ -34,3 +34,5 @@ export const TILE_KEYS: readonly Key[] = [
     return isChosen ? "back" : no(REFUSED.back);
   }),
 ];
+
+export const TILE_KEYS: readonly KeyGroup[] = [{ name: "Tiles", rank: 70, keys: KEYS }];

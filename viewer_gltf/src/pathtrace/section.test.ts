@@ -1,12 +1,12 @@
 import { describe, expect, it } from "vitest";
-import { sampleManifest } from "../../../test/support/fixture/manifest";
-import { initialState } from "../../state/initial_state";
-import { LIGHT_NUMBERS } from "../../state/parameters/light";
-import { LAMPS } from "../../state/path_trace_settings";
-import { reduce } from "../../state/reduce";
-import type { ViewerState } from "../../state/viewer_state";
-import { type Control, type Group, START_VIEW, type Wish } from "../controls";
-import { lightItems } from "./path_trace";
+import { sampleManifest } from "../../test/support/fixture/manifest";
+import { type Control, type Group, START_VIEW, type Wish } from "../panel/controls";
+import { initialState } from "../state/initial_state";
+import { LIGHT_NUMBERS } from "../state/parameters/light";
+import { LAMPS } from "../state/path_trace_settings";
+import { reduce } from "../state/reduce";
+import type { ViewerState } from "../state/viewer_state";
+import { lightItems } from "./section";
 
 const CLOSED = initialState(sampleManifest(2));
 const TRACED = reduce(CLOSED, { type: "set", id: "mode", value: "traced" });

@@ -1,13 +1,13 @@
 /** The keys of the shapes of a two-dimensional transfer function. Pure. */
-import { MAX_SHAPES, type Shape } from "../../bundle/transfer_2d";
-import { fromHex, toHex } from "../../math/color";
-import { REFUSED } from "../../state/refusals";
-import { removeShape, replaceShape } from "../../state/transfer_shapes";
-import type { ChannelState } from "../../state/viewer_state";
-import type { PanelView, Refusal, Wish } from "../controls";
-import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../edit_shapes";
-import { type Key, key, neighbour, no, ofChannel, withChannel } from "../key";
-import { nextColour } from "../palettes";
+import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
+import { fromHex, toHex } from "../math/color";
+import type { PanelView, Refusal, Wish } from "../panel/controls";
+import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../panel/edit_shapes";
+import { type Key, key, neighbour, no, ofChannel, withChannel } from "../panel/key";
+import { nextColour } from "../panel/palettes";
+import { REFUSED } from "../state/refusals";
+import { removeShape, replaceShape } from "../state/transfer_shapes";
+import type { ChannelState } from "../state/viewer_state";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
 /** One step of a shape's number, 0..1: five cells of its table. */

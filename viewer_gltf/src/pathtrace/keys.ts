@@ -1,5 +1,7 @@
 /** The keys of the path-traced picture. Pure. */
-import { type NumberParameter, setTo, shareOf, valueAtShare } from "../../state/parameters/kinds";
+
+import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
+import { type NumberParameter, setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
 import {
   AFTER,
   LAMP,
@@ -8,11 +10,10 @@ import {
   MEDIUM,
   ROOM,
   TRACED_ALONE,
-} from "../../state/parameters/light";
-import { STEREO_NUMBERS } from "../../state/parameters/tools";
-import { isTraced, MODE } from "../../state/parameters/volumes";
-import type { ViewerState } from "../../state/viewer_state";
-import { type Key, key, keysOf, neighbour, no, refusalOf } from "../key";
+} from "../state/parameters/light";
+import { STEREO_NUMBERS } from "../state/parameters/tools";
+import { isTraced, MODE } from "../state/parameters/volumes";
+import type { ViewerState } from "../state/viewer_state";
 
 /** The keys that switch the lamps. */
 const LAMP_KEYS: readonly string[] = ["!", "@", "#"];
@@ -37,7 +38,7 @@ function turn(steps: number): Key["to"] {
   };
 }
 
-export const LIGHT_KEYS: readonly Key[] = [
+const KEYS: readonly Key[] = [
   key("G", "Path tracing on or off", ({ state }) =>
     setTo(MODE, isTraced(state) ? "all" : "traced"),
   ),
@@ -55,4 +56,8 @@ export const LIGHT_KEYS: readonly Key[] = [
   }),
   ...keysOf(LAMPS_SHOWN),
   ...AFTER.flatMap(keysOf),
+];
+
+export const LIGHT_KEYS: readonly KeyGroup[] = [
+  { name: "Path tracing", rank: 60, keys: KEYS, needsVolumes: true },
 ];

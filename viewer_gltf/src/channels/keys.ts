@@ -1,13 +1,23 @@
 /** The keys of the channels: which one is meant, and how it looks. Pure. */
-import { fromHex, toHex } from "../../math/color";
-import { CHANNEL, COLOR, VOLUME } from "../../state/parameters/channel";
-import { setTo } from "../../state/parameters/kinds";
-import { REFUSED } from "../../state/refusals";
-import type { ChannelState } from "../../state/viewer_state";
-import type { Wish } from "../controls";
-import { type Key, key, keysOfChannel, neighbour, no, ofChannel, withChannel } from "../key";
-import { nextFreeColour } from "../palettes";
-import { pagesOf } from "./channels";
+import { fromHex, toHex } from "../math/color";
+import type { Wish } from "../panel/controls";
+import {
+  type Key,
+  type KeyGroup,
+  key,
+  keysOfChannel,
+  neighbour,
+  no,
+  ofChannel,
+  withChannel,
+} from "../panel/key";
+import { nextFreeColour } from "../panel/palettes";
+import { CHANNEL, COLOR, VOLUME } from "../state/parameters/channel";
+import { setTo } from "../state/parameters/kinds";
+import { REFUSED } from "../state/refusals";
+import type { ChannelState } from "../state/viewer_state";
+import { pagesOf } from "./section";
+import { SHAPE_KEYS } from "./transfer_function_2d_keys";
 
 const WINDOW_STEP = 1 / 64;
 
@@ -29,7 +39,7 @@ function shift(low: number, high: number) {
 
 const DIGITS = ["1", "2", "3", "4", "5", "6", "7", "8", "9"] as const;
 
-export const CHANNEL_KEYS: readonly Key[] = [
+const KEYS: readonly Key[] = [
   key(DIGITS, "Show or hide this channel of the bundle", ({ state }, name) => {
     const channel = state.channels[Number(name) - 1];
     if (channel === undefined) return no(`This bundle has no channel ${name}.`);
@@ -62,4 +72,9 @@ export const CHANNEL_KEYS: readonly Key[] = [
   ofChannel("W", "Window: lower end up", shift(WINDOW_STEP, 0)),
   ofChannel("e", "Window: upper end down", shift(0, -WINDOW_STEP)),
   ofChannel("E", "Window: upper end up", shift(0, WINDOW_STEP)),
+];
+
+export const CHANNEL_KEYS: readonly KeyGroup[] = [
+  { name: "Channels", rank: 20, keys: KEYS },
+  { name: "Value and gradient", rank: 30, keys: SHAPE_KEYS },
 ];

@@ -1,20 +1,14 @@
-/** The panel's tiles: a map by row and column, or a list. Pure. */
+/** The panel's section of the tiles: a map by row and column, or a list. Pure. */
 
-import { REFUSED } from "../../state/refusals";
-import { tileName } from "../../state/tile_name";
-import type { ViewerState } from "../../state/viewer_state";
-import { command } from "../control_templates";
-import type { Control } from "../controls";
-import { tileGrid } from "../tile_grid";
+import { command } from "../panel/control_templates";
+import type { Control, PartSection } from "../panel/controls";
+import { chosenTile } from "../state/chosen_tile";
+import { REFUSED } from "../state/refusals";
+import { tileName } from "../state/tile_name";
+import type { ViewerState } from "../state/viewer_state";
+import { tileGrid } from "./tile_grid";
 
-/** The effect of choosing a tile: select it; again, isolate it; once more, show all. */
-export function chosenTile({ selected, isolated }: ViewerState, tile: string) {
-  if (isolated === tile) return { type: "isolate", tile: null } as const;
-  if (isolated !== null || selected === tile) return { type: "isolate", tile } as const;
-  return { type: "select", tile } as const;
-}
-
-export function tileItems(state: ViewerState, focusTile: string | null): readonly Control[] {
+function tileItems(state: ViewerState, focusTile: string | null): readonly Control[] {
   const { selected, isolated } = state;
   const grid = tileGrid(state.tiles.map(({ id }) => id));
   const items: Control[] = [];
@@ -66,4 +60,10 @@ export function tileItems(state: ViewerState, focusTile: string | null): readonl
     },
   );
   return items;
+}
+
+/** A specimen of one tile leaves nothing to choose, and has no such section. */
+export function tileSections(state: ViewerState, focusTile: string | null): readonly PartSection[] {
+  if (state.tiles.length < 2) return [];
+  return [{ rank: 40, id: "tiles", label: "Tiles", items: tileItems(state, focusTile) }];
 }
