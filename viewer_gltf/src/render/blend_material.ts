@@ -23,6 +23,9 @@ import type { Cuts } from "../gpu/clip_planes";
 import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
+import { insertInto, insertionsOf } from "../gpu/insert_glsl";
+import fragmentInsertions from "./insertions/surface.frag.glsl?raw";
+import vertexInsertions from "./insertions/surface.vert.glsl?raw";
 import surfaceFragment from "./shaders/surface.frag.glsl?raw";
 import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
 import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
@@ -55,16 +58,18 @@ export function makeSurfaceFrame(
  */
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
-/**
- * What some surfaces have beside all others, as text in their shaders. `place` may move `transformed`,
- * `end` changes `gl_Position`, `color` changes `diffuseColor`.
- */
+/** What the shaders of surfaces include of a part: see insertions/surface.vert.glsl and surface.frag.glsl. */
+const PART_CHUNKS = [
+  ...["part/vertex_declared", "part/vertex_place", "part/vertex_end"],
+  ...["part/fragment_declared", "part/fragment_color"],
+] as const;
+
+/** What some surfaces have beside all others. */
 export type SurfacePart = Readonly<{
   /** Of the text: the same for the same one. */
   key: string;
   uniforms: Readonly<Record<string, { value: unknown }>>;
-  vertex: Readonly<{ declared: string; place: string; end: string }>;
-  fragment: Readonly<{ declared: string; color: string }>;
+  chunks: Readonly<Record<(typeof PART_CHUNKS)[number], string>>;
 }>;
 
 /** How much of a surface is left. */
@@ -87,35 +92,16 @@ const UNITS_APART = 32;
 /** Units of depth between a translucent surface's colour and the pass that writes its depth before. */
 const UNITS_BEHIND = 2;
 
-const NO_PART: Pick<SurfacePart, "uniforms" | "vertex" | "fragment"> = {
+const NO_PART: Pick<SurfacePart, "uniforms" | "chunks"> = {
   uniforms: {},
-  vertex: { declared: "", place: "", end: "" },
-  fragment: { declared: "", color: "" },
+  chunks: {
+    ...{ "part/vertex_declared": "", "part/vertex_place": "", "part/vertex_end": "" },
+    ...{ "part/fragment_declared": "", "part/fragment_color": "" },
+  },
 };
 
-/** The text that is inserted into the shaders of three's standard material, by `patch`. */
-const VERTEX_DECLARED = includeChunks(
-  "varying vec3 vRoom;\n#include <chunks/both_eyes_vertex>\n",
-  CHUNKS,
-);
-const FRAGMENT_DECLARED = includeChunks(surfaceFragment, CHUNKS);
+const SURFACE = includeChunks(surfaceFragment, CHUNKS);
 const DEPTH_FRAGMENT = includeChunks(depthFragment, CHUNKS);
-const PLACED = `
-	vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
-	toEachEye(mvPosition);
-`;
-const KEPT = `
-	keepToOwnEye();
-	if (isGone(vRoom) || isCut(vRoom)) discard;
-`;
-const FACED = `
-	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);
-`;
-const BLENDED = `
-#ifndef OPAQUE
-	gl_FragColor = blended(gl_FragColor, diffuseColor.a);
-#endif
-`;
 
 /**
  * Writes depth alone, cut as the surfaces are.
@@ -134,16 +120,11 @@ export function depthMaterial(
     side: DoubleSide,
     uniforms,
     defines: isShared ? { SHARED: 1 } : {},
-    vertexShader: depthVertexWith(NO_PART.vertex),
+    vertexShader: includeChunks(depthVertex, { ...CHUNKS, ...NO_PART.chunks }),
     fragmentShader: DEPTH_FRAGMENT,
   });
   both.adopt(material);
   return material;
-}
-
-function depthVertexWith({ declared, place, end }: SurfacePart["vertex"]): string {
-  const part = { part_declared: declared, part_place: place, part_end: end };
-  return includeChunks(depthVertex, { ...CHUNKS, ...part });
 }
 
 /** Before the depth of surfaces without a share, after all opaque ones. */
@@ -210,16 +191,12 @@ export class BlendedSurface {
 
   private patch(material: MeshStandardMaterial): void {
     material.onBeforeCompile = (shader) => {
-      const { vertex, fragment, uniforms } = this.part ?? NO_PART;
+      const { chunks, uniforms } = this.part ?? NO_PART;
       Object.assign(shader.uniforms, this.uniforms, uniforms);
-      shader.vertexShader = (VERTEX_DECLARED + vertex.declared + shader.vertexShader).replace(
-        "#include <project_vertex>",
-        (chunk) => `${vertex.place}\n${chunk}\n${PLACED}${vertex.end}`,
-      );
-      shader.fragmentShader = (FRAGMENT_DECLARED + fragment.declared + shader.fragmentShader)
-        .replace("#include <dithering_fragment>", (chunk) => `${BLENDED}\n${chunk}`)
-        .replace("#include <color_fragment>", (chunk) => `${chunk}\n${fragment.color}${KEPT}`)
-        .replace("#include <normal_fragment_maps>", (chunk) => `${chunk}\n${FACED}`);
+      const all = { ...CHUNKS, ...chunks, surface: SURFACE };
+      const insertions = (file: string) => insertionsOf(includeChunks(file, all));
+      shader.vertexShader = insertInto(shader.vertexShader, insertions(vertexInsertions));
+      shader.fragmentShader = insertInto(shader.fragmentShader, insertions(fragmentInsertions));
     };
     material.customProgramCacheKey = () => `blended ${this.part?.key}`;
   }
@@ -229,7 +206,7 @@ export class BlendedSurface {
     this.part = part;
     const { depth } = this;
     Object.assign(depth.uniforms, part.uniforms);
-    depth.vertexShader = depthVertexWith(part.vertex);
+    depth.vertexShader = includeChunks(depthVertex, { ...CHUNKS, ...part.chunks });
     for (const material of [...this.materials, depth]) material.needsUpdate = true;
     // in the pass for the depth, too, what is gone is not there
     for (const material of this.materials) material.allowOverride = false;

@@ -1,4 +1,4 @@
-// The functions that surfaces call beside three's standard material. ../blend_material.ts inserts the calls.
+// The functions that surfaces call beside three's standard material. ../insertions/surface.frag.glsl has the calls.
 varying vec3 vRoom;
 #include <chunks/both_eyes_fragment>
 #include <chunks/clip_planes>

@@ -1,14 +1,15 @@
-// Writes depth alone. `part_place` may move `transformed`, `part_end` changes `gl_Position`.
+// Writes depth alone. A part of some surfaces may place `transformed` elsewhere, and change
+// `gl_Position` at the end.
 varying vec3 vRoom;
 #include <chunks/both_eyes_vertex>
-#include <part_declared>
+#include <part/vertex_declared>
 
 void main() {
   vec3 transformed = position;
-  #include <part_place>
+  #include <part/vertex_place>
   vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
   vec4 seen = modelViewMatrix * vec4(transformed, 1.0);
   gl_Position = projectionMatrix * seen;
   toEachEye(seen);
-  #include <part_end>
+  #include <part/vertex_end>
 }
