@@ -30,9 +30,6 @@ export const LAYERS: readonly string[] = [
   "xr",
   "host",
   PARTS,
-  "notebook",
-  "bench",
-  "page",
   "app",
 ];
 

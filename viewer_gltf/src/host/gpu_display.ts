@@ -123,6 +123,15 @@ export class GpuDisplay implements Display {
     return this.loop.nextFrame();
   }
 
+  /** Resolves once every shown channel's overview is on screen. */
+  async overviewShown(): Promise<void> {
+    for (;;) {
+      const before = this.frames;
+      if (this.forms.overview.isComplete && before > 0) return;
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  }
+
   async settled(): Promise<void> {
     await this.background.settled;
     return this.loop.settled();

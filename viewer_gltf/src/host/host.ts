@@ -23,7 +23,7 @@ import type { Focus } from "./form";
 import { GpuDisplay } from "./gpu_display";
 import { watchContext } from "./graphics_context";
 import { PanelModel } from "./panel_model";
-import type { Hit, Part, PartDefinition, PartHost, SharedFrame } from "./part";
+import type { Hit, PartDefinition, PartHost, SharedFrame } from "./part";
 import { inOrder, Parts } from "./parts";
 import type { Services } from "./services";
 import { Taps } from "./taps";
@@ -89,9 +89,14 @@ export class Host implements PartHost {
     this.parts.begin();
   }
 
-  /** Adds a part that is made after the host, such as the page. */
-  add(part: Part): void {
-    this.parts.add(part);
+  /** The view that the address asks for is open. */
+  noteOpening(): Promise<void> {
+    return this.parts.afterOpening();
+  }
+
+  /** The overview is on screen. */
+  noteOverview(): Promise<void> {
+    return this.parts.afterOverview();
   }
 
   dispatch(action: Action, isStep = action.type !== "restore"): void {

@@ -97,6 +97,10 @@ export interface Part {
   readonly id: string;
   /** Called once, when all parts of the list are made. */
   begin?(): void;
+  /** Called once, when the view that the address asks for is open. */
+  afterOpening?(): unknown;
+  /** Called once, when the overview is on screen: then comes what nobody needs before the first picture. */
+  afterOverview?(): unknown;
   /** Brings the part to a state; called after every change, and at the start. */
   sync?(state: ViewerState, previous: ViewerState): void;
   /** Animation, before each frame. */

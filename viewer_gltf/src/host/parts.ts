@@ -40,6 +40,15 @@ export class Parts {
     for (const part of this.all) part.begin?.();
   }
 
+  /** Resolves when all parts have done what they do there. */
+  async afterOpening(): Promise<void> {
+    await Promise.all(this.all.map((part) => part.afterOpening?.()));
+  }
+
+  async afterOverview(): Promise<void> {
+    await Promise.all(this.all.map((part) => part.afterOverview?.()));
+  }
+
   sync(state: ViewerState, previous: ViewerState): void {
     this.newest = state;
     for (const part of this.all) {

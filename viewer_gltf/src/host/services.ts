@@ -7,8 +7,11 @@ import type { HandleId } from "../marks/clip_handles";
 import type { Vec3 } from "../math/vec3";
 import type { Refusal, Wish } from "../panel/controls";
 import type { BlendedSurface } from "../render/blend_material";
+import type { Action } from "../state/actions";
+import type { CameraView } from "../state/camera_view";
 import type { ObjectView } from "../state/objects";
 import type { ShownSurface } from "../state/on_screen";
+import type { XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
 import type { BrickService } from "../voxels/bricks/brick_service";
 import type { Appearance } from "../voxels/march_tables";
@@ -59,6 +62,8 @@ export interface PagePanel {
   perform(wish: Wish | Refusal): void;
   /** Brings the keyboard to a control, also of a panel that is hidden. Returns whether there is one. */
   focus(section: string, control: string): boolean;
+  /** Shows words on the page alone. */
+  say(words: string): void;
   /** Offers a button beside the words that were announced last. */
   offer(words: string, label: string, act: () => void): void;
 }
@@ -107,7 +112,38 @@ export interface Surfaces {
   outline(channel: string): readonly Vec3[] | null;
 }
 
+/** The stereo that browser and device offer. */
+export interface StereoFinder {
+  readonly found: Promise<Readonly<{ stereo: XrSupport; hasRoom: boolean }>>;
+}
+
+/** Links to the view, for a part that shares it in another way. */
+export type LinkCode = Readonly<{
+  /** The link to the present view. */
+  link: () => string;
+  /** What a link changes, and from where it looks; null: as the view opens. */
+  read: (
+    link: string,
+    state: ViewerState,
+  ) => Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
+}>;
+export interface Links {
+  /** Loads the code that writes and reads links. */
+  load(): Promise<LinkCode>;
+  /** Brings the page's address to the view at once, as before a reload. */
+  writeAddress(): void;
+}
+
+/** What the benchmark has found. */
+export interface BenchResult {
+  /** null: it has not been run. */
+  readonly report: object | null;
+}
+
 export type Services = Readonly<{
+  stereoSupport: StereoFinder;
+  links: Links;
+  bench: BenchResult;
   volumes: Volumes;
   texels: VolumeTexels;
   surfaces: Surfaces;

@@ -2,6 +2,8 @@
 import { BundleError } from "../bundle/errors";
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { StereoFinder } from "../host/services";
+import { startSplit } from "../host/start_split";
 import type { Lenses, PanelView, PartSection } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
 import type { XrSupport } from "../state/stereo";
@@ -15,6 +17,7 @@ import {
   parseProfile,
 } from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
+import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
 import { STEREO_KEYS } from "./keys";
 import {
   rememberEyes,
@@ -25,14 +28,23 @@ import {
   rememberScreen,
 } from "./remembered";
 import { stereoSections } from "./section";
-import { startSplit } from "./start_split";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
+/** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
+const AFTER_PICTURE_MS = 2000;
+const IS_TOUCH = matchMedia("(pointer: coarse)").matches;
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 
-class StereoPart implements Part {
+async function findSupport(): StereoFinder["found"] {
+  const stereo = await findXrSupport(navigator.xr, isSecureContext);
+  return { stereo, hasRoom: await showsUsersRoom(navigator.xr, isSecureContext) };
+}
+
+class StereoPart implements Part, StereoFinder {
   readonly id = "stereo";
+  readonly services = { stereoSupport: this };
+  readonly found = findSupport();
   readonly pageCommands = {
     stereo: () => this.toggleHeadset(),
     room: () => this.toggleRoom(),
@@ -52,6 +64,19 @@ class StereoPart implements Part {
     host.display.setScreen(rememberedScreen());
     for (const action of rememberedEyes()) host.dispatch(action);
     void canScan().then((isAble) => host.panel.learn({ canScan: isAble }));
+  }
+
+  async afterOpening(): Promise<void> {
+    this.host.panel.learn(await this.found);
+  }
+
+  /** Loads the code of stereo where it may be wanted, once the page has nothing else to do. */
+  async afterOverview(): Promise<void> {
+    const { stereo, hasRoom } = await this.found;
+    if (wayToStereo(stereo, IS_TOUCH) === null && !hasRoom) return;
+    const prepare = () => void this.host.stereo.prepare().catch(() => undefined); // a start reports it
+    if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
+    else setTimeout(prepare, AFTER_PICTURE_MS);
   }
 
   sync(state: ViewerState, previous: ViewerState): void {

@@ -1,19 +1,21 @@
 /** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
 import { toggleFullScreen } from "../dom/full_screen";
-import type { Part, PartHost } from "../host/part";
+import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
 import type { Refusal, Wish } from "../panel/controls";
-import type { Said } from "../panel/html/overlays";
 import { Panel } from "../panel/html/panel";
 import { withKeys } from "../panel/keys";
+import { pixelShare } from "../render/pixel_share";
 import { Keyboard } from "./keyboard";
+import { Overlays } from "./overlays";
 import { rememberChange, rememberedView } from "./remembered";
 
 /** Time between updates of the figures that change with each frame, ms. */
 const REFRESH_MS = 250;
+const FEWER_PIXELS = "Drawn with fewer pixels until this tab is closed.";
 const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
 
-export class Page implements Part, PagePanel {
+class PagePart implements Part, PagePanel {
   readonly id = "page";
   readonly services = { page: this };
   readonly pageCommands = {
@@ -22,28 +24,43 @@ export class Page implements Part, PagePanel {
     "full-screen": () => void this.toggleFullScreen(),
   };
   private readonly html: Panel;
+  private readonly overlays: Overlays;
   private readonly keyboard: Keyboard;
   private readonly disposed = new AbortController();
   private timer = 0;
 
-  constructor(
-    private readonly host: PartHost,
-    parent: HTMLElement,
-    private readonly said: Said,
-  ) {
+  constructor(private readonly host: PartHost) {
     const { signal } = this.disposed;
+    const parent = host.view.parentElement ?? host.view;
+    this.overlays = new Overlays(host, this, signal);
     this.html = new Panel((wish) => this.perform(wish));
     parent.append(this.html.root);
     this.keyboard = new Keyboard(host, this, parent, signal);
-    host.panel.show(rememberedView());
-    host.announced.subscribe((text) => said.say(text));
+    host.announced.subscribe((text) => this.say(text));
     host.revealed.subscribe((control) => this.html.reveal(control));
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
     host.drawn.subscribe(() => this.refreshSoon());
     // A link to another view of the same bundle: what it leaves out is as the bundle opens.
     addEventListener("hashchange", () => location.reload(), { signal });
-    this.refresh();
+    host.canvas.addEventListener("webglcontextlost", () => {
+      void import("./lost_context").then(({ offerReload }) =>
+        offerReload(host, () => host.service("links")?.writeAddress()),
+      );
+    });
+  }
+
+  begin(): void {
+    this.host.panel.show(rememberedView());
+  }
+
+  afterOpening(): Promise<void> {
+    this.overlays.begin();
+    return this.overlays.offerWaysIn();
+  }
+
+  afterOverview(): void {
+    if (pixelShare() < 1) this.say(FEWER_PIXELS);
   }
 
   private refresh(): void {
@@ -51,7 +68,7 @@ export class Page implements Part, PagePanel {
     this.timer = 0;
     const { panel } = this.host;
     this.html.update(panel.layOutPage());
-    if (this.keyboard.update()) this.said.withdraw();
+    if (this.keyboard.update()) this.overlays.said.withdraw();
     panel.noteShown();
   }
 
@@ -79,8 +96,12 @@ export class Page implements Part, PagePanel {
     return this.html.focus(control);
   }
 
+  say(words: string): void {
+    this.overlays.said.say(words);
+  }
+
   offer(words: string, label: string, act: () => void): void {
-    this.said.offer(words, label, act);
+    this.overlays.said.offer(words, label, act);
   }
 
   /** Says why a request does nothing now, with a button where something leads on. */
@@ -110,3 +131,8 @@ export class Page implements Part, PagePanel {
     this.keyboard.dispose();
   }
 }
+
+export const page: PartDefinition = {
+  id: "page",
+  create: (host) => new PagePart(host),
+};

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { ChannelState } from "../state/viewer_state";
-import { channelActions, sharedChannel } from "./notebook_part";
+import { channelActions, sharedChannel } from "./view_sharing";
 
 const CHANNEL = {
   id: "CD31",

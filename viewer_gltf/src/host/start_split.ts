@@ -1,6 +1,7 @@
 /** Starts the split screen of a phone in a viewer without WebXR. */
-import type { PartHost } from "../host/part";
+
 import type { Profile } from "../xr/cardboard/viewer_profile";
+import type { PartHost } from "./part";
 
 /** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
 export async function startSplit(host: PartHost, profile: Profile): Promise<void> {

@@ -1,13 +1,12 @@
 /**
- * This part shares the view with the notebook or the page that holds this one. It sends each change through a
+ * Shares the view with the notebook or the page that holds this one. It sends each change through a
  * port, and shows the changes that come back. Lengths are micrometres of the specimen, windows are values of the source.
  */
 import type { Manifest } from "../bundle/generated/bundle";
-import type { Part, PartHost, Tap } from "../host/part";
+import type { PartHost, Tap } from "../host/part";
+import type { LinkCode } from "../host/services";
 import { fromHex, toHex } from "../math/color";
 import type { Ray, Vec3 } from "../math/vec3";
-import { linkOf } from "../share/link_of";
-import { readLink } from "../share/permalink";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { COLOR, OPACITY } from "../state/parameters/channel";
@@ -101,8 +100,7 @@ export type Port = Readonly<{
   postMessage: MessagePort["postMessage"];
 }>;
 
-export class NotebookPart implements Part {
-  readonly id = "notebook";
+export class ViewSharing {
   private picked: Picked | null = null;
   /** What both sides know. */
   private known: Partial<Shared> = {};
@@ -115,6 +113,7 @@ export class NotebookPart implements Part {
   constructor(
     private readonly host: PartHost,
     private readonly port: Port,
+    private readonly links: LinkCode,
   ) {
     const { display } = host;
     this.manifest = host.bundle.manifest;
@@ -153,7 +152,7 @@ export class NotebookPart implements Part {
       return [x, y, z] as const;
     });
     return {
-      link: linkOf(host, initialState(this.manifest)),
+      link: this.links.link(),
       channels: Object.fromEntries(
         host.state.channels.map((channel) => [
           channel.id,
@@ -216,9 +215,8 @@ export class NotebookPart implements Part {
 
   private openLink(link: string): void {
     const { host } = this;
-    const { bounds_um } = this.manifest.specimen;
     host.dispatch({ type: "restore", state: initialState(this.manifest) });
-    const { actions, camera } = readLink(link, host.state, bounds_um);
+    const { actions, camera } = this.links.read(link, host.state);
     for (const action of actions) host.dispatch(action);
     if (camera !== null) host.viewpoint.lookFrom(camera);
     else host.run("reset");
