@@ -1,13 +1,15 @@
 /**
  * The folders of src/ lie in layers: a file imports from its own folder and from those below, types
  * and tests too, and no import leads round in a circle. All parts, folders with a part.ts, share one
- * layer, and none imports another: so a new part needs no line here. `npm run lint` holds it by this.
+ * layer, and none imports another: so a new part needs no line here. No file above the host reaches through it (see
+ * reach.ts). `npm run lint` holds it by this.
  *
  *   npx tsx scripts/layers.ts
  */
 import { readdir, readFile } from "node:fs/promises";
 import { dirname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
+import { reachesOf } from "./reach";
 
 /** The layer of all parts. */
 const PARTS = "parts";
@@ -19,9 +21,7 @@ export const LAYERS: readonly string[] = [
   "dom",
   "bundle",
   "state",
-  "volumes",
-  "surfaces",
-  "pathtrace",
+  "voxels",
   "render",
   "interaction",
   "probe",
@@ -30,10 +30,7 @@ export const LAYERS: readonly string[] = [
   "xr",
   "host",
   PARTS,
-  "notebook",
-  "bench",
   "live",
-  "page",
   "app",
 ];
 
@@ -70,6 +67,18 @@ export function against(
   });
 }
 
+/** The files above the host, which use it. */
+export function usersOfHost(
+  files: readonly string[],
+  parts: ReadonlySet<string>,
+): readonly string[] {
+  const lowest = LAYERS.indexOf(PARTS);
+  return files.filter((file) => {
+    const room = roomOf(file);
+    return !file.endsWith(".test.ts") && (parts.has(room) || LAYERS.indexOf(room) > lowest);
+  });
+}
+
 /** The files that can be reached from themselves, circle by circle. */
 export function circles(arrows: readonly Arrow[]): readonly (readonly string[])[] {
   const next = new Map<string, string[]>();
@@ -98,24 +107,33 @@ async function filesOf(src: string): Promise<readonly string[]> {
   return names.filter((name) => name.endsWith(".ts") && name.includes("/"));
 }
 
-async function readArrows(src: string, files: readonly string[]): Promise<readonly Arrow[]> {
+async function readTexts(src: string, files: readonly string[]): Promise<Map<string, string>> {
   const texts = await Promise.all(files.map((name) => readFile(join(src, name), "utf8")));
-  return files.flatMap((name, i) => arrowsOf(name, texts[i]));
+  return new Map(files.map((name, i) => [name, texts[i]]));
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const src = fileURLToPath(new URL("../src", import.meta.url));
   const files = await filesOf(src);
-  const arrows = await readArrows(src, files);
-  const wrong = against(arrows, partsOf(files));
+  const texts = await readTexts(src, files);
+  const parts = partsOf(files);
+  const arrows = [...texts].flatMap(([name, text]) => arrowsOf(name, text));
+  const wrong = against(arrows, parts);
+  const reaches = usersOfHost(files, parts).flatMap((file) =>
+    reachesOf(file, texts.get(file) ?? "").map((reach) => ({ file, ...reach })),
+  );
   const round = circles(arrows);
   const lines = [
     ...wrong.map(
       ({ from, to }) => `src/${from}: imports ${to}, which lies in a higher layer or another part`,
     ),
     ...round.map((files) => `src/${files[0]}: in a circle with ${files.slice(1).join(", ")}`),
-    `${arrows.length} imports, ${wrong.length} against the layers, ${round.length} circles`,
+    ...reaches.map(
+      ({ file, line, chain }) =>
+        `src/${file}:${line}: ${chain} reaches through the host: ask it, or a service, for the thing itself`,
+    ),
+    `${arrows.length} imports, ${wrong.length} against the layers, ${round.length} circles, ${reaches.length} chains through the host`,
   ];
   process.stdout.write(`${lines.join("\n")}\n`);
-  if (wrong.length + round.length > 0) process.exitCode = 1;
+  if (wrong.length + round.length + reaches.length > 0) process.exitCode = 1;
 }

@@ -32,11 +32,10 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
 
   constructor(private readonly host: PartHost) {
     const { bundle, stage, display } = host;
-    const { surfaces } = display.contents;
     const options = {
       manifest: bundle.manifest,
-      reading: display.reading,
-      surfaces: () => surfaces.meshes,
+      reading: host.reading,
+      surfaces: () => host.service("surfaces")?.meshes ?? [],
       dispatch: host.dispatch.bind(host),
       announce: host.announce.bind(host),
       onChange: () => display.requestFrame(),
@@ -47,7 +46,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
     stage.append(...marks.overlayElements);
     listenForHandles(
       stage,
-      display.renderer.domElement,
+      host.canvas,
       {
         pick: (point, pointing) => (host.isInRoom ? null : marks.pick(host.rayAt(point), pointing)),
         drag: (id, point) => marks.drag(id, host.rayAt(point)),
@@ -67,7 +66,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
     const lamps = this.lampsOf(state);
     if (lamps.length > this.lampsOf(previous).length && !this.host.isInRoom) {
       // they may be beside and behind the eye; in stereo the head finds them
-      this.host.display.viewpoint.stepBackFor(lamps.map(({ position }) => position));
+      this.host.viewpoint.stepBackFor(lamps.map(({ position }) => position));
     }
   }
 

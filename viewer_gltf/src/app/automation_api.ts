@@ -17,7 +17,7 @@ export interface StereoCellApi {
   settled(): Promise<void>;
   snapshot(): Snapshot;
   /** What the benchmark (`?bench`) has found; null: it has not been run. */
-  bench: Report | null;
+  readonly bench: Report | null;
 }
 
 declare global {

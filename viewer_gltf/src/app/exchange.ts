@@ -63,8 +63,6 @@ export async function exchange(
   }
   parent.classList.remove("preparing");
   parent.inert = false;
-  if (before.display.viewpoint.navigation.isTurning)
-    after.display.viewpoint.navigation.turnSlowly();
   shown?.remove();
   before.dispose();
   return after;
@@ -73,15 +71,12 @@ export async function exchange(
 /** Brings a host to the state, the camera and the panel of another one. */
 function carry(before: Host, after: Host, start: ViewerState): void {
   const opening = settingsOf(location.search).reduce(reduce, initialState(before.bundle.manifest));
-  const { cameraView, navigation } = before.display.viewpoint;
-  // where the eye is now, also where nobody has moved: the opening may have another distance by then
-  const camera = cameraView ?? { ...navigation.lookNow, specimen: null };
   const link = linkOf(before, opening);
   const { bounds_um } = after.bundle.manifest.specimen;
   after.dispatch({ type: "restore", state: start });
   const { actions } = readLink(link, after.state, bounds_um);
   for (const action of actions) after.dispatch(action);
-  after.display.viewpoint.lookFrom(camera);
+  after.viewpoint.lookFrom(before.viewpoint.viewNow);
   after.panel.show(before.panel.view);
   after.undo.forget();
 }

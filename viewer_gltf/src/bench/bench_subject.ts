@@ -15,17 +15,16 @@ const MODES: Record<BenchMode, Mode> = { mesh: "off", disc: "disc", all: "all", 
 const ALWAYS_NEAR_M = 10;
 
 export function subjectOf(host: PartHost): Subject {
-  const { bundle, display } = host;
-  const { renderer, contents, viewpoint, stereo } = display;
+  const { bundle, display, viewpoint, stereo } = host;
   const { tiles, channels } = bundle.manifest;
   return {
-    device: deviceOf(renderer.getContext() as WebGL2RenderingContext),
+    device: deviceOf(host.canvas.getContext("webgl2") as WebGL2RenderingContext),
     tiles: tiles.length,
     channels: channels.length,
     canTrace: host.state.canTrace,
     edges: async () => {
       const [first] = volumeChannels(host.state);
-      const sources = first && (await contents.volumes.sourcesOf(first.id));
+      const sources = first && (await host.service("volumes")?.sourcesOf(first.id));
       // of the tile with most voxels: those at a specimen's end have fewer
       const sizes = [...(sources?.values() ?? [])].map(({ volume }) =>
         volume.levels.map(({ size }) => Math.max(...size)),
@@ -48,7 +47,7 @@ export function subjectOf(host: PartHost): Subject {
       const isFlat = stereo.kind === null;
       return { eye, middle: isFlat ? [0, 0, 0] : ahead(head, XR_DISTANCE_M).toArray() };
     },
-    fly: (specimen) => viewpoint.lookFrom({ ...viewpoint.navigation.lookNow, specimen }),
+    fly: (specimen) => viewpoint.lookFrom({ ...viewpoint.lookNow, specimen }),
     nextFrame: () => display.nextFrame(),
     cost: () => {
       const { drawCalls, triangles, volumeBytes } = display.snapshot();

@@ -2,7 +2,6 @@
 import { fileName, saveFile } from "../dom/save_file";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PosterMaker } from "../host/services";
-import { isSameLook } from "../interaction/orbit_camera";
 import type { PartSection } from "../panel/controls";
 import { REFUSED } from "../state/refusals";
 import type { Scene } from "./save_picture";
@@ -54,16 +53,15 @@ class CapturePart implements Part, PosterMaker {
   }
 
   private get filmed(): Scene {
-    const { stage, state, bundle, display } = this.host;
-    const { renderer, studio, viewpoint, contents } = display;
-    const { parent } = contents.surfaces.group;
+    const { stage, state, bundle, display, viewpoint, specimen } = this.host;
+    const { renderer, studio } = display;
     return {
       renderer,
       navigation: viewpoint.navigation,
       studio,
       height_px: stage.clientHeight,
       specimen: viewpoint.specimen,
-      labelled: parent ?? contents.surfaces.group,
+      labelled: specimen,
       state,
       manifest: bundle.manifest,
       colorsOf: (channel) => this.host.service("objects")?.legend(channel) ?? null,
@@ -82,7 +80,7 @@ class CapturePart implements Part, PosterMaker {
   /** Through the kept views, or once round. */
   private async makeVideo(signal: AbortSignal): Promise<Made> {
     const { saveVideo } = await loadSaving();
-    const { viewpoint } = this.host.display;
+    const { viewpoint } = this.host;
     const before = viewpoint.cameraView;
     const say = (done: number, of: number) => this.host.announce(`Video: ${done} of ${of}`);
     try {
@@ -108,7 +106,7 @@ class CapturePart implements Part, PosterMaker {
     }
     this.filming = new AbortController();
     const { signal } = this.filming;
-    host.panel.changed.emit();
+    host.panel.refresh();
     try {
       const made = await make(signal);
       const doing = what === "picture" ? "Saving the picture" : "Making the video";
@@ -124,14 +122,14 @@ class CapturePart implements Part, PosterMaker {
       host.announce(`The ${what} can't be ${done}: ${error.message}.`);
     } finally {
       this.filming = null;
-      host.panel.changed.emit();
+      host.panel.refresh();
     }
   }
 
   private keep(): boolean {
-    const { state, isInRoom, display } = this.host;
+    const { state, isInRoom, viewpoint } = this.host;
     if (isInRoom) return false;
-    this.setViews([...state.keptViews, display.viewpoint.navigation.lookNow]);
+    this.setViews([...state.keptViews, viewpoint.lookNow]);
     return true;
   }
 
@@ -151,15 +149,13 @@ class CapturePart implements Part, PosterMaker {
   }
 
   private goToNext(): boolean {
-    const { state, isInRoom, undo, display } = this.host;
-    const { navigation } = display.viewpoint;
+    const { state, isInRoom, undo, viewpoint } = this.host;
     const { keptViews } = state;
     if (isInRoom || keptViews.length === 0) return false;
     undo.noteLook();
-    const before = navigation.lookNow;
-    navigation.lookFrom(keptViews[this.nextView++ % keptViews.length]);
-    if (isSameLook(before, navigation)) this.host.announce(ONLY_VIEW);
-    display.redraw();
+    const before = viewpoint.lookNow;
+    viewpoint.lookFlatFrom(keptViews[this.nextView++ % keptViews.length]);
+    if (viewpoint.isAt(before)) this.host.announce(ONLY_VIEW);
     return true;
   }
 

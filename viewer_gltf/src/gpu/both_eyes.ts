@@ -22,6 +22,17 @@ import {
 import bothEyesFragment from "./chunks/both_eyes_fragment.glsl?raw";
 import bothEyesVertex from "./chunks/both_eyes_vertex.glsl?raw";
 import type { Eyes } from "./eyes";
+import { includeChunks } from "./glsl_include";
+import { insertInto, insertionsOf } from "./insert_glsl";
+import fragmentInsertions from "./insertions/both_eyes.frag.glsl?raw";
+import vertexInsertions from "./insertions/both_eyes.vert.glsl?raw";
+
+const CHUNKS = {
+  "chunks/both_eyes_vertex": bothEyesVertex,
+  "chunks/both_eyes_fragment": bothEyesFragment,
+};
+const VERTEX = insertionsOf(includeChunks(vertexInsertions, CHUNKS));
+const FRAGMENT = insertionsOf(includeChunks(fragmentInsertions, CHUNKS));
 
 /** The layer of what is drawn so; no other camera sees it. WebXR has 1 and 2. */
 const BOTH = 4;
@@ -101,12 +112,8 @@ export class BothEyes {
     const { uniforms } = this;
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, uniforms);
-      const end = shader.vertexShader.lastIndexOf("}");
-      const body = shader.vertexShader.slice(0, end);
-      shader.vertexShader = `${bothEyesVertex}${body}\ttoEachEye(mvPosition);\n}`;
-      shader.fragmentShader =
-        bothEyesFragment +
-        shader.fragmentShader.replace("void main() {", "void main() {\n\tkeepToOwnEye();");
+      shader.vertexShader = insertInto(shader.vertexShader, VERTEX);
+      shader.fragmentShader = insertInto(shader.fragmentShader, FRAGMENT);
     };
   }
 

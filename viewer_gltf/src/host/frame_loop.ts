@@ -6,8 +6,8 @@ import { GatherPace } from "../render/pacing/samples_per_frame";
 import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
-import { ERROR_TARGET_PX } from "../surfaces/surface_set";
-import { MAX_STEPS, REST_STEPS } from "../volumes/march_frame";
+import { MAX_STEPS, REST_STEPS } from "../voxels/march_frame";
+import { ERROR_TARGET_PX } from "./form";
 import { Pulse } from "./pulse";
 import { SceneFrame, type SceneFrameOptions } from "./scene_frame";
 import { Studio } from "./studio";
@@ -127,22 +127,21 @@ export class FrameLoop {
   }
 
   private get isLoading(): boolean {
-    const { contents, parts } = this.options.shown();
-    return contents.isLoading || parts.isLoading;
+    return this.options.shown().parts.isLoading;
   }
 
   /** Draws a frame if one is due. Returns whether nothing more is to be drawn until something changes. */
   private frame(time_ms: number): boolean {
     const { renderer } = this.options;
     if (renderer.getContext().isContextLost()) return true; // there is nothing to draw on
-    const { contents } = this.options.shown();
+    const { forms } = this.options.shown();
     const { picture } = this.scene;
     const interval_ms = time_ms - this.last_ms;
     this.last_ms = time_ms;
     const wasLoading = this.isLoading;
     const passed_s = Math.max(0, interval_ms / 1000);
     const { camera, isStereo, isChanging, isFading } = this.advance(passed_s);
-    const isGathering = contents.traced.isGathering && this.gathering.isReady(time_ms);
+    const isGathering = forms.isGathering && this.gathering.isReady(time_ms);
     const isDue = this.resting.isDue(time_ms) && this.hasCome;
     const isMoving = isStereo || this.isStale;
     // a picture that came to rest is drawn once more, as well as can be
@@ -153,14 +152,14 @@ export class FrameLoop {
     // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
     const isAwaited = this.waiting.length > 0;
     if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) {
-      return !canGather && !contents.traced.isGathering;
+      return !canGather && !forms.isGathering;
     }
     const settings = this.begin(isMoving, interval_ms);
     this.stream(camera, settings);
     if (isWanted || gathers) {
       this.isStale = isChanging;
       this.hasCome = isFading;
-      contents.surfaces.dressAll();
+      forms.dress();
       const { passes } = this.gathering;
       // late frames give up smooth edges first
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
@@ -184,12 +183,12 @@ export class FrameLoop {
   /** Poses the eyes, and goes on with what moves and with what fades. */
   private advance(passed_s: number) {
     const { onOverview } = this.options;
-    const { contents, stereo, viewpoint } = this.options.shown();
+    const { forms, stereo, viewpoint } = this.options.shown();
     const { picture } = this.scene;
     const dt_s = Math.min(LONGEST_FRAME_S, passed_s);
     const fade_s = Math.min(this.hasDrawn ? LONGEST_FADE_S : LONGEST_FRAME_S, passed_s);
     this.hasDrawn = false;
-    if (contents.hasJustBegun()) onOverview();
+    if (forms.hasJustBegun()) onOverview();
     const inRoom = stereo.pose(picture.eyes);
     picture.isSeeThrough = stereo.isInUsersRoom;
     const camera = inRoom ?? this.scene.poseMono(passed_s);
@@ -216,9 +215,10 @@ export class FrameLoop {
   private stream(camera: Camera, { errorFactor }: QualitySettings): void {
     const [eye] = this.scene.picture.eyes.all; // a headset has none before its first pose
     if (eye === undefined) return;
-    const { contents, stereo } = this.options.shown();
+    const { forms, stereo } = this.options.shown();
     const { z, w } = eye.viewport;
-    contents.stream(stereo.seenBy(camera), z, w, ERROR_TARGET_PX * errorFactor);
+    const error_px = ERROR_TARGET_PX * errorFactor;
+    forms.stream({ camera: stereo.seenBy(camera), width_px: z, height_px: w, error_px });
   }
 
   dispose(): void {

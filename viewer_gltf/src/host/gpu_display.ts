@@ -1,8 +1,10 @@
 /** All that draws the specimen: the scene, its contents, the eyes before it, and the loop of frames. */
-import type { WebGLRenderer } from "three";
+import type { Object3D, WebGLRenderer } from "three";
 import type { Bundle } from "../bundle/load";
+import { ValuesHost } from "../bundle/values_host";
 import { shownBox } from "../math/pick";
 import { Reading } from "../probe/probe_reader";
+import type { FrameRenderer } from "../render/frame_renderer";
 import { Hybrid } from "../render/gaze_focus";
 import { Room } from "../render/scene";
 import type { Action } from "../state/actions";
@@ -12,7 +14,8 @@ import type { ViewerState } from "../state/viewer_state";
 import { Stereo, type StereoOptions } from "../xr/stereo";
 import { Background } from "./background";
 import { CanvasFit } from "./canvas";
-import { Contents } from "./contents";
+import type { Focus } from "./form";
+import { Forms } from "./forms";
 import { FrameLoop } from "./frame_loop";
 import type { Display, FrameView } from "./part";
 import type { Parts } from "./parts";
@@ -40,7 +43,9 @@ export type DisplayOptions = Readonly<{
 
 export class GpuDisplay implements Display {
   readonly renderer: WebGLRenderer;
-  readonly contents: Contents;
+  readonly forms: Forms;
+  /** Voxels as they were measured; null: the page's host has none. */
+  readonly values: ValuesHost | null;
   readonly reading: Reading;
   readonly viewpoint: Viewpoint;
   readonly stereo: Stereo;
@@ -53,7 +58,7 @@ export class GpuDisplay implements Display {
   private perInch: number | null = null;
 
   constructor(private readonly options: DisplayOptions) {
-    const { bundle, renderer, stage, report } = options;
+    const { bundle, renderer, stage } = options;
     const { manifest } = bundle;
     const { bounds_um: bounds } = manifest.specimen;
     this.renderer = renderer;
@@ -65,16 +70,11 @@ export class GpuDisplay implements Display {
       stereo: () => this.stereo,
     });
     this.loop = this.makeLoop();
-    this.contents = new Contents({
-      ...{ bundle, renderer, picture: this.loop.scene.picture },
-      dispatch: (action) => options.dispatch(action),
-      onChange: () => this.requestFrame(),
-      onError: report,
-    });
+    this.forms = new Forms(options.parts, manifest);
+    this.values = bundle.values === undefined ? null : new ValuesHost(bundle.values);
     this.reading = this.makeReading();
     this.stereo = this.makeStereo();
     this.background = new Background(this.room, onChange);
-    this.room.specimen.group.add(this.contents.surfaces.group);
     this.canvas = new CanvasFit(renderer, stage, this.viewpoint.navigation, onChange);
   }
 
@@ -98,7 +98,6 @@ export class GpuDisplay implements Display {
     this.room.specimen.show(isolated === null ? null : shownBox(manifest, isolated));
     this.followScreenStereo(state);
     this.reading.state = state;
-    this.contents.sync(state, this.hybrid);
     this.room.mark(isolated === null ? selected : null);
     this.loop.setLevel(quality);
     this.redraw();
@@ -124,9 +123,33 @@ export class GpuDisplay implements Display {
     return this.loop.nextFrame();
   }
 
+  /** Resolves once every shown channel's overview is on screen. */
+  async overviewShown(): Promise<void> {
+    for (;;) {
+      const before = this.frames;
+      if (this.forms.overview.isComplete && before > 0) return;
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  }
+
   async settled(): Promise<void> {
     await this.background.settled;
     return this.loop.settled();
+  }
+
+  get focus(): Focus {
+    const { focusTiles, mayRefine } = this.hybrid;
+    return { focusTiles, mayRefine, hasOverview: this.forms.hasOverview };
+  }
+
+  /** What all shaders of the scene share. */
+  get frame(): FrameRenderer {
+    return this.loop.scene.picture;
+  }
+
+  /** The object of the scene that holds the specimen: from um to the room. */
+  get specimen(): Object3D {
+    return this.room.specimen.group;
   }
 
   setScreen(perInch: number | null): void {
@@ -143,32 +166,32 @@ export class GpuDisplay implements Display {
   }
 
   limitEdge(edge: number): void {
-    this.contents.limitEdge(edge);
+    this.forms.limitEdge(edge);
     this.options.follow();
   }
 
   get isLoading(): boolean {
-    return this.contents.isLoading || this.options.parts.isLoading;
+    return this.options.parts.isLoading;
   }
 
   snapshot(): Snapshot {
     const { parts, state } = this.options;
-    const { renderer, room, hybrid, contents, stereo, viewpoint, loop } = this;
+    const { renderer, room, hybrid, forms, stereo, viewpoint, loop } = this;
     const measuredValues = parts.service("measured")?.values ?? [];
     const { isLoading } = this;
-    const drawn = { renderer, room, hybrid, contents, stereo, viewpoint, loop };
+    const drawn = { renderer, room, hybrid, forms, stereo, viewpoint, loop };
     return snapshotOf({ ...drawn, state: state(), isLoading, measuredValues });
   }
 
   /** The graphics context is gone, and with it the texels and the times that were asked of it. */
   forget(): void {
-    this.contents.forget();
+    this.forms.forget();
     this.loop.forget();
   }
 
   /** There is a graphics context again. */
   renew(): void {
-    this.contents.forget(); // texels that have come since
+    this.forms.forget(); // texels that have come since
     this.loop.renew();
     this.options.follow();
   }
@@ -179,8 +202,8 @@ export class GpuDisplay implements Display {
       ...{ renderer, stage, onFrame, room: this.room, hybrid: this.hybrid },
       bounds: bundle.manifest.specimen.bounds_um,
       shown: () => {
-        const { contents, stereo, viewpoint } = this;
-        return { contents, parts, stereo, viewpoint, state: state() };
+        const { forms, stereo, viewpoint } = this;
+        return { forms, parts, stereo, viewpoint, state: state() };
       },
       onAdvance: (frame) => this.advance(frame),
       onFocus: follow,
@@ -196,15 +219,17 @@ export class GpuDisplay implements Display {
 
   private makeReading(): Reading {
     const { bundle, parts, report, state } = this.options;
-    const { contents } = this;
+    const { forms, values } = this;
     const options = {
-      values: contents.values,
+      values,
       manifest: bundle.manifest,
       base: bundle.base,
-      surfaces: () => contents.surfaces.meshes,
-      volumes: () => contents.shownVolumes,
-      source: (tile: string, channel: string) => contents.volumes.source(tile, channel),
-      sourceOf: (tile: string, channel: string) => contents.volumes.sourceOf(tile, channel),
+      surfaces: () => parts.service("surfaces")?.meshes ?? [],
+      volumes: () => forms.shownVolumes,
+      source: (tile: string, channel: string) =>
+        parts.service("volumes")?.source(tile, channel) ?? null,
+      sourceOf: async (tile: string, channel: string) =>
+        (await parts.service("volumes")?.sourceOf(tile, channel)) ?? null,
       pick: (ray: Parameters<Parts["pick"]>[0]) =>
         parts.pick(ray, ({ object }) => object === undefined),
       corner: (eye: Parameters<Parts["cutBefore"]>[0]) => parts.cutBefore(eye),
@@ -260,7 +285,6 @@ export class GpuDisplay implements Display {
     this.stereo.dispose();
     this.viewpoint.dispose();
     this.reading.dispose();
-    this.contents.dispose();
     this.loop.dispose();
     this.canvas.dispose();
   }

@@ -1,32 +1,34 @@
 /** The host of the viewer's parts: the state, its history, the parts, and what draws them. */
-import type { Vector2 } from "three";
+import type { Object3D, Vector2 } from "three";
 import type { Bundle } from "../bundle/load";
-import { isSameLook } from "../interaction/orbit_camera";
+import type { ValuesHost } from "../bundle/values_host";
 import type { Ray } from "../math/vec3";
 import type { Lenses } from "../panel/controls";
 import type { KeyTable } from "../panel/keys";
 import type { WaysOn } from "../panel/ways_on";
+import type { Reading } from "../probe/probe_reader";
 import type { Theme } from "../render/theme";
 import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
-import { CANT, type Command, STAYS } from "../state/commands";
+import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { newNotice, reduce } from "../state/reduce";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
+import type { Stereo } from "../xr/stereo";
 import { makeRenderer } from "./canvas";
-import { DROPPED, Faults } from "./faults";
+import { Commands } from "./commands";
+import { Faults } from "./faults";
+import type { Focus } from "./form";
 import { GpuDisplay } from "./gpu_display";
+import { watchContext } from "./graphics_context";
 import { PanelModel } from "./panel_model";
-import type { CommandTable, Hit, Part, PartDefinition, PartHost } from "./part";
-import { Parts } from "./parts";
+import type { Hit, PartDefinition, PartHost, SharedFrame } from "./part";
+import { inOrder, Parts } from "./parts";
 import type { Services } from "./services";
 import { Taps } from "./taps";
 import { Undo } from "./undo";
-
-/** Commands before which the place from which the specimen is seen is a step of its own. */
-const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
-const NOTHING_AHEAD = "Nothing is in the middle of the view.";
+import type { Viewpoint } from "./viewpoint";
 
 export class Host implements PartHost {
   readonly display: GpuDisplay;
@@ -41,6 +43,7 @@ export class Host implements PartHost {
   private readonly parts: Parts;
   private readonly faults: Faults;
   private readonly taps: Taps;
+  private readonly commands: Commands;
   private readonly disposed = new AbortController();
 
   /** @param view the part of the page with the stage */
@@ -53,13 +56,16 @@ export class Host implements PartHost {
     const { manifest } = bundle;
     const { signal } = this.disposed;
     const renderer = makeRenderer(stage);
-    const canTrace = renderer.getContext().getExtension("EXT_color_buffer_float") !== null;
-    this.state = initialState(manifest, canTrace);
+    const gl = renderer.getContext();
+    this.state = initialState(
+      manifest,
+      definitions.some(({ canTrace }) => canTrace?.(gl) ?? false),
+    );
     this.parts = new Parts(definitions);
     this.faults = new Faults({
       state: () => this.state,
       dispatch: (action) => this.dispatch(action),
-      isIncomplete: () => this.display.contents.isIncomplete,
+      isIncomplete: () => this.display.forms.isIncomplete,
     });
     this.display = this.makeDisplay(renderer);
     this.undo = new Undo({
@@ -72,15 +78,25 @@ export class Host implements PartHost {
     });
     this.panel = this.makePanel();
     this.taps = new Taps(this, this.parts, signal);
-    for (const { create } of definitions) this.parts.add(create(this));
-    this.listen(renderer.domElement, signal);
+    this.commands = new Commands({
+      ...{ host: this, parts: this.parts, taps: this.taps },
+      retry: () => this.retry(),
+    });
+    for (const { create } of inOrder(definitions)) this.parts.add(create(this));
+    watchContext(this.canvas, this.display, (action) => this.dispatch(action));
+    addEventListener("online", () => this.retry(), { signal });
     this.display.start();
     this.parts.begin();
   }
 
-  /** Adds a part that is made after the host, such as the page. */
-  add(part: Part): void {
-    this.parts.add(part);
+  /** The view that the address asks for is open. */
+  noteOpening(): Promise<void> {
+    return this.parts.afterOpening();
+  }
+
+  /** The overview is on screen. */
+  noteOverview(): Promise<void> {
+    return this.parts.afterOverview();
   }
 
   dispatch(action: Action, isStep = action.type !== "restore"): void {
@@ -89,7 +105,7 @@ export class Host implements PartHost {
     if (next === previous) return;
     const notice = newNotice(previous, next);
     const announcement = announcementOf(previous, next, this.bundle.manifest.tiles);
-    const { stereo } = this.display;
+    const { stereo } = this;
     const larger = next.specimenSize_m / previous.specimenSize_m;
     if (isStep) this.undo.add(action, next);
     this.state = next;
@@ -102,49 +118,8 @@ export class Host implements PartHost {
 
   /** @param isOnPage false: by the panel in the room */
   run(command: Command, isOnPage = true): boolean {
-    const { state } = this;
-    const { navigation } = this.display.viewpoint;
-    const before = this.isInRoom ? null : navigation.lookNow;
-    if (this.parts.run(command, isOnPage)) return true;
-    if (ENDS_A_LOOK.has(command)) this.undo.noteLook();
-    if (!this.carryOut(command)) {
-      this.announce(CANT);
-      return false;
-    }
-    const stays = STAYS[command];
-    const isSame = this.state === state && before !== null && isSameLook(before, navigation);
-    if (isSame && stays !== undefined) this.announce(stays);
-    this.display.redraw();
-    return true;
+    return this.commands.run(command, isOnPage);
   }
-
-  private carryOut(command: Command): boolean {
-    const own = this.commands[command];
-    if (own !== undefined) return own() !== false;
-    const { stereo, viewpoint } = this.display;
-    return this.isInRoom ? stereo.run(command, this.state) : viewpoint.navigation.run(command);
-  }
-
-  /** The host's own commands; all others move the specimen or the camera. */
-  private readonly commands: CommandTable = {
-    undo: () => this.undo.step("undo"),
-    redo: () => this.undo.step("redo"),
-    reset: () => {
-      this.dispatch({ type: "isolate", tile: null });
-      this.display.viewpoint.recentre();
-    },
-    back: () => {
-      const type = this.state.isolated !== null ? "isolate" : "select";
-      this.dispatch({ type, tile: null });
-    },
-    retry: () => this.retry(),
-    press: () => {
-      const { stereo, viewpoint } = this.display;
-      if (this.isInRoom) return stereo.run("press", this.state);
-      if (!this.taps.tap(viewpoint.rayAhead, "key")) this.announce(NOTHING_AHEAD);
-      return true;
-    },
-  };
 
   get keys(): KeyTable {
     return this.parts.keys;
@@ -159,7 +134,39 @@ export class Host implements PartHost {
   }
 
   get isInRoom(): boolean {
-    return this.display.stereo.kind !== null;
+    return this.stereo.kind !== null;
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.display.renderer.domElement;
+  }
+
+  get specimen(): Object3D {
+    return this.display.specimen;
+  }
+
+  get viewpoint(): Viewpoint {
+    return this.display.viewpoint;
+  }
+
+  get stereo(): Stereo {
+    return this.display.stereo;
+  }
+
+  get reading(): Reading {
+    return this.display.reading;
+  }
+
+  get values(): ValuesHost | null {
+    return this.display.values;
+  }
+
+  get frame(): SharedFrame {
+    return this.display.frame;
+  }
+
+  get focus(): Focus {
+    return this.display.focus;
   }
 
   get doubleTapped(): Signal<void> {
@@ -218,24 +225,10 @@ export class Host implements PartHost {
   private makePanel(): PanelModel {
     const { manifest } = this.bundle;
     return new PanelModel(manifest, () => ({
-      ...{ manifest, state: this.state, stereo: this.display.stereo, undo: this.undo },
+      ...{ manifest, state: this.state, undo: this.undo },
       snapshot: () => this.display.snapshot(),
-      histogram: (channel) => this.display.contents.transferFunctions2d.histogram(channel),
-      objects: this.service("objects"),
       sections: (view) => this.parts.sections(view),
     }));
-  }
-
-  private listen(canvas: HTMLCanvasElement, signal: AbortSignal): void {
-    canvas.addEventListener("webglcontextlost", () => {
-      this.dispatch({ type: "notify", text: DROPPED });
-      this.display.forget();
-    });
-    canvas.addEventListener("webglcontextrestored", () => {
-      this.display.renew();
-      this.dispatch({ type: "dismiss", texts: [DROPPED] });
-    });
-    addEventListener("online", () => this.retry(), { signal });
   }
 
   /** Brings the display and the parts to the state. */
@@ -247,7 +240,6 @@ export class Host implements PartHost {
   /** Asks again for all that has failed. */
   private retry(): void {
     this.dispatch({ type: "dismiss", texts: this.state.mendable });
-    this.display.contents.retryFailed();
     this.parts.retryFailed();
     this.follow();
   }

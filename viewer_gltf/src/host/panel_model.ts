@@ -2,6 +2,7 @@
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
+import { keepPlaces } from "../panel/channel_cards";
 import {
   changePanel,
   type Layout,
@@ -11,20 +12,13 @@ import {
   START_VIEW,
 } from "../panel/controls";
 import { type Facts, layOut, MORE } from "../panel/layout";
-import { keepPlaces, type Ranges } from "../panel/sections/channels";
+import type { Ranges } from "../panel/window_texts";
 import { unitOf } from "../probe/measure";
 import { Signal } from "../state/signal";
 import type { XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
-import type { Histogram } from "../volumes/transfer_functions_loader";
-import { faultOfCode } from "../xr/cardboard/viewer_profile";
-import type { Stereo } from "../xr/stereo";
-import type { ObjectMaps } from "./services";
 import type { Snapshot } from "./snapshot";
 import type { Undo } from "./undo";
-
-/** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
-const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 
 /** The facts about page and browser on which the panel depends. */
 export type PageFacts = Readonly<{
@@ -39,12 +33,8 @@ export type PageFacts = Readonly<{
 export type PanelSource = Readonly<{
   manifest: Manifest;
   state: ViewerState;
-  stereo: Stereo;
   undo: Undo;
   snapshot: () => Snapshot;
-  /** Voxels of a channel by value and gradient; null: not yet, it is being fetched. */
-  histogram: (channel: string) => Histogram | null;
-  objects: ObjectMaps | null;
   sections: (view: PanelView) => readonly PartSection[];
 }>;
 
@@ -57,10 +47,8 @@ export class PanelModel {
   view: PanelView = START_VIEW;
   /** In the source's values, by channel. */
   readonly ranges: Ranges;
-  /** The panel in the page has to show something else. */
-  readonly changed = new Signal<void>();
-  /** The panel in the page shows the present state. */
-  readonly refreshed = new Signal<void>();
+  private readonly changed = new Signal<void>();
+  private readonly shownByPage = new Signal<void>();
   private page: PageFacts = {
     ...{ subtitle: "", canScan: false, hasRoom: false },
     stereo: { isAvailable: false, reason: "" },
@@ -72,6 +60,26 @@ export class PanelModel {
   ) {
     const unit = unitOf(manifest);
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
+  }
+
+  /** Calls back when the panel in the page has to show something else. */
+  onChange(listener: () => void): void {
+    this.changed.subscribe(listener);
+  }
+
+  /** Makes the panel in the page show its content anew. */
+  refresh(): void {
+    this.changed.emit();
+  }
+
+  /** Calls back when the panel in the page shows the present state. */
+  onShown(listener: () => void): void {
+    this.shownByPage.subscribe(listener);
+  }
+
+  /** The panel in the page shows the present state. */
+  noteShown(): void {
+    this.shownByPage.emit();
   }
 
   get facts(): PageFacts {
@@ -115,32 +123,20 @@ export class PanelModel {
   /** The content of a panel; one in the room has its own sections open. */
   layOut(view: PanelView): Layout {
     const source = this.source();
-    return layOut(source.state, this.factsFor(source, view), view, source.sections(view));
+    return layOut(source.state, this.factsFor(source), view, source.sections(view));
   }
 
-  private factsFor(source: PanelSource, { isHistogramOpen, picked }: PanelView): Facts {
-    const { manifest, stereo, undo, histogram, objects } = source;
-    const { subtitle, hasRoom, canScan, stereo: support } = this.page;
-    const hasHistogram = isHistogramOpen && picked !== null && this.ranges.has(picked);
+  private factsFor(source: PanelSource): Facts {
+    const { manifest, undo } = source;
     const now = source.snapshot();
-    const { triangles, traced, isLoading, discLimit_deg, frame_ms, isStereo, settings } = now;
+    const { triangles, traced, isLoading, frame_ms, isStereo, settings } = now;
     const drawn = [...now.volumes, traced];
     const levels = drawn.flatMap(({ level }) => (level === null ? [] : [level]));
     return {
       title: manifest.specimen.name,
-      subtitle,
+      subtitle: this.page.subtitle,
       shown: this.shown,
-      ranges: this.ranges,
-      histogram: hasHistogram ? histogram(picked) : null,
-      objectColors: objects?.colors,
-      focusTile: now.gazed,
-      discLimit_deg,
       isStereo,
-      stereo: support,
-      split: stereo.kind === "headset" ? null : SPLIT,
-      canScan,
-      hasRoom: hasRoom && stereo.kind === null,
-      faultOfCode,
       frame_ms: frame_ms > 0 ? frame_ms : null,
       settings,
       triangles,

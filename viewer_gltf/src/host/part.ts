@@ -1,6 +1,7 @@
 /** The interface between the host and the features of the viewer, its parts. */
 import type { Matrix4, Object3D, PerspectiveCamera, Vector2, Vector3, WebGLRenderer } from "three";
 import type { Bundle } from "../bundle/load";
+import type { ValuesHost } from "../bundle/values_host";
 import type { Target } from "../interaction/ray_pointer";
 import type { Sight } from "../marks/style";
 import type { ClipPlane } from "../math/clip";
@@ -11,12 +12,13 @@ import type { KeyTable } from "../panel/keys";
 import type { WaysOn } from "../panel/ways_on";
 import type { Cone, Probed } from "../probe/probe";
 import type { Reading } from "../probe/probe_reader";
+import type { FrameRenderer } from "../render/frame_renderer";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
 import type { Stereo } from "../xr/stereo";
-import type { Contents } from "./contents";
+import type { Focus, Form } from "./form";
 import type { PanelModel } from "./panel_model";
 import type { Services } from "./services";
 import type { Snapshot } from "./snapshot";
@@ -87,11 +89,18 @@ export type TapAnswer = "used" | "met" | null;
 /** Functions by the name of the command. One that returns false leaves the command to others. */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 
-/** One feature of the viewer. The host calls these; a part never calls the host's other parts. */
+/**
+ * One feature of the viewer. The host calls these; a part never calls the host's other parts. What a part asks of the
+ * host is at most two dots away from it: scripts/reach.ts holds that.
+ */
 export interface Part {
   readonly id: string;
   /** Called once, when all parts of the list are made. */
   begin?(): void;
+  /** Called once, when the view that the address asks for is open. */
+  afterOpening?(): unknown;
+  /** Called once, when the overview is on screen: then comes what nobody needs before the first picture. */
+  afterOverview?(): unknown;
   /** Brings the part to a state; called after every change, and at the start. */
   sync?(state: ViewerState, previous: ViewerState): void;
   /** Animation, before each frame. */
@@ -113,6 +122,8 @@ export interface Part {
   readonly pageCommands?: CommandTable;
   panel?(view: PanelView): readonly PartSection[];
   readonly services?: Partial<Services>;
+  /** A way to draw the specimen. */
+  readonly form?: Form;
   readonly isLoading?: boolean;
   /** Asks again for what has failed. */
   retryFailed?(): void;
@@ -123,6 +134,10 @@ export interface Part {
 export type PartDefinition = Readonly<{
   id: string;
   keys?: readonly KeyGroup[];
+  /** Place among the parts that are made and follow changes first; absent: after those. */
+  rank?: number;
+  /** Whether the part traces paths of light on a device. */
+  canTrace?: (gl: WebGLRenderingContext | WebGL2RenderingContext) => boolean;
   /** Buttons that lead on from the part's refusals. */
   waysOn?: WaysOn;
   create: (host: PartHost) => Part;
@@ -131,10 +146,6 @@ export type PartDefinition = Readonly<{
 /** The scene and all that draws it. */
 export interface Display {
   readonly renderer: WebGLRenderer;
-  readonly contents: Contents;
-  readonly reading: Reading;
-  readonly viewpoint: Viewpoint;
-  readonly stereo: Stereo;
   readonly studio: StillMaker;
   /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
   readonly cssPixelsPerInch: number | null;
@@ -157,15 +168,28 @@ export interface Display {
   snapshot(): Snapshot;
 }
 
+/** What the shaders of a frame share, by reference, and where a form adds what it lays over the scene. */
+export type SharedFrame = Pick<FrameRenderer, "marchFrame" | "surfaceFrame" | "sceneDepth" | "add">;
+
 /** The host as the parts see it. */
 export interface PartHost {
   readonly bundle: Bundle;
   readonly state: ViewerState;
   /** Holds the canvas. */
   readonly stage: HTMLElement;
+  readonly canvas: HTMLCanvasElement;
   /** The part of the page with the stage. */
   readonly view: HTMLElement;
   readonly display: Display;
+  /** The object of the scene that holds the specimen: from um to the room. */
+  readonly specimen: Object3D;
+  readonly viewpoint: Viewpoint;
+  readonly stereo: Stereo;
+  readonly reading: Reading;
+  readonly focus: Focus;
+  readonly frame: SharedFrame;
+  /** Voxels as they were measured; null: the page's host has none. */
+  readonly values: ValuesHost | null;
   readonly panel: PanelModel;
   readonly undo: Undo;
   readonly keys: KeyTable;

@@ -8,8 +8,17 @@ import { KeyTable, OWN_KEYS } from "../panel/keys";
 import type { WaysOn } from "../panel/ways_on";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
+import type { Form } from "./form";
 import type { CommandTable, FrameView, Hit, Part, PartDefinition, Tap } from "./part";
 import type { Services } from "./services";
+
+const LAST = Number.POSITIVE_INFINITY;
+
+/** Parts with a rank come first, as others use their services and follow after them. */
+export function inOrder(definitions: readonly PartDefinition[]): readonly PartDefinition[] {
+  const place = ({ rank = LAST }: PartDefinition) => rank;
+  return definitions.toSorted((a, b) => (place(a) < place(b) ? -1 : Number(place(a) > place(b))));
+}
 
 export class Parts {
   readonly keys: KeyTable;
@@ -31,6 +40,15 @@ export class Parts {
     for (const part of this.all) part.begin?.();
   }
 
+  /** Resolves when all parts have done what they do there. */
+  async afterOpening(): Promise<void> {
+    await Promise.all(this.all.map((part) => part.afterOpening?.()));
+  }
+
+  async afterOverview(): Promise<void> {
+    await Promise.all(this.all.map((part) => part.afterOverview?.()));
+  }
+
   sync(state: ViewerState, previous: ViewerState): void {
     this.newest = state;
     for (const part of this.all) {
@@ -41,6 +59,11 @@ export class Parts {
 
   advance(frame: FrameView): void {
     for (const part of this.all) part.advance?.(frame);
+  }
+
+  /** The ways to draw the specimen. */
+  get forms(): readonly Form[] {
+    return this.all.flatMap(({ form = [] }) => form);
   }
 
   get groups(): readonly Object3D[] {

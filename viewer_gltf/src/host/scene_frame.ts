@@ -4,13 +4,13 @@ import type { Bounds } from "../bundle/generated/bundle";
 import { rayAhead } from "../interaction/rays";
 import { sightOf } from "../marks/sight";
 import type { Vec3 } from "../math/vec3";
-import { type FramePace, Picture } from "../render/frame_renderer";
+import { type FramePace, FrameRenderer } from "../render/frame_renderer";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import type { Stereo } from "../xr/stereo";
-import type { Contents } from "./contents";
+import type { Forms } from "./forms";
 import type { FrameView } from "./part";
 import type { Parts } from "./parts";
 import type { Viewpoint } from "./viewpoint";
@@ -22,9 +22,9 @@ export type SceneFrameOptions = Readonly<{
   hybrid: Hybrid;
   /** The box of the specimen, um. */
   bounds: Bounds;
-  /** The contents of the frames. They are made after the picture, whose uniforms their shaders share. */
+  /** What the frames show. It is made after the renderer of frames, whose uniforms the shaders share. */
   shown: () => Readonly<{
-    contents: Contents;
+    forms: Forms;
     parts: Parts;
     stereo: Stereo;
     viewpoint: Viewpoint;
@@ -37,21 +37,21 @@ export type SceneFrameOptions = Readonly<{
 }>;
 
 export class SceneFrame {
-  readonly picture: Picture;
+  readonly picture: FrameRenderer;
   private readonly eye = new Vector3();
 
   constructor(private readonly options: SceneFrameOptions) {
     const { renderer, room, hybrid } = options;
-    this.picture = new Picture(renderer, room, hybrid);
+    this.picture = new FrameRenderer(renderer, room, hybrid);
   }
 
   /** Places the flat camera. Returns it. */
   poseMono(dt_s: number): Camera {
-    const { viewpoint, contents, state } = this.options.shown();
+    const { viewpoint, forms, state } = this.options.shown();
     const { navigation } = viewpoint;
-    const outline = contents.outline(state);
+    const outline = forms.outline(state);
     if (outline !== null) navigation.surround(outline);
-    const shown = contents.shownPoints(state);
+    const shown = forms.shownPoints(state);
     if (shown !== null) this.options.room.standUnder(navigation.inRoom(shown));
     navigation.update(dt_s);
     this.followScreen();
@@ -68,15 +68,15 @@ export class SceneFrame {
   /** Follows the gaze, and goes on with what moves and what fades. Returns whether each goes on. */
   advance(dt_s: number, fade_s = dt_s): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { hybrid, room, onFocus } = this.options;
-    const { contents, stereo, viewpoint, state } = this.options.shown();
+    const { forms, stereo, viewpoint, state } = this.options.shown();
     const { head } = viewpoint;
     const { specimen } = room;
     const isMoving = specimen.advance(dt_s);
     this.picture.fade.advance(fade_s);
     if (specimen.takeJump() && stereo.kind !== null) this.picture.fade.begin();
-    const isReady = (tile: string) => contents.volumes.isReady(tile);
+    const isReady = (tile: string) => forms.marched?.isReady(tile) ?? false;
     if (hybrid.look(state, head, specimen.group.matrixWorld, isReady, dt_s)) onFocus();
-    const isFading = contents.advance(fade_s);
+    const isFading = forms.fade(fade_s);
     this.options.onAdvance(this.viewOf(head, dt_s));
     return { isChanging: isMoving || hybrid.isChanging(state), isFading };
   }
@@ -102,17 +102,16 @@ export class SceneFrame {
   }
 
   draw(pace: FramePace): void {
-    const { contents, parts, stereo, viewpoint, state } = this.options.shown();
+    const { forms, parts, stereo, viewpoint, state } = this.options.shown();
     const { head } = viewpoint;
-    const { volumes, traced, surfaces } = contents;
     const drawn = {
-      volumes,
-      traced,
-      panes: surfaces.blended,
+      volumes: forms.marched,
+      traced: forms.traced,
+      panes: forms.panes,
       overlays: [...parts.overlays, ...stereo.overlays],
       bounds: this.options.bounds,
       openTile: this.openTile(state),
-      solids: surfaces.triangles + parts.solid,
+      solids: forms.triangles + parts.solid,
     };
     const clip = { ...state.clip, corner: parts.cutBefore(this.eyeOnSpecimen(head)) };
     stereo.present(() => this.picture.draw(head, drawn, clip, pace));

@@ -1,16 +1,16 @@
 /** The viewer in numbers: for automation, the panel and the benchmark. */
 import type { WebGLRenderer } from "three";
 import type { Look } from "../interaction/named_views";
+import type { VolumeStatus } from "../render/drawn_forms";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { discLimit } from "../state/focus_tiles";
+import type { Progress } from "../state/overview_progress";
 import type { QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
-import type { Progress } from "../surfaces/overview_progress";
-import type { VolumeStatus } from "../volumes/volume_set";
 import type { MenuEntry } from "../xr/panel/menu_entries";
 import type { Stereo } from "../xr/stereo";
-import type { Contents } from "./contents";
+import type { Forms } from "./forms";
 import type { Viewpoint } from "./viewpoint";
 
 export type Snapshot = Readonly<{
@@ -61,7 +61,7 @@ export type SnapshotSource = Readonly<{
   renderer: WebGLRenderer;
   room: Room;
   hybrid: Hybrid;
-  contents: Contents;
+  forms: Forms;
   stereo: Stereo;
   viewpoint: Viewpoint;
   loop: Readonly<{ frame_ms: number; settings: QualitySettings }>;
@@ -70,20 +70,20 @@ export type SnapshotSource = Readonly<{
 }>;
 
 export function snapshotOf(source: SnapshotSource): Snapshot {
-  const { state, renderer, room, hybrid, contents, stereo, viewpoint, loop } = source;
-  const { surfaces, volumes, traced } = contents;
+  const { state, renderer, room, hybrid, forms, stereo, viewpoint, loop } = source;
+  const { marched, traced } = forms;
   const { memory, render, programs } = renderer.info;
   return {
     state,
     look: viewpoint.navigation.lookNow,
-    hasFirstPicture: surfaces.hasFirst,
-    overview: surfaces.overview,
+    hasFirstPicture: forms.hasFirst,
+    overview: forms.overview,
     isLoading: source.isLoading,
-    triangles: surfaces.triangles,
+    triangles: forms.triangles,
     drawCalls: render.calls,
-    volumes: volumes.status(),
-    volumeBytes: volumes.bytes,
-    traced: traced.status(),
+    volumes: marched?.status() ?? [],
+    volumeBytes: marched?.bytes ?? 0,
+    traced: traced?.status() ?? { samples: 0, level: null },
     gazed: hybrid.focusTiles.focusTile,
     discRadius_deg: (hybrid.outer_rad * 180) / Math.PI,
     discLimit_deg: discLimit(hybrid.focusTiles, state.discRadius_deg),

@@ -1,6 +1,6 @@
 /** Frames that are drawn apart from the page's own: pictures that are saved, and videos. */
 import type { WebGLRenderer } from "three";
-import { ERROR_TARGET_PX } from "../surfaces/surface_set";
+import { ERROR_TARGET_PX } from "./form";
 import type { SceneFrame, SceneFrameOptions } from "./scene_frame";
 import { type Still, type StillMaker, TRACED_SAMPLES } from "./still";
 
@@ -46,8 +46,7 @@ export class Studio implements StillMaker {
   }
 
   private get isLoading(): boolean {
-    const { contents, parts } = this.options.shown();
-    return contents.isLoading || parts.isLoading;
+    return this.options.shown().parts.isLoading;
   }
 
   /** Follows the flat camera, without drawing. */
@@ -56,9 +55,9 @@ export class Studio implements StillMaker {
     const camera = scene.poseMono(dt_s);
     scene.advance(dt_s);
     const { width, height } = renderer.domElement;
-    const { contents } = shown();
-    if (contents.hasJustBegun()) onOverview();
-    contents.stream(camera, width, height, ERROR_TARGET_PX);
+    const { forms } = shown();
+    if (forms.hasJustBegun()) onOverview();
+    forms.stream({ camera, width_px: width, height_px: height, error_px: ERROR_TARGET_PX });
   }
 
   /**
@@ -68,25 +67,26 @@ export class Studio implements StillMaker {
    */
   drawStill(most_ms: number, begun: Still | null = null): Still {
     const { scene, renderer, shown } = this.options;
-    const { contents, state } = shown();
-    const { traced, surfaces } = contents;
+    const { forms, state } = shown();
+    const traced = forms.traced?.isShown ? forms.traced : null;
     const gl = renderer.getContext();
     scene.followScreen();
-    surfaces.dressAll();
+    forms.dress();
     const start_ms = performance.now();
     const pace = { resolution: 1, isMoving: false, passes: 1, isSmooth: true };
     for (let frames = begun?.frames ?? 0; ; ) {
-      const gathers = frames > 0 && !traced.isShown;
+      const gathers = frames > 0 && traced === null;
       scene.draw({ ...pace, gathers });
       frames++;
-      const { samples } = traced.status();
-      const isDone = traced.isShown
-        ? samples >= TRACED_SAMPLES
-        : state.quality !== "auto" || !scene.picture.canGather || frames >= MAX_SAMPLES;
+      const samples = traced?.status().samples ?? null;
+      const isDone =
+        samples !== null
+          ? samples >= TRACED_SAMPLES
+          : state.quality !== "auto" || !scene.picture.canGather || frames >= MAX_SAMPLES;
       // a pixel that is read waits for the drawing, which `finish` does not where another process draws
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, this.pixel);
       if (isDone || performance.now() - start_ms > most_ms) {
-        return { frames, isDone, samples: traced.isShown ? Math.floor(samples) : null };
+        return { frames, isDone, samples: samples === null ? null : Math.floor(samples) };
       }
     }
   }

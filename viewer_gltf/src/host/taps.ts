@@ -3,7 +3,7 @@ import { Vector2 } from "three";
 import { listenForClicks } from "../interaction/rays";
 import { pickTile, shownTiles } from "../math/pick";
 import type { Ray } from "../math/vec3";
-import { chosenTile } from "../panel/layout";
+import { chosenTile } from "../state/chosen_tile";
 import { Signal } from "../state/signal";
 import type { PartHost } from "./part";
 import type { Parts } from "./parts";
@@ -21,7 +21,7 @@ export class Taps {
   ) {
     const isFlat = () => !host.isInRoom;
     listenForClicks(
-      host.display.renderer.domElement,
+      host.canvas,
       (point) => {
         if (isFlat()) this.tap(this.rayAt(point));
       },
@@ -33,8 +33,7 @@ export class Taps {
 
   /** The ray (um) under a point of the screen, -1..1, in the picture of the eye that shows there. */
   rayAt(point: Vector2): Ray {
-    const { state, display } = this.host;
-    const { viewpoint } = display;
+    const { state, viewpoint } = this.host;
     if (state.screenStereo !== "side-by-side") return viewpoint.rayAt(point);
     return viewpoint.rayAt(new Vector2(2 * point.x + (point.x < 0 ? 1 : -1), point.y));
   }
@@ -77,8 +76,7 @@ export class Taps {
 
   /** Flies to the place that a ray (um) meets. Where it meets nothing the view stays, and the page says so. */
   private async flyAlong(ray: Ray): Promise<void> {
-    const { display, undo } = this.host;
-    const { reading, viewpoint } = display;
+    const { reading, undo, viewpoint } = this.host;
     const met = await reading.probe(ray);
     if (this.signal.aborted) return;
     if (met === null) {

@@ -1,8 +1,8 @@
 /** From where the specimen is seen, and where it stands: the flat camera, the head in stereo, the specimen's pose. */
 import { type Matrix4, Quaternion, type Vector2, Vector3 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
-import type { Stand } from "../interaction/named_views";
-import { Navigation } from "../interaction/orbit_camera";
+import type { Look, Stand } from "../interaction/named_views";
+import { isSameLook, Navigation } from "../interaction/orbit_camera";
 import { rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -68,9 +68,62 @@ export class Viewpoint {
     return this.transition.cameraView;
   }
 
+  /** From where the specimen is seen now, also where nobody has moved. */
+  get viewNow(): CameraView {
+    return this.cameraView ?? { ...this.navigation.lookNow, specimen: null };
+  }
+
   lookFrom(view: CameraView): void {
     this.transition.lookFrom(view);
     this.options.onChange();
+  }
+
+  /** From where the flat camera looks, m of the scene. */
+  get lookNow(): Look {
+    return this.navigation.lookNow;
+  }
+
+  /** Places the flat camera; the specimen stays where it is. */
+  lookFlatFrom(look: Look): void {
+    this.navigation.lookFrom(look);
+    this.options.onChange();
+  }
+
+  /** Whether the flat camera looks from there. */
+  isAt(look: Look): boolean {
+    return isSameLook(look, this.navigation);
+  }
+
+  /** The named view that still holds; null: someone has moved. */
+  get standing(): Stand | null {
+    return this.navigation.standing;
+  }
+
+  /** From the eye to the middle of the specimen as it opens, m. */
+  get openingDistance_m(): number {
+    return this.navigation.openingDistance_m;
+  }
+
+  /** Turns slowly to and fro, as long as nobody moves and the opening holds. */
+  turnSlowly(): void {
+    this.navigation.turnSlowly();
+    this.options.onChange();
+  }
+
+  /** The place (-1..1) of a point (um) in the flat picture, and its depth. */
+  project(point: Vec3): Vector3 {
+    return new Vector3(...point).applyMatrix4(this.specimen).project(this.navigation.camera);
+  }
+
+  /** From um to the scene, m. */
+  toScene(point: Vec3): Vec3 {
+    return new Vector3(...point).applyMatrix4(this.specimen).toArray();
+  }
+
+  /** From the scene (m) to um. */
+  toSpecimen(place: Vec3): Vec3 {
+    const toSpecimen = this.specimen.clone().invert();
+    return new Vector3(...place).applyMatrix4(toSpecimen).toArray();
   }
 
   /** Goes back to an earlier `cameraView`. */

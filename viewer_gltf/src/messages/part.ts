@@ -21,7 +21,7 @@ class MessagesPart implements Part, MessageButtons {
 
   constructor(private readonly host: PartHost) {
     this.opening = host.state;
-    host.panel.refreshed.subscribe(() => this.update());
+    host.panel.onShown(() => this.update());
   }
 
   private update(): void {

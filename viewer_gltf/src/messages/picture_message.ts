@@ -49,16 +49,18 @@ export class PictureMessage {
 
   private get content(): Content {
     const { opening, host } = this;
-    const { surfaces, volumes } = host.display.contents;
+    const surfaces = host.service("surfaces");
+    const volumes = host.service("volumes");
     return {
       opening,
       tiles: host.bundle.manifest.tiles,
       outline: ({ id, hasSurface, volume }) =>
-        hasSurface ? surfaces.outline(id) : volume ? volumes.outline(id) : null,
-      hasSurface: (channel, tile) => surfaces.of(channel).some((each) => each.tile === tile),
+        (hasSurface ? surfaces?.outline(id) : volume ? volumes?.outline(id) : null) ?? null,
+      hasSurface: (channel, tile) =>
+        surfaces?.of(channel).some((each) => each.tile === tile) ?? false,
       hasVolume: (channel, tile) => {
         this.ask(channel);
-        return this.known.has(channel) ? volumes.source(tile, channel) !== null : null;
+        return this.known.has(channel) ? volumes?.source(tile, channel) != null : null;
       },
       objectsLeft: (channel) => host.service("objects")?.left(channel) ?? null,
     };
@@ -68,12 +70,14 @@ export class PictureMessage {
   private ask(channel: string): void {
     if (this.asked.has(channel)) return;
     this.asked.add(channel);
-    const { volumes } = this.host.display.contents;
-    void volumes.sourcesOf(channel).then((sources) => {
-      if (sources === null) return;
-      this.known.add(channel);
-      this.update();
-    });
+    void this.host
+      .service("volumes")
+      ?.sourcesOf(channel)
+      .then((sources) => {
+        if (sources === null) return;
+        this.known.add(channel);
+        this.update();
+      });
   }
 
   dispose(): void {

@@ -3,7 +3,7 @@
  * origin that the address names (`?embed=https://lab.example`). What it sends is checked before anything is done.
  */
 import type { Manifest } from "../bundle/generated/bundle";
-import type { Asked } from "./notebook_part";
+import type { Asked } from "./view_sharing";
 
 /** A name in every message, both ways: a page may hear others, too. */
 const NAME = "stereocell";

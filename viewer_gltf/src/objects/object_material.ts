@@ -20,12 +20,15 @@ import {
 } from "three";
 import { includeChunks } from "../gpu/glsl_include";
 import type { Rgb } from "../math/color";
-import type { SurfacePart } from "../surfaces/blend_material";
+import type { SurfacePart } from "../render/blend_material";
 import objectGap from "./chunks/object_gap.glsl?raw";
 import objectLight from "./chunks/object_light.glsl?raw";
 import objectStain from "./chunks/object_stain.glsl?raw";
 import objectTexel from "./chunks/object_texel.glsl?raw";
 import { middleOf } from "./gap";
+import objectColor from "./part_chunks/fragment_color.glsl?raw";
+import objectEnd from "./part_chunks/vertex_end.glsl?raw";
+import objectPlace from "./part_chunks/vertex_place.glsl?raw";
 import objectFragment from "./shaders/object_surface.frag.glsl?raw";
 import objectVertex from "./shaders/object_surface.vert.glsl?raw";
 
@@ -138,14 +141,12 @@ export class ObjectMaterial {
     this.part = {
       key: "objects",
       uniforms: this.uniforms,
-      vertex: {
-        declared: include(objectVertex),
-        place: "transformed = objectPlace(transformed);",
-        end: "gl_Position = objectEnd(gl_Position);",
-      },
-      fragment: {
-        declared: include(objectFragment),
-        color: "diffuseColor.rgb = objectColor(diffuseColor.rgb);",
+      chunks: {
+        "part/vertex_declared": include(objectVertex),
+        "part/vertex_place": objectPlace,
+        "part/vertex_end": objectEnd,
+        "part/fragment_declared": include(objectFragment),
+        "part/fragment_color": objectColor,
       },
     };
   }

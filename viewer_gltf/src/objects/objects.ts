@@ -1,14 +1,13 @@
 /** The objects of one label map: their table, how their surfaces look, and who is met by a ray. */
 import { Matrix4, Mesh, type Object3D } from "three";
 import type { FileRef, Manifest } from "../bundle/generated/bundle";
-import type { ColorLegend } from "../host/services";
+import type { ColorLegend, Surfaces } from "../host/services";
 import { type Box, centerOf } from "../math/box";
 import type { Clip } from "../math/clip";
 import type { Rgb } from "../math/color";
 import type { Ray, Vec3 } from "../math/vec3";
 import { type ObjectChange, type ObjectView, START_OBJECTS } from "../state/objects";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import type { SurfaceSet } from "../surfaces/surface_set";
 import { objectsCsv } from "./csv";
 import { filtered, flag, GONE } from "./flags";
 import { middleOf } from "./gap";
@@ -28,7 +27,8 @@ export type ObjectsOptions = Readonly<{
   manifest: Manifest;
   channel: string;
   file: FileRef;
-  surfaces: SurfaceSet;
+  /** null: no part draws surfaces. */
+  surfaces: Surfaces | null;
   /** What the surfaces' world is seen by: um to the room. */
   specimen: Object3D;
   dispatch: (change: ObjectChange, isStep?: boolean) => void;
@@ -147,7 +147,7 @@ export class Objects {
 
   /** The surfaces that are there already; those that come later are handed to `adopt`. */
   private adoptAll(): void {
-    for (const { scene, tile, blend } of this.options.surfaces.of(this.options.channel)) {
+    for (const { scene, tile, blend } of this.options.surfaces?.of(this.options.channel) ?? []) {
       this.adopt(scene, tile, blend);
     }
   }
@@ -213,7 +213,7 @@ export class Objects {
   meet(ray: Ray): MetObject | null {
     if (!this.isShown || this.isWaiting) return null;
     const { surfaces, specimen, channel } = this.options;
-    const meshes = surfaces.meshes.filter((each) => each.channel === channel);
+    const meshes = (surfaces?.meshes ?? []).filter((each) => each.channel === channel);
     const world = new Matrix4().copy(specimen.matrixWorld);
     const { boxes } = this.table;
     return pickObject(ray, world, meshes, boxes, this.view.gap_um, this.flags, this.clip);

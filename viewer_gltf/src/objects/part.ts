@@ -34,10 +34,11 @@ class ObjectsPart implements Part, ObjectMaps {
   private makeItems: MakeItems = () => [];
 
   constructor(private readonly host: PartHost) {
-    const { surfaces } = host.display.contents;
-    surfaces.surfaceLoaded.subscribe(({ channel, surface: { scene, tile, blend } }) =>
-      this.objects.get(channel)?.adopt(scene, tile, blend),
-    );
+    host
+      .service("surfaces")
+      ?.onLoaded((channel, { scene, tile, blend }) =>
+        this.objects.get(channel)?.adopt(scene, tile, blend),
+      );
   }
 
   sync(state: ViewerState): void {
@@ -74,14 +75,14 @@ class ObjectsPart implements Part, ObjectMaps {
   }
 
   private get options(): Omit<Parameters<typeof Objects.load>[0], "channel" | "file"> {
-    const { bundle, display } = this.host;
-    const { surfaces } = display.contents;
+    const { bundle, display, viewpoint, specimen } = this.host;
+    const surfaces = this.host.service("surfaces");
     return {
       ...{ base: bundle.base, manifest: bundle.manifest, surfaces },
-      specimen: surfaces.group.parent ?? surfaces.group,
+      specimen,
       dispatch: (change, isStep) => this.host.dispatch(change, isStep),
       onAim: (box, isSeen) => {
-        const isFree = display.viewpoint.flyTo(box, isSeen);
+        const isFree = viewpoint.flyTo(box, isSeen);
         if (!isFree) this.host.announce(BEHIND_OTHERS);
       },
       onChange: () => display.requestFrame(),

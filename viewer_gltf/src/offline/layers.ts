@@ -2,11 +2,11 @@
 import { fileAddress } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
 import type { Asked } from "../bundle/request_log";
+import { contentHashes, TilesetFiles } from "../bundle/tileset_files";
 import type { PartHost } from "../host/part";
 import { wantsSurface } from "../state/representation";
 import { volumeChannels } from "../state/viewer_state";
-import { contentHashes, TilesetFiles } from "../surfaces/fetch_content";
-import type { VolumeSource } from "../volumes/volume_source";
+import type { VolumeSource } from "../voxels/volume_source";
 import type { Layer, Levels } from "./coverage";
 
 export class OfflineLayers {
@@ -53,9 +53,10 @@ export class OfflineLayers {
   }
 
   private volumesOf(channel: string): Layer {
-    const { bundle, display } = this.host;
+    const { bundle } = this.host;
+    const volumes = this.host.service("volumes");
     return bundle.manifest.tiles.flatMap(({ id }) => {
-      const source = display.contents.volumes.source(id, channel);
+      const source = volumes?.source(id, channel) ?? null;
       return source === null ? [] : [{ tile: id, levels: levelsOf(bundle.base, source) }];
     });
   }

@@ -1,102 +1,21 @@
-/** Keeps what was shown for a visit without a network, and announces how far that goes. */
-import { allCome, keyOf } from "../bundle/request_log";
-import type { PartHost } from "../host/part";
-import { showsVolumes } from "../state/viewer_state";
-import { type Coverage, coverageOf, coverageText } from "./coverage";
-import { OfflineLayers } from "./layers";
-import { Keeping } from "./register";
+/** A visit without a network, as a part of the viewer. Its code loads after the first picture. */
+import type { Part, PartDefinition, PartHost } from "../host/part";
 
-/** Time between two looks at what has come since, ms. */
-const LOOK_MS = 2000;
+class OfflinePart implements Part {
+  readonly id = "offline";
 
-export class OfflinePart {
-  private readonly layers: OfflineLayers;
-  /** The number of answers and the layers shown at the last check; a check without a change is skipped. */
-  private looked = "";
-  /** Whether this visit, or one before, has announced how much is kept. */
-  private hasSaid: boolean;
-  private isReady: boolean;
-  /** Requests that the worker was asked to keep a second time. */
-  private readonly missed = new Set<string>();
+  constructor(private readonly host: PartHost) {}
 
-  private constructor(
-    private readonly host: PartHost,
-    private readonly keeping: Keeping,
-    private readonly say: (text: string) => void,
-  ) {
-    this.layers = new OfflineLayers(host);
-    this.hasSaid = keeping.wasServed;
-    this.isReady = keeping.wasServed;
+  async afterOverview(): Promise<void> {
+    if (this.host.bundle.live !== undefined) return; // the bundle is not whole yet
+    const { KeepOffline } = await import("./keep_offline");
+    await KeepOffline.start(this.host);
   }
 
-  /**
-   * Starts after the first picture. From then on the page's root has `data-offline`: "partly" once all that was shown and can be
-   * kept is kept, "ready" once that is every place, "refused" where the browser keeps nothing, as on a full disk.
-   *
-   * @param also addresses of files of the bundle that the page has not asked for
-   */
-  static async start(
-    host: PartHost,
-    say: (text: string) => void,
-    also: readonly string[],
-  ): Promise<void> {
-    const keeping = await Keeping.start();
-    if (keeping === null) return;
-    if (!(await keeping.adopt(null, also))) {
-      document.documentElement.dataset.offline = "refused";
-      return;
-    }
-    const part = new OfflinePart(host, keeping, say);
-    const look = () => part.look().catch(() => undefined); // the network went: the next look may do
-    await look();
-    setInterval(look, LOOK_MS);
-  }
-
-  private async look(): Promise<void> {
-    const { state, display } = this.host;
-    const { channels, mode } = state;
-    const shown = channels.filter((each) => each.shown).map(({ id, volume }) => [id, volume]);
-    const looked = JSON.stringify([allCome().length, mode, shown]);
-    if (looked === this.looked || display.isLoading || !navigator.onLine) return;
-    const coverage = await this.coverage();
-    if (coverage === "later") return;
-    this.looked = looked;
-    this.report(coverage);
-  }
-
-  /** "later": the worker fetches what it has missed; null: some of what was shown can't be kept. */
-  private async coverage(): Promise<Coverage | "later" | null> {
-    const { host, keeping } = this;
-    const layers = await this.layers.now();
-    const come = allCome();
-    const levels = layers.flat().flatMap((each) => each.levels.flat());
-    const asked = [...new Map([...come, ...levels].map((each) => [keyOf(each), each])).values()];
-    const areKept = await keeping.isKept(asked);
-    const kept = new Set(asked.filter((_, i) => areKept[i]).map(keyOf));
-    const missed = come.filter((each) => !kept.has(keyOf(each)));
-    const news = missed.filter((each) => !this.missed.has(keyOf(each)));
-    if (news.length > 0) {
-      for (const each of news) this.missed.add(keyOf(each));
-      await keeping.adopt(news, []);
-      return "later";
-    }
-    if (missed.length > 0) return null;
-    const { manifest, bricks } = host.bundle;
-    // a host that sends bricks by view is needed for each view
-    if (bricks !== undefined && showsVolumes(host.state)) return { tiles: 0, isByView: true };
-    const tiles = manifest.tiles.map(({ id }) => id);
-    return coverageOf(tiles, layers, come, kept);
-  }
-
-  private report(coverage: Coverage | null): void {
-    const { length } = this.host.bundle.manifest.tiles;
-    const isReady = coverage?.tiles === length;
-    document.documentElement.dataset.offline = isReady ? "ready" : "partly";
-    // The first state and "Ready" are announced; an announcement for each further tile would disturb.
-    if (coverage !== null && (!this.hasSaid || (isReady && !this.isReady))) {
-      this.say(coverageText(coverage, length));
-      this.hasSaid = true;
-    }
-    this.isReady = isReady;
-  }
+  dispose(): void {}
 }
+
+export const offline: PartDefinition = {
+  id: "offline",
+  create: (host) => new OfflinePart(host),
+};

@@ -136,7 +136,7 @@ export class Keyboard {
       },
       (changes) => this.page.perform({ panel: "keys", changes }),
     );
-    host.panel.changed.emit();
+    host.panel.refresh();
   }
 
   dispose(): void {

@@ -16,7 +16,6 @@ const OFFER = "Reload with fewer pixels";
  * @param beforeReload called before the page is loaded again, to keep the view
  */
 export function offerReload(host: PartHost, beforeReload: () => void): void {
-  const canvas = host.display.renderer.domElement;
   const reload = () => {
     beforeReload();
     takeFewerPixels();
@@ -31,12 +30,12 @@ export function offerReload(host: PartHost, beforeReload: () => void): void {
   );
   // in the stage, which covers the whole page in the split screen
   const timer = setTimeout(() => {
-    canvas.parentElement?.append(card);
+    host.stage.append(card);
     host.dispatch({ type: "dismiss", texts: [DROPPED] });
   }, PATIENCE_MS);
   const come = () => {
     clearTimeout(timer);
     card.remove();
   };
-  canvas.addEventListener("webglcontextrestored", come, { once: true });
+  host.canvas.addEventListener("webglcontextrestored", come, { once: true });
 }

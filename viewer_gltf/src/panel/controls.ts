@@ -9,7 +9,6 @@ import type { Rgb } from "../math/color";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { HistogramPoint } from "../state/transfer_shapes";
-import type { Histogram } from "../volumes/transfer_functions_loader";
 import type { ClipPart } from "./clip_by_key";
 import type { Grasp, Meant } from "./edit_shapes";
 
@@ -188,6 +187,13 @@ export type TileMap = Base &
     tiles: readonly MapTile[];
     to: (tile: string) => Wish;
   }>;
+/** The voxels of a channel by value and gradient. */
+export type Histogram = Readonly<{
+  /** 256 x 64 bytes, row 0 is gradient 0: the logarithm of the number of voxels. */
+  cells: Uint8Array;
+  /** A panel distinguishes pictures by their text: a name is enough. */
+  toJSON: () => string;
+}>;
 /** Value to the right, gradient up: a histogram, and shapes that can be taken hold of. */
 export type HistogramEditor = Base &
   Readonly<{

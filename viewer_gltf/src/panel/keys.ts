@@ -1,25 +1,18 @@
 /** Every key: the panel's own groups and those of the parts, in the order of the list that `?` opens. Pure. */
 
+import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { REFUSED } from "../state/refusals";
 import { hasVolumes } from "../state/viewer_state";
 import type { Refusal, Wish } from "./controls";
-import { type Key, type KeyContext, type KeyGroup, no } from "./key";
-import { CHANNEL_KEYS } from "./sections/channel_keys";
-import { LIGHT_KEYS } from "./sections/path_trace_keys";
-import { TILE_KEYS } from "./sections/tile_keys";
-import { TOOL_KEYS } from "./sections/tool_keys";
-import { SHAPE_KEYS } from "./sections/transfer_function_2d_keys";
-import { VIEW_KEYS } from "./sections/view_keys";
-import { VOLUME_KEYS } from "./sections/volume_keys";
+import { type Key, type KeyContext, type KeyGroup, keysOf, no } from "./key";
+import { TOOL_KEYS } from "./tool_keys";
+import { VIEW_KEYS } from "./view_keys";
 
 /** The keys of what every viewer has. */
 export const OWN_KEYS: readonly KeyGroup[] = [
   { name: "View", rank: 10, keys: VIEW_KEYS },
-  { name: "Channels", rank: 20, keys: CHANNEL_KEYS },
-  { name: "Value and gradient", rank: 30, keys: SHAPE_KEYS },
-  { name: "Volumes", rank: 40, keys: VOLUME_KEYS, needsVolumes: true },
-  { name: "Path tracing", rank: 60, keys: LIGHT_KEYS, needsVolumes: true },
-  { name: "Tiles", rank: 70, keys: TILE_KEYS },
+  // how finely volumes are drawn stands after where they show
+  { name: "Volumes", rank: 41, keys: QUALITY_PARAMETERS.flatMap(keysOf), needsVolumes: true },
   { name: "Tools", rank: 80, keys: TOOL_KEYS },
 ];
 

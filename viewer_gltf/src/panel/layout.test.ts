@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { type Facts, layOut } from "../../test/support/panel/whole_panel";
+import { CHANNELS_OF_A_PAGE, type Facts, layOut } from "../../test/support/panel/whole_panel";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "../state/parameters/volumes";
@@ -17,7 +17,6 @@ import {
   type Wish,
 } from "./controls";
 import { PALETTES } from "./palettes";
-import { PAGE } from "./sections/channels";
 
 const FACTS: Facts = { ...FLAT_FACTS, ranges: new Map([["c0", [100, 1120]]]) };
 const start = (channels = 3) => initialState(sampleManifest(channels));
@@ -142,11 +141,11 @@ describe("the panel's layout", () => {
     const layout = laid(start(70));
     const [cards, others] = [channelsOf(layout).slice(0, 4), channelsOf(layout).slice(4)];
     expect(cards.map(({ id }) => id)).toEqual(["c0", "c1", "c2", "c3"]);
-    expect(others).toHaveLength(PAGE);
+    expect(others).toHaveLength(CHANNELS_OF_A_PAGE);
     const next = find(layout, "button", "next-channels").to();
     if (typeof next === "string" || !("panel" in next)) throw new Error("no change of the panel");
     const second = channelsOf(laid(start(70), changePanel(START_VIEW, next))).slice(4);
-    expect(second[0].id).toBe(`c${4 + PAGE}`);
+    expect(second[0].id).toBe(`c${4 + CHANNELS_OF_A_PAGE}`);
   });
 
   it("finds a channel by a part of its name", () => {

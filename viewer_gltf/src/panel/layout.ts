@@ -3,54 +3,34 @@ import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { groupNotices } from "../state/notice_groups";
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
-import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import type { QualitySettings } from "../state/quality_controller";
 import { REFUSED } from "../state/refusals";
-import type { StereoSupport } from "../state/stereo";
 import { tileName } from "../state/tile_name";
-import { hasVolumes, type ViewerState } from "../state/viewer_state";
-import type { Histogram } from "../volumes/transfer_functions_loader";
-import { command, controlOf, controlsOf } from "./control_templates";
+import type { ViewerState } from "../state/viewer_state";
+import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, PartSection, Section } from "./controls";
-import { channelItems, type Ranges } from "./sections/channels";
-import { MOVES } from "./sections/move";
-import { lightItems } from "./sections/path_trace";
-import { stereoItems } from "./sections/stereo";
-import { tileItems } from "./sections/tiles";
-
-export { chosenTile } from "./sections/tiles";
 
 /** Facts outside the state. */
-export type Facts = StereoSupport &
-  Readonly<{
-    title: string;
-    subtitle: string;
-    /** The specimen, or the isolated tile; um, world. */
-    shown: Box;
-    ranges: Ranges;
-    /** Of the channel with the open joint histogram, if it has come. */
-    histogram?: Histogram | null;
-    /** The tile that is looked at. */
-    focusTile: string | null;
-    /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
-    discLimit_deg?: number | null;
-    isStereo: boolean;
-    /** null: not known yet. */
-    frame_ms: number | null;
-    settings: QualitySettings | null;
-    triangles: number;
-    /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
-    volumeLevel: number | null;
-    /** Of the path-traced picture, for each pixel; null: it is none. */
-    samples: number | null;
-    isLoading: boolean;
-    /** Some of the objects' colours, by label map that is shown. */
-    objectColors?: ReadonlyMap<string, readonly string[]>;
-    /** What undoing and redoing would change, in words; null: there is nothing. */
-    undo: string | null;
-    redo: string | null;
-  }>;
+export type Facts = Readonly<{
+  title: string;
+  subtitle: string;
+  /** The specimen, or the isolated tile; um, world. */
+  shown: Box;
+  isStereo: boolean;
+  /** null: not known yet. */
+  frame_ms: number | null;
+  settings: QualitySettings | null;
+  triangles: number;
+  /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
+  volumeLevel: number | null;
+  /** Of the path-traced picture, for each pixel; null: it is none. */
+  samples: number | null;
+  isLoading: boolean;
+  /** What undoing and redoing would change, in words; null: there is nothing. */
+  undo: string | null;
+  redo: string | null;
+}>;
 
 /** Most notices on the panel: the newest few are enough. */
 const MAX_NOTICES = 3;
@@ -83,8 +63,7 @@ export function layOut(
   view: PanelView,
   contributed: readonly PartSection[],
 ): Layout {
-  const all = [...firstSections(state, facts, view), ...deeperSections(state, facts, view)];
-  const sections = [...all, ...contributed]
+  const sections = [...ownSections(state, facts, view), ...contributed]
     .filter(({ items }) => items.length > 0)
     .toSorted((a, b) => placeOf(a) - placeOf(b))
     .map(({ id, label, items, isDeeper = false }): Section => {
@@ -115,45 +94,21 @@ export function objectsSection(channel: string, count: number): string {
 export const labelMapsOf = ({ channels }: ViewerState) =>
   channels.filter(({ shown, hasObjects }) => shown && hasObjects);
 
-function firstSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
-  const mode = hasVolumes(state) ? [controlOf(MODE, state)] : [];
-  // a specimen of one tile leaves nothing to choose, and has an empty section
-  const tiles = state.tiles.length < 2 ? [] : tileItems(state, facts.focusTile);
+/** The sections that are no part's. */
+function ownSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
+  const { isStereo } = facts;
+  const about = aboutItems(facts);
+  // in stereo a page of texts alone would lead nowhere
+  const quality = [...controlsOf(QUALITY_PARAMETERS, state), ...(isStereo ? about : [])];
+  const isDeeper = true;
   return [
-    { rank: 0, id: "notices", label: "Notices", items: facts.isStereo ? noticeItems(state) : [] },
-    { rank: 10, id: "channels", label: "Channels", items: channelItems(state, facts, view) },
-    { rank: 30, id: "volumes", label: "Surfaces and volumes", items: mode },
-    { rank: 40, id: "tiles", label: "Tiles", items: tiles },
+    { rank: 0, id: "notices", label: "Notices", items: isStereo ? noticeItems(state) : [] },
     { rank: 50, id: "cut", label: "Cut open", items: cutItems(state, facts.shown) },
-    { rank: 80, id: "stereo", label: "Stereo", items: stereoItems(state, facts, view) },
+    { rank: 10, id: "view", label: "View", isDeeper, items: viewItems(facts) },
+    { rank: 60, id: "share", label: "Share and keys", isDeeper, items: shareItems(facts, view) },
+    { rank: 70, id: "quality", label: "Quality", isDeeper, items: quality },
+    { rank: 80, id: "about", label: "About this view", isDeeper, items: isStereo ? [] : about },
   ];
-}
-
-function deeperSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
-  const ofVolumes = (items: Section["items"]) => (hasVolumes(state) ? items : []);
-  const settings = controlsOf(
-    VOLUMES.filter((row) => row !== MODE),
-    state,
-  ).map((item) => discItem(item, state, facts));
-  const quality = [
-    ...controlsOf(QUALITY_PARAMETERS, state),
-    ...(facts.isStereo ? aboutItems(facts) : []), // there a page of texts alone would lead nowhere
-  ];
-  const about = facts.isStereo ? [] : aboutItems(facts);
-  const sections = [
-    { rank: 10, id: "view", label: "View", items: viewItems(facts) },
-    // a screen has fingers, wheel and arrow keys for it
-    { rank: 20, id: "move", label: "Move", items: facts.isStereo ? MOVES : [] },
-    { rank: 40, id: "volume-settings", label: "Volume settings", items: ofVolumes(settings) },
-    {
-      ...{ rank: 50, id: "light", label: "Path tracing" },
-      items: ofVolumes(lightItems(state, view, facts.isStereo)),
-    },
-    { rank: 60, id: "share", label: "Share and keys", items: shareItems(facts, view) },
-    { rank: 70, id: "quality", label: "Quality", items: quality },
-    { rank: 80, id: "about", label: "About this view", items: about },
-  ];
-  return sections.map((each) => ({ ...each, isDeeper: true }));
 }
 
 function viewItems(facts: Facts): readonly Control[] {
@@ -203,13 +158,6 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
       refusal: redo === null ? REFUSED.redo : "",
     },
   ];
-}
-
-/** The focus disc's slider, with its radius now where the limit of tiles makes it smaller than it was set. */
-function discItem(item: Control, { mode }: ViewerState, { discLimit_deg = null }: Facts): Control {
-  const isCut = item.id === DISC_RADIUS.id && mode === "disc" && discLimit_deg !== null;
-  if (!isCut || item.kind !== "slider") return item;
-  return { ...item, text: `${item.text}, now ${discLimit_deg.toFixed(0)}°` };
 }
 
 /** On a flat screen they lie over the picture; in stereo there is the panel alone. */

@@ -11,10 +11,10 @@ import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
 import type { Wish } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
+import { LENS_NAMES } from "./lenses";
 import { measuredText } from "./measured";
-import { type Ranges, windowTexts } from "./sections/channels";
-import { LENS_NAMES } from "./sections/stereo";
 import { transferTitle } from "./transfer_titles";
+import { type Ranges, windowTexts } from "./window_texts";
 
 /** @param state after the wish was granted; "" where the picture shows it all */
 export function spokenFeedback(

@@ -3,7 +3,7 @@ import { seeded } from "../../test/support/seeded";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/skip_bricks";
+import { brickCounts } from "../voxels/skip_bricks";
 import { assemble, brickRanges, emptyBlock, paste } from "./assemble_tiles";
 import { frameOf } from "./texel_frame";
 

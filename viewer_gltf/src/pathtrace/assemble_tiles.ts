@@ -6,7 +6,7 @@
 
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/skip_bricks";
+import { brickCounts } from "../voxels/skip_bricks";
 
 /**
  * One mip level of a tile, channels interleaved, x fastest. `at` and `whole`: where the tile's

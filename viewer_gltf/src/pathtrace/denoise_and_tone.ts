@@ -2,6 +2,7 @@
  * From what was gathered to the picture: its mean, denoised where few paths have been gathered, as
  * it is seen from where the eyes are by now, and what comes after the light.
  */
+
 import {
   HalfFloatType,
   Matrix4,
@@ -15,6 +16,7 @@ import type { Eyes } from "../gpu/eyes";
 import { byteTarget, floatTarget, nothing } from "../gpu/float_targets";
 import { drawEyes, partOf } from "../gpu/offscreen_target";
 import { ScreenPass } from "../gpu/screen_pass";
+import type { MarchedFrame } from "../render/drawn_forms";
 import type { TraceSettings } from "../state/path_trace_settings";
 import { areSame, type TraceView } from "./eye_rays";
 import type { LightProbe } from "./light_probe";
@@ -24,15 +26,8 @@ import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sou
 const DENOISED = 192;
 const DENOISE_GAPS = [1, 2, 4] as const;
 
-/** A marched picture of the same view, linear and premultiplied. */
-export type Marched = Readonly<{
-  picture: Texture;
-  /** Its pixels to one of the frame buffer. */
-  scale: number;
-}>;
-
 /** The marched picture in place of a traced one, and the samples that every pixel of that has. */
-export type StandIn = Marched & Readonly<{ rounds: number }>;
+export type StandIn = MarchedFrame & Readonly<{ rounds: number }>;
 
 export class DenoiseAndTone {
   /** Encoded, premultiplied. */

@@ -3,8 +3,8 @@ import { seeded } from "../../test/support/seeded";
 import { randomShapes, sampled } from "../../test/support/transfer_2d";
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
-import { brickCounts } from "../volumes/skip_bricks";
-import { transferTable2d } from "../volumes/transfer_table_2d";
+import { brickCounts } from "../voxels/skip_bricks";
+import { transferTable2d } from "../voxels/transfer_table_2d";
 import { brickRanges } from "./assemble_tiles";
 import { coarserMajorants, majorants, mediumTable } from "./extinction";
 

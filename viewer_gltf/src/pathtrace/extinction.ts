@@ -4,8 +4,8 @@
  */
 import type { Size3 } from "../bundle/ktx2";
 import { ROWS } from "../bundle/transfer_2d";
-import { ENTRIES } from "../volumes/transfer_luts";
-import { envelopeOf, type TransferTable2d } from "../volumes/transfer_table_2d";
+import { ENTRIES } from "../voxels/transfer_luts";
+import { envelopeOf, type TransferTable2d } from "../voxels/transfer_table_2d";
 
 /** Largest opacity, 0..1: 1 would be infinitely dense. */
 const MAX_OPACITY = 0.999;

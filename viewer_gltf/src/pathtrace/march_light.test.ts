@@ -2,7 +2,7 @@ import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { GLOSS } from "../gpu/room_light";
 import { START_TRACE } from "../state/path_trace_settings";
-import { marchLight } from "../volumes/march_frame";
+import { marchLight } from "../voxels/march_frame";
 import { environmentTables } from "./environment_sampling";
 import { hemispheresOf, lightMarch } from "./march_light";
 

@@ -6,7 +6,7 @@ import { type Matrix4, Vector3 } from "three";
 import { GLOSS } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import { type Lamp, MEDIUM_NUMBERS, type TraceSettings } from "../state/path_trace_settings";
-import type { MarchLight } from "../volumes/march_frame";
+import type { MarchLight } from "../voxels/march_frame";
 import type { EnvironmentTables } from "./environment_sampling";
 
 /** Mean radiance of the upper and of the lower half of the room. */

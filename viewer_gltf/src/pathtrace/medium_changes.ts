@@ -1,7 +1,7 @@
 /** Whether another appearance of the medium, or another light on it, makes the gathered light worthless. */
 import { gathersAnew, type TraceSettings } from "../state/path_trace_settings";
-import type { Appearance } from "../volumes/march_tables";
-import type { TransferTable2d } from "../volumes/transfer_table_2d";
+import type { Appearance } from "../voxels/march_tables";
+import type { TransferTable2d } from "../voxels/transfer_table_2d";
 
 export class MediumChanges {
   private appearance = "";

@@ -5,10 +5,10 @@
 import type { Data3DTexture } from "three";
 import { decodeTexels } from "../bundle/decode";
 import type { Size3 } from "../bundle/ktx2";
-import { LoadQueue } from "../volumes/load_queue";
-import { levelsToFetch, texels as texelsOf, type VolumeLimits } from "../volumes/mip_levels";
-import type { VolumeSource } from "../volumes/volume_source";
-import { stride, volumeTexture } from "../volumes/volume_texture";
+import { LoadQueue } from "../voxels/load_queue";
+import { levelsToFetch, texels as texelsOf, type VolumeLimits } from "../voxels/mip_levels";
+import type { VolumeSource } from "../voxels/volume_source";
+import { stride, volumeTexture } from "../voxels/volume_texture";
 import { askWorker } from "./ask_worker";
 import type { Assembled, AssembleRequest, Part } from "./assemble_tiles";
 import { type BlockFrame, frameOf } from "./texel_frame";

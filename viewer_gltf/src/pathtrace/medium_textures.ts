@@ -3,9 +3,9 @@ import { type Data3DTexture, type DataTexture, RGBAFormat, RGFormat } from "thre
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import { float3D, floatTexture } from "../gpu/float_targets";
 import type { ScreenPass } from "../gpu/screen_pass";
-import { brickCounts } from "../volumes/skip_bricks";
-import { ENTRIES, edgeContrast } from "../volumes/transfer_luts";
-import { tablesInto } from "../volumes/transfer_table_2d";
+import { brickCounts } from "../voxels/skip_bricks";
+import { ENTRIES, edgeContrast } from "../voxels/transfer_luts";
+import { tablesInto } from "../voxels/transfer_table_2d";
 import type { EnvironmentTables } from "./environment_sampling";
 import {
   coarserMajorants,

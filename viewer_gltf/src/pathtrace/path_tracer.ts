@@ -8,9 +8,10 @@ import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
 import { GROUND, SKY } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
+import type { MarchedFrame, TraceScene } from "../render/drawn_forms";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
-import type { MarchLight } from "../volumes/march_frame";
-import { DenoiseAndTone, type Marched } from "./denoise_and_tone";
+import type { MarchLight } from "../voxels/march_frame";
+import { DenoiseAndTone } from "./denoise_and_tone";
 import type { EnvironmentTables } from "./environment_sampling";
 import type { MediumAppearance } from "./extinction";
 import { type History, historyOf, type TraceView, viewOf } from "./eye_rays";
@@ -26,7 +27,6 @@ import {
   keyOf,
   matterOf,
   sceneInto,
-  type TraceScene,
   type TraceUniforms,
   texelsInto,
   traceUniforms,
@@ -51,7 +51,7 @@ export type Gathering = Readonly<{
   /** Paths are shorter: a picture that moves has to be quick. */
   isDraft: boolean;
   /** What stands in for pixels that have few samples of this view; null: nothing can. */
-  standIn?: Marched | null;
+  standIn?: MarchedFrame | null;
 }>;
 
 type Drawing = Pick<Gathering, "scale" | "isDraft">;
@@ -189,7 +189,7 @@ export class Tracer {
     eyes: Eyes,
     scene: TraceScene,
     settings: TraceSettings,
-    marched: Marched,
+    marched: MarchedFrame,
   ): void {
     if (this.texels === null) return;
     this.prepare(eyes, scene, settings, { ...this.drawing, isDraft: false });
@@ -267,7 +267,7 @@ export class Tracer {
     eyes: Eyes,
     views: readonly TraceView[],
     { isPostOn, occlusion }: TraceSettings,
-    { picture }: Marched,
+    { picture }: MarchedFrame,
   ): void {
     this.probe.measure(renderer, eyes, picture, isPostOn ? occlusion : 0, (target, scale) => {
       const { uniforms } = this.pathPass;

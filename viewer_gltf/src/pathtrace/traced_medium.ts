@@ -1,12 +1,12 @@
 /** The texels that paths go through: from a host that sends bricks by view, or from files. */
 import type { ShownVolume } from "../state/on_screen";
-import type { BrickTile } from "../volumes/bricks/brick_atlas";
-import type { BrickService } from "../volumes/bricks/brick_service";
-import type { Appearance } from "../volumes/march_tables";
-import { showsBelow } from "../volumes/marches";
-import type { VolumeLimits } from "../volumes/mip_levels";
-import type { Packed } from "../volumes/tile_texture";
-import type { VolumeSource } from "../volumes/volume_source";
+import type { BrickTile } from "../voxels/bricks/brick_atlas";
+import type { BrickService } from "../voxels/bricks/brick_service";
+import { showsBelow } from "../voxels/bricks/shows_below";
+import type { Appearance } from "../voxels/march_tables";
+import type { VolumeLimits } from "../voxels/mip_levels";
+import type { Packed } from "../voxels/tile_texture";
+import type { VolumeSource } from "../voxels/volume_source";
 import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import { frameOf } from "./texel_frame";
 

@@ -3,16 +3,15 @@ import { Group, type Matrix4, type Texture, type WebGLRenderer } from "three";
 import { TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
 import type { Eyes } from "../gpu/eyes";
+import type { Volumes } from "../host/services";
+import type { TracedVolumes, TracePace, TraceScene } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { isTraced } from "../state/parameters/volumes";
 import { ENOUGH_SAMPLES } from "../state/path_trace_settings";
 import { type ViewerState, volumeChannels } from "../state/viewer_state";
-import type { BrickService } from "../volumes/bricks/brick_service";
-import type { MarchLight } from "../volumes/march_frame";
-import type { Appearance } from "../volumes/march_tables";
-import type { VolumeLimits } from "../volumes/mip_levels";
-import type { VolumeSource } from "../volumes/volume_source";
-import type { Marched } from "./denoise_and_tone";
+import type { BrickService } from "../voxels/bricks/brick_service";
+import type { MarchLight } from "../voxels/march_frame";
+import type { VolumeLimits } from "../voxels/mip_levels";
 import { EnvironmentLight, PATHS_NOT_LOADED } from "./environment_light";
 import type { EnvironmentTables } from "./environment_sampling";
 import { MediumChanges } from "./medium_changes";
@@ -20,28 +19,10 @@ import type { MediumTexels } from "./medium_loader";
 import type { Tracer } from "./path_tracer";
 import { PictureScale } from "./picture_scale";
 import { TracedMedium } from "./traced_medium";
-import type { TraceScene } from "./uniforms";
 
 const FIRST_SAMPLES = 6;
 
-/** The part of the volumes that the tracer uses. */
-export type Volumes = Readonly<{
-  sourcesOf: (channel: string) => Promise<ReadonlyMap<string, VolumeSource> | null>;
-  appearances: Readonly<{ of: (state: ViewerState, channel: string) => Appearance }>;
-}>;
-
-/** How a frame is traced. */
-export type TracePace = Readonly<{
-  /** Share of the pixels that the frame's budget allows, 0..1. */
-  resolution: number;
-  isMoving: boolean;
-  /** Samples of every pixel. */
-  passes: number;
-  /** The march's picture of the same view; null: there is none. */
-  standIn: Marched | null;
-}>;
-
-export class TracedVolume {
+export class TracedVolume implements TracedVolumes {
   private readonly medium: TracedMedium;
   /** What is drawn of it. */
   readonly group = new Group();
@@ -60,7 +41,7 @@ export class TracedVolume {
   private readonly scale = new PictureScale();
 
   constructor(
-    private readonly volumes: Volumes,
+    private readonly volumes: Pick<Volumes, "sourcesOf" | "appearances">,
     bricks: BrickService | null,
     private limits: VolumeLimits,
     private readonly sceneDepth: { value: Texture },

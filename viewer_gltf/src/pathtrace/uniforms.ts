@@ -1,12 +1,14 @@
 /** The path tracer's uniforms: the medium, the scene, its light and its paths. */
+
 import { Matrix3, Matrix4, type Texture, Vector2, Vector3, Vector4 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { SKIP_BRICK } from "../bundle/generated/constants";
-import { clipInto, type MarchClip, noCorner } from "../gpu/clip_uniforms";
+import { clipInto, noCorner } from "../gpu/clip_uniforms";
 import type { Eyes } from "../gpu/eyes";
 import { nothing } from "../gpu/float_targets";
+import type { TraceScene } from "../render/drawn_forms";
 import { LAMPS, type TraceSettings } from "../state/path_trace_settings";
-import { tableUniforms } from "../volumes/transfer_table_2d";
+import { tableUniforms } from "../voxels/transfer_table_2d";
 import { turnOf } from "./eye_rays";
 import type { MediumTexels } from "./medium_loader";
 import type { BlockFrame } from "./texel_frame";
@@ -25,16 +27,6 @@ const GLOSS = 60;
 /** Radius of a lamp, as a share of the longest edge of the box. */
 const LAMP_RADIUS = 0.08;
 const OCCLUSION_REACH = 0.06;
-
-export type TraceScene = Readonly<{
-  /** From um of the bundle's world, before tiles' matrices, to the room. */
-  specimen: Matrix4;
-  clip: MarchClip;
-  /** A number that changes with what is opaque in the room. */
-  solids: number;
-  /** The specimen's box, um: lamps are placed by it. */
-  bounds: Bounds;
-}>;
 
 /** Settings that the gathered samples depend on: a change of one of them drops the samples. */
 export function keyOf(

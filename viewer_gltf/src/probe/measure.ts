@@ -6,7 +6,7 @@ import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
 import { angleOf, lengthOf } from "../state/measurements";
 import type { MeasureKind } from "../state/parameters/tools";
-import { textureCorners } from "../volumes/texture_space";
+import { textureCorners } from "../voxels/texture_space";
 
 /** One mip level: texels along x, y, z and their bytes, x fastest. */
 export type VolumeLevel = Readonly<{

@@ -9,7 +9,7 @@ import { pickTile, shownTiles } from "../math/pick";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { LevelSource, ShownSurface, ShownVolume } from "../state/on_screen";
 import type { ViewerState } from "../state/viewer_state";
-import { VolumeSource } from "../volumes/volume_source";
+import { VolumeSource } from "../voxels/volume_source";
 import { measuredText, unitOf, valueAt, valueText, voxelAt } from "./measure";
 import {
   type Cone,

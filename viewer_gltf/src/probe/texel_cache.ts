@@ -6,7 +6,7 @@
 import { decodeTexels } from "../bundle/decode";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { LevelSource } from "../state/on_screen";
-import { levelsToFetch, texels } from "../volumes/mip_levels";
+import { levelsToFetch, texels } from "../voxels/mip_levels";
 import type { VolumeLevel } from "./measure";
 
 /** Most bytes of memory, beside the texels that were asked for last. */

@@ -18,7 +18,7 @@ import { BothEyes } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
 import type { Eyes } from "../gpu/eyes";
 import { drawAllEyes } from "../gpu/offscreen_target";
-import { depthMaterial, PANES } from "../surfaces/blend_material";
+import { depthMaterial, PANES } from "./blend_material";
 
 export class DepthPass {
   /** Of what is opaque. */

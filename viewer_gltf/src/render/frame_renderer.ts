@@ -6,6 +6,7 @@ import {
   Matrix4,
   type Object3D,
   Scene,
+  type Texture,
   Vector3,
   type WebGLRenderer,
   type WebGLRenderTarget,
@@ -20,20 +21,21 @@ import { drawWhole } from "../gpu/float_targets";
 import { linearTarget } from "../gpu/linear_target";
 import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
-import type { TracedVolume } from "../pathtrace/traced_volume";
-import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "../surfaces/blend_material";
-import { lightByRoom, makeFrame, REST_STEPS } from "../volumes/march_frame";
-import type { VolumeSet } from "../volumes/volume_set";
+import { lightByRoom, makeFrame, REST_STEPS } from "../voxels/march_frame";
+import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_material";
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
+import type { MarchedVolumes, TracedVolumes } from "./drawn_forms";
 import type { Hybrid } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
 import type { Room } from "./scene";
 
 /** The things to draw. */
 export type Drawn = Readonly<{
-  volumes: VolumeSet;
-  traced: TracedVolume;
+  /** null: no part draws volumes. */
+  volumes: MarchedVolumes | null;
+  /** null: no part traces paths of light. */
+  traced: TracedVolumes | null;
   /** Surfaces that are not opaque now. */
   panes: readonly BlendedScene[];
   /** Other objects that are not opaque, besides those of the scene itself. */
@@ -67,7 +69,7 @@ const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Pixels of the march beyond the disc that those within it mix. */
 const MIXED_PX = 2;
 
-export class Picture {
+export class FrameRenderer {
   /** Where they are in this frame. */
   readonly eyes = new Eyes();
   private readonly both = new BothEyes();
@@ -141,7 +143,7 @@ export class Picture {
   ): void {
     const { renderer, room, hybrid } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
-    const { marches } = volumes;
+    const marches = volumes?.marches ?? null;
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.light(head);
@@ -150,30 +152,31 @@ export class Picture {
     this.cuts.follow(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
-    this.marchFrame.uIsCrossing.value = marches.isInDisc;
+    this.marchFrame.uIsCrossing.value = marches?.isInDisc ?? false;
     this.march.hide();
     this.marchWithin.hide();
-    traced.hide();
+    traced?.hide();
     const opaque = (blended = panes) =>
       this.depth.render(renderer, room.scene, this.eyes, [
         ...room.overlays,
         ...overlays,
         ...blended.map(({ scene }) => scene),
       ]);
-    const isTraced = traced.isShown;
-    if (isTraced || !marches.isEmpty) opaque();
-    const isMarched = !marches.isEmpty && !(isTraced && this.needsNoMarch(drawn, clip, isMoving));
-    const isMixed = isMarched && !isTraced && hybrid.outer_rad > 0 && marches.isPartlyInDisc;
+    const tracer = traced?.isShown ? traced : null;
+    const hasMarches = marches !== null && !marches.isEmpty;
+    if (tracer !== null || hasMarches) opaque();
+    const isMarched = hasMarches && !this.needsNoMarch(drawn, clip, isMoving);
+    const isMixed = isMarched && tracer === null && hybrid.outer_rad > 0 && marches.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       marches.placeAs(specimen);
       const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
       lamp.transformDirection(toSpecimen);
-      if (isTraced) traced.lightMarch(this.marchFrame, specimen, head);
-      else lightByRoom(this.marchFrame);
+      if (tracer === null) lightByRoom(this.marchFrame);
+      else tracer.lightMarch(this.marchFrame, specimen, head);
       const { apex_um: apex, axis_um: axis } = hybrid;
-      volumes.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
+      volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
       this.shiftNoise(isMoving, gathers);
       const marchBy = (pass: MarchPass, blended = panes) => {
         const hasPane = blended.some(({ isPane }) => isPane);
@@ -197,11 +200,11 @@ export class Picture {
         marchBy(this.march);
       }
     }
-    if (isTraced) {
+    if (tracer !== null) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
       const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
-      traced.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
-      if (traced.isOnScreen) this.march.hide();
+      tracer.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
+      if (tracer.isOnScreen) this.march.hide();
     }
     this.show(isSmooth ? this.light : this.draft, isMixed);
   }
@@ -222,12 +225,13 @@ export class Picture {
    * at rest. Before a head, which never rests, it does until the first traced picture.
    */
   private needsNoMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
+    if (!traced?.isShown) return false;
     const isWorn = this.eyes.all.length > 1;
     if (isWorn && traced.standsAlone) {
       this.stoodIn = "";
       return true;
     }
-    const stoodIn = isMoving ? "" : JSON.stringify([volumes.marchKey, clip, solids]);
+    const stoodIn = isMoving ? "" : JSON.stringify([volumes?.marchKey, clip, solids]);
     const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
     this.stoodIn = stoodIn;
     return isSame;
@@ -288,6 +292,11 @@ export class Picture {
     renderer.render(this.room.scene, both.cameraOf(eyes));
     renderer.xr.enabled = enabled;
     return before;
+  }
+
+  /** Depth of what is opaque in this frame. */
+  get sceneDepth(): { value: Texture } {
+    return this.marchFrame.uSceneDepth;
   }
 
   /** What is laid over the scene. */

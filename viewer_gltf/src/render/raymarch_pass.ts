@@ -10,7 +10,7 @@ import { linearTarget } from "../gpu/linear_target";
 import { drawEyes } from "../gpu/offscreen_target";
 import { aimLens, FilledPeriphery } from "../gpu/periphery";
 import { RunningMean } from "../gpu/running_mean";
-import type { MarchFrame } from "../volumes/march_frame";
+import type { MarchFrame } from "../voxels/march_frame";
 
 export class MarchPass {
   readonly target: WebGLRenderTarget;

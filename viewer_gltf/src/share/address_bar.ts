@@ -90,10 +90,10 @@ export class AddressBar {
   }
 
   private get now(): Seen {
-    const { state, display } = this.host;
-    const { cameraView: camera, navigation } = display.viewpoint;
+    const { state, viewpoint } = this.host;
+    const { cameraView: camera, standing } = viewpoint;
     const home = standOf(location.search) ?? "opening";
-    const isHome = navigation.standing === home && (camera?.specimen ?? null) === null;
+    const isHome = standing === home && (camera?.specimen ?? null) === null;
     return { state, camera: isHome ? null : camera };
   }
 

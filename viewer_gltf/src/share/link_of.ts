@@ -14,7 +14,7 @@ export function linkOf(
   start: ViewerState,
   view: Readonly<{ state: ViewerState; camera: CameraView | null }> = {
     state: host.state,
-    camera: host.display.viewpoint.cameraView,
+    camera: host.viewpoint.cameraView,
   },
 ): string {
   const objects = host.service("objects");

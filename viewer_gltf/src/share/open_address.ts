@@ -27,7 +27,7 @@ export async function loadLink(link: string): Promise<LinkReader> {
 }
 
 export function openAddress(host: PartHost, search: string, readLink: LinkReader): void {
-  const { viewpoint } = host.display;
+  const { viewpoint } = host;
   const { bounds_um } = host.bundle.manifest.specimen;
   const { actions, camera } = readLink(host.state, bounds_um);
   const asked = [...settingsOf(search), ...actions];
@@ -44,12 +44,12 @@ export function openAddress(host: PartHost, search: string, readLink: LinkReader
 
 /** Shows all of the specimen, near enough for volumes, and slowly turning until someone touches it. */
 function openSlowly(host: PartHost, saysDistance: boolean): void {
-  const { navigation } = host.display.viewpoint;
-  const away_m = NEAR_AT_START * navigation.openingDistance_m;
+  const { viewpoint } = host;
+  const away_m = NEAR_AT_START * viewpoint.openingDistance_m;
   const isFar = away_m > host.state.switchDistance_m;
   if (isFar && !saysDistance) host.dispatch(setTo(SWITCH_DISTANCE, away_m));
   // light is gathered while nothing moves
   const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  if (!isCalm && !isTraced(host.state)) navigation.turnSlowly();
+  if (!isCalm && !isTraced(host.state)) viewpoint.turnSlowly();
   host.display.redraw();
 }

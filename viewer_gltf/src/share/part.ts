@@ -3,20 +3,58 @@ import { hasAddress, pageAddress } from "../bundle/address";
 import { copyText } from "../dom/clipboard";
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { LinkCode, Links } from "../host/services";
 import { initialState } from "../state/initial_state";
 import { isPassingStep, writeAddress } from "./address";
+import type { AddressBar, Opened } from "./address_bar";
 import { SETTINGS } from "./page_parameters";
 
-type LinkCode = typeof import("./link_of");
+type LinkWriter = typeof import("./link_of");
 
-class SharePart implements Part {
+class SharePart implements Part, Links {
   readonly id = "share";
+  readonly services = { links: this };
   readonly commands = { share: () => void this.share() };
 
   /** The code that writes links; null until a link is first wanted. */
-  private code: LinkCode | null = null;
+  private code: LinkWriter | null = null;
+  /** The view that the address has opened; null: it is not open yet. */
+  private opened: Opened | null = null;
+  /** null: the address stays as it is. */
+  private addressBar: AddressBar | null = null;
 
   constructor(private readonly host: PartHost) {}
+
+  afterOpening(): void {
+    const { state, viewpoint } = this.host;
+    this.opened = { state, camera: viewpoint.cameraView };
+  }
+
+  /** The address follows the view from now on, where it may. */
+  async afterOverview(): Promise<void> {
+    const { opened } = this;
+    if (opened === null || !hasAddress()) return;
+    const { AddressBar, follows } = await import("./address_bar");
+    const isFollowed = follows(location.search, window.parent !== window);
+    if (isFollowed) this.addressBar = new AddressBar(this.host, opened);
+  }
+
+  writeAddress(): void {
+    this.addressBar?.write();
+  }
+
+  async load(): Promise<LinkCode> {
+    const { host } = this;
+    const { manifest } = host.bundle;
+    const [{ linkOf }, { readLink }] = await Promise.all([
+      import("./link_of"),
+      import("./permalink"),
+    ]);
+    return {
+      link: () => linkOf(host, initialState(manifest)),
+      read: (link, state) => readLink(link, state, manifest.specimen.bounds_um),
+    };
+  }
 
   private async share(): Promise<void> {
     if (this.code === null) this.code = await import("./link_of").catch(() => null);
@@ -24,7 +62,7 @@ class SharePart implements Part {
     else await this.shareBy(this.code);
   }
 
-  private async shareBy({ leftOutOfLink, linkOf }: LinkCode): Promise<void> {
+  private async shareBy({ leftOutOfLink, linkOf }: LinkWriter): Promise<void> {
     const { host } = this;
     const address = new URL(pageAddress());
     for (const name of SETTINGS) address.searchParams.delete(name);
@@ -33,7 +71,7 @@ class SharePart implements Part {
     if (hasAddress() && !isPassingStep()) writeAddress(address);
     host.panel.show({ link: address.href });
     host.panel.unfold("share");
-    host.display.stereo.showInPanel({ link: address.href });
+    host.stereo.showInPanel({ link: address.href });
     const without = leftOutOfLink(host);
     const but =
       without === 0
@@ -49,7 +87,9 @@ class SharePart implements Part {
     }
   }
 
-  dispose(): void {}
+  dispose(): void {
+    this.addressBar?.dispose();
+  }
 }
 
 export const share: PartDefinition = {

@@ -38,8 +38,8 @@ class SlicesPart implements Part {
   }
 
   private async load(): Promise<void> {
-    const { bundle, view, display } = this.host;
-    const { volumes, values } = display.contents;
+    const { bundle, view, display, values } = this.host;
+    const volumes = this.host.service("volumes");
     try {
       const { Slices } = await import("./slices").catch((cause) => {
         throw new TemporaryError(NOT_LOADED, { cause });
@@ -48,7 +48,7 @@ class SlicesPart implements Part {
       this.slices = new Slices({
         ...{ manifest: bundle.manifest, base: bundle.base, view, state: this.wanted },
         values,
-        sourceOf: (tile, channel) => volumes.sourceOf(tile, channel),
+        sourceOf: async (tile, channel) => (await volumes?.sourceOf(tile, channel)) ?? null,
         dispatch: (action) => this.host.dispatch(action),
         onChange: () => display.requestFrame(),
         onError: (error) => this.host.report(error),

@@ -7,7 +7,7 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import type { Rgb } from "../math/color";
 import type { SliceFrame } from "../math/slice_frame";
 import type { VolumeLevel } from "../probe/measure";
-import { textureCorners } from "../volumes/texture_space";
+import { textureCorners } from "../voxels/texture_space";
 
 /** One tile's texels of a channel. */
 export type TexelBlock = Readonly<{ volume: TileVolume; level: VolumeLevel }>;

@@ -14,7 +14,7 @@ import { TexelCache } from "../probe/texel_cache";
 import type { LevelSource } from "../state/on_screen";
 import { isSliced } from "../state/parameters/slices";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import { VolumeSource } from "../volumes/volume_source";
+import { VolumeSource } from "../voxels/volume_source";
 import { compose, GREY, reslice, type Size, sizeOf, type TexelBlock } from "./reslice";
 
 /** Pixels of a picture's longer edge. */

@@ -22,7 +22,8 @@ const KEY_TURN_DEG = 5;
 const WHEEL_STEP = 0.01;
 const EDGES = ["left", "right", "top", "bottom"] as const;
 
-class Picture {
+/** One slice in the page: its image, and what is written around it. */
+class SliceFigure {
   readonly root: HTMLElement;
   private readonly plane: HTMLElement;
   private readonly across = element("i", { className: "line across" });
@@ -210,7 +211,7 @@ class Picture {
 
 export class SliceView {
   readonly root = element("div", { className: "slices", role: "group", ariaLabel: "Slices" });
-  private readonly pictures: readonly Picture[];
+  private readonly figures: readonly SliceFigure[];
   private large: number | null = null;
 
   /** @param view the part of the page with the stage, which makes room */
@@ -219,10 +220,10 @@ export class SliceView {
     private readonly images: SliceImages,
     changes: SliceChanges,
   ) {
-    this.pictures = images.canvases.map(
-      (_, i) => new Picture(i, images, changes, () => this.enlarge(i)),
+    this.figures = images.canvases.map(
+      (_, i) => new SliceFigure(i, images, changes, () => this.enlarge(i)),
     );
-    this.root.append(...this.pictures.map(({ root }) => root));
+    this.root.append(...this.figures.map(({ root }) => root));
     this.root.hidden = true;
     view.append(this.root);
   }
@@ -232,15 +233,15 @@ export class SliceView {
     this.root.hidden = !areShown || frames === null;
     this.view.classList.toggle("with-slices", !this.root.hidden);
     if (this.root.hidden || frames === null) return;
-    this.pictures.forEach((picture, i) => {
-      picture.update(frames[i]);
+    this.figures.forEach((figure, i) => {
+      figure.update(frames[i]);
     });
   }
 
   private enlarge(index: number): void {
     this.large = this.large === index ? null : index;
     this.root.classList.toggle("alone", this.large !== null);
-    this.pictures.forEach(({ root }, i) => {
+    this.figures.forEach(({ root }, i) => {
       root.hidden = this.large !== null && i !== this.large;
     });
   }

@@ -2,12 +2,23 @@
 import { BundleError } from "../bundle/errors";
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
-import type { Lenses } from "../panel/controls";
+import type { StereoFinder } from "../host/services";
+import { startSplit } from "../host/start_split";
+import type { Lenses, PanelView, PartSection } from "../panel/controls";
 import type { CardMeasure } from "../panel/html/card_measure";
+import type { XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
 import { canScan, scanCode } from "../xr/cardboard/scan_qr";
-import { BUILT_IN, type Profile, ProfileError, parseProfile } from "../xr/cardboard/viewer_profile";
+import {
+  BUILT_IN,
+  faultOfCode,
+  type Profile,
+  ProfileError,
+  parseProfile,
+} from "../xr/cardboard/viewer_profile";
 import type { ImmersiveMode } from "../xr/session";
+import { findXrSupport, showsUsersRoom, wayToStereo } from "../xr/support";
+import { STEREO_KEYS } from "./keys";
 import {
   rememberEyes,
   rememberedEyes,
@@ -16,12 +27,24 @@ import {
   rememberLens,
   rememberScreen,
 } from "./remembered";
-import { startSplit } from "./start_split";
+import { stereoSections } from "./section";
 
+/** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
+const SPLIT: XrSupport = { isAvailable: true, reason: "" };
+/** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
+const AFTER_PICTURE_MS = 2000;
+const IS_TOUCH = matchMedia("(pointer: coarse)").matches;
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 
-class StereoPart implements Part {
+async function findSupport(): StereoFinder["found"] {
+  const stereo = await findXrSupport(navigator.xr, isSecureContext);
+  return { stereo, hasRoom: await showsUsersRoom(navigator.xr, isSecureContext) };
+}
+
+class StereoPart implements Part, StereoFinder {
   readonly id = "stereo";
+  readonly services = { stereoSupport: this };
+  readonly found = findSupport();
   readonly pageCommands = {
     stereo: () => this.toggleHeadset(),
     room: () => this.toggleRoom(),
@@ -43,21 +66,47 @@ class StereoPart implements Part {
     void canScan().then((isAble) => host.panel.learn({ canScan: isAble }));
   }
 
+  async afterOpening(): Promise<void> {
+    this.host.panel.learn(await this.found);
+  }
+
+  /** Loads the code of stereo where it may be wanted, once the page has nothing else to do. */
+  async afterOverview(): Promise<void> {
+    const { stereo, hasRoom } = await this.found;
+    if (wayToStereo(stereo, IS_TOUCH) === null && !hasRoom) return;
+    const prepare = () => void this.host.stereo.prepare().catch(() => undefined); // a start reports it
+    if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
+    else setTimeout(prepare, AFTER_PICTURE_MS);
+  }
+
   sync(state: ViewerState, previous: ViewerState): void {
     rememberEyes(state, previous);
   }
 
+  panel(view: PanelView): readonly PartSection[] {
+    const { state, isInRoom, panel, stereo } = this.host;
+    const { facts } = panel;
+    const facing = {
+      stereo: facts.stereo,
+      split: stereo.kind === "headset" ? null : SPLIT,
+      canScan: facts.canScan,
+      hasRoom: facts.hasRoom && !isInRoom,
+      faultOfCode,
+    };
+    return stereoSections(state, { ...facing, isStereo: isInRoom }, view);
+  }
+
   private toggleHeadset(): void {
-    const { display, panel, isInRoom } = this.host;
+    const { stereo, panel, isInRoom } = this.host;
     const { isAvailable, reason } = panel.facts.stereo;
-    if (isInRoom) display.stereo.end();
+    if (isInRoom) stereo.end();
     else if (isAvailable) void this.enter("immersive-vr");
     else this.host.announce(reason);
   }
 
   private toggleRoom(): void {
-    const { display, panel, isInRoom } = this.host;
-    if (isInRoom) display.stereo.end();
+    const { stereo, panel, isInRoom } = this.host;
+    if (isInRoom) stereo.end();
     else if (panel.facts.hasRoom) void this.enter("immersive-ar");
     else this.host.announce(NO_ROOM);
   }
@@ -66,7 +115,7 @@ class StereoPart implements Part {
   private async enter(mode: ImmersiveMode): Promise<void> {
     if (navigator.xr === undefined) return;
     try {
-      await this.host.display.stereo.startHeadset(navigator.xr, mode);
+      await this.host.stereo.startHeadset(navigator.xr, mode);
     } catch (error) {
       if (!(error instanceof DOMException || error instanceof BundleError)) throw error;
       const text = `Stereo could not start: ${error.message}`;
@@ -77,7 +126,7 @@ class StereoPart implements Part {
   private splitScreen(): void {
     const { host } = this;
     const { lenses, code } = host.panel.view;
-    host.display.stereo.showInPanel({ lenses, code });
+    host.stereo.showInPanel({ lenses, code });
     this.withProfile((profile) => {
       startSplit(host, profile).catch((error) => host.report(error));
     });
@@ -86,7 +135,7 @@ class StereoPart implements Part {
   /** In stereo: the phone is in another viewer. */
   private changeLenses(lenses: Lenses): void {
     this.host.panel.change({ panel: "lenses", lenses });
-    this.withProfile((profile) => this.host.display.stereo.setLenses(profile));
+    this.withProfile((profile) => this.host.stereo.setLenses(profile));
   }
 
   private withProfile(use: (profile: Profile) => void): void {
@@ -146,5 +195,6 @@ class StereoPart implements Part {
 
 export const stereo: PartDefinition = {
   id: "stereo",
+  keys: STEREO_KEYS,
   create: (host) => new StereoPart(host),
 };

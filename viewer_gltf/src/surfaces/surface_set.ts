@@ -2,9 +2,13 @@
 import { type Camera, Group, Mesh, ShaderMaterial } from "three";
 import type { Bundle } from "../bundle/load";
 import type { MemoryBudget } from "../gpu/memory_budget";
+import { ERROR_TARGET_PX } from "../host/form";
+import type { LoadedSurface, Surfaces } from "../host/services";
 import { surfaceColor } from "../math/color";
 import type { Vec3 } from "../math/vec3";
+import type { BlendedScene, SurfaceFrame } from "../render/blend_material";
 import type { ShownSurface } from "../state/on_screen";
+import { overview, type Progress } from "../state/overview_progress";
 import {
   type FocusTiles,
   isInDisc,
@@ -15,21 +19,30 @@ import {
 } from "../state/representation";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
-import type { BlendedScene, SurfaceFrame } from "./blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
-import { overview, type Progress } from "./overview_progress";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
 import { type Face, faceTowards } from "./thin_rests";
 import { coarserFor, FINEST } from "./triangle_budget";
 
-/** Screen-space error, in pixels, down to which LODs are refined where frames come in time. */
-export const ERROR_TARGET_PX = 2;
 /** The presence of a volume from which the thin rests beside it are left out, 0..1. */
 const RESTS_GO_AT = 0.5;
 
 const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
-export class SurfaceSet {
+export type SurfaceOptions = Readonly<{
+  loader: SurfaceLoader;
+  frame: SurfaceFrame;
+  /** For all channels. */
+  budget: Pick<MemoryBudget, "surfaces" | "triangles">;
+  /** How far the volume of a tile and channel has faded in, 0..1. */
+  presence: (tile: string, channel: string) => number;
+  /** Whether all that is marched shows in the disc alone. */
+  isCrossing: () => boolean;
+  onChange: () => void;
+  onError: (error: unknown) => void;
+}>;
+
+export class SurfaceSet implements Surfaces {
   /** In um, world. */
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
@@ -42,21 +55,11 @@ export class SurfaceSet {
   private errorTarget_px = ERROR_TARGET_PX;
   /** Since a device draws no more triangles in time. */
   private coarser = FINEST;
-  /** A surface has come. */
-  readonly surfaceLoaded = new Signal<Readonly<{ channel: string; surface: Surface }>>();
+  private readonly loaded = new Signal<Readonly<{ channel: string; surface: LoadedSurface }>>();
 
   constructor(
     private readonly bundle: Bundle,
-    private readonly loader: SurfaceLoader,
-    private readonly frame: SurfaceFrame,
-    /** For all channels. */
-    private readonly budget: Pick<MemoryBudget, "surfaces" | "triangles">,
-    /** How far the volume of a tile and channel has faded in, 0..1. */
-    private readonly presence: (tile: string, channel: string) => number,
-    /** Whether all that is marched shows in the disc alone. */
-    private readonly isCrossing: () => boolean,
-    private readonly onChange: () => void,
-    private readonly onError: (error: unknown) => void,
+    private readonly options: SurfaceOptions,
   ) {}
 
   get overview(): Progress {
@@ -121,6 +124,11 @@ export class SurfaceSet {
     return found;
   }
 
+  /** Calls back when a surface has come. */
+  onLoaded(listener: (channel: string, surface: LoadedSurface) => void): void {
+    this.loaded.subscribe(({ channel, surface }) => listener(channel, surface));
+  }
+
   /** Volumes came, went, or fade. */
   dressAll(): void {
     for (const [id, { surfaces }] of this.shown()) {
@@ -145,7 +153,12 @@ export class SurfaceSet {
   update(camera: Camera, width_px: number, height_px: number): void {
     const isComplete = this.overview.isComplete;
     const inView = this.shown().flatMap(([, tileset]) => tileset.inView);
-    this.coarser = coarserFor(inView, this.errorTarget_px, this.budget.triangles, this.coarser);
+    this.coarser = coarserFor(
+      inView,
+      this.errorTarget_px,
+      this.options.budget.triangles,
+      this.coarser,
+    );
     for (const [, tileset] of this.shown()) {
       if (isComplete) tileset.refine(this.errorTarget_px, this.coarser);
       tileset.update(camera, width_px, height_px);
@@ -162,18 +175,19 @@ export class SurfaceSet {
   private add(id: string): void {
     const channel = this.bundle.manifest.channels.find((c) => c.id === id);
     if (channel === undefined) throw new Error(`the bundle has no channel ${id}`);
+    const { loader, frame, budget, onChange, onError } = this.options;
     const tileset = new SurfaceTileset(
       this.bundle.base,
       channel,
-      this.loader,
-      this.frame,
-      this.budget.surfaces,
+      loader,
+      frame,
+      budget.surfaces,
       (surface) => {
         this.dress(id, surface);
-        this.surfaceLoaded.emit({ channel: id, surface });
+        this.loaded.emit({ channel: id, surface });
       },
-      this.onChange,
-      this.onError,
+      onChange,
+      onError,
     );
     this.tilesets.set(id, tileset);
     this.group.add(tileset.group);
@@ -185,18 +199,18 @@ export class SurfaceSet {
     const channel = state?.channels.find((c) => c.id === id);
     const tile = state?.tiles.find((each) => each.id === surface.tile);
     if (state === null || channel === undefined || tile === undefined) return;
-    const presence = this.presence(tile.id, id);
+    const presence = this.options.presence(tile.id, id);
     const taken = takenFrom(state, channel, tile, this.focusTiles, presence);
     surface.blend.set({
       opacity: taken === null ? 0 : channel.opacity,
       taken: taken ?? 0,
       isInDisc: isInDisc(state, channel),
-      isCrossing: this.isCrossing(),
+      isCrossing: this.options.isCrossing(),
       rank: state.channels.filter((each) => each.shown).indexOf(channel),
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
     const { open } = this;
-    const isOpen = open.tile !== null && this.presence(open.tile, id) >= RESTS_GO_AT;
+    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= RESTS_GO_AT;
     surface.leaveRestsOut((isOpen && open.faces.get(tile.id)) || null);
   }
 

@@ -1,7 +1,7 @@
 import type { Group } from "three";
 import { expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import type { SurfaceFrame } from "./blend_material";
+import type { SurfaceFrame } from "../render/blend_material";
 import type { SurfaceLoader } from "./gltf_loader";
 import { SurfaceTileset } from "./surface_tileset";
 import { FINEST } from "./triangle_budget";

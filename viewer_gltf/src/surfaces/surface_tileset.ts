@@ -23,15 +23,15 @@ import {
 } from "three";
 import { BundleError } from "../bundle/errors";
 import type { Channel } from "../bundle/generated/bundle";
+import { TilesetFiles } from "../bundle/tileset_files";
 import { cornersOf } from "../math/box";
 import type { Rgb } from "../math/color";
 import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
-import { BlendedSurface, type SurfaceFrame } from "./blend_material";
+import { BlendedSurface, type SurfaceFrame } from "../render/blend_material";
+import type { TileProgress } from "../state/overview_progress";
 import { branchOf, leaveOut, putBack } from "./failed_branch";
-import { TilesetFiles } from "./fetch_content";
 import type { SurfaceLoader } from "./gltf_loader";
-import type { TileProgress } from "./overview_progress";
 import { type Face, leaveRestsOut } from "./thin_rests";
 import type { Coarser, Levels } from "./triangle_budget";
 

@@ -11,7 +11,7 @@ class TapCardPart implements Part {
   private taps = 0;
 
   constructor(private readonly host: PartHost) {
-    host.panel.refreshed.subscribe(() => this.card?.update());
+    host.panel.onShown(() => this.card?.update());
     host.drawn.subscribe(() => this.card?.follow());
     host.doubleTapped.subscribe(() => {
       this.taps++;

@@ -1,5 +1,4 @@
 /** The card of a tapped place, which follows the place as the view turns. */
-import { Vector3 } from "three";
 import type { Hit, PartHost, Tap } from "../host/part";
 import { pickTile, shownTiles } from "../math/pick";
 import { along, type Ray, type Vec3 } from "../math/vec3";
@@ -71,8 +70,8 @@ export class PlacedCard {
 
   /** The nearest object, surface, volume or slice along a ray, else the tile; null: the ray meets nothing. */
   private async meet(ray: Ray): Promise<Place | null> {
-    const { state, display } = this.host;
-    const met = await display.reading.probe(ray);
+    const { state, reading } = this.host;
+    const met = await reading.probe(ray);
     const object = this.host.objectAlong(ray);
     const isOfObjects = (id: string | null) =>
       state.channels.some((each) => each.id === id && each.hasObjects);
@@ -96,10 +95,9 @@ export class PlacedCard {
 
   /** px from the upper left of the picture; null: out of the picture. */
   private placeOf(point: Vec3): Readonly<{ x: number; y: number }> | null {
-    const { renderer, viewpoint } = this.host.display;
-    const { clientWidth, clientHeight } = renderer.domElement;
-    const { specimen, navigation } = viewpoint;
-    const at = new Vector3(...point).applyMatrix4(specimen).project(navigation.camera);
+    const { canvas, viewpoint } = this.host;
+    const { clientWidth, clientHeight } = canvas;
+    const at = viewpoint.project(point);
     if (Math.max(Math.abs(at.x), Math.abs(at.y), Math.abs(at.z)) > 1) return null;
     return { x: ((at.x + 1) / 2) * clientWidth, y: ((1 - at.y) / 2) * clientHeight };
   }

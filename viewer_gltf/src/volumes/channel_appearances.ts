@@ -4,11 +4,11 @@ import { isTraced } from "../state/parameters/volumes";
 import { isInDisc } from "../state/representation";
 import { isTwoD, shapesOf } from "../state/transfer_functions_2d";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
+import type { Appearance } from "../voxels/march_tables";
+import { lookUpTable } from "../voxels/transfer_luts";
+import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "../voxels/transfer_table_2d";
 import type { ChannelLists } from "./channel_volumes";
-import type { Appearance } from "./march_tables";
 import { tracedTable, tracedTable2d } from "./traced_table";
-import { lookUpTable } from "./transfer_luts";
-import { NO_ENTRIES, type TransferTable2d, transferTable2d } from "./transfer_table_2d";
 
 type MadeTable2d = Readonly<{
   shapes: Shapes;

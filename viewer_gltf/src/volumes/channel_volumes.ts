@@ -1,8 +1,8 @@
 /** What the bundle has of each channel's volumes: where each tile's comes from, and how it may look. */
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
-import { loadTransferFunctions, type TransferFunction } from "./transfer_luts";
-import { VolumeSource } from "./volume_source";
+import { loadTransferFunctions, type TransferFunction } from "../voxels/transfer_luts";
+import { VolumeSource } from "../voxels/volume_source";
 
 export type ChannelVolumes = Readonly<{
   /** By tile. */

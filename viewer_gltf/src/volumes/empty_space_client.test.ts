@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { OccupancyRequest } from "./empty_space";
+import type { OccupancyRequest } from "../voxels/empty_space";
 import { OccupancyClient, type OccupancyPort } from "./empty_space_client";
 
 const BRICKS = new Uint8Array(2);

@@ -3,7 +3,7 @@
  * the answers, so of each key (a tile) only the latest request counts: the worker has one request
  * at a time, and those that wait are overtaken here.
  */
-import type { OccupancyRequest } from "./empty_space";
+import type { OccupancyRequest } from "../voxels/empty_space";
 
 /** The part of a Worker that the client uses, so that tests need none. */
 export type OccupancyPort = Pick<

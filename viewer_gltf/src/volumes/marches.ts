@@ -1,33 +1,24 @@
 /** The marches of all tiles whose volumes have come: a box each, with the textures and tables of its channels. */
 import { Group, type Matrix4, Scene, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
-import type { MarchClip } from "../gpu/clip_uniforms";
+import type { DrawnMarches, MarchView } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { canBeShaded, isTraced } from "../state/parameters/volumes";
 import type { ViewerState } from "../state/viewer_state";
-import { BrickTile } from "./bricks/brick_atlas";
+import { showsBelow } from "../voxels/bricks/shows_below";
+import type { MarchFrame } from "../voxels/march_frame";
+import type { Appearance } from "../voxels/march_tables";
+import { brickCounts } from "../voxels/skip_bricks";
+import type { Packed } from "../voxels/tile_texture";
+import { opacities } from "../voxels/transfer_luts";
 import type { ChannelAppearances } from "./channel_appearances";
 import { OccupancyClient } from "./empty_space_client";
 import type { Marched } from "./light/depth_shading";
 import { LaterShading } from "./light/later_shading";
-import type { MarchFrame } from "./march_frame";
-import { type Appearance, floorOf } from "./march_tables";
 import type { Residency, Resident } from "./residency";
-import { brickCounts } from "./skip_bricks";
 import { TileMarch } from "./tile_raymarch";
-import type { Packed, TileTexture } from "./tile_texture";
-import { opacities } from "./transfer_luts";
 
-/** Where a frame is seen from: um, world. The disc's cone has an apex and an axis; `lamp` is the direction towards it. */
-export type MarchView = Readonly<{
-  eye: Vector3;
-  apex: Vector3;
-  axis: Vector3;
-  clip: MarchClip;
-  lamp: Vector3;
-}>;
-
-export class Marches {
+export class Marches implements DrawnMarches {
   readonly scene = new Scene();
   private readonly group = new Group();
   private readonly occupancy = new OccupancyClient();
@@ -198,16 +189,6 @@ function volumeOf(channel: string, { texture }: Resident): TileVolume {
   const source = texture.kept.get(channel);
   if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
   return source.volume;
-}
-
-/** Whether functions show what bricks leave out. */
-export function showsBelow(
-  texture: TileTexture | BrickTile,
-  appearances: readonly Appearance[],
-): boolean {
-  if (!(texture instanceof BrickTile)) return false;
-  const { thresholds } = texture;
-  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
 }
 
 /** The box round several marched tiles, um, world. */

@@ -1,8 +1,8 @@
 /** Which tiles have volumes on the GPU: how much each may take, how far it has faded in, which leave. */
 import type { WantedTile } from "../state/representation";
-import type { BrickTile } from "./bricks/brick_atlas";
+import type { BrickTile } from "../voxels/bricks/brick_atlas";
+import type { Packed, TileTexture } from "../voxels/tile_texture";
 import type { TileMarch } from "./tile_raymarch";
-import type { Packed, TileTexture } from "./tile_texture";
 
 /** Length of a fade, s: a volume that has come fades in, one that goes fades out. */
 const PRESENCE_S = 0.25;

@@ -30,14 +30,14 @@ import {
 import { extremePoints } from "../math/extreme_points";
 import type { Vec3 } from "../math/vec3";
 import type { Compositing } from "../state/parameters/volumes";
+import { MAX_STEPS, type MarchFrame, REST_STEPS } from "../voxels/march_frame";
+import { type Appearance, MarchTables } from "../voxels/march_tables";
+import { brickCounts } from "../voxels/skip_bricks";
+import { textureCorners } from "../voxels/texture_space";
+import type { Packed } from "../voxels/tile_texture";
 import { distanceInGrid } from "./blend_order";
-import { MAX_STEPS, type MarchFrame, REST_STEPS } from "./march_frame";
-import { type Appearance, MarchTables } from "./march_tables";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
-import { brickCounts } from "./skip_bricks";
-import { textureCorners } from "./texture_space";
-import type { Packed } from "./tile_texture";
 
 /** Shortest step, in voxels. */
 const STEP_VOXELS = 1;

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
+import { ENTRIES } from "../voxels/transfer_luts";
+import { alikeRows } from "../voxels/transfer_table_2d";
 import { tracedTable, tracedTable2d } from "./traced_table";
-import { ENTRIES } from "./transfer_luts";
-import { alikeRows } from "./transfer_table_2d";
 
 /** Its opacity and its red are the entry's number. */
 const ramp = Uint8Array.from({ length: 4 * ENTRIES }, (_, i) =>

@@ -3,8 +3,8 @@
  * one table for both, so that they can't show different matter. Pure arrays.
  */
 import type { TraceSettings } from "../state/path_trace_settings";
-import { ENTRIES } from "./transfer_luts";
-import { envelopeOf, type TransferTable2d } from "./transfer_table_2d";
+import { ENTRIES } from "../voxels/transfer_luts";
+import { envelopeOf, type TransferTable2d } from "../voxels/transfer_table_2d";
 
 type Shift = Pick<TraceSettings, "bias" | "threshold">;
 

@@ -12,10 +12,10 @@ import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import { NO_FOCUS, wantedTiles } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
-import { makeFrame } from "./march_frame";
-import { texels } from "./mip_levels";
+import { makeFrame } from "../voxels/march_frame";
+import { texels } from "../voxels/mip_levels";
+import { stride } from "../voxels/volume_texture";
 import { VolumeSet } from "./volume_set";
-import { stride } from "./volume_texture";
 
 const TILES = 6;
 const SIDE = 2048;

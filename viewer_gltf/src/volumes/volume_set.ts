@@ -1,35 +1,30 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
 import { BundleError } from "../bundle/errors";
 import type { Bundle } from "../bundle/load";
+import type { Volumes } from "../host/services";
 import type { Vec3 } from "../math/vec3";
+import type { MarchedVolumes, MarchView, VolumeStatus } from "../render/drawn_forms";
 import type { ShownVolume } from "../state/on_screen";
 import { isTraced } from "../state/parameters/volumes";
 import type { WantedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
-import type { BrickService } from "./bricks/brick_service";
+import type { BrickService } from "../voxels/bricks/brick_service";
+import { LoadQueue } from "../voxels/load_queue";
+import type { MarchFrame } from "../voxels/march_frame";
+import { levelsToFetch, type VolumeLimits } from "../voxels/mip_levels";
+import { TileTexture } from "../voxels/tile_texture";
+import type { VolumeSource } from "../voxels/volume_source";
+import { stride } from "../voxels/volume_texture";
 import { ChannelAppearances } from "./channel_appearances";
 import { ChannelLists } from "./channel_volumes";
-import { LoadQueue } from "./load_queue";
-import type { MarchFrame } from "./march_frame";
-import { Marches, type MarchView } from "./marches";
-import { levelsToFetch, type VolumeLimits } from "./mip_levels";
+import { Marches } from "./marches";
 import { Residency, type Resident } from "./residency";
-import { TileTexture } from "./tile_texture";
-import type { VolumeSource } from "./volume_source";
-import { stride } from "./volume_texture";
 
 const PARALLEL_LOADS = 4;
 /** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
 const STAND_IN_BYTES = 2 ** 21;
 
-export type VolumeStatus = Readonly<{
-  tile: string;
-  channel: string;
-  /** Mip level on screen, 0 is the finest; null: none yet. */
-  level: number | null;
-}>;
-
-export class VolumeSet {
+export class VolumeSet implements MarchedVolumes, Volumes {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;

@@ -2,14 +2,13 @@
  * Everything that is done in stereo: looking, pointing, pressing, holding. One of it serves both
  * WebXR and the split screen, where there is nothing but the gaze and a tap.
  */
-import { Matrix4, Vector3 } from "three";
-import { Ring } from "../interaction/dwell_ring";
+import { Matrix4 } from "three";
+import type { Ring } from "../interaction/dwell_ring";
 import {
   gazeOf,
   type Met,
   meetFirst,
   Pointer,
-  pointOn,
   type RoomRay,
   type Target,
 } from "../interaction/ray_pointer";
@@ -32,6 +31,7 @@ import { RoomNotice } from "./panel/notice";
 import { RoomPanel } from "./panel/panel";
 import { PANEL } from "./panel/panel_surface";
 import type { Setting } from "./panel/placement";
+import { PointedLight } from "./pointed_light";
 import { SpecimenMover } from "./specimen_mover";
 
 /** By gaze alone it is not switched off: nothing would be left to switch it on by. */
@@ -46,7 +46,7 @@ const CARRY_BUTTON = `${PANEL}bar-move`;
 
 export class Hands {
   readonly panel: RoomPanel;
-  readonly ring = new Ring();
+  private readonly light: PointedLight;
   readonly notice: RoomNotice;
   readonly ground = new Ground();
   private readonly mover: SpecimenMover;
@@ -61,7 +61,6 @@ export class Hands {
   /** Times at which the button was pressed since the previous frame, ms. */
   private taps: number[] = [];
   private isRunning = false;
-  private shown = "";
   private readonly lastChoice = new LastChoice();
   /** The specimen as it was taken by the bar. */
   private barHold: HeadHold | null = null;
@@ -94,6 +93,8 @@ export class Hands {
       onPress: (ray, time_ms) => this.press(ray, time_ms),
       onTap: (time_ms) => this.tap(time_ms),
     });
+    const { pointer, controllers, grips, panel } = this;
+    this.light = new PointedLight({ pointer, controllers, grips, panel });
     this.targets = [...this.panel.targets, ...handles(), this.tiles];
     scene.add(...this.overlays);
   }
@@ -102,6 +103,11 @@ export class Hands {
   get overlays() {
     const { controllers, panel, ring, notice, ground } = this;
     return [controllers.group, panel.group, ring.group, notice.mesh, ground.lines];
+  }
+
+  /** The ring of a dwell. */
+  get ring(): Ring {
+    return this.light.ring;
   }
 
   /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
@@ -223,7 +229,7 @@ export class Hands {
     }
     const hasGone = this.grips.goOn(dt_s, state);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
+    return this.light.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
   }
 
   dispose(): void {
@@ -233,7 +239,7 @@ export class Hands {
     this.panel.dispose();
     this.notice.dispose();
     this.controllers.dispose();
-    this.ring.dispose();
+    this.light.dispose();
     this.ground.dispose();
   }
 
@@ -278,21 +284,5 @@ export class Hands {
     } else if (this.barHold !== null) {
       this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
     }
-  }
-
-  /** Ring, rays, and the light on what is pointed at. */
-  private draw(head: Matrix4): boolean {
-    this.grips.tracked.forEach((hand, i) => {
-      this.controllers.draw(hand, this.pointer.hands[i]?.distance_m ?? null);
-    });
-    const { leading, progress } = this.pointer;
-    this.panel.light(leading?.key ?? null);
-    const eye = new Vector3().setFromMatrixPosition(head);
-    if (leading === null) this.ring.hide();
-    else this.ring.show(pointOn(leading), eye, progress);
-    const shown = `${leading?.key} ${leading?.distance_m} ${progress}`;
-    const isChanged = shown !== this.shown;
-    this.shown = shown;
-    return isChanged || this.grips.tracked.length > 0;
   }
 }

@@ -11,8 +11,8 @@ import type { Eyes } from "../gpu/eyes";
 import type { PanelView } from "../panel/controls";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
-import type { SplitSession } from "./cardboard/split_session";
-import { askInTap } from "./cardboard/user_gesture";
+import type { Gesture } from "./cardboard/fingers";
+import { LaterSplit } from "./cardboard/later_split";
 import type { Profile } from "./cardboard/viewer_profile";
 import type { HandsOptions } from "./hands_options";
 import { betweenEyes } from "./head_pose";
@@ -40,12 +40,10 @@ export class Stereo {
   private loading: Promise<Hands> | null = null;
   /** The page's own choices, for the panel in the room as soon as it is loaded. */
   private choices: Partial<PanelView> = {};
-  private split: SplitSession | null = null;
+  private readonly split: LaterSplit;
   /** Stereo on the page's own screen. */
   readonly screen: LaterScreen;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
-  /** A split screen that is being asked for. */
-  private starting: Promise<readonly string[]> | null = null;
   private readonly between = new Matrix4();
   /** In the user's own room, before the first frame with a head. */
   private isArriving = false;
@@ -55,6 +53,13 @@ export class Stereo {
     private readonly options: StereoOptions,
   ) {
     this.screen = new LaterScreen(renderer);
+    const handlers = {
+      prepare: () => this.prepare(),
+      onStart: () => this.begin(null),
+      onEnd: () => this.leave(),
+      onGesture: (gesture: Gesture) => this.hands?.touch(gesture),
+    };
+    this.split = new LaterSplit(renderer, handlers, this.splitOptions);
     this.headset = new XrSession(
       renderer,
       () => {
@@ -103,7 +108,7 @@ export class Stereo {
   setEyes(eyes: EyeSettings): void {
     const isSame = JSON.stringify(eyes) === JSON.stringify(this.eyes);
     this.eyes = eyes;
-    if (!isSame) this.split?.set(this.splitOptions);
+    if (!isSame) this.split.set(this.splitOptions);
   }
 
   private get splitOptions() {
@@ -113,7 +118,7 @@ export class Stereo {
 
   get kind(): "headset" | "split" | null {
     if (this.renderer.xr.isPresenting) return "headset";
-    return this.split?.isRunning ? "split" : null;
+    return this.split.running === null ? null : "split";
   }
 
   /**
@@ -122,34 +127,7 @@ export class Stereo {
    */
   startSplit(profile: Profile): Promise<readonly string[]> {
     if (this.kind !== null) return Promise.resolve([]);
-    this.starting ??= this.askAndSplit(profile).finally(() => {
-      this.starting = null;
-    });
-    return this.starting;
-  }
-
-  private async askAndSplit(profile: Profile): Promise<readonly string[]> {
-    const asked = askInTap(this.renderer.domElement, () => this.end());
-    try {
-      const [, split] = await Promise.all([this.prepare(), this.split ?? this.loadSplit()]);
-      this.split = split;
-    } catch (error) {
-      void asked.screen.then(({ release }) => release());
-      throw error;
-    }
-    await this.split.start(profile, asked);
-    return this.split.problems;
-  }
-
-  private async loadSplit(): Promise<SplitSession> {
-    const { SplitSession } = await import("./cardboard/split_session").catch(notLoaded);
-    return new SplitSession(
-      this.renderer,
-      () => this.begin(null),
-      () => this.leave(),
-      (gesture) => this.hands?.touch(gesture),
-      this.splitOptions,
-    );
+    return this.split.start(profile);
   }
 
   /** Everything but what is opaque, which the pass for the depth has to leave out. */
@@ -168,10 +146,11 @@ export class Stereo {
       }
       return this.headset.camera;
     }
-    if (!this.split?.isRunning) return null;
-    this.split.update();
-    eyes.follow(this.split.eyes.map(({ camera, viewport }) => [camera, viewport]));
-    return this.split.camera;
+    const { running } = this.split;
+    if (running === null) return null;
+    running.update();
+    eyes.follow(running.eyes.map(({ camera, viewport }) => [camera, viewport]));
+    return running.camera;
   }
 
   /** Whether the user's own room shows behind the specimen. */
@@ -190,37 +169,38 @@ export class Stereo {
     if (this.renderer.xr.isPresenting) {
       return betweenEyes(this.renderer.xr.getCamera().cameras, this.between);
     }
-    return this.split?.isRunning ? this.split.head : null;
+    return this.split.running?.head ?? null;
   }
 
   /** Take what the head looks at for ahead. Returns its pose then; null: no stereo. */
   recentre(): Matrix4 | null {
-    if (this.split?.isRunning) {
-      const before = this.split.head.clone();
-      this.split.recentre();
-      this.split.update();
-      this.hands?.panel.comeAlong(before, this.split.head);
+    const { running } = this.split;
+    if (running !== null) {
+      const before = running.head.clone();
+      running.recentre();
+      running.update();
+      this.hands?.panel.comeAlong(before, running.head);
     }
     return this.head;
   }
 
   /** Draw a frame: through the lenses, where the screen is split. */
   present(draw: () => void): void {
-    const { split } = this;
-    if (!split?.isRunning) {
+    const { running } = this.split;
+    if (running === null) {
       if (this.kind === null) this.screen.present(draw);
       else draw();
       return;
     }
-    this.renderer.setRenderTarget(split.target);
+    this.renderer.setRenderTarget(running.target);
     draw();
     this.renderer.setRenderTarget(null);
-    split.present();
+    running.present();
   }
 
   /** The phone is in another viewer; nothing changes where there is no split screen. */
   setLenses(profile: Profile): void {
-    this.split?.setProfile(profile);
+    this.split.setProfile(profile);
   }
 
   /** The specimen becomes so much larger where it is; on a flat screen nothing does. */
@@ -237,7 +217,7 @@ export class Stereo {
   }
 
   end(): void {
-    this.split?.end();
+    this.split.end();
     void this.headset.end();
   }
 
@@ -292,7 +272,7 @@ export class Stereo {
 
   dispose(): void {
     this.hands?.dispose();
-    this.split?.dispose();
+    this.split.dispose();
     this.screen.dispose();
   }
 }

@@ -19,7 +19,7 @@ const SAME = 0.01;
 
 /** The parts of the page for stereo, slices and light that the page can't get now. */
 async function missing(page: Page): Promise<readonly string[]> {
-  const LATER = /^(interaction|split_session|slices|path_tracer|notebook_part)-.*\.js$/;
+  const LATER = /^(interaction|split_session|slices|path_tracer|view_sharing)-.*\.js$/;
   const names = (await readdir(join(DIST, "assets"))).filter((name) => LATER.test(name));
   expect(names.length).toBe(5);
   return page.evaluate(async (all) => {

@@ -1,6 +1,6 @@
 /** Numbers out of the ray-march: how many steps a ray takes, and what its chunks compute. */
 import { expect, it } from "vitest";
-import { MAX_STEPS } from "../../src/volumes/march_frame";
+import { MAX_STEPS } from "../../src/voxels/march_frame";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
 import { sweep } from "../support/exhaustive";

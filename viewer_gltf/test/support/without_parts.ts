@@ -10,7 +10,7 @@ const COPIED = ["src", "index.html", "public", "package.json", "tsconfig.json"];
 /** Writes the copy to a folder, beside a link to the schemas. Returns the path of the copied viewer. */
 export async function copyWithout(parts: readonly string[], folder: string): Promise<string> {
   const copy = join(folder, "viewer_gltf");
-  await mkdir(copy);
+  await mkdir(copy, { recursive: true });
   const isSource = (path: string) => !path.endsWith(".test.ts");
   for (const name of COPIED) {
     await cp(join(VIEWER, name), join(copy, name), { recursive: true, filter: isSource });

@@ -3,7 +3,7 @@ import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
 import type { TileVolume } from "../../src/bundle/generated/volumes";
-import type { VolumeStatus } from "../../src/volumes/volume_set";
+import type { VolumeStatus } from "../../src/render/drawn_forms";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";

@@ -16,11 +16,11 @@ import { Eyes } from "viewer/gpu/eyes";
 import { linearTarget } from "viewer/gpu/linear_target";
 import { DepthPass } from "viewer/render/depth_pass";
 import { MarchPass } from "viewer/render/raymarch_pass";
-import { occupancyDistances } from "viewer/volumes/empty_space";
-import { makeFrame } from "viewer/volumes/march_frame";
-import { brickCounts } from "viewer/volumes/skip_bricks";
 import { TileMarch } from "viewer/volumes/tile_raymarch";
-import { opacities } from "viewer/volumes/transfer_luts";
+import { occupancyDistances } from "viewer/voxels/empty_space";
+import { makeFrame } from "viewer/voxels/march_frame";
+import { brickCounts } from "viewer/voxels/skip_bricks";
+import { opacities } from "viewer/voxels/transfer_luts";
 import { serve } from "./page";
 import type { About, Camera, Renderer, Scene } from "./scene";
 

@@ -11,16 +11,16 @@ import {
   Vector4,
   WebGLRenderer,
 } from "three";
-import { environmentTables } from "viewer/pathtrace/environment_sampling";
-import { START_TRACE } from "viewer/state/path_trace_settings";
-import { Tracer } from "viewer/pathtrace/path_tracer";
 import { Cuts } from "viewer/gpu/clip_planes";
 import { noCorner } from "viewer/gpu/clip_uniforms";
-import { DepthPass } from "viewer/render/depth_pass";
+import { LAST, Overlay } from "viewer/gpu/composite_pass";
 import { EncodePass } from "viewer/gpu/encode_pass";
 import { Eyes } from "viewer/gpu/eyes";
 import { linearTarget } from "viewer/gpu/linear_target";
-import { LAST, Overlay } from "viewer/gpu/composite_pass";
+import { environmentTables } from "viewer/pathtrace/environment_sampling";
+import { Tracer } from "viewer/pathtrace/path_tracer";
+import { DepthPass } from "viewer/render/depth_pass";
+import { START_TRACE } from "viewer/state/path_trace_settings";
 import { serve } from "./page";
 import type { Camera, Renderer, Scene } from "./scene";
 
@@ -90,7 +90,10 @@ class Traced implements Renderer {
       bricks: [bricks],
       release: () => texture.dispose(),
     });
-    this.tracer.setAppearances([{ color: about.color, table: Uint8Array.from(about.table) }], this.settings);
+    this.tracer.setAppearances(
+      [{ color: about.color, table: Uint8Array.from(about.table) }],
+      this.settings,
+    );
     this.tracer.lightBy(environmentTables(WHITE));
     this.room.add(this.overlay.mesh);
     const away = Math.hypot(...camera.eye_um.map((v, i) => v - camera.target_um[i]));

@@ -5,7 +5,7 @@
 import { setTo } from "../../state/parameters/kinds";
 import { MODE, type Mode } from "../../state/parameters/volumes";
 import { hasVolumes, type ViewerState } from "../../state/viewer_state";
-import { MOVES } from "../sections/move";
+import { MOVES } from "../moves";
 import { box, type CanvasWish, type Mark, type Rect, type Region, text } from "./draw_list";
 import type { Page } from "./page";
 

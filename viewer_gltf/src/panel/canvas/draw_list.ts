@@ -1,8 +1,7 @@
 /** What the panel on a canvas is made of: marks to paint and regions to point at. Pixels. Pure. */
 
 import type { Command } from "../../state/commands";
-import type { Histogram } from "../../volumes/transfer_functions_loader";
-import type { Wish } from "../controls";
+import type { Histogram, Wish } from "../controls";
 
 /** From the upper left corner. */
 export type Rect = Readonly<{ x: number; y: number; width: number; height: number }>;

@@ -1,6 +1,7 @@
 /** Histograms as pictures, each made once. */
+
 import { COLUMNS, ROWS } from "../../bundle/transfer_2d";
-import type { Histogram } from "../../volumes/transfer_functions_loader";
+import type { Histogram } from "../controls";
 
 /** Colour of the most voxels, sRGB, 0..255: the page's accent. */
 const COLOR = [150, 190, 240] as const;

@@ -2,9 +2,9 @@
 
 import { element, setText } from "../../dom/element";
 import { groupNotices } from "../../state/notice_groups";
+import type { Progress } from "../../state/overview_progress";
 import type { Mode } from "../../state/parameters/volumes";
 import { showsVolumes, type ViewerState } from "../../state/viewer_state";
-import type { Progress } from "../../surfaces/overview_progress";
 
 /** Time for which an announcement stays, ms; a screen reader reads it at once. */
 const SAID_MS = 4000;

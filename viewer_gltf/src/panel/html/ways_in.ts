@@ -1,4 +1,6 @@
 /** On the picture itself, in its corner: the ways out of the flat screen. Those that lead nowhere are hidden. */
+import { fileAddress } from "../../bundle/fetch";
+import type { Bundle } from "../../bundle/load";
 import { element } from "../../dom/element";
 import { isFullScreen } from "../../dom/full_screen";
 
@@ -11,9 +13,15 @@ const LABEL =
   `font-family="system-ui, sans-serif" textLength="108">${IN_ROOM}</text></svg>`;
 
 /** Whether a link opens a viewer of augmented reality here: on iOS it does. */
-export function opensAr(): boolean {
+function opensAr(): boolean {
   const { relList } = document.createElement("a");
   return relList?.supports?.("ar") === true;
+}
+
+/** Address of the file that this device shows in the user's room; null: it shows none. */
+export function arAddress({ base, manifest }: Bundle): string | null {
+  const usdz = manifest.usdz ?? null;
+  return usdz !== null && opensAr() ? fileAddress(base, usdz.path) : null;
 }
 
 export class WaysIn {

@@ -1,7 +1,7 @@
 /** Texels of coarse mip levels for the shading: of levels that have come already, decoded once more. */
 import { DecodeError, decodeTexels } from "../../bundle/decode";
-import { texels } from "../mip_levels";
-import type { VolumeSource } from "../volume_source";
+import { texels } from "../../voxels/mip_levels";
+import type { VolumeSource } from "../../voxels/volume_source";
 
 type Kept = { level: number; texels: Uint8Array | null };
 

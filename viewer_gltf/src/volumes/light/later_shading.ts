@@ -1,7 +1,7 @@
 /** The shading of volumes. Its code comes with the first volumes that are shaded. */
 import type { Vector3 } from "three";
 import type { MarchClip } from "../../gpu/clip_uniforms";
-import type { MarchFrame } from "../march_frame";
+import type { MarchFrame } from "../../voxels/march_frame";
 import type { TileMarch } from "../tile_raymarch";
 import { CoarseTexels } from "./coarse_texels";
 import type { DepthShading, Marched } from "./depth_shading";

@@ -6,15 +6,8 @@ import { Group, type Matrix4, Vector3 } from "three";
 import type { RoomRay, Target } from "../../interaction/ray_pointer";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
 import type { CanvasChange, CanvasWish, Region } from "../../panel/canvas/draw_list";
-import {
-  type CanvasView,
-  CONTENT,
-  HEIGHT,
-  type Page,
-  pageOf,
-  START_CANVAS,
-  WIDTH,
-} from "../../panel/canvas/page";
+import { CONTENT, HEIGHT, type Page, pageOf, WIDTH } from "../../panel/canvas/page";
+import { keepPlaces } from "../../panel/channel_cards";
 import {
   changePanel,
   type Layout,
@@ -22,12 +15,12 @@ import {
   type PanelView,
   START_VIEW,
 } from "../../panel/controls";
-import { keepPlaces } from "../../panel/sections/channels";
 import type { Action } from "../../state/actions";
 import type { Command } from "../../state/commands";
 import { START_VOLUMES } from "../../state/parameters/volumes";
 import type { ViewerState } from "../../state/viewer_state";
 import { CanvasQuad, type Spot } from "./canvas_quad";
+import { PanelPages } from "./panel_pages";
 import { PANEL, PanelSurface, type PlacedTarget } from "./panel_surface";
 import {
   type Bearing,
@@ -40,7 +33,6 @@ import {
   pointAt,
   type Setting,
 } from "./placement";
-import { SwatchFan } from "./swatch_fan";
 
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
@@ -67,7 +59,7 @@ export class RoomPanel {
   private readonly bar: PanelSurface;
   private page: Page | null = null;
   private view: PanelView = START_VIEW;
-  private section: CanvasView = START_CANVAS;
+  private readonly pages = new PanelPages(() => this.giveCards());
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
@@ -77,10 +69,7 @@ export class RoomPanel {
   private wantsPlace: "bar" | "head" | null = null;
   /** The last request: a button that is held still asks for nothing more. */
   private dragged = "";
-  private readonly fan = new SwatchFan();
   private lastMode = START_VOLUMES.mode;
-  /** The page of the section from which a group was opened. */
-  private sectionPage = 0;
   /** Whether the last choice can be undone by the bar. */
   canUndo = false;
   /** The specimen is carried: the bar would be in the way. */
@@ -171,11 +160,7 @@ export class RoomPanel {
     this.bar.quad.place(pointAt(under, eye, panelDistance_m(setting)), eye);
     this.bar.quad.mesh.visible = !this.isCarrying;
     this.rested_s += dt_s;
-    const fanned = this.fan.advance(dt_s, this.section.fanned);
-    if (fanned !== this.section.fanned) {
-      this.section = { ...this.section, fanned };
-      this.isStale = true;
-    }
+    if (this.pages.advance(dt_s)) this.isStale = true;
     if (state !== this.state || this.rested_s >= REFRESH_S) this.isStale = true;
     if (this.isOpen) this.view = keepPlaces(this.view, state);
     this.state = state;
@@ -190,7 +175,7 @@ export class RoomPanel {
   /** Light up what is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
-    this.fan.point(id);
+    this.pages.fan.point(id);
     for (const surface of [this.menu, this.bar]) surface.light(id);
   }
 
@@ -221,12 +206,11 @@ export class RoomPanel {
   private open(eye: Vector3, bearing: Bearing): void {
     this.quad.place(pointAt(bearing, eye, panelDistance_m(this.setting)), eye);
     this.quad.mesh.visible = true;
-    this.go(START_CANVAS);
+    this.pages.begin();
   }
 
-  /** To another page, with cards for the channels that are shown now. */
-  private go(section: CanvasView): void {
-    this.section = section;
+  /** The page that is opened has cards for the channels that are shown now. */
+  private giveCards(): void {
     this.view = { ...this.view, channelsWithCard: null };
     this.isStale = true;
   }
@@ -239,7 +223,7 @@ export class RoomPanel {
       return false;
     }
     this.view = keepPlaces(this.view, state);
-    this.page = pageOf(this.options.layOut(this.view), this.section);
+    this.page = pageOf(this.options.layOut(this.view), this.pages.view);
     return this.menu.show(this.page);
   }
 
@@ -271,28 +255,12 @@ export class RoomPanel {
   }
 
   private act(wish: CanvasChange): void {
-    const { options, section } = this;
+    const { options } = this;
+    if (wish.canvas === "group") this.take({ picked: wish.group });
+    if (this.pages.follow(wish)) return;
     switch (wish.canvas) {
       case "open":
         this.wantsPlace = "bar";
-        break;
-      case "tab":
-        this.go({ ...START_CANVAS, tab: wish.section });
-        break;
-      case "fan":
-        this.section = { ...section, fanned: wish.group };
-        break;
-      case "group":
-        this.take({ picked: wish.group });
-        this.sectionPage = section.page;
-        this.go({ ...section, group: wish.group, page: 0, fanned: null });
-        break;
-      case "page":
-        this.section = { ...section, page: wish.page, fanned: null };
-        break;
-      case "back":
-        if (section.group === null) this.go({ ...START_CANVAS, tab: null });
-        else this.go({ ...section, group: null, page: this.sectionPage });
         break;
       case "announce":
         options.onAnnounce(wish.text);

@@ -27,9 +27,9 @@ import { Tracer } from "../../../src/pathtrace/path_tracer";
 import { TRACE_WARP } from "../../../src/pathtrace/shaders/sources";
 import { DepthPass } from "../../../src/render/depth_pass";
 import { START_TRACE, type TraceSettings } from "../../../src/state/path_trace_settings";
-import { STORED } from "../../../src/volumes/bricks/tree";
-import { alikeRows } from "../../../src/volumes/transfer_table_2d";
-import { volumeTexture } from "../../../src/volumes/volume_texture";
+import { STORED } from "../../../src/voxels/bricks/tree";
+import { alikeRows } from "../../../src/voxels/transfer_table_2d";
+import { volumeTexture } from "../../../src/voxels/volume_texture";
 
 export type Run = Readonly<{
   /** Texels along x, y, z, apron and all; one byte each, x fastest. */

@@ -10,9 +10,9 @@ import { Tracer } from "../../../src/pathtrace/path_tracer";
 import { DepthPass } from "../../../src/render/depth_pass";
 import { MarchPass } from "../../../src/render/raymarch_pass";
 import { START_TRACE, type TraceSettings } from "../../../src/state/path_trace_settings";
-import { MAX_STEPS, makeFrame } from "../../../src/volumes/march_frame";
 import { TileMarch } from "../../../src/volumes/tile_raymarch";
 import { tracedTable } from "../../../src/volumes/traced_table";
+import { MAX_STEPS, makeFrame } from "../../../src/voxels/march_frame";
 import { appearancesOf, type Run, texelsOf } from "./harness";
 
 export type View = Run &

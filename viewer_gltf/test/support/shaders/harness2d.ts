@@ -8,7 +8,7 @@ import {
   alikeRows,
   type TransferTable2d,
   transferTable2d,
-} from "../../../src/volumes/transfer_table_2d";
+} from "../../../src/voxels/transfer_table_2d";
 import { makeBricks } from "../fixture/volumes";
 import { seeded } from "../seeded";
 import { cube, PIXELS } from "./cube";

@@ -19,7 +19,7 @@ import { BothEyes } from "../../../src/gpu/both_eyes";
 import { Cuts } from "../../../src/gpu/clip_planes";
 import { marchedUniforms } from "../../../src/gpu/composite_pass";
 import type { Vec3 } from "../../../src/math/vec3";
-import { BlendedSurface, makeSurfaceFrame } from "../../../src/surfaces/blend_material";
+import { BlendedSurface, makeSurfaceFrame } from "../../../src/render/blend_material";
 import { seeded } from "../seeded";
 
 const PIXELS = 64;

@@ -5,7 +5,7 @@ import { CHUNKS } from "../../../src/gpu/glsl_chunks";
 import { includeChunks } from "../../../src/gpu/glsl_include";
 import { ScreenPass } from "../../../src/gpu/screen_pass";
 import { MarchPass } from "../../../src/render/raymarch_pass";
-import { makeFrame } from "../../../src/volumes/march_frame";
+import { makeFrame } from "../../../src/voxels/march_frame";
 
 /** Of one eye's part. */
 const SIDE = 90;

@@ -14,8 +14,8 @@ import { Eyes } from "../../../src/gpu/eyes";
 import { byteTarget } from "../../../src/gpu/float_targets";
 import { linearTarget } from "../../../src/gpu/linear_target";
 import { DepthPass } from "../../../src/render/depth_pass";
-import { makeFrame } from "../../../src/volumes/march_frame";
 import { TileMarch } from "../../../src/volumes/tile_raymarch";
+import { makeFrame } from "../../../src/voxels/march_frame";
 import { cube, PIXELS } from "./cube";
 
 const SIDE = 51;

@@ -1,0 +1,223 @@
+/**
+ * The panel's section of the channels. A few channels have a card each, in the bundle's order. Of many, the
+ * cards of those that are shown come first; the others are a list to add from, by name, and a page at a
+ * time: there may be seventy. No row changes its place when a channel is shown or hidden, since the next
+ * row would slide under the pointer or the gaze. Pure.
+ */
+
+import { toHex } from "../math/color";
+import { colourOf, controlOf, paletteOf } from "../panel/control_templates";
+import type {
+  Colour,
+  Control,
+  Group,
+  Histogram,
+  PanelView,
+  PartSection,
+  Section,
+} from "../panel/controls";
+import { freeColours } from "../panel/palettes";
+import { transferTitle } from "../panel/transfer_titles";
+import { intensityText, type Ranges, windowTexts } from "../panel/window_texts";
+import { CHANNEL, COLOR, OPACITY, VOLUME } from "../state/parameters/channel";
+import { REFUSED } from "../state/refusals";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
+import { transferFunction2dItems } from "./transfer_function_2d";
+
+/** Largest number of channels that all have a card. */
+const FEW = 9;
+/** Channels of a page of the list; fewer need no search. */
+export const PAGE = 6;
+/** Steps of a window's slider: the volumes have 8 bits. */
+const WINDOW_STEPS = 255;
+
+/** What is known of the channels beside the state. */
+export type ChannelFacts = Readonly<{
+  ranges: Ranges;
+  /** Of the channel with the open joint histogram, if it has come. */
+  histogram?: Histogram | null;
+  /** Some colours of each label map's objects. */
+  objectColors?: ReadonlyMap<string, readonly string[]>;
+}>;
+
+function tagsOf({ hasSurface, surfaceReason }: ChannelState): string[] {
+  if (surfaceReason !== "") return [surfaceReason.split(":", 1)[0]];
+  return hasSurface ? [] : ["no surface"];
+}
+
+function shownToggle({ id, name, shown }: ChannelState): Control {
+  return {
+    kind: "toggle",
+    id: `${id}/shown`,
+    label: "Shown",
+    name: `Show ${name}`,
+    value: shown,
+    to: (value) => ({ type: "show", channel: id, shown: value }),
+  };
+}
+
+/** The channel's colour, with those that no other channel has. */
+function ownColour(channel: ChannelState, channels: readonly ChannelState[]): Colour {
+  const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
+  return { ...colourOf(COLOR, channel, channel.id), free: freeColours(others) };
+}
+
+function cardOf(
+  channel: ChannelState,
+  { channels }: ViewerState,
+  { ranges, histogram = null, objectColors = new Map() }: ChannelFacts,
+  view: PanelView,
+): Group {
+  const { id, name } = channel;
+  const isOpen = view.picked === id;
+  const toWindow = (window: readonly [number, number]) =>
+    ({ type: "window", channel: id, window }) as const;
+  const range = ranges.get(id);
+  const head = {
+    kind: "group",
+    id,
+    label: name,
+    tags: tagsOf(channel),
+    about: channel.surfaceReason,
+    isDimmed: !channel.shown,
+    isOpen,
+    opener: { panel: "pick", channel: isOpen ? null : id },
+  } as const;
+  if (channel.hasObjects) {
+    const shows = objectColors.get(id) ?? [];
+    const controls = [colourOf(COLOR, channel, id, shows), shownToggle(channel)];
+    const opacity = controlOf(OPACITY, channel, id);
+    return { ...head, controls, more: [opacity, paletteOf(COLOR, channel, `${id}/palette`, id)] };
+  }
+  return {
+    ...head,
+    controls: [ownColour(channel, channels), shownToggle(channel)],
+    more: [
+      controlOf(VOLUME, channel, id),
+      {
+        kind: "choice",
+        id: `${id}/transfer-function`,
+        label: "Transfer function",
+        name: `Transfer function of ${name}`,
+        value: channel.transferFunction,
+        options: channel.transferFunctions.map((each) => ({
+          value: each,
+          label: transferTitle(channel, each),
+        })),
+        isInline: false,
+        refusal: channel.volume ? "" : REFUSED.transfer,
+        to: (each) => ({ type: "choose-transfer-function", channel: id, name: each }),
+      },
+      ...CHANNEL.filter((row) => row !== COLOR && row !== VOLUME).map((row) =>
+        controlOf(row, channel, id),
+      ),
+      {
+        kind: "window",
+        id: `${id}/window`,
+        label: "Window",
+        name: `Window of ${name}`,
+        value: channel.window,
+        steps: WINDOW_STEPS,
+        texts: windowTexts(channel.window, range),
+        to: toWindow,
+      },
+      paletteOf(COLOR, channel, `${id}/palette`, id),
+      ...transferFunction2dItems(channel, view, histogram, (share) => intensityText(share, range)),
+    ],
+  };
+}
+
+/** The channels with a card above the list. */
+function withCards(
+  { channels }: ViewerState,
+  { channelsWithCard: ids }: PanelView,
+): readonly ChannelState[] {
+  if (channels.length <= FEW) return channels;
+  return channels.filter(({ id, shown }) => ids?.includes(id) ?? shown);
+}
+
+/** The channels of the list whose name or id contains the text that is searched for. */
+function foundChannels(
+  state: ViewerState,
+  view: PanelView,
+  search = view.search,
+): readonly ChannelState[] {
+  const sought = search.trim().toLowerCase();
+  const cards = withCards(state, view);
+  return state.channels.filter(
+    (channel) =>
+      !cards.includes(channel) &&
+      (channel.name.toLowerCase().includes(sought) || channel.id.toLowerCase().includes(sought)),
+  );
+}
+
+/** How many pages the found channels take. */
+export function pagesOf(state: ViewerState, view: PanelView): number {
+  return Math.max(1, Math.ceil(foundChannels(state, view).length / PAGE));
+}
+
+/** Beginnings of the channels' names, as `CD`: the letters up to a digit, three at most. */
+function beginningsOf(channels: readonly ChannelState[]): readonly string[] {
+  const found = channels.map(({ name }) => /^\p{L}{1,3}/u.exec(name)?.[0] ?? name.slice(0, 1));
+  return [...new Set(found)].sort((a, b) => a.localeCompare(b, "en"));
+}
+
+function addingOf(
+  state: ViewerState,
+  facts: ChannelFacts,
+  view: PanelView,
+): readonly (Control | Group)[] {
+  const all = foundChannels(state, view, "");
+  if (all.length === 0) return [];
+  const isLong = all.length > PAGE;
+  const found = isLong ? foundChannels(state, view) : all;
+  const pages = Math.max(1, Math.ceil(found.length / PAGE));
+  const page = Math.min(view.page, pages - 1);
+  const items: (Control | Group)[] = [];
+  if (isLong) {
+    items.push({
+      kind: "search",
+      id: "find-channel",
+      label: `Add one of ${all.length} more channels`,
+      value: view.search,
+      hints: beginningsOf(all),
+      to: (text) => ({ panel: "find", text }),
+    });
+  }
+  for (const channel of found.slice(page * PAGE, (page + 1) * PAGE)) {
+    items.push(rowOf(cardOf(channel, state, facts, view)));
+  }
+  if (isLong && found.length === 0) {
+    const value = `No channel of the list is called "${view.search.trim()}".`;
+    items.push({ kind: "text", id: "no-channel", label: "Channels", value });
+  }
+  if (pages > 1) {
+    items.push({
+      kind: "button",
+      id: "next-channels",
+      label: `Next ${PAGE} (page ${page + 1} of ${pages})`,
+      isStep: true,
+      to: () => ({ panel: "page", page: (page + 1) % pages }),
+    });
+  }
+  return items;
+}
+
+/** A card as a row of the list: swatch and switch, and the rest once the channel is shown and opened. */
+function rowOf(card: Group): Group {
+  const canOpen = !card.isDimmed || card.isOpen;
+  return { ...card, isCompact: true, more: canOpen ? card.more : [] };
+}
+
+function channelItems(state: ViewerState, facts: ChannelFacts, view: PanelView): Section["items"] {
+  const cards = withCards(state, view).map((channel) => cardOf(channel, state, facts, view));
+  return [...cards, ...addingOf(state, facts, view)];
+}
+
+export function channelSections(
+  state: ViewerState,
+  facts: ChannelFacts,
+  view: PanelView,
+): readonly PartSection[] {
+  return [{ rank: 10, id: "channels", label: "Channels", items: channelItems(state, facts, view) }];
+}

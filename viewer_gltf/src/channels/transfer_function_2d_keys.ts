@@ -1,0 +1,87 @@
+/** The keys of the shapes of a two-dimensional transfer function. Pure. */
+import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
+import { fromHex, toHex } from "../math/color";
+import type { PanelView, Refusal, Wish } from "../panel/controls";
+import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../panel/edit_shapes";
+import { type Key, key, neighbour, no, ofChannel, withChannel } from "../panel/key";
+import { nextColour } from "../panel/palettes";
+import { REFUSED } from "../state/refusals";
+import { removeShape, replaceShape } from "../state/transfer_shapes";
+import type { ChannelState } from "../state/viewer_state";
+import { refusalOf, setShapes } from "./transfer_function_2d";
+
+/** One step of a shape's number, 0..1: five cells of its table. */
+const SHAPE_STEP = 5 / 255;
+
+const NO_SHAPE = no(REFUSED.shape);
+
+function addShapeOf(kind: Shape["kind"]) {
+  return (channel: ChannelState): Wish | Refusal => {
+    const reason = refusalOf(channel);
+    if (reason !== "") return no(reason);
+    const shapes = withNewShape(channel, kind);
+    if (shapes.length > MAX_SHAPES)
+      return no(`A transfer function has at most ${MAX_SHAPES} shapes.`);
+    return setShapes(channel, shapes);
+  };
+}
+
+/** A key of the meant shape of the meant channel; `shape` null: without it. */
+function ofShape(
+  name: string,
+  label: string,
+  to: (shape: Shape, view: PanelView) => Shape | null,
+): Key {
+  return key(name, label, (context) =>
+    withChannel(context, (channel) => {
+      const reason = refusalOf(channel);
+      if (reason !== "") return no(reason);
+      const shapes = editedShapes(channel);
+      const index = meantShape(context.view.shape, shapes);
+      if (index === null) return NO_SHAPE;
+      const changed = to(shapes[index], context.view);
+      return setShapes(
+        channel,
+        changed === null ? removeShape(shapes, index) : replaceShape(shapes, index, changed),
+      );
+    }),
+  );
+}
+
+function changeNumber(steps: number) {
+  return (shape: Shape, { shapeNumber }: PanelView): Shape => {
+    const [first] = SHAPE_NUMBERS;
+    const number = SHAPE_NUMBERS.find(({ id, isOf }) => id === shapeNumber && isOf(shape)) ?? first;
+    return number.by(shape, steps * SHAPE_STEP);
+  };
+}
+
+export const SHAPE_KEYS: readonly Key[] = [
+  ofChannel("H", "Plane of value and gradient: open or close", ({ id }) => ({
+    panel: "histogram",
+    channel: id,
+  })),
+  ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),
+  ofChannel("Y", "Add a triangle", addShapeOf("triangle")),
+  key("J", "Next shape: the keys below mean it", (context) =>
+    withChannel(context, (channel) => {
+      const shapes = editedShapes(channel);
+      const present = meantShape(context.view.shape, shapes);
+      if (present === null) return NO_SHAPE;
+      const { length: count } = shapes;
+      return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
+    }),
+  ),
+  key(";", "Next number of the shape", ({ view }) => {
+    const ids = SHAPE_NUMBERS.map(({ id }) => id);
+    const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
+    return id === null ? NO_SHAPE : { panel: "shape-number", id };
+  }),
+  ofShape("<", "Less of it", changeNumber(-1)),
+  ofShape(">", "More of it", changeNumber(1)),
+  ofShape("*", "Next colour of the shape", (shape) => ({
+    ...shape,
+    color: fromHex(nextColour(toHex(shape.color))),
+  })),
+  ofShape("Shift+Delete", "Remove the shape", () => null),
+];

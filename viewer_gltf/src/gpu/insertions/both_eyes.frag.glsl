@@ -1,0 +1,6 @@
+// For the fragment shaders of three's own materials.
+#insert start
+#include <chunks/both_eyes_fragment>
+
+#insert main_start
+	keepToOwnEye();

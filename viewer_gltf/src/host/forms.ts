@@ -1,0 +1,157 @@
+/** All ways in which parts draw the specimen: each question goes to those that can answer it. */
+import type { Manifest } from "../bundle/generated/bundle";
+import { cornersOf } from "../math/box";
+import { behindPlane, keptPoints } from "../math/clip";
+import { extremePoints } from "../math/extreme_points";
+import { shownBox } from "../math/pick";
+import type { Vec3 } from "../math/vec3";
+import type { BlendedScene } from "../render/blend_material";
+import type { MarchedVolumes, TracedVolumes } from "../render/drawn_forms";
+import type { ShownVolume } from "../state/on_screen";
+import type { Progress } from "../state/overview_progress";
+import type { ChannelState, ViewerState } from "../state/viewer_state";
+import type { Form, StreamView } from "./form";
+
+export class Forms {
+  /** Whether all tiles have their first picture. */
+  hasOverview = false;
+  /** Whether it is known for good where all lies that shows at the opening. */
+  private isOutlined = false;
+  /** The parts of the state that `shownPoints` has answered for. */
+  private asked: readonly unknown[] = [];
+
+  constructor(
+    private readonly parts: Readonly<{ forms: readonly Form[] }>,
+    private readonly manifest: Manifest,
+  ) {}
+
+  private get all(): readonly Form[] {
+    return this.parts.forms;
+  }
+
+  get overview(): Progress {
+    const all = this.all.flatMap(({ overview = [] }) => overview);
+    const sum = (key: "done" | "total") => all.reduce((total, each) => total + each[key], 0);
+    const isComplete = all.every((each) => each.isComplete);
+    return { done: sum("done"), total: sum("total"), isComplete };
+  }
+
+  /** Whether all tiles show, in the first channel. */
+  get hasFirst(): boolean {
+    return this.all.every(({ hasFirst = true }) => hasFirst);
+  }
+
+  get triangles(): number {
+    return this.all.reduce((sum, { triangles = 0 }) => sum + triangles, 0);
+  }
+
+  get panes(): readonly BlendedScene[] {
+    return this.all.flatMap(({ panes = [] }) => panes);
+  }
+
+  get marched(): MarchedVolumes | null {
+    return this.all.flatMap(({ marched = [] }) => marched)[0] ?? null;
+  }
+
+  get traced(): TracedVolumes | null {
+    return this.all.flatMap(({ traced = [] }) => traced)[0] ?? null;
+  }
+
+  /** Whether a view at rest still gathers samples of light. */
+  get isGathering(): boolean {
+    return this.traced?.isGathering ?? false;
+  }
+
+  /** Draws volumes of at most so many voxels along a tile's edge, from the next `sync` on. */
+  limitEdge(edge: number): void {
+    for (const form of this.all) form.limitEdge?.(edge);
+  }
+
+  /**
+   * Returns the outermost points (um, world) of all that shows and is not cut away, as far as they are known.
+   * Returns null if none are known, or if nothing has improved since the last call. A channel without a surface may
+   * show in all of the specimen.
+   */
+  outline(state: ViewerState): readonly Vec3[] | null {
+    if (this.isOutlined) return null;
+    const points = this.pointsOf(state);
+    if (points === null) return null;
+    this.isOutlined = this.hasOverview;
+    if (points.length === 0) return null;
+    const { plane } = state.clip;
+    return extremePoints(plane === null ? points : behindPlane(points, plane));
+  }
+
+  /**
+   * Returns points (um, world) whose box holds what is shown now; no points if nothing is. Returns null if they are not
+   * known yet, or if nothing has changed since the last call.
+   */
+  shownPoints(state: ViewerState): readonly Vec3[] | null {
+    const { channels, mode, isolated, clip } = state;
+    const asked = [channels, mode, isolated, clip, this.hasOverview];
+    if (asked.every((each, i) => each === this.asked[i])) return null;
+    const points = this.pointsOf(state);
+    if (points === null) return null;
+    this.asked = asked;
+    return keptPoints(points, clip, shownBox(this.manifest, isolated));
+  }
+
+  /** Outermost points (um, world) of all channels that are shown, uncut; null: not known yet. */
+  private pointsOf(state: ViewerState): readonly Vec3[] | null {
+    const points: Vec3[] = [];
+    for (const channel of state.channels.filter(({ shown }) => shown)) {
+      const outline = this.outlineOf(state, channel);
+      if (outline === null) return null;
+      points.push(...outline);
+    }
+    return points;
+  }
+
+  private outlineOf(state: ViewerState, channel: ChannelState): readonly Vec3[] | null {
+    if (!channel.hasSurface) return cornersOf(this.manifest.specimen.bounds_um);
+    for (const form of this.all) {
+      const points = form.outline?.(state, channel);
+      if (points !== undefined) return points;
+    }
+    return []; // no part draws it
+  }
+
+  /** True once, when the overview has come: then `sync` again. */
+  hasJustBegun(): boolean {
+    if (this.hasOverview || !this.overview.isComplete) return false;
+    this.hasOverview = true;
+    return true;
+  }
+
+  /** Goes on with what fades, by so long. Returns whether anything still fades. */
+  fade(fade_s: number): boolean {
+    const fading = this.all.map((form) => form.fade?.(fade_s) ?? false);
+    return fading.includes(true);
+  }
+
+  /** The volumes on screen. */
+  get shownVolumes(): readonly ShownVolume[] {
+    const { marched, traced } = this;
+    return (traced?.isShown ? traced : marched)?.shown() ?? [];
+  }
+
+  /** Whether a piece of the frame is missing, not merely coarse. */
+  get isIncomplete(): boolean {
+    return !this.overview.isComplete || this.all.some(({ isIncomplete = false }) => isIncomplete);
+  }
+
+  /** The graphics context is gone, and the texels with it. */
+  forget(): void {
+    for (const form of this.all) form.forget?.();
+  }
+
+  /** Called before each frame. */
+  dress(): void {
+    for (const form of this.all) form.dress?.();
+  }
+
+  /** Streams what the eye needs, down to an error on screen. */
+  stream(view: StreamView): void {
+    for (const form of this.all) form.stream?.(view);
+  }
+}

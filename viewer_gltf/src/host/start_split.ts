@@ -1,0 +1,10 @@
+/** Starts the split screen of a phone in a viewer without WebXR. */
+
+import type { Profile } from "../xr/cardboard/viewer_profile";
+import type { PartHost } from "./part";
+
+/** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
+export async function startSplit(host: PartHost, profile: Profile): Promise<void> {
+  const problems = await host.stereo.startSplit(profile);
+  for (const text of problems) host.dispatch({ type: "notify", text });
+}

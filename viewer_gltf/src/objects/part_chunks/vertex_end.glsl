@@ -1,0 +1,1 @@
+gl_Position = objectEnd(gl_Position);

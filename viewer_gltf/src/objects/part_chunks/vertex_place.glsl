@@ -1,0 +1,1 @@
+transformed = objectPlace(transformed);

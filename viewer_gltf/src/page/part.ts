@@ -1,0 +1,138 @@
+/** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
+import { toggleFullScreen } from "../dom/full_screen";
+import type { Part, PartDefinition, PartHost } from "../host/part";
+import type { PagePanel } from "../host/services";
+import type { Refusal, Wish } from "../panel/controls";
+import { Panel } from "../panel/html/panel";
+import { withKeys } from "../panel/keys";
+import { pixelShare } from "../render/pixel_share";
+import { Keyboard } from "./keyboard";
+import { Overlays } from "./overlays";
+import { rememberChange, rememberedView } from "./remembered";
+
+/** Time between updates of the figures that change with each frame, ms. */
+const REFRESH_MS = 250;
+const FEWER_PIXELS = "Drawn with fewer pixels until this tab is closed.";
+const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
+
+class PagePart implements Part, PagePanel {
+  readonly id = "page";
+  readonly services = { page: this };
+  readonly pageCommands = {
+    undo: () => this.keyboard.undo(),
+    find: () => this.find(),
+    "full-screen": () => void this.toggleFullScreen(),
+  };
+  private readonly html: Panel;
+  private readonly overlays: Overlays;
+  private readonly keyboard: Keyboard;
+  private readonly disposed = new AbortController();
+  private timer = 0;
+
+  constructor(private readonly host: PartHost) {
+    const { signal } = this.disposed;
+    const parent = host.view.parentElement ?? host.view;
+    this.overlays = new Overlays(host, this, signal);
+    this.html = new Panel((wish) => this.perform(wish));
+    parent.append(this.html.root);
+    this.keyboard = new Keyboard(host, this, parent, signal);
+    host.announced.subscribe((text) => this.say(text));
+    host.revealed.subscribe((control) => this.html.reveal(control));
+    host.changed.subscribe(() => this.refresh());
+    host.panel.onChange(() => this.refresh());
+    host.drawn.subscribe(() => this.refreshSoon());
+    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    addEventListener("hashchange", () => location.reload(), { signal });
+    host.canvas.addEventListener("webglcontextlost", () => {
+      void import("./lost_context").then(({ offerReload }) =>
+        offerReload(host, () => host.service("links")?.writeAddress()),
+      );
+    });
+  }
+
+  begin(): void {
+    this.host.panel.show(rememberedView());
+  }
+
+  afterOpening(): Promise<void> {
+    this.overlays.begin();
+    return this.overlays.offerWaysIn();
+  }
+
+  afterOverview(): void {
+    if (pixelShare() < 1) this.say(FEWER_PIXELS);
+  }
+
+  private refresh(): void {
+    clearTimeout(this.timer);
+    this.timer = 0;
+    const { panel } = this.host;
+    this.html.update(panel.layOutPage());
+    if (this.keyboard.update()) this.overlays.said.withdraw();
+    panel.noteShown();
+  }
+
+  /** Brings the figures to the newest frame now and then. */
+  private refreshSoon(): void {
+    if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
+  }
+
+  perform(wish: Wish | Refusal): void {
+    const { host } = this;
+    if (typeof wish === "string") host.run(wish);
+    else if ("refusal" in wish) void this.explain(wish);
+    else if ("panel" in wish) {
+      if (wish.panel === "hide" && host.stereo.togglePanel()) return;
+      host.panel.change(wish);
+      rememberChange(wish, host.panel.view);
+      if (wish.panel === "reveal") this.html.reveal(wish.control);
+    } else host.dispatch(wish);
+  }
+
+  focus(section: string, control: string): boolean {
+    const { panel } = this.host;
+    panel.show({ isHidden: false });
+    panel.unfold(section);
+    return this.html.focus(control);
+  }
+
+  say(words: string): void {
+    this.overlays.said.say(words);
+  }
+
+  offer(words: string, label: string, act: () => void): void {
+    this.overlays.said.offer(words, label, act);
+  }
+
+  /** Says why a request does nothing now, with a button where something leads on. */
+  private async explain({ refusal }: Refusal): Promise<void> {
+    const { host } = this;
+    const words = withKeys(refusal, host.panel.view.keyChanges);
+    host.announce(words);
+    if (host.isInRoom) return;
+    const button = (await host.service("messages")?.buttonFor(refusal)) ?? null;
+    if (button !== null) this.offer(words, button.label, button.act);
+  }
+
+  private find(): void {
+    const isLong = this.focus("channels", "find-channel");
+    if (!isLong) this.host.announce("The panel lists all channels.");
+  }
+
+  private async toggleFullScreen(): Promise<void> {
+    const isDone = await toggleFullScreen();
+    if (!isDone) this.host.announce(NO_FULL_SCREEN);
+  }
+
+  dispose(): void {
+    clearTimeout(this.timer);
+    this.disposed.abort();
+    this.html.root.remove();
+    this.keyboard.dispose();
+  }
+}
+
+export const page: PartDefinition = {
+  id: "page",
+  create: (host) => new PagePart(host),
+};

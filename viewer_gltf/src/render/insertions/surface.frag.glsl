@@ -1,0 +1,18 @@
+// For the fragment shader of three's standard material. A part of some surfaces may declare functions, and change
+// `diffuseColor`.
+#insert start
+#include <surface>
+#include <part/fragment_declared>
+
+#insert after <color_fragment>
+	#include <part/fragment_color>
+	keepToOwnEye();
+	if (isGone(vRoom) || isCut(vRoom)) discard;
+
+#insert after <normal_fragment_maps>
+	if (!gl_FrontFacing) normal = insideNormal(normal, cameraPosition);
+
+#insert before <dithering_fragment>
+#ifndef OPAQUE
+	gl_FragColor = blended(gl_FragColor, diffuseColor.a);
+#endif

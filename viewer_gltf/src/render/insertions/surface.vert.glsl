@@ -1,0 +1,14 @@
+// For the vertex shader of three's standard material. A part of some surfaces may declare functions, place
+// `transformed` elsewhere, and change `gl_Position` at the end.
+#insert start
+varying vec3 vRoom;
+#include <chunks/both_eyes_vertex>
+#include <part/vertex_declared>
+
+#insert before <project_vertex>
+	#include <part/vertex_place>
+
+#insert after <project_vertex>
+	vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
+	toEachEye(mvPosition);
+	#include <part/vertex_end>

@@ -1,0 +1,26 @@
+// The functions that surfaces call beside three's standard material. ../insertions/surface.frag.glsl has the calls.
+varying vec3 vRoom;
+#include <chunks/both_eyes_fragment>
+#include <chunks/clip_planes>
+#include <chunks/open_tile>
+#include <chunks/focus_disc>
+#include <chunks/surface_share>
+#include <chunks/marched_light>
+
+// The inside of a solid that is cut open, or that ends at the open tile, is drawn flat: as the plane there.
+vec3 insideNormal(vec3 normal, vec3 eye) {
+  vec3 flatNormal = cutNormal(eye, vRoom);
+  if (flatNormal == vec3(0.0)) flatNormal = openNormal(eye, vRoom);
+  if (flatNormal == vec3(0.0)) return normal;
+  return normalize((viewMatrix * vec4(flatNormal, 0.0)).xyz);
+}
+
+// Light, times its opacity. In the disc both pictures, of surface and of volume, are mixed: one laid over
+// the other would be dark between.
+vec4 blended(vec4 light, float alpha) {
+  float taken = shareTaken(vRoom);
+  float own = uOpacity * alpha * (1.0 - taken);
+  vec4 mixed = vec4(own * light.rgb, own);
+  if (uCrosses && taken > 0.0) mixed += taken * marchedLight(gl_FragCoord.xy);
+  return mixed;
+}

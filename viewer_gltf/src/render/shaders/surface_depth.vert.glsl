@@ -1,0 +1,15 @@
+// Writes depth alone. A part of some surfaces may place `transformed` elsewhere, and change
+// `gl_Position` at the end.
+varying vec3 vRoom;
+#include <chunks/both_eyes_vertex>
+#include <part/vertex_declared>
+
+void main() {
+  vec3 transformed = position;
+  #include <part/vertex_place>
+  vRoom = (modelMatrix * vec4(transformed, 1.0)).xyz;
+  vec4 seen = modelViewMatrix * vec4(transformed, 1.0);
+  gl_Position = projectionMatrix * seen;
+  toEachEye(seen);
+  #include <part/vertex_end>
+}

@@ -1,9 +1,0 @@
-/** Starts the split screen of a phone in a viewer without WebXR. */
-import type { PartHost } from "../host/part";
-import type { Profile } from "../xr/cardboard/viewer_profile";
-
-/** Must be called from a tap. Throws BundleError in words if the browser or the user refuses. */
-export async function startSplit(host: PartHost, profile: Profile): Promise<void> {
-  const problems = await host.display.stereo.startSplit(profile);
-  for (const text of problems) host.dispatch({ type: "notify", text });
-}

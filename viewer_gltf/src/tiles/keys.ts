@@ -1,0 +1,38 @@
+/** The keys of the tiles. Pure. */
+
+import { type Key, type KeyGroup, key, neighbour, no } from "../panel/key";
+import { chosenTile } from "../state/chosen_tile";
+import { setTo } from "../state/parameters/kinds";
+import { SCREEN_STEREO } from "../state/parameters/tools";
+import { REFUSED } from "../state/refusals";
+
+function nextTile(by: number): Key["to"] {
+  return ({ state }) => {
+    const ids = state.tiles.map(({ id }) => id);
+    const tile = neighbour(ids, state.isolated ?? state.selected ?? undefined, by);
+    if (tile === null) return no(REFUSED.tileAhead);
+    return state.isolated === null ? { type: "select", tile } : { type: "isolate", tile };
+  };
+}
+
+const KEYS: readonly Key[] = [
+  key("t", "Next tile", nextTile(1)),
+  key("T", "Previous tile", nextTile(-1)),
+  key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
+    const { state, focusTile } = context;
+    if (state.isolated !== null) return { type: "isolate", tile: null };
+    const tile = state.selected ?? focusTile;
+    if (tile === null) return no(REFUSED.tile);
+    return { type: "isolate", tile };
+  }),
+  key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
+    focusTile === null ? no(REFUSED.tileAhead) : chosenTile(state, focusTile),
+  ),
+  key(["Escape", "Backspace"], "Back: out of stereo, all tiles, then none chosen", ({ state }) => {
+    if (state.screenStereo !== "off") return setTo(SCREEN_STEREO, "off");
+    const isChosen = state.isolated !== null || state.selected !== null;
+    return isChosen ? "back" : no(REFUSED.back);
+  }),
+];
+
+export const TILE_KEYS: readonly KeyGroup[] = [{ name: "Tiles", rank: 70, keys: KEYS }];

@@ -1,0 +1,26 @@
+/** The panel's sections of volumes: where they show, and how. Pure. */
+import { controlOf, controlsOf } from "../panel/control_templates";
+import type { Control, PartSection } from "../panel/controls";
+import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
+import { hasVolumes, type ViewerState } from "../state/viewer_state";
+
+/** @param discLimit_deg where the limit of tiles in the disc ends it; null: the disc covers no more */
+export function volumeSections(
+  state: ViewerState,
+  discLimit_deg: number | null,
+): readonly PartSection[] {
+  if (!hasVolumes(state)) return [];
+  const others = VOLUMES.filter((row) => row !== MODE);
+  const items = controlsOf(others, state).map((item) => discItem(item, state, discLimit_deg));
+  return [
+    { rank: 30, id: "volumes", label: "Surfaces and volumes", items: [controlOf(MODE, state)] },
+    { rank: 40, id: "volume-settings", label: "Volume settings", isDeeper: true, items },
+  ];
+}
+
+/** The focus disc's slider, with its radius now where the limit of tiles makes it smaller than it was set. */
+function discItem(item: Control, { mode }: ViewerState, discLimit_deg: number | null): Control {
+  const isCut = item.id === DISC_RADIUS.id && mode === "disc" && discLimit_deg !== null;
+  if (!isCut || item.kind !== "slider") return item;
+  return { ...item, text: `${item.text}, now ${discLimit_deg.toFixed(0)}°` };
+}

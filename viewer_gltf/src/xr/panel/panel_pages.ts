@@ -1,0 +1,62 @@
+/** The page of the panel in the room that is open, and the ways between its pages. */
+import type { CanvasChange } from "../../panel/canvas/draw_list";
+import { type CanvasView, START_CANVAS } from "../../panel/canvas/page";
+import { SwatchFan } from "./swatch_fan";
+
+export class PanelPages {
+  readonly fan = new SwatchFan();
+  private shown: CanvasView = START_CANVAS;
+  /** The page of the section from which a group was opened. */
+  private sectionPage = 0;
+
+  /** @param onNew another section or group is open */
+  constructor(private readonly onNew: () => void) {}
+
+  get view(): CanvasView {
+    return this.shown;
+  }
+
+  /** Opens the section that the panel begins with. */
+  begin(): void {
+    this.go(START_CANVAS);
+  }
+
+  /** Goes on with the colours that lie beside a swatch. Returns whether others lie there now. */
+  advance(dt_s: number): boolean {
+    const fanned = this.fan.advance(dt_s, this.shown.fanned);
+    if (fanned === this.shown.fanned) return false;
+    this.shown = { ...this.shown, fanned };
+    return true;
+  }
+
+  /** Follows a change. Returns whether it was one of pages. */
+  follow(change: CanvasChange): boolean {
+    const { shown } = this;
+    switch (change.canvas) {
+      case "tab":
+        this.go({ ...START_CANVAS, tab: change.section });
+        return true;
+      case "fan":
+        this.shown = { ...shown, fanned: change.group };
+        return true;
+      case "group":
+        this.sectionPage = shown.page;
+        this.go({ ...shown, group: change.group, page: 0, fanned: null });
+        return true;
+      case "page":
+        this.shown = { ...shown, page: change.page, fanned: null };
+        return true;
+      case "back":
+        if (shown.group === null) this.go({ ...START_CANVAS, tab: null });
+        else this.go({ ...shown, group: null, page: this.sectionPage });
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  private go(view: CanvasView): void {
+    this.shown = view;
+    this.onNew();
+  }
+}
