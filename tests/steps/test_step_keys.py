@@ -19,6 +19,7 @@ from support.step_record import find_steps
 SHAPE = (16, 24, 48)
 # fields that count by another one, or only name a place
 PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("Labels", "color")}
+PLACES |= {("WriteStageTile", "stage_dir")}
 
 
 @pytest.fixture(scope="module")

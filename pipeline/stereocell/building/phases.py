@@ -53,7 +53,6 @@ from stereocell.planning.survey import Survey
 from stereocell.planning.unit_steps import choose_units, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
-from stereocell.steps.write_stage_tile import StageTile
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
@@ -183,24 +182,27 @@ def run_stage(out: Path, engine: Engine) -> None:
             located = Passes(out_folder, plan, engine).objects(labels)
             tables[labels.id], remarks = table_of_objects(out_folder, plan, labels, located)
             phase.print(*remarks)
-        tiles = [
-            StageTile(
-                stage_tile_step(plan, tile, units, tables), out_folder.tile_file(tile.id), stage_dir
-            )
-            for tile in plan.tiles
-        ]
-        stage = stage_step(plan, survey, [tile.step for tile in tiles], tables)
+        steps = [stage_tile_step(plan, tile, units, tables, stage_dir) for tile in plan.tiles]
+        tiles = {
+            tile.id: Kept(tile.id, step, out_folder.tile_file(tile.id), step.inputs)
+            for tile, step in zip(plan.tiles, steps, strict=True)
+        }
+        stage = stage_step(plan, survey, steps, tables)
         done = partial(digest_of_stage, out_folder)
         if phase.is_done(stage.key, done, require_own=require_own_stage):
             return
         out_folder.remove(stage_dir / USDZ_NAME)
         out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
-        run_missing(engine, "stage", tiles)
+        run_missing(engine, "stage", tiles.values())
         stage.write(stage_dir)
-        out_folder.remove_other_folders(stage_dir / "tiles", {tile.id for tile in plan.tiles})
-        lists = [tile.listed() for tile in tiles]
-        files = {path: entry for listed, _ in lists for path, entry in listed.items()}
-        if measured := sum(measured for _, measured in lists):
+        out_folder.remove_other_folders(stage_dir / "tiles", {*tiles})
+        made = {id_: tile.read() for id_, tile in tiles.items()}
+        files = {
+            f"tiles/{id_}/{name}": entry
+            for id_, one in made.items()
+            for name, entry in one.files.items()
+        }
+        if measured := sum(one.measured_bytes for one in made.values()):
             whole = sum(entry["bytes"] for entry in files.values())
             phase.print(
                 f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for other "

@@ -35,8 +35,10 @@ class Form(Protocol[R_contra]):
 class Keyed:
     """Work that is skipped where its key is unchanged. Subclasses are frozen dataclasses.
 
-    A field that does not change the result is not a field. Work that a phase carries out as a whole
-    is a direct subclass, with a method of its own, as `write` of `WriteStage`.
+    A field that does not change the result is not a field, except one with `compare=False`: it only
+    says where something lies. Work that a phase carries out as a whole is a direct subclass, with a
+    method of its own, as `write` of `WriteStage`. Its results lie at a place that users know, where
+    they may edit them, so phases.json keeps their key: see building/phase.py.
 
     VERSION  is raised when the same fields give another result
     """
@@ -47,12 +49,27 @@ class Keyed:
     @property
     def key(self) -> str:
         """The name of the result, 20 hexadecimal digits."""
-        own = {one.name: content_of(getattr(self, one.name)) for one in fields(self)}  # type: ignore[arg-type]
+        counted = (one.name for one in fields(self) if one.compare)  # type: ignore[arg-type]
+        own = {name: content_of(getattr(self, name)) for name in counted}
         return key_of([type(self).__name__, self.VERSION, own])
 
 
-class Step(Keyed, ABC, Generic[R]):
-    """A task of one worker, whose result is kept. Subclasses are picklable.
+class FileStep(Keyed, ABC):
+    """A task of one worker that writes files. Subclasses are picklable."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the result lies at a place, as it was written."""
+
+    @abstractmethod
+    def keep(self, place: Path) -> None:
+        """Compute the result and write it to a place, whole or not at all. Raises OutputError."""
+
+
+class Step(FileStep, Generic[R]):
+    """A task of one worker that returns its result.
 
     FORM  the form of the result in OUT
     """
@@ -63,6 +80,14 @@ class Step(Keyed, ABC, Generic[R]):
     @abstractmethod
     def run(self) -> R:
         """Compute the result."""
+
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the result lies at a place, as it was written."""
+        return self.FORM.is_whole(place)
+
+    def keep(self, place: Path) -> None:
+        """Compute the result and write it to a place. Raises OutputError."""
+        self.FORM.write(place, self.run())
 
 
 @dataclass(frozen=True, slots=True)
