@@ -31,7 +31,7 @@ from typing import Any
 from packaging.utils import canonicalize_name
 
 import stereocell
-from stereocell.engine.step import FileStep, Keyed, Step
+from stereocell.engine.step import Keyed, Step
 from stereocell.engine.step_record import RECORD
 from stereocell.read.known_formats import known_formats
 from stereocell.storage.assets import find_asset
@@ -64,7 +64,7 @@ BEHIND = {
     "tifffile": ("imagecodecs",),
     "zarr": ("numcodecs",),
 }
-_STEP = re.compile(r"^class \w+\((?:Step\[|FileStep\)|Keyed\))", re.MULTILINE)
+_STEP = re.compile(r"^class \w+\((?:Step\[|Keyed\))", re.MULTILINE)
 
 
 def record() -> dict[str, Any]:
@@ -98,9 +98,8 @@ def find_steps() -> list[type[Keyed]]:
     # a dataclass with slots is another class than the one that it was made from
     steps = {
         (one.__module__, one.__name__): getattr(sys.modules[one.__module__], one.__name__, None)
-        for base in (Keyed, FileStep, Step)
-        for one in base.__subclasses__()
-        if one not in (FileStep, Step) and one.__module__.startswith(f"{PACKAGE.name}.")
+        for one in (*Keyed.__subclasses__(), *Step.__subclasses__())
+        if one is not Step and one.__module__.startswith(f"{PACKAGE.name}.")
     }
     return sorted(filter(None, steps.values()), key=lambda step: step.__name__)
 

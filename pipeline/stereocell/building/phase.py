@@ -1,4 +1,8 @@
-"""A phase of a build: whether what it made is whole, and made of the same as it would be now."""
+"""A phase of a build: whether its results are whole, and made of the same as they would be now.
+
+A phase is no work for the runner of steps. Its results lie at places that users know and may edit
+them in, so no key names them, and phases.json keeps the key beside a digest of the results.
+"""
 
 import hashlib
 import time

@@ -53,6 +53,7 @@ from stereocell.planning.survey import Survey
 from stereocell.planning.unit_steps import choose_units, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
@@ -229,7 +230,14 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         if not phase.is_done(step.key, done, require_own=require_own_bundle):
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key
-            step.write(out_folder.bundle_dir, path, viewer, parts=parts, run=engine.run)
+            write_bundle(
+                path,
+                out_folder.bundle_dir,
+                viewer,
+                engine=engine,
+                parts=parts,
+                report_line=phase.print,
+            )
             phase.about = "" if stage is None else f"of {printable(path.name)}"
     out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:

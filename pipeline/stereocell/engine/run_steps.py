@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from stereocell.engine.run import Engine
-from stereocell.engine.step import Document, FileStep, Step
+from stereocell.engine.step import Document, Step, Work
 from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
@@ -28,14 +28,14 @@ class Reads(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A step, with the place of its files.
+    """Work, with the place of its files.
 
     name    for progress and errors, as `<tile>/<channel>`
     inputs  see `Reads`
     """
 
     name: str
-    step: FileStep
+    step: Work
     place: Path
     inputs: tuple[Path, ...] = ()
 

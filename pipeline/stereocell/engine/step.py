@@ -37,8 +37,7 @@ class Keyed:
 
     A field that does not change the result is not a field, except one with `compare=False`: it only
     says where something lies. Work that a phase carries out as a whole is a direct subclass, with a
-    method of its own, as `write` of `WriteStage`. Its results lie at a place that users know, where
-    they may edit them, so phases.json keeps their key: see building/phase.py.
+    method of its own, as `write` of `WriteStage`: see building/phase.py.
 
     VERSION  is raised when the same fields give another result
     """
@@ -54,8 +53,8 @@ class Keyed:
         return key_of([type(self).__name__, self.VERSION, own])
 
 
-class FileStep(Keyed, ABC):
-    """A task of one worker that writes files. Subclasses are picklable."""
+class Work(ABC):
+    """The work of one worker: it writes files at a place. Subclasses are picklable."""
 
     __slots__ = ()
 
@@ -68,8 +67,8 @@ class FileStep(Keyed, ABC):
         """Compute the result and write it to a place, whole or not at all. Raises OutputError."""
 
 
-class Step(FileStep, Generic[R]):
-    """A task of one worker that returns its result.
+class Step(Keyed, Work, Generic[R]):
+    """Work whose result is kept under a key.
 
     FORM  the form of the result in OUT
     """
