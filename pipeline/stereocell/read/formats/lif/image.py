@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.format import Format, Guide, Library
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.plane_positions import falling_notes
 from stereocell.read.series import Candidate, candidate, list_images, read_chosen
 from stereocell.read.spacing import Grid, Triple
-from stereocell.storage.first_bytes import Mark
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -215,16 +213,3 @@ def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Col
         colors.append(linear_color(rgb) if rgb else None)
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)
-
-
-FORMAT = Format(
-    title="LIF",
-    open=read_image,
-    list_series=list_series,
-    library=Library("liffile", extra="lif"),
-    endings=(".lif",),
-    marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
-    guides=(
-        Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
-)
