@@ -22,7 +22,7 @@ FORMAT = Format(
     title="LIF",
     open=_open,
     list_series=_list_series,
-    library=Library("liffile", extra="lif"),
+    library=Library("liffile", extra="lif", reads=".lif (Leica)"),
     endings=(".lif",),
     marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
     guides=(
