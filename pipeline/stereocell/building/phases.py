@@ -7,7 +7,6 @@ is a key of all that it depends on.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from stereocell.building.bundle_inputs import (
@@ -19,12 +18,10 @@ from stereocell.building.bundle_inputs import (
 from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
-    require_own_bundle,
     require_own_places,
-    require_own_stage,
 )
 from stereocell.building.passes import Passes
-from stereocell.building.phase import Phase, digest_of_bundle, digest_of_stage, phase_of
+from stereocell.building.phase import Phase, phase_of
 from stereocell.building.replaced_plan import replace_plan, replaced_plan, require_own_settings
 from stereocell.building.running_pass import remove_mixed
 from stereocell.building.surface_cover import notes_on_cover
@@ -189,8 +186,7 @@ def run_stage(out: Path, engine: Engine) -> None:
             for tile, step in zip(plan.tiles, steps, strict=True)
         }
         stage = stage_step(plan, survey, steps, tables)
-        done = partial(digest_of_stage, out_folder)
-        if phase.is_done(stage.key, done, require_own=require_own_stage):
+        if phase.is_done(stage):
             return
         out_folder.remove(stage_dir / USDZ_NAME)
         out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
@@ -226,8 +222,7 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         remove_half_bundle(out_folder)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
-        done = partial(digest_of_bundle, out_folder)
-        if not phase.is_done(step.key, done, require_own=require_own_bundle):
+        if not phase.is_done(step):
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key
             write_bundle(
