@@ -59,6 +59,7 @@ FORMATS: dict[str, tuple[str, str, str]] = {
     ),
 }
 _ANCHOR = re.compile(r"#/\$defs/(\w+)")
+_OTHER_SCHEMA = re.compile(r"urn:stereocell:schema:(\w+):1#/([$\w]+)/")
 
 
 def pages() -> dict[str, str]:
@@ -120,7 +121,10 @@ def _type(schema: Mapping[str, Any]) -> str:
     """Return a field's type in words."""
     if "$ref" in schema:
         name = schema["$ref"].rsplit("/", 1)[-1]
-        return f"[{name}](#{name.lower()})"
+        if (other := _OTHER_SCHEMA.match(schema["$ref"])) is None:
+            return f"[{name}](#{name.lower()})"
+        page = next(page for page, (_, own, _) in FORMATS.items() if own == other[1])
+        return f"[{name}]({page}.md#{name.lower() if other[2] == '$defs' else 'the-file'})"
     if "const" in schema:
         return f"`{json.dumps(schema['const'])}`"
     if "enum" in schema:

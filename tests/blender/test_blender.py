@@ -14,7 +14,6 @@ import pytest
 from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
 
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
@@ -23,6 +22,7 @@ from stereocell.formats.gltf_decode import read_glb
 from stereocell.formats.vdb import write_vdb
 from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.blender_session import NEEDS_BLENDER, run
@@ -96,7 +96,7 @@ def test_objects_are_coloured_hidden_and_renamed_up_to_the_bundle(
     assert before == whole > after > 0
     assert validate_stage(overlay) == []
     bundle = tmp_path / "bundle"
-    write_bundle(overlay, bundle, None, run=Engine(0).run)
+    write_bundle(overlay, bundle, None, engine=Engine(0))
     content = load(bundle / "channels/cells/objects.json")
     left = np.fromfile(bundle / content["labels"]["path"], "<u4")
     assert {str(label) for label in left} == set(labels) - gone
@@ -294,7 +294,7 @@ def test_edits_reach_the_bundle(stage_path: Path, tmp_path: Path, size: str) -> 
         delete=[leaf("r0_c0", BALL_ID)], move={"/Specimen/Tiles/r0_c0": offset},
     )  # fmt: skip
     assert validate_stage(overlay) == []
-    write_bundle(overlay, bundle, None, run=Engine(0).run)
+    write_bundle(overlay, bundle, None, engine=Engine(0))
     manifest = load(bundle / "manifest.json")
     letter, ball, _ = manifest["channels"]
     assert letter["color"] == [0.25, 0.5, 0.75]
@@ -415,7 +415,7 @@ def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, 
         found_at = prim.GetLocalTransformation().ExtractTranslation()
         assert np.allclose(found_at, expected or (0, 0, 0), atol=1e-5)
         assert prim.GetXformOpOrderAttr().HasAuthoredValue() == (expected is not None)
-    write_bundle(overlay, tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(overlay, tmp_path / "bundle", None, engine=Engine(0))
     ball = load(tmp_path / "bundle" / "manifest.json")["channels"][1]
     entries = load(tmp_path / "bundle" / ball["volumes"]["path"])["volumes"]
     assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])

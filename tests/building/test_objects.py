@@ -13,13 +13,13 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 from stereocell import samples
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.passes import Passes
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf_decode import read_glb
 from stereocell.planning import label_numbers
 from stereocell.planning.located_objects import CUT
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from stereocell.steps.unit_files import load_objects
+from stereocell.steps.write_bundle import write_bundle
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on
@@ -132,7 +132,7 @@ def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> N
     names = [f"{name}, it's" for name in kinds.GetCustomDataByKey("categories")]
     kinds.SetCustomDataByKey("categories", Vt.StringArray(names))
     layer.Save()
-    write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(out / "stage/names.usda", tmp_path / "bundle", None, engine=Engine(0))
     content = objects_of(tmp_path)
     (column,) = (one for one in content["columns"] if one["id"] == "cell_type")
     assert column["categories"] == names

@@ -6,12 +6,12 @@ import pytest
 from pxr import Sdf
 
 from stereocell.bundle.manifest import read_manifest
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError
 from stereocell.notebook.bundle_files import NotebookBundle
 from stereocell.serve.brick_library import BrickLibrary
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.layer_units import LINES
 from support import plain_bundle
 from support.bundles import write_tiles
@@ -39,7 +39,7 @@ def _over(stage: Path, place: Path) -> Path:
 
 
 def _fingerprint(stage: Path, place: Path) -> str:
-    write_bundle(stage, place, None, run=Engine(0).run)
+    write_bundle(stage, place, None, engine=Engine(0))
     return str(read_manifest(place)["specimen"].get("fingerprint", "not stated"))
 
 

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import files
 from support.phantoms import f_phantom, write_ome_tiff
 from support.validators import make_assets
@@ -50,7 +50,7 @@ def bundle_over(out: Path, folder: Path) -> Path:
     stage = Usd.Stage.Open(layer)
     stage.GetAttributeAtPath("/Specimen/Channels/F.stereocell:window").Set(Gf.Vec2f(*WINDOW))
     layer.Save()
-    write_bundle(folder / "edit.usda", folder / "bundle", None, run=Engine(0).run)
+    write_bundle(folder / "edit.usda", folder / "bundle", None, engine=Engine(0))
     return folder / "bundle"
 
 

@@ -11,12 +11,12 @@ import zstandard
 from jsonschema import Draft202012Validator
 from scipy.spatial import cKDTree
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.tiles3d import content_hash
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.mesh import Baked
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import schema_path
 from support import spheres
 from support.bundles import TILES, channel, files, load, volumes, write, write_tiles
@@ -184,7 +184,7 @@ def test_coarsest_keeps_the_occlusion_of_its_map_at_its_vertices(tmp_path):
 @pytest.mark.exhaustive  # whole builds are compared by every run: tests/system/test_build.py
 def test_two_exports_are_equal_whatever_the_workers(stage, bundle, tmp_path):
     with closing(Engine(2)) as engine:
-        write_bundle(stage, tmp_path / "again", None, run=engine.run)
+        write_bundle(stage, tmp_path / "again", None, engine=engine)
     assert files(tmp_path / "again") == files(bundle)
 
 
@@ -246,14 +246,14 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     (tmp_path / "dist" / "assets").mkdir(parents=True)
     (tmp_path / "dist" / "index.html").write_text("<!doctype html>")
     (tmp_path / "dist" / "assets" / "main.js").write_text("start()")
-    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
+    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
     assert (tmp_path / "bundle" / "assets" / "main.js").read_text("utf-8") == "start()"
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
 def test_viewer_that_is_not_built_is_named(stage, tmp_path):
     with pytest.raises(OutputError, match=r"dist: no index\.html, expected the built viewer"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
 
 
 def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
@@ -261,14 +261,14 @@ def test_viewer_may_not_hide_files_of_the_bundle(stage, tmp_path):
     for name in ("index.html", "manifest.json"):
         (tmp_path / "dist" / name).write_text("")
     with pytest.raises(OutputError, match=r"the bundle has a manifest\.json of its own"):
-        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", run=Engine(0).run)
+        write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
     assert not (tmp_path / "bundle").exists()
 
 
 @pytest.mark.parametrize("escape", ["id", "path"])
 def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path, escape):
     parts = tmp_path / "parts"
-    write_bundle(stage, tmp_path / "first", None, run=Engine(0).run, parts=parts)
+    write_bundle(stage, tmp_path / "first", None, engine=Engine(0), parts=parts)
     (tmp_path / "secret.txt").write_text("private")
     for record in sorted(parts.glob("*/tile.json")):
         content = load(record)
@@ -279,7 +279,7 @@ def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path
                 for file in channel["files"]:
                     file |= {"path": "../../secret.txt", "bytes": 7}
         record.write_text(json.dumps(content))
-    write_bundle(stage, tmp_path / "again", None, run=Engine(0).run, parts=parts)
+    write_bundle(stage, tmp_path / "again", None, engine=Engine(0), parts=parts)
     assert files(tmp_path / "again") == files(bundle)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"first", "again", "parts", "secret.txt"}

@@ -1,7 +1,7 @@
 """A step's key follows its name, VERSION and fields, and nothing else."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -31,6 +31,14 @@ class Sum(Keyed):
 
 
 @dataclass(frozen=True, slots=True)
+class Placed(Keyed):
+    VERSION: ClassVar[int] = 1
+
+    number: int
+    folder: Path = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Mean(Keyed):
     VERSION: ClassVar[int] = 1
 
@@ -52,6 +60,11 @@ HERE, THERE = Source("/here/a.tif", "f1"), Source("/there/b.tif", "f1")
 def test_a_source_counts_by_its_fingerprint_and_not_by_its_path() -> None:
     assert Sum(HERE).key == Sum(THERE).key
     assert Sum(HERE).key != Sum(Source("/here/a.tif", "f2")).key
+
+
+def test_a_field_without_comparison_does_not_count() -> None:
+    assert Placed(1, Path("/here")).key == Placed(1, Path("/there")).key
+    assert Placed(1, Path("/here")).key != Placed(2, Path("/here")).key
 
 
 def test_the_class_counts_by_its_name_and_its_version(monkeypatch: pytest.MonkeyPatch) -> None:

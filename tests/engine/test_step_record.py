@@ -1,5 +1,8 @@
 """The record of steps follows all the code, files and libraries that make a result."""
 
+import os
+import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from importlib.metadata import packages_distributions, requires
@@ -18,6 +21,7 @@ from support import step_record
 
 PACKAGE = step_record.PACKAGE
 UNITS = {"BuildUnit"}
+TOP = PACKAGE.parents[1]
 TILES = {"FindWindow", "GatherEvidence", "SumComponents", "BuildUnit"}
 OBJECTS = {"FindExtents", "BuildObjects"}
 
@@ -88,6 +92,40 @@ def test_a_changed_constant_in_a_reached_file_asks_for_a_decision(
     before = entry(text)
     assert entry(f"# a comment\n{text}") == before
     assert entry(change(text)) != before != recorded["steps"]["FindExtents"]["code"]
+
+
+@pytest.mark.slow
+def test_make_lint_asks_for_a_version_where_a_constant_changed(tmp_path: Path) -> None:
+    """The command runs in a copy of the tree, where a comment changed in a second file."""
+    module = "support.step_record"
+    assert f"-m {module.partition('.')[0]}" in (TOP / "Makefile").read_text("utf-8")
+    assert "\n\t$(SUPPORT).step_record\n" in (TOP / "Makefile").read_text("utf-8")
+    without = shutil.ignore_patterns("__pycache__", "*.tif")
+    for name in ("pipeline", "schemas", "usd_assets", "tests/support"):
+        shutil.copytree(TOP / name, tmp_path / name, ignore=without)
+    shutil.copy2(TOP / "requirements.lock", tmp_path)
+    package = tmp_path / "pipeline" / PACKAGE.name
+    denoise = package / "filters" / "denoise.py"
+    constant = "SMOOTHING_REACH = 4.0"
+    text = denoise.read_text("utf-8")
+    assert text.count(constant) == 1
+    denoise.write_text(text.replace(constant, "SMOOTHING_REACH = 4.5"), encoding="utf-8")
+    with (package / "objects" / "extents.py").open("a", encoding="utf-8") as file:
+        file.write("# This comment is new.\n")
+    done = subprocess.run(
+        [sys.executable, "-m", module],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(["tests", "pipeline"])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    changed, question = done.stderr.splitlines()
+    assert done.returncode == 1
+    named = set(changed.removeprefix("the code of ").removesuffix(" changed").split(", "))
+    assert named >= TILES
+    assert not named & {"FindExtents", *known_formats()}
+    assert "raise the step's VERSION" in question
 
 
 @pytest.mark.parametrize("file", ["usd_assets/lights.usda", "schemas/usd/schema.usda"])

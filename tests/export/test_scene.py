@@ -11,13 +11,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.export.scene import write_scene
 from stereocell.formats.tiles3d import TileLod, make_tilesets
 from stereocell.formats.tiles3d_levels import inlined, surfaces, without_finer
 from stereocell.model.errors import OutputError, UsageError
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import load, write_tiles
 from support.small_viewer import use_small_viewer
 
@@ -28,7 +28,7 @@ LINK = "https://host.example/page/?quality=low#v=1&c=CD31&eye=0,0,1.8,0,0,0"
 def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("scene")
     stage = write_tiles(folder / "stage")
-    write_bundle(stage, folder / "bundle", None, run=Engine(0).run)
+    write_bundle(stage, folder / "bundle", None, engine=Engine(0))
     return folder / "bundle"
 
 

@@ -5,11 +5,11 @@ import shutil
 
 import pytest
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
 from stereocell.formats.tiles3d import content_hash
 from stereocell.formats.tiles3d_walk import walk
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.formats import check
 from support import spheres
@@ -25,7 +25,7 @@ def made(tmp_path_factory):
     spheres.write_one_tile(out / "stage")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tiles3d, "MAX_WHOLE_TILES", 0)
-        write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
+        write_bundle(out / "stage" / "stage.usda", out / "bundle", None, engine=Engine(0))
     return out
 
 

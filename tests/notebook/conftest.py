@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from stereocell.bundle import blob_page
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.notebook import page
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import write_tiles
 
 
@@ -17,7 +17,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bundle by itself, to be read only."""
     folder = tmp_path_factory.mktemp("notebook")
     stage = write_tiles(folder / "stage")
-    write_bundle(stage, folder / "bundle", None, run=Engine(0).run)
+    write_bundle(stage, folder / "bundle", None, engine=Engine(0))
     return folder / "bundle"
 
 

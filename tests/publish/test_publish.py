@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 
 import pytest
 
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.publish.targets import AGAIN, FOREVER, FolderTarget
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import write_tiles
 from support.object_store import ObjectStore, serving_bucket
 from support.plain_bundle import FILES, below, write
@@ -66,7 +66,7 @@ def test_of_a_bundle_as_it_is_written_every_file_is_there(
     (viewer / "index.html").write_text("<!doctype html>")
     out, site = tmp_path / "out", tmp_path / "site"
     out.mkdir()
-    write_bundle(write_tiles(tmp_path / "stage"), out / "bundle", viewer, run=Engine(0).run)
+    write_bundle(write_tiles(tmp_path / "stage"), out / "bundle", viewer, engine=Engine(0))
     order: list[str] = []
     put = FolderTarget.write
 

@@ -19,6 +19,13 @@ class Unsupported(Exception):
     """As bioio_base.exceptions.UnsupportedFileFormatError is: of no other class."""
 
 
+class Nanometer:
+    """As a unit of pint is: its name is its text."""
+
+    def __str__(self) -> str:
+        return "nanometer"
+
+
 class BioImage:
     """The part of bioio.BioImage that is used."""
 
@@ -63,6 +70,28 @@ def test_a_plugin_s_format_is_read_with_its_scenes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(dataset.read(1, box).voxels, f_phantom()[box.slices] + 1)
     assert read.open(tmp_path / "a b.dv", series=1).levels[0].shape == (9, 48, 36)
     assert "Jane" not in "".join(read.list_series(tmp_path / "a b.dv"))
+    assert dataset.notes[-1].startswith("unit of the voxel size: not stated, um is assumed")
+
+
+@pytest.mark.usefixtures("_bioio")
+def test_a_plugin_s_units_and_both_sizes_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As bioio-base has them since 3.0: units of pint, and a scale beside the sizes."""
+    unit = SimpleNamespace(unit=Nanometer())
+    units, scale = SimpleNamespace(Z=unit, Y=unit, X=unit), SimpleNamespace(Z=500, Y=200, X=300)
+    sizes = SimpleNamespace(Z=500.0, Y=200.0, X=250.0)
+    for name, value in (("physical_pixel_sizes", sizes), ("scale", scale)):
+        monkeypatch.setattr(BioImage, name, value, raising=False)
+    monkeypatch.setattr(BioImage, "dimension_properties", units, raising=False)
+    (tmp_path / "a.dv").write_bytes(b"DV")
+    dataset = read.open(tmp_path / "a.dv")
+    assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
+    assert dataset.notes[-1] == (
+        "voxel spacing along x: physical_pixel_sizes states 0.25 um, scale states 0.3 um: "
+        "physical_pixel_sizes is used; --spacing-um z,y,x replaces it"
+    )
+    assert not [note for note in dataset.notes if note.startswith("unit ")]
 
 
 @pytest.mark.usefixtures("_bioio")

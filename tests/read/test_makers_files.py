@@ -234,6 +234,39 @@ def test_images_of_a_lif_are_series_without_their_names(tmp_path: Path) -> None:
     assert not any(name in "".join(lines) for name in ("Jane", "Joe", "Jim"))
 
 
+@pytest.mark.parametrize(
+    ("recorded", "note"),
+    [
+        ({"dblVoxelX": 0.25e-6, "dblVoxelY": 0.2e-6, "dblVoxelZ": 0.5e-6}, ""),
+        (
+            {"dblVoxelZ": 0.5e-6, "dblStepSize": -0.7e-6},
+            "voxel spacing along z: Length of the dimension states 0.5 um, dblStepSize of the "
+            "scanner states 0.7 um: Length of the dimension is used; --spacing-um z,y,x replaces "
+            "it",
+        ),
+        ({"dblVoxelX": 0.0, "dblStepSize": 0.0}, ""),
+    ],
+)
+def test_lengths_that_a_lif_states_twice_are_compared(
+    tmp_path: Path, recorded: dict[str, float], note: str
+) -> None:
+    path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())}, recorded=recorded)
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert dataset.notes == ((note,) if note else ())
+
+
+def test_the_unit_of_a_lif_s_lengths_counts(tmp_path: Path) -> None:
+    path = write_lif(tmp_path / "mm.lif", {"a": ("ZYX", f_phantom())}, spacing=1000, unit="mm")
+    assert read.open(path).levels[0].spacing_um == pytest.approx(SIZE_UM)
+    dataset = read.open(write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())}, unit=""))
+    assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
+    assert len(dataset.notes) == 3
+    assert dataset.notes[0].startswith("unit of length along z: not stated, m is assumed")
+    path = write_lif(tmp_path / "deg.lif", {"a": ("ZYX", f_phantom())}, unit="degree")
+    assert "--spacing-um" in refusal(path)
+
+
 def test_a_lif_without_lengths_asks_for_them(tmp_path: Path) -> None:
     path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())}, spacing=0)
     assert "--spacing-um" in refusal(path)
@@ -299,6 +332,25 @@ def test_an_nd2_without_a_length_asks_for_it(
     write_nd2(path, SMALL, spacing, about=about)
     assert "--spacing-um" in refusal(path)
     assert read.open(path, spacing_um=(2, 1, 1)).levels[0].spacing_um == (2, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("high", "note"),
+    [
+        (2.0 * (SMALL.shape[2] - 1), ""),
+        (2.0 * (SMALL.shape[2] - 1) + 1.5, ""),  # a range that is no multiple of the step
+        (3.0 * 2.0 * (SMALL.shape[2] - 1), "dZStep of the Z loop states 2 um, its range from"),
+    ],
+)
+def test_the_step_of_an_nd2_is_compared_with_its_range(
+    tmp_path: Path, high: float, note: str
+) -> None:
+    path = tmp_path / "a.nd2"
+    write_nd2(path, SMALL, (2.0, 1.0, 1.0), depth_loop={"dZLow": 0.0, "dZHigh": high})
+    dataset = read.open(path)
+    assert dataset.levels[0].spacing_um == (2.0, 1.0, 1.0)
+    assert bool(dataset.notes) == bool(note)
+    assert note in "".join(dataset.notes)
 
 
 def test_planes_of_an_nd2_that_were_taken_downwards_are_noted(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from stereocell.formats import voxel_bvh
-from stereocell.serve import brick_library, brick_session
+from stereocell.serve import brick_library, brick_session, frame_window
 from support.server.brick_bundles import phantom, replace_volume, write_out
 from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
 from support.server.running import serving
@@ -241,7 +241,7 @@ def test_bricks_that_a_client_finds_meanwhile_are_left_out(port):
 
 
 def test_a_full_window_without_an_ack_is_closed_in_the_end(port, monkeypatch):
-    monkeypatch.setattr(brick_session, "ACK_S", 0.1)
+    monkeypatch.setattr(frame_window, "ACK_S", 0.1)
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         t.acks = False

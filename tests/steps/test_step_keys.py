@@ -19,6 +19,7 @@ from support.step_record import find_steps
 SHAPE = (16, 24, 48)
 # fields that count by another one, or only name a place
 PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("Labels", "color")}
+PLACES |= {("WriteStageTile", "stage_dir")}
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,8 @@ def test_every_field_changes_the_key_and_no_place_does(steps: dict[str, Keyed], 
         else:
             assert other.key != step.key, path
             changed += 1
-    assert changed >= len(fields(step))  # type: ignore[arg-type]
+    counted = [one for one in fields(step) if one.compare]  # type: ignore[arg-type]
+    assert changed >= len(counted)
 
 
 Path_ = tuple[tuple[str, str], ...]  # of class and field, from the step inwards

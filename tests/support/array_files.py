@@ -5,6 +5,7 @@ LIF has no writer: it is made here byte by byte.
 
 import json
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +78,23 @@ def write_czi(path: Path, scenes: dict[int | None, NDArray[Any]], **about: Any) 
     return path
 
 
-def write_lif(path: Path, images: dict[str, tuple[str, NDArray[Any]]], spacing: Any = 1.0) -> Path:
-    """Write images, each with its axes, slowest first (`TCZYX` or a part in any order)."""
+def write_lif(
+    path: Path,
+    images: dict[str, tuple[str, NDArray[Any]]],
+    spacing: Any = 1.0,
+    *,
+    unit: str = "m",
+    recorded: Mapping[str, float] | None = None,
+) -> Path:
+    """Write images, each with its axes, slowest first (`TCZYX` or a part in any order).
+
+    unit      of the lengths, whose numbers are those in m
+    recorded  values of the scanner's records, by their identifiers
+    """
+    records = "".join(
+        f'<ScannerSettingRecord Identifier="{name}" Unit="m" Variant="{value:.9g}"/>'
+        for name, value in (recorded or {}).items()
+    )
     order = "XYZT"
     sizes_um = dict(zip("ZYX", SIZE_UM, strict=True)) | {"T": 1e6}
     elements, blocks = "", b""
@@ -96,14 +112,15 @@ def write_lif(path: Path, images: dict[str, tuple[str, NDArray[Any]]], spacing: 
             f'<DimensionDescription DimID="{order.index(axis) + 1}" '
             f'NumberOfElements="{counts[axis]}" Origin="0" '
             f'Length="{(counts[axis] - 1) * sizes_um[axis] * 1e-6 * spacing:.9g}" '
-            f'Unit="{"s" if axis == "T" else "m"}" BytesInc="{strides[axis]}" BitInc="0"/>'
+            f'Unit="{"s" if axis == "T" else unit}" BytesInc="{strides[axis]}" BitInc="0"/>'
             for axis in reversed(axes)
             if axis in order
         )
         elements += (
             f'<Element Name="{name}" UniqueID="u{number}"><Data><Image TextDescription="">'
             f"<ImageDescription><Channels>{channels}</Channels><Dimensions>{dimensions}"
-            "</Dimensions></ImageDescription></Image></Data>"
+            f'</Dimensions></ImageDescription><Attachment Name="HardwareSetting">{records}'
+            "</Attachment></Image></Data>"
             f'<Memory Size="{voxels.nbytes}" MemoryBlockID="Mem{number}"/></Element>'
         )
         block = f"Mem{number}"

@@ -2,8 +2,8 @@
 
 import json
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
 from support.glbs import read
@@ -50,7 +50,7 @@ def files(folder):
 def write(stage, folder):
     """Write the bundle of a stage; return the lines that were reported."""
     lines: list[str] = []
-    write_bundle(stage, folder, None, run=Engine(0).run, report_line=lines.append)
+    write_bundle(stage, folder, None, engine=Engine(0), report_line=lines.append)
     return lines
 
 

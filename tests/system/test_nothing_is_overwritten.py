@@ -63,9 +63,9 @@ OF_A_BUILD = {name for name, places in PLACES.items() if places.writes == "out" 
 # the functions with which the work of the commands begins; a guard comes before each of them
 BEGINNINGS = (
     "building.phases.remove_mixed",
-    "steps.write_stage_tile.StageTile.keep",
+    "steps.write_stage_tile.WriteStageTile.run",
     "building.tissue._learn",
-    "steps.write_bundle.write_bundle",
+    "building.phases.write_bundle",
     "export.write.Chosen",
     "export.write.write_scene",
     "preview.iso_value.window_step",

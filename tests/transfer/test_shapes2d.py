@@ -15,11 +15,11 @@ from pxr import Gf, Sdf, Usd, Vt
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
 from stereocell.model.errors import StageError
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import find_asset, schema_path
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.transfer.opacity import evaluate
@@ -292,7 +292,7 @@ def test_a_faulty_edit_is_one_clear_line(
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its bundle, to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, run=Engine(0).run)
+    write_bundle(stage, out, None, engine=Engine(0))
     return out
 
 
@@ -356,7 +356,7 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
         shapeSoftness=Vt.FloatArray([0]),
         gradientMax=0.74,
     )
-    write_bundle(path, tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(path, tmp_path / "bundle", None, engine=Engine(0))
     entry = channel(tmp_path / "bundle")
     assert entry["transfer_function"] == NAME  # what is chosen in the layer
     found = functions(tmp_path / "bundle")

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import write_tiles
 from support.unity_meta import PACKAGE
 
@@ -69,7 +69,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of two tiles and two channels, one without surfaces; to be read only."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
-    write_bundle(stage, out, None, run=Engine(0).run)
+    write_bundle(stage, out, None, engine=Engine(0))
     return out
 
 

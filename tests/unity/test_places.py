@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import load
 from support.unity_import import UM, boxes, child, texels_of, volume_of, world_of
 
@@ -36,7 +36,7 @@ def edited(stage: Path, tmp_path: Path) -> Callable[[Gf.Matrix4d], Path]:
         tile.MakeMatrixXform().Set(matrix)
         layer.Save()
         out = tmp_path / "edited"
-        write_bundle(Path(layer.realPath), out, None, run=Engine(0).run)
+        write_bundle(Path(layer.realPath), out, None, engine=Engine(0))
         return out
 
     return write
@@ -252,7 +252,7 @@ def test_tilesets_of_tilesets_are_followed(
 ) -> None:
     monkeypatch.setattr(tiles3d, "MAX_WHOLE_TILES", 1)
     bundle = tmp_path / "many"
-    write_bundle(stage, bundle, None, run=Engine(0).run)
+    write_bundle(stage, bundle, None, engine=Engine(0))
     assert (bundle / "channels" / "CD31" / "r0_c0" / "finer.json").exists()
     found = imported(bundle)
     assert check_surfaces(found, bundle) == 6

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from pxr import Usd, UsdGeom
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
 from support.deactivated import PARTS, deactivate
@@ -49,7 +49,7 @@ def test_a_bundle_leaves_out_a_deactivated_part(
     stage_path: Path, tmp_path: Path, part: str
 ) -> None:
     layer = deactivate(part, tmp_path / "edited.usda", stage_path)
-    write_bundle(layer, tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(layer, tmp_path / "bundle", None, engine=Engine(0))
     manifest = load(tmp_path / "bundle" / "manifest.json")
     assert [tile["id"] for tile in manifest["tiles"]] == list(TILES[part == "a tile" :])
     assert [channel["name"] for channel in manifest["channels"]] == list(

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from pxr import Usd
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StageError
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_levels import read_lods
 from stereocell.usd.read_stage import loaded, open_stage
@@ -48,7 +48,7 @@ def test_bundle_and_export_report_a_layer_without_units(stage_path: Path, tmp_pa
     layer = write_over(stage_path, tmp_path / "edit.usda", "")
     note = "states no metersPerUnit, no upAxis, no defaultPrim"
     lines: list[str] = []
-    write_bundle(layer, tmp_path / "b", None, run=Engine(0).run, report_line=lines.append)
+    write_bundle(layer, tmp_path / "b", None, engine=Engine(0), report_line=lines.append)
     assert sum(note in line for line in lines) == 1
     lines.clear()
     export_stage(layer, tmp_path / "flat.usdc", options=ExportOptions(), report=lines.append)

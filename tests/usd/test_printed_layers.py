@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.validate import validate_stage
 from support.bundles import load
 from support.printed_layers import find_layers, write_layer
@@ -38,7 +38,7 @@ def test_a_printed_layer_is_valid(stage_path: Path, tmp_path: Path, place: str) 
 @pytest.mark.parametrize("place", LAYERS)
 def test_a_printed_layer_goes_into_a_bundle(stage_path: Path, tmp_path: Path, place: str) -> None:
     layer = write_layer(LAYERS[place], tmp_path / "edited.usda", stage_path, F_ID)
-    write_bundle(layer, tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(layer, tmp_path / "bundle", None, engine=Engine(0))
     channel = load(tmp_path / "bundle" / "manifest.json")["channels"][0]
     if "inputs:color = " in LAYERS[place]:
         assert channel["color"] == [1, 0.1, 0.1]

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Tf, Usd
 
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StereoCellError
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd import read_stage, typed_values
 from stereocell.usd.read_attributes import color_of
 from stereocell.usd.typed_values import read_as
@@ -48,7 +48,7 @@ def edited(stage_path: Path, tmp_path: Path) -> Callable[[str, str], Path]:
 
 def refusal_of_bundle(layer: Path, folder: Path) -> str:
     with pytest.raises(StereoCellError) as raised:
-        write_bundle(layer, folder / "bundle", None, run=Engine(0).run)
+        write_bundle(layer, folder / "bundle", None, engine=Engine(0))
     return str(raised.value)
 
 

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import pytest
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.formats.stl import write_stl
@@ -16,6 +15,7 @@ from stereocell.planning import settings as settings_module
 from stereocell.planning.channels import Channel
 from stereocell.planning.plan import make_plan
 from stereocell.read import Level
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.written_files import write_list
@@ -33,7 +33,7 @@ def made(tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
     spheres.write_one_tile(out / "stage")
     write_list(out / "stage", {}, out / "stage")
-    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, run=Engine(0).run)
+    write_bundle(out / "stage" / "stage.usda", out / "bundle", None, engine=Engine(0))
     return out
 
 
@@ -222,7 +222,7 @@ def test_a_build_without_any_surface_passes(tmp_path):
         provenance={},
     )
     write_list(tmp_path / "stage", {}, tmp_path / "stage")
-    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, run=Engine(0).run)
+    write_bundle(tmp_path / "stage" / "stage.usda", tmp_path / "bundle", None, engine=Engine(0))
     found = lines(tmp_path)
     assert failed(found) == set()
     assert found["glTF validator"].detail == "0 files: no channel has a surface"

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from stereocell.bundle.scene_blocks import FILE, block
-from stereocell.bundle.write import write_bundle
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.export.scene import write_scene
+from stereocell.steps.write_bundle import write_bundle
 from support.bundles import write_tiles
 from support.small_viewer import use_small_viewer
 
@@ -28,7 +28,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The document of a scene."""
     folder = tmp_path_factory.mktemp("scene")
     stage = write_tiles(folder / "stage")
-    write_bundle(stage, folder / "bundle", None, run=Engine(0).run)
+    write_bundle(stage, folder / "bundle", None, engine=Engine(0))
     with pytest.MonkeyPatch.context() as patch:
         use_small_viewer(folder / "dist", patch)
         write_scene(folder / "bundle", folder / "s.html", view=VIEW)

@@ -1,16 +1,28 @@
-"""A phase of a build: whether what it made is whole, and made of the same as it would be now."""
+"""A phase of a build: whether its results are whole, and made of the same as they would be now.
+
+A phase is no work for the runner of steps. Its results lie at places that users know and may edit
+them in, so no key names them, and phases.json keeps the key beside a digest of the results.
+"""
 
 import hashlib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from stereocell.building.made_of import FIELD, made_of
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.own_parts import (
+    require_own_bundle,
+    require_own_report,
+    require_own_stage,
+)
 from stereocell.building.sealed_documents import require_documents
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
+from stereocell.engine.step import Keyed
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import find_faults, list_files, read_list, sizes_of
 from stereocell.usd import written_files
@@ -26,21 +38,18 @@ class Phase:
         self.is_up_to_date = False
         self.is_whole = True  # False: some results are still missing
 
-    def is_done(
-        self, key: str, results: Callable[[], str], *, require_own: Callable[[OutFolder], None]
-    ) -> bool:
+    def is_done(self, step: Keyed) -> bool:
         """Return whether the phase's results are whole and made from the same inputs.
 
-        key          digest of the inputs
-        results      returns a digest of the results
-        require_own  raises OutputError where the phase would replace files that it did not write.
-                     It is called if there is work to do, before the phase is recorded as begun
+        Raises OutputError where there is work to do that would replace files that the phase did not
+        write, before it is recorded as begun.
         """
-        self.key, self.results = key, results
+        kind = _RESULTS[self.name]
+        self.key, self.results = step.key, partial(kind.digest, self.out_folder)
         entry = self.out_folder.phases().get(self.name, {})
-        self.is_up_to_date = entry.get("key") == key and entry["results"] == results()
+        self.is_up_to_date = entry.get("key") == self.key and entry["results"] == self.results()
         if not self.is_up_to_date:
-            require_own(self.out_folder)
+            kind.require_own(self.out_folder)
             # an empty key: a killed phase is not done
             self.save(0.0, is_finished=False)
         return self.is_up_to_date
@@ -90,7 +99,7 @@ def states_of(files: Iterable[Path]) -> list[tuple[str, int, int]]:
     return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
-def digest_of_names(folder: Path) -> str:
+def _digest_of_names(folder: Path) -> str:
     """Return a digest of the names and sizes of all files below a folder: damage changes it."""
     digest = hashlib.sha256()
     for path, size in sizes_of(folder).items():
@@ -98,7 +107,7 @@ def digest_of_names(folder: Path) -> str:
     return digest.hexdigest()[:20]
 
 
-def digest_of_bundle(out_folder: OutFolder) -> str:
+def _digest_of_bundle(out_folder: OutFolder) -> str:
     """Return a digest of the bundle; empty where one of its files is missing or damaged."""
     path = out_folder.bundle_dir / FILES
     try:
@@ -106,21 +115,23 @@ def digest_of_bundle(out_folder: OutFolder) -> str:
     except OutputError:
         return ""
     faults = find_faults(out_folder.bundle_dir, listed, since=path)
-    return "" if faults else digest_of_names(out_folder.bundle_dir) + digest_of_manifest(out_folder)
+    return (
+        "" if faults else _digest_of_names(out_folder.bundle_dir) + digest_of_manifest(out_folder)
+    )
 
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
     """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
-    return digest_of_file(out_folder.bundle_dir / MANIFEST)
+    return _digest_of_file(out_folder.bundle_dir / MANIFEST)
 
 
-def digest_of_file(file: Path) -> str:
+def _digest_of_file(file: Path) -> str:
     """Return a digest of a file's content; empty: there is none."""
     listed = list_files(file, root=file.parent)
     return str(listed[file.name]["sha256"])[:20] if listed else ""
 
 
-def digest_of_stage(out_folder: OutFolder) -> str:
+def _digest_of_stage(out_folder: OutFolder) -> str:
     """Return a digest of the stage's list; empty where one of its files is missing or damaged."""
     try:
         listed = written_files.read_stage_list(out_folder.stage_dir)
@@ -129,3 +140,23 @@ def digest_of_stage(out_folder: OutFolder) -> str:
     if not written_files.is_kept(out_folder.stage_dir, listed, since=out_folder.stage_list):
         return ""
     return written_files.digest_of(listed)
+
+
+class _Results(NamedTuple):
+    """The results of a phase.
+
+    digest       of them; empty where one is missing or damaged
+    require_own  raises OutputError where the phase would replace files that it did not write
+    """
+
+    digest: Callable[[OutFolder], str]
+    require_own: Callable[[OutFolder], None]
+
+
+_RESULTS = {
+    "stage": _Results(_digest_of_stage, require_own_stage),
+    "bundle": _Results(_digest_of_bundle, require_own_bundle),
+    "report": _Results(
+        lambda out_folder: _digest_of_file(out_folder.report_file), require_own_report
+    ),
+}

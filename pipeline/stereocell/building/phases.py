@@ -7,7 +7,6 @@ is a key of all that it depends on.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 from stereocell.building.bundle_inputs import (
@@ -19,12 +18,10 @@ from stereocell.building.bundle_inputs import (
 from stereocell.building.object_records import save_notes, table_of_objects
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
-    require_own_bundle,
     require_own_places,
-    require_own_stage,
 )
 from stereocell.building.passes import Passes
-from stereocell.building.phase import Phase, digest_of_bundle, digest_of_stage, phase_of
+from stereocell.building.phase import Phase, phase_of
 from stereocell.building.replaced_plan import replace_plan, replaced_plan, require_own_settings
 from stereocell.building.running_pass import remove_mixed
 from stereocell.building.surface_cover import notes_on_cover
@@ -53,7 +50,7 @@ from stereocell.planning.survey import Survey
 from stereocell.planning.unit_steps import choose_units, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
-from stereocell.steps.write_stage_tile import StageTile
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
@@ -183,24 +180,26 @@ def run_stage(out: Path, engine: Engine) -> None:
             located = Passes(out_folder, plan, engine).objects(labels)
             tables[labels.id], remarks = table_of_objects(out_folder, plan, labels, located)
             phase.print(*remarks)
-        tiles = [
-            StageTile(
-                stage_tile_step(plan, tile, units, tables), out_folder.tile_file(tile.id), stage_dir
-            )
-            for tile in plan.tiles
-        ]
-        stage = stage_step(plan, survey, [tile.step for tile in tiles], tables)
-        done = partial(digest_of_stage, out_folder)
-        if phase.is_done(stage.key, done, require_own=require_own_stage):
+        steps = [stage_tile_step(plan, tile, units, tables, stage_dir) for tile in plan.tiles]
+        tiles = {
+            tile.id: Kept(tile.id, step, out_folder.tile_file(tile.id), step.inputs)
+            for tile, step in zip(plan.tiles, steps, strict=True)
+        }
+        stage = stage_step(plan, survey, steps, tables)
+        if phase.is_done(stage):
             return
         out_folder.remove(stage_dir / USDZ_NAME)
         out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
-        run_missing(engine, "stage", tiles)
+        run_missing(engine, "stage", tiles.values())
         stage.write(stage_dir)
-        out_folder.remove_other_folders(stage_dir / "tiles", {tile.id for tile in plan.tiles})
-        lists = [tile.listed() for tile in tiles]
-        files = {path: entry for listed, _ in lists for path, entry in listed.items()}
-        if measured := sum(measured for _, measured in lists):
+        out_folder.remove_other_folders(stage_dir / "tiles", {*tiles})
+        made = {id_: tile.read() for id_, tile in tiles.items()}
+        files = {
+            f"tiles/{id_}/{name}": entry
+            for id_, one in made.items()
+            for name, entry in one.files.items()
+        }
+        if measured := sum(one.measured_bytes for one in made.values()):
             whole = sum(entry["bytes"] for entry in files.values())
             phase.print(
                 f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for other "
@@ -223,11 +222,17 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         remove_half_bundle(out_folder)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
-        done = partial(digest_of_bundle, out_folder)
-        if not phase.is_done(step.key, done, require_own=require_own_bundle):
+        if not phase.is_done(step):
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key
-            step.write(out_folder.bundle_dir, path, viewer, parts=parts, run=engine.run)
+            write_bundle(
+                path,
+                out_folder.bundle_dir,
+                viewer,
+                engine=engine,
+                parts=parts,
+                report_line=phase.print,
+            )
             phase.about = "" if stage is None else f"of {printable(path.name)}"
     out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:

@@ -83,13 +83,19 @@ class TileChannel:
 
 @dataclass(frozen=True, slots=True)
 class BundleTile:
-    """One tile in the bundle. `low`, `high`: corners (x, y, z) of its box in the world, um."""
+    """One tile in the bundle.
+
+    low      corner (x, y, z) of its box in the world, um
+    high     the opposite corner
+    changed  paths of its layers that differ from the stage's list, from the stage's folder
+    """
 
     id: str
     representation: Representation
     low: WorldPoint
     high: WorldPoint
     channels: tuple[TileChannel, ...]
+    changed: tuple[str, ...] = ()
 
 
 def write_file(root: Path, path: str, content: bytes) -> FileRef:
@@ -103,17 +109,19 @@ def _records() -> TypeAdapter[BundleTile]:
     return TypeAdapter(BundleTile)
 
 
-def find_part(part: Path) -> BundleTile | None:
-    """Return the tile whose part lies in a folder, or None where it isn't there as a whole."""
+def read_part(part: Path) -> BundleTile:
+    """Return the tile whose part lies in a folder. Raises OutputError where it isn't whole."""
+    remedy = "run `stereocell bundle OUT` again"
     try:
-        tile = _records().validate_python(read_json(part / _RECORD, None, ""))
-    except (OutputError, ValidationError):
-        return None
+        tile = _records().validate_python(read_json(part / _RECORD, None, remedy))
+    except ValidationError:
+        raise OutputError(f"{part / _RECORD}: damaged: {remedy}") from None
     sizes = sizes_of(part)
     refs = [ref for channel in tile.channels for ref in channel.files]
     # by these names files are moved: they must be of this folder
-    is_own = tile.id == part.name and all(sizes.get(ref.path) == ref.bytes for ref in refs)
-    return tile if is_own else None
+    if tile.id != part.name or any(sizes.get(ref.path) != ref.bytes for ref in refs):
+        raise OutputError(f"{part}: damaged: {remedy}")
+    return tile
 
 
 def write_record(root: Path, tile: BundleTile) -> None:

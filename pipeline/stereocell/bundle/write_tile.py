@@ -48,17 +48,16 @@ from stereocell.usd.written_files import AsWritten
 FIRST_COLUMN = "volume_um3"  # first column of every table of objects
 
 
-def export_tile(
+def write_tile(
     stage_path: Path,
-    parts: Path,
-    tile_id: str,
+    part: Path,
     *,
     appearances: tuple[ComposedAppearance, ...],
     step_m: float,
-) -> tuple[BundleTile, set[Path]]:
-    """Write one tile's part, `parts`/<tile>/; see gltf.py for the lattice step, in metres.
+) -> None:
+    """Write the part of the tile that its folder is named by; see gltf.py for the lattice step.
 
-    Returns the tile, and the layers of it that are not as the stage's list says.
+    step_m  of the lattice, metres
 
     Opens the stage anew and loads this tile only, so that it runs in any process and the memory
     of the others does not grow. Raises StageError and OutputError.
@@ -67,8 +66,8 @@ def export_tile(
     stage = open_stage(stage_path)
     with (
         usd_boundary(stage_path),
-        replacing_folder(parts / tile_id) as root,
-        loaded(stage, tile_id, as_written=as_written) as (tile, choice),
+        replacing_folder(part) as root,
+        loaded(stage, part.name, as_written=as_written) as (tile, choice),
     ):
         volumes = [read_volume(tile, appearance.id) for appearance in appearances]
         channels = [
@@ -84,9 +83,15 @@ def export_tile(
             for appearance, volume in zip(appearances, volumes, strict=True)
         ]
         low, high = find_bounds(tile, volumes)
-        made = BundleTile(tile_id, choice.representation, low, high, tuple(channels))
+        changed = tuple(sorted(path_from_stage(file, stage_path) for file in as_written.changed))
+        made = BundleTile(part.name, choice.representation, low, high, tuple(channels), changed)
         write_record(root, made)
-    return made, as_written.changed
+
+
+def path_from_stage(file: Path, stage_path: Path) -> str:
+    """Return a layer's path from the folder of the stage; of one that lies elsewhere, its own."""
+    folder = stage_path.absolute().parent
+    return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else str(file)
 
 
 def find_bounds(tile: Usd.Prim, volumes: Sequence[ComposedVolume | None]) -> tuple[Point, Point]:

@@ -43,7 +43,8 @@ def examine() -> Iterator[Finding]:
     """Yield the findings, one after another. Changes nothing on this machine."""
     for look in LOOKS:
         try:
-            yield look()
+            found = look()
+            yield from found if isinstance(found, list) else [found]
         except ImportError as error:  # the line of the packages names the missing ones
             name = look.__name__.strip("_")
             yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
@@ -166,6 +167,15 @@ def _gpu() -> Finding:
     return _finding("GPU", bool(devices), found, cost)
 
 
+def _formats() -> list[Finding]:
+    """Check the libraries that formats need beyond StereoCell's own."""
+    from stereocell.read.known_formats import known_formats
+
+    rows = known_formats().values()
+    libraries = [one for row in rows for one in (row.library, row.decoders) if one is not None]
+    return [_extra(one.extra, f"to read {one.reads}", one.import_name)() for one in libraries]
+
+
 def _extra(name: str, work: str, *modules: str) -> Callable[[], Finding]:
     """Return the check of an extra.
 
@@ -186,7 +196,7 @@ def _finding(name: str, ok: bool, found: str, cost: str, is_needed: bool = False
     return Finding(name, ok, found, "" if ok else cost, is_needed)
 
 
-LOOKS: tuple[Callable[[], Finding], ...] = (
+LOOKS: tuple[Callable[[], Finding | list[Finding]], ...] = (
     _python,
     _packages,
     _cores,
@@ -197,13 +207,10 @@ LOOKS: tuple[Callable[[], Finding], ...] = (
     _browser,
     _node,
     _gpu,
+    _formats,
     _extra("alpha-wrap", "for `--wrap alpha-wrap` alone", "pymeshlab"),
-    _extra("czi", "to read .czi (Zeiss)", "pylibCZIrw"),
     _extra("draco", "to export .precomputed and Draco's .glb", "DracoPy"),
-    _extra("hdf5", "to read HDF5 packed by Blosc, zstd, LZ4 and others", "hdf5plugin"),
-    _extra("lif", "to read .lif (Leica)", "liffile"),
     _extra("maps", "for UVs and baked maps (`--maps`) alone", "xatlas", "alktx2"),
-    _extra("nd2", "to read .nd2 (Nikon)", "nd2"),
     _extra("notebook", "for `stereocell.show` alone", "anywidget", "IPython", "traitlets"),
     _extra("onnx", "for `stereocell tissue --model` alone", "onnxruntime"),
     _extra("tables", "to read tables in Parquet", "pyarrow"),

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from stereocell.engine.run import Engine
-from stereocell.engine.step import Document, Keyed, Step
+from stereocell.engine.step import Document, Step, Work
 from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
@@ -26,46 +26,33 @@ class Reads(Protocol):
     def inputs(self) -> Sequence[Path]: ...
 
 
-class Task(Reads, Protocol):
-    """Work of one worker, with the place of its result. It is picklable.
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Work, with the place of its files.
 
-    name  for progress and errors, as `<tile>/<channel>`
+    name    for progress and errors, as `<tile>/<channel>`
+    inputs  see `Reads`
     """
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def step(self) -> Keyed: ...
-    @property
-    def place(self) -> Path: ...
-
-    def is_whole(self) -> bool:
-        """Return whether the result lies at its place, as it was written."""
-
-    def keep(self) -> None:
-        """Compute the result and write it, whole or not at all."""
-
-
-@dataclass(frozen=True, slots=True)
-class Kept(Generic[R]):
-    """A step, and the place of its result."""
-
     name: str
-    step: Step[R]
+    step: Work
     place: Path
     inputs: tuple[Path, ...] = ()
 
     def is_whole(self) -> bool:
         """Return whether the result lies at its place, as it was written."""
-        return self.step.FORM.is_whole(self.place)
+        return self.step.is_whole(self.place)
 
-    def keep(self) -> None:
-        """Compute the result and write it."""
-        self.step.FORM.write(self.place, self.step.run())
+
+@dataclass(frozen=True, slots=True)
+class Kept(Task, Generic[R]):
+    """A step that keeps its result as a document or as the folder of a unit."""
+
+    step: Step[R]
 
     def read(self) -> R:
         """Return the result of a step that keeps a document. Raises OutputError."""
-        form = self.step.FORM
+        form: Any = self.step.FORM
         assert isinstance(form, Document)
         result: R = form.read(self.place)
         return result
@@ -125,7 +112,7 @@ def run_missing(
 def keep(task: Task) -> None:
     """Compute one result and write it, on a worker."""
     with cached(*task.inputs):
-        task.keep()
+        task.step.keep(task.place)
 
 
 def with_inputs(function: Callable[[S], R], task: S) -> R:

@@ -35,8 +35,9 @@ class Form(Protocol[R_contra]):
 class Keyed:
     """Work that is skipped where its key is unchanged. Subclasses are frozen dataclasses.
 
-    A field that does not change the result is not a field. Work that a phase carries out as a whole
-    is a direct subclass, with a method of its own, as `write` of `WriteStage`.
+    A field that does not change the result is not a field, except one with `compare=False`: it only
+    says where something lies. Work that a phase carries out as a whole is a direct subclass, with a
+    method of its own, as `write` of `WriteStage`: see building/phase.py.
 
     VERSION  is raised when the same fields give another result
     """
@@ -47,12 +48,27 @@ class Keyed:
     @property
     def key(self) -> str:
         """The name of the result, 20 hexadecimal digits."""
-        own = {one.name: content_of(getattr(self, one.name)) for one in fields(self)}  # type: ignore[arg-type]
+        counted = (one.name for one in fields(self) if one.compare)  # type: ignore[arg-type]
+        own = {name: content_of(getattr(self, name)) for name in counted}
         return key_of([type(self).__name__, self.VERSION, own])
 
 
-class Step(Keyed, ABC, Generic[R]):
-    """A task of one worker, whose result is kept. Subclasses are picklable.
+class Work(ABC):
+    """The work of one worker: it writes files at a place. Subclasses are picklable."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the result lies at a place, as it was written."""
+
+    @abstractmethod
+    def keep(self, place: Path) -> None:
+        """Compute the result and write it to a place, whole or not at all. Raises OutputError."""
+
+
+class Step(Keyed, Work, Generic[R]):
+    """Work whose result is kept under a key.
 
     FORM  the form of the result in OUT
     """
@@ -63,6 +79,14 @@ class Step(Keyed, ABC, Generic[R]):
     @abstractmethod
     def run(self) -> R:
         """Compute the result."""
+
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the result lies at a place, as it was written."""
+        return self.FORM.is_whole(place)
+
+    def keep(self, place: Path) -> None:
+        """Compute the result and write it to a place. Raises OutputError."""
+        self.FORM.write(place, self.run())
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,6 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
-from stereocell.model.errors import OutputError
-from stereocell.storage.workspace import is_mirrored
 from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, UP_AXIS, export
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
@@ -33,10 +31,6 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
 
 def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     """Write .usdc or .usda; return a line about it. Raises OutputError."""
-    if is_mirrored(chosen.path):
-        raise OutputError(
-            f"{path.name}: it names files of OUT by their paths, expected OUT in a folder, or .usdz"
-        )
     stage = chosen.stage
     kept = {channel.id for channel in chosen.channels}
     for name in chosen.tiles:

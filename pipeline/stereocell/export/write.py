@@ -43,17 +43,19 @@ _LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "sc
 class Format:
     """How an ending is written, and the options that it takes beside --channels.
 
-    write      is given the level of detail, 0 where the format has none; returns a line about the
-               file
-    triangles  the most that are wanted if nothing is said; a coarsest level of more is taken
-    is_seen    made to be looked at: without --channels it has those that the viewer opens with
-    beside     returns the paths of what goes with the file
+    write        is given the level of detail, 0 where the format has none; returns a line about the
+                 file
+    triangles    the most that are wanted if nothing is said; a coarsest level of more is taken
+    is_seen      made to be looked at: without --channels it has those that the viewer opens with
+    names_files  names files of OUT by their paths, so OUT has to be a folder
+    beside       returns the paths of what goes with the file
     """
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
     triangles: int | None = None
     is_seen: bool = False
+    names_files: bool = False
     beside: Callable[[Path, ExportOptions], list[Path]] = lambda _path, _options: []
 
     @property
@@ -71,8 +73,8 @@ FORMATS = {
     ".gltf": _GLTF,
     **dict.fromkeys(PRINT_ENDINGS, _PRINT),
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
-    ".usdc": Format(write_flattened, _USD),
-    ".usda": Format(write_flattened, _USD),
+    ".usdc": Format(write_flattened, _USD, names_files=True),
+    ".usda": Format(write_flattened, _USD, names_files=True),
     ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES, is_seen=True),
     ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
     ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
@@ -112,6 +114,10 @@ def export(
     path = stage if stage is not None else out_folder.stage_file
     if not out_folder.has(path):
         raise no_layer(path, is_given=stage is not None)
+    if out_folder.is_stored and path.is_relative_to(out) and FORMATS[find_ending(file)].names_files:
+        raise OutputError(
+            f"{file.name}: it names files of OUT by their paths, expected OUT in a folder, or .usdz"
+        )
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)

@@ -16,7 +16,11 @@ from stereocell.steps.write_stage_tile import TableOfTile, UnitPart, WriteStageT
 
 
 def stage_tile_step(
-    plan: Plan, tile: Tile, units: Mapping[str, Path], tables: Mapping[str, ObjectTable]
+    plan: Plan,
+    tile: Tile,
+    units: Mapping[str, Path],
+    tables: Mapping[str, ObjectTable],
+    stage_dir: Path,
 ) -> WriteStageTile:
     """Return the step of one tile.
 
@@ -46,7 +50,7 @@ def stage_tile_step(
         TableOfTile(id_, table.of_tile(tile.id), table.touching(tile.id))
         for id_, table in tables.items()
     )
-    return WriteStageTile(content, tuple(parts), plan.shared_volumes, own)
+    return WriteStageTile(content, tuple(parts), plan.shared_volumes, own, stage_dir=stage_dir)
 
 
 def stage_step(

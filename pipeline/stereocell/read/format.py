@@ -29,10 +29,14 @@ class Guide(NamedTuple):
 
 
 class Library(NamedTuple):
-    """A library that an extra of StereoCell installs."""
+    """A library that an extra of StereoCell installs.
+
+    reads  the files that need it, in words
+    """
 
     import_name: str
     extra: str
+    reads: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +57,7 @@ class Format:
     version          is raised when the same file gives other voxels or another place: a part of the
                      key of each result
     library          the library that it needs beyond StereoCell's own
+    decoders         a library that unpacks more of its files than StereoCell's own do
     endings          of its files' names, in lower case, the usual one first
     loose_endings    of files whose first bytes may state another format, which is then taken
     folder_endings   of its folders' names: all in such a folder is of the format
@@ -81,6 +86,7 @@ class Format:
     is_remote: bool = False
     version: int = 1
     library: Library | None = None
+    decoders: Library | None = None
     endings: tuple[str, ...] = ()
     loose_endings: tuple[str, ...] = ()
     folder_endings: tuple[str, ...] = ()
@@ -108,5 +114,5 @@ class Format:
     def require_library(self, location: Location) -> None:
         """Raise SourceError, with the command that installs it, where the library is missing."""
         if self.library is not None:
-            name, extra = self.library
+            name, extra = self.library.import_name, self.library.extra
             require_installed(name, extra, location.shown, self.short_title)

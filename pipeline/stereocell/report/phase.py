@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 from stereocell.building.made_of import FIELD
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.own_parts import require_own_report
-from stereocell.building.phase import digest_of_file, phase_of
+from stereocell.building.phase import phase_of
 from stereocell.engine.step import Keyed
 from stereocell.planning.provenance import provenance_record
 from stereocell.report.page import TEMPLATE, write_report
@@ -49,6 +47,5 @@ def run_report(out: Path) -> None:
             others,
             TEMPLATE.read_text("utf-8"),
         )
-        done = partial(digest_of_file, out_folder.report_file)
-        if not phase.is_done(step.key, done, require_own=require_own_report):
+        if not phase.is_done(step):
             write_report(out)

@@ -34,18 +34,16 @@ from stereocell.formats.brick_stream import (
     FRAME,
     TABLE_FRAME,
     VERSION,
-    BrickFormatError,
     Frame,
     Part,
     encode_frame,
-    parse_message,
 )
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.brick_library import BrickFile, BrickLibrary, UnknownVolumeError
 from stereocell.serve.brick_order import View, order
+from stereocell.serve.frame_window import FrameWindow
 from stereocell.serve.limits import (
     ACK_S,
-    ACKS_PER_S,
     CLIENT_SOCKETS,
     FRAME_BYTES,
     HELLO_S,
@@ -54,9 +52,9 @@ from stereocell.serve.limits import (
     MESSAGE_BYTES,
     MESSAGES_PER_S,
     WINDOW_BYTES,
-    Bucket,
     Refusal,
 )
+from stereocell.serve.message_reader import MessageReader
 
 _AHEAD = 2048  # bricks considered for one frame
 _LOG = logging.getLogger(__name__)
@@ -131,19 +129,14 @@ class BrickSession:
         self._library = library
         self._builder = builder
         self._quick = quick
-        self._window = WINDOW_BYTES
+        self._window = FrameWindow()
+        self._messages = MessageReader(socket)
         self._trees: list[_Tree] = []
         self._asked = 0  # trees requested
         self._to_open: asyncio.Queue[dict[str, str]] = asyncio.Queue()
         self._outbox: deque[str | Part] = deque()
         self._view: _Running | None = None
         self._wake = asyncio.Event()
-        self._sequence = 0
-        self._flying: deque[tuple[int, int]] = deque()  # (sequence, bytes) without an ack
-        self._flying_bytes = 0
-        self._acked = asyncio.Event()
-        self._messages = Bucket(MESSAGES_PER_S)
-        self._acks = Bucket(ACKS_PER_S)
 
     async def run(self) -> None:
         """Serve the client. Closes the socket, unless the client left."""
@@ -173,21 +166,23 @@ class BrickSession:
     async def _read(self) -> None:
         try:
             async with asyncio.timeout(HELLO_S):
-                hello = await self._receive()
+                hello = await self._messages.read()
         except TimeoutError:
             raise Refusal(1008, f"no hello within {HELLO_S:g} s") from None
         if hello["type"] != "hello":
             raise Refusal(1008, f"{hello['type']} before hello")
         if hello["version"] != VERSION:
             raise Refusal(1008, f"version {hello['version']}, expected {VERSION}")
-        self._window = int(hello.get("window", WINDOW_BYTES))
+        self._window.size = int(hello.get("window", WINDOW_BYTES))
         limits = {
             "message_bytes": MESSAGE_BYTES,
             "trees": MAX_TREES,
             "messages_per_s": MESSAGES_PER_S,
             "ack_s": ACK_S,
         }
-        self._say({"type": "welcome", "version": VERSION, "window": self._window, "limits": limits})
+        self._say(
+            {"type": "welcome", "version": VERSION, "window": self._window.size, "limits": limits}
+        )
         handlers: dict[str, Callable[[dict[str, Any]], None]] = {
             "ack": self._on_ack,
             "cancel": self._on_cancel,
@@ -196,37 +191,14 @@ class BrickSession:
             "view": self._on_view,
         }
         while True:
-            message = await self._receive()
+            message = await self._messages.read()
             handler = handlers.get(message["type"])
             if handler is None:
                 raise Refusal(1008, "a second hello")
             handler(message)
 
-    async def _receive(self) -> dict[str, Any]:
-        event = await self._socket.receive()
-        if event["type"] != "websocket.receive":
-            raise WebSocketDisconnect(event.get("code", 1006), event.get("reason"))
-        text = event.get("text")
-        if text is None:
-            raise Refusal(1003, "binary frames go to the client only")
-        if len(text) > MESSAGE_BYTES:
-            raise Refusal(1009, f"a message of more than {MESSAGE_BYTES} bytes")
-        try:
-            message = parse_message(text)
-        except BrickFormatError as error:
-            raise Refusal(1007, str(error)) from None
-        bucket = self._acks if message["type"] == "ack" else self._messages
-        if not bucket.take():
-            raise Refusal(1008, f"more than {bucket.per_s} messages a second")
-        return message
-
     def _on_ack(self, message: dict[str, Any]) -> None:
-        sequence = int(message["sequence"])
-        if sequence > self._sequence:
-            raise Refusal(1008, f"ack of frame {sequence}, the last one was {self._sequence}")
-        while self._flying and self._flying[0][0] <= sequence:
-            self._flying_bytes -= self._flying.popleft()[1]
-        self._acked.set()
+        self._window.acknowledge(int(message["sequence"]))
 
     def _on_cancel(self, message: dict[str, Any]) -> None:
         if self._view is not None and self._view.id == int(message["id"]):
@@ -287,21 +259,7 @@ class BrickSession:
                 _Tree(tile, channel, file.table_hash, len(table.nodes), bytearray(len(table.nodes)))
             )
             follows = wanted.get("table") != file.table_hash
-            self._say(
-                {
-                    "type": "tree",
-                    "tree": number,
-                    "tile": tile,
-                    "channel": channel,
-                    "source": file.volume.source,
-                    "table": file.table_hash,
-                    "table_bytes": table.bytes,
-                    "table_follows": follows,
-                    "nodes": len(table.nodes),
-                    "bricks": int(np.count_nonzero(table.nodes["length"])),
-                    "brick_bytes": table.brick_bytes,
-                }
-            )
+            self._say(_describe(number, wanted, file, table_follows=follows))
             if follows:
                 for at in range(0, table.bytes, FRAME_BYTES):
                     part = file.table_bytes[at : at + FRAME_BYTES]
@@ -316,7 +274,7 @@ class BrickSession:
                 if isinstance(item, str):
                     await self._socket.send_text(item)
                 else:
-                    frame = Frame(TABLE_FRAME, self._sequence + 1, 0, (item,))
+                    frame = Frame(TABLE_FRAME, self._window.sequence + 1, 0, (item,))
                     await self._push(await self._in(self._quick, partial(encode_frame, frame)))
             elif self._view is None:
                 self._wake.clear()
@@ -329,21 +287,7 @@ class BrickSession:
     async def _plan(self, view: _Running) -> None:
         trees = {int(number): self._trees[int(number)] for number in view.message["trees"]}
 
-        def work() -> tuple[dict[int, BrickFile], NDArray[np.int64]]:
-            files = {}
-            for number, tree in trees.items():
-                file = self._library.open_built(tree.tile, tree.channel)
-                if file is None or file.table_hash != tree.table_hash:
-                    raise Refusal(1012, "the bundle was written anew, connect again")
-                files[number] = file
-            found = _find_order(view.message, files)
-            for number, tree in trees.items():  # here, so that the event loop is not blocked
-                sent = np.frombuffer(tree.sent, np.uint8)
-                here = found[0] == number
-                here[here] = sent[found[1, here]] != 0
-                found = found[:, ~here]
-            return files, found
-
+        work = partial(_plan, self._library, view.message, trees)
         try:
             view.files, view.order = await self._in(self._quick, work)
         except (StereoCellError, OSError) as error:
@@ -373,10 +317,12 @@ class BrickSession:
 
         def work() -> bytes:
             parts = [Part(t, n, files[t].read([n])[0]) for t, n in picked]
-            return encode_frame(Frame(BRICKS_FRAME, self._sequence + 1, view.id, tuple(parts)))
+            return encode_frame(
+                Frame(BRICKS_FRAME, self._window.sequence + 1, view.id, tuple(parts))
+            )
 
         data = await self._in(self._quick, work)
-        await self._wait_for_room(len(data))
+        await self._window.wait_for_room(len(data))
         if self._view is not view:  # ended meanwhile, and its `done` is queued
             return
         view.at = at
@@ -388,20 +334,9 @@ class BrickSession:
 
     async def _push(self, data: bytes) -> None:
         """Send a binary frame, which carries the next sequence number."""
-        await self._wait_for_room(len(data))
-        self._sequence += 1
-        self._flying.append((self._sequence, len(data)))
-        self._flying_bytes += len(data)
+        await self._window.wait_for_room(len(data))
+        self._window.add(len(data))
         await self._socket.send_bytes(data)
-
-    async def _wait_for_room(self, length: int) -> None:
-        while self._flying_bytes + length > self._window:
-            self._acked.clear()
-            try:
-                async with asyncio.timeout(ACK_S):
-                    await self._acked.wait()
-            except TimeoutError:
-                raise Refusal(1008, f"no ack within {ACK_S:g} s") from None
 
     def _finish(self, reason: str) -> None:
         view = self._view
@@ -420,6 +355,45 @@ class BrickSession:
 
     async def _in(self, threads: ThreadPoolExecutor, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(threads, work)
+
+
+def _describe(
+    number: int, volume: dict[str, str], file: BrickFile, *, table_follows: bool
+) -> dict[str, Any]:
+    """Return the message on an open tree."""
+    table = file.table
+    return {
+        "type": "tree",
+        "tree": number,
+        "tile": volume["tile"],
+        "channel": volume["channel"],
+        "source": file.volume.source,
+        "table": file.table_hash,
+        "table_bytes": table.bytes,
+        "table_follows": table_follows,
+        "nodes": len(table.nodes),
+        "bricks": int(np.count_nonzero(table.nodes["length"])),
+        "brick_bytes": table.brick_bytes,
+    }
+
+
+def _plan(
+    library: BrickLibrary, message: dict[str, Any], trees: dict[int, _Tree]
+) -> tuple[dict[int, BrickFile], NDArray[np.int64]]:
+    """Return the files of a view's trees, and the order of the bricks that the client lacks."""
+    files = {}
+    for number, tree in trees.items():
+        file = library.open_built(tree.tile, tree.channel)
+        if file is None or file.table_hash != tree.table_hash:
+            raise Refusal(1012, "the bundle was written anew, connect again")
+        files[number] = file
+    found = _find_order(message, files)
+    for number, tree in trees.items():  # here, so that the event loop is not blocked
+        sent = np.frombuffer(tree.sent, np.uint8)
+        here = found[0] == number
+        here[here] = sent[found[1, here]] != 0
+        found = found[:, ~here]
+    return files, found
 
 
 def _find_order(message: dict[str, Any], files: dict[int, BrickFile]) -> NDArray[np.int64]:

@@ -34,6 +34,10 @@ class Learned:
 class LearnTissue(Keyed):
     """Learn the classes of a channel in the planned region.
 
+    The command runs this step itself (building/tissue.py): its network lives in a child process of
+    the command, its errors are the command's, and the plan names and colours the classes that are
+    written.
+
     channel   its name, which the record states
     settings  of the method, as the record states them: a network counts by its digest
     """

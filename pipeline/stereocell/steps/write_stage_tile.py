@@ -1,11 +1,12 @@
-"""The task that writes one tile of the stage from its units."""
+"""The step that writes one tile of the stage from its units."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from stereocell.engine.step import Keyed, content_of
+from stereocell.engine.step import Document, Step, content_of
 from stereocell.model.channel import PaintColors
 from stereocell.model.object_table import ObjectTable, SharedWalls
 from stereocell.model.tile_content import ChannelContent, TileContent
@@ -17,11 +18,8 @@ from stereocell.steps.unit_files import (
     load_volume,
 )
 from stereocell.storage.file_list import FileList
-from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 from stereocell.usd import write_stage as stage_writer
 from stereocell.usd import written_files
-
-_RECORD = "units.schema.json#StageTile"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,65 +49,75 @@ class TableOfTile:
 
 
 @dataclass(frozen=True, slots=True)
-class WriteStageTile(Keyed):
-    """The key of one tile of the stage: its fields are all that the tile depends on.
+class StageTile:
+    """The record of one tile of the stage.
 
-    content  the tile without its channels
-    shared   IDs of the channels whose volume is another channel's: they have surfaces alone
+    key             of its step
+    files           as they were written, by their paths from the tile's folder
+    measured_bytes  those of its voxels as measured
+    """
+
+    key: str
+    files: FileList
+    measured_bytes: int
+
+
+def _from_json(content: Mapping[str, Any]) -> StageTile:
+    return StageTile(content["key"], content["files"], content["measured_bytes"])
+
+
+@dataclass(frozen=True, slots=True)
+class WriteStageTile(Step[StageTile]):
+    """Write one tile of the stage. The result is a record of its files, beside the units.
+
+    content    the tile without its channels
+    shared     IDs of the channels whose volume is another channel's: they have surfaces alone
+    stage_dir  the folder with the tile's files, where an artist may edit them
     """
 
     VERSION: ClassVar[int] = 1
+    FORM: ClassVar[Document[StageTile]] = Document(
+        "units.schema.json#StageTile", asdict, _from_json, written_files.REMEDY
+    )
 
     content: TileContent
     units: tuple[UnitPart, ...]
     shared: frozenset[str] = frozenset()
     tables: tuple[TableOfTile, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class StageTile:
-    """The task that writes one tile of the stage.
-
-    place      the tile's record in OUT, which lists its files as they were written
-    stage_dir  the folder with these files, where an artist may edit them
-    """
-
-    step: WriteStageTile
-    place: Path
-    stage_dir: Path
+    stage_dir: Path = field(kw_only=True, compare=False)
 
     @property
-    def name(self) -> str:
-        """The tile's ID, for progress and errors."""
-        return self.step.content.id
-
-    @property
-    def inputs(self) -> list[Path]:
+    def inputs(self) -> tuple[Path, ...]:
         """The folders of the tile's units."""
-        return [unit.folder for unit in self.step.units]
+        return tuple(unit.folder for unit in self.units)
 
-    def is_whole(self) -> bool:
+    def is_whole(self, place: Path) -> bool:
         """Return whether the tile and its units are whole, and its inputs are unchanged."""
-        found = find_sealed(self.place, _RECORD)
-        if found is None or found["key"] != self.step.key:
+        found = self.FORM.find(place)
+        if found is None or found.key != self.key:
             return False
-        folder = self.stage_dir / "tiles" / self.name
+        folder = self.stage_dir / "tiles" / self.content.id
         are_whole = all(map(is_whole, self.inputs))
-        return are_whole and written_files.is_kept(folder, found["files"], since=self.place)
+        return are_whole and written_files.is_kept(folder, found.files, since=place)
 
-    def keep(self) -> None:
-        """Write the tile and its record. Raises OutputError where a unit is damaged."""
-        files, measured = _write(self.step, self.stage_dir)
-        record = {"key": self.step.key, "files": files, "measured_bytes": measured}
-        write_sealed(self.place, record)
-
-    def listed(self) -> tuple[FileList, int]:
-        """Return the files of the finished tile, by their paths from the stage's folder, and the
-        bytes of its voxels as measured.
-        """
-        found = read_sealed(self.place, _RECORD, written_files.REMEDY)
-        files = {f"tiles/{self.name}/{name}": one for name, one in found["files"].items()}
-        return files, found["measured_bytes"]
+    def run(self) -> StageTile:
+        """Write the tile. Raises OutputError where a unit is damaged."""
+        tables = {one.labels_id: (one.table, one.touching) for one in self.tables}
+        no_volume = self.shared | tables.keys()
+        channels = tuple(
+            ChannelContent(
+                unit.channel_id,
+                load_lods(unit.folder),
+                None if unit.channel_id in no_volume else load_volume(unit.folder),
+                unit.paint,
+                find_closed(unit.folder),
+                None if unit.channel_id in no_volume else load_measured(unit.folder),
+                *tables.get(unit.channel_id, (None, None)),
+            )
+            for unit in self.units
+        )
+        content = replace(self.content, channels=channels)
+        return StageTile(self.key, *stage_writer.write_tile(self.stage_dir, content))
 
 
 def _digest(walls: SharedWalls) -> str:
@@ -129,22 +137,3 @@ def digest_of_table(table: ObjectTable) -> str:
 
 
 _DESCRIBED = ("id", "name", "about", "unit", "categories", "colors")
-
-
-def _write(step: WriteStageTile, stage_dir: Path) -> tuple[FileList, int]:
-    """Write a tile; return its files and the bytes of its voxels as measured."""
-    tables = {one.labels_id: (one.table, one.touching) for one in step.tables}
-    no_volume = step.shared | tables.keys()
-    channels = tuple(
-        ChannelContent(
-            unit.channel_id,
-            load_lods(unit.folder),
-            None if unit.channel_id in no_volume else load_volume(unit.folder),
-            unit.paint,
-            find_closed(unit.folder),
-            None if unit.channel_id in no_volume else load_measured(unit.folder),
-            *tables.get(unit.channel_id, (None, None)),
-        )
-        for unit in step.units
-    )
-    return stage_writer.write_tile(stage_dir, replace(step.content, channels=channels))

@@ -47,6 +47,8 @@ SCHEMAS: dict[str, str | None] = {
     r"(files|tile|tileset|finer.*|.*_level|stereocell-published)\.json": None,
 }
 SETTINGS = "stereocell.toml"
+# references to other schemas by their `$id`
+_OTHERS = re.compile(r'"\$ref": "urn:stereocell:schema:(\w+):1#')
 NOT_WRITTEN = "not written, because no command could read it"
 # Schemas, and hashes of documents that passed them. A unit's record is read with each of its files,
 # and the check took up to 20 ms each time, a fifth of a small build.
@@ -124,7 +126,12 @@ def _validator(schema: str) -> "Draft202012Validator":
     from jsonschema import Draft202012Validator
 
     name, _, definition = schema.partition("#")
-    content = json.loads(schema_path(name).read_bytes())
+    text = schema_path(name).read_text("utf-8")
+    content = json.loads(text)
+    # a schema among the definitions is found by its `$id`
+    others = {other: schema_path(f"{other}.schema.json") for other in _OTHERS.findall(text)}
+    own = {other: json.loads(file.read_bytes()) for other, file in others.items()}
+    content["$defs"] = {**content.get("$defs", {}), **own}
     if definition:
         content = {"$defs": content["$defs"], "$ref": f"#/$defs/{definition}"}
     return Draft202012Validator(content)

@@ -17,7 +17,6 @@ import lzma
 import math
 import re
 import struct
-import sys
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -25,6 +24,7 @@ from contextlib import contextmanager
 from json import JSONDecodeError
 from pathlib import Path
 from types import FrameType
+from xml.etree.ElementTree import ParseError
 
 from pydantic import ValidationError
 from zstandard import ZstdError
@@ -41,8 +41,8 @@ _AGAIN = "copy or download it again"
 _REMEDY = f": it may be damaged, {_AGAIN}"
 # Classes that a damaged file raises in our own parsing, or in C code, which has no frame. numpy and
 # numcodecs raise ValueError, TypeError and RuntimeError; packed bytes that end early zlib.error and
-# EOFError; a short header struct.error; metadata of another form AttributeError; sizes beyond this
-# machine MemoryError, OverflowError and SystemError.
+# EOFError; a short header struct.error; metadata of another form AttributeError or, of XML,
+# ParseError; sizes beyond this machine MemoryError, OverflowError and SystemError.
 _FAULTS = (
     OSError,
     EOFError,
@@ -58,15 +58,7 @@ _FAULTS = (
     zlib.error,
     lzma.LZMAError,
     ZstdError,
-)
-# Classes of libraries that take long to import: an error of theirs is raised once they are there
-_NO_NODE = ("zarr.errors", "NodeNotFoundError")
-_LATE = (
-    ("aiohttp", "ClientError"),
-    ("botocore.exceptions", "BotoCoreError"),
-    ("nrrd.errors", "NRRDError"),
-    ("xml.etree.ElementTree", "ParseError"),  # a SyntaxError; liffile lets it pass
-    _NO_NODE,
+    ParseError,
 )
 
 
@@ -74,24 +66,14 @@ class DamagedError(ValueError):
     """A decoder can't decode a part of a source. The text names the part and the reason."""
 
 
-# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. An
-# OSError with an errno comes from the system and is no damage.
+# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. Most of
+# these libraries unpack the bytes of several formats, so no format's row has them. An OSError with
+# an errno comes from the system and is no damage.
 _UNDECODED = (DamagedError, zlib.error, lzma.LZMAError, ZstdError, EOFError, struct.error)
 _DECODERS = re.compile(
     r"imagecodecs\b.*|numcodecs\.(?!registry|errors).*|zarr\.codecs\.crc32c_|pyarrow\b.*|gzip|bz2|lzma"
     r"|h5py\.(h5d|_selector)"
 )
-
-
-def _faults() -> tuple[type[BaseException], ...]:
-    """Return the caught classes, of the slow libraries those that are imported already."""
-    late = (_imported(module, name) for module, name in _LATE)
-    return (*_FAULTS, *(found for found in late if found is not None))
-
-
-def _imported(module: str, name: str) -> type[BaseException] | None:
-    """Return a library's class of errors, or None where the library is not imported."""
-    return getattr(sys.modules.get(module), name, None)
 
 
 @contextmanager
@@ -112,7 +94,7 @@ def one_line(
     except StereoCellError:
         raise
     except Exception as error:
-        if not isinstance(error, _faults()) and not _library_of(error):
+        if not isinstance(error, _FAULTS) and not _library_of(error):
             raise
         raise_if_short(error, where, raised=raised)
         if is_undecoded(error):
@@ -198,9 +180,6 @@ def _reason(error: BaseException) -> str:
         first = error.errors()[0]
         field = ".".join(str(step) for step in first["loc"])
         return f"field {field}: found {first['input']!r:.60}, {first['msg'].lower()}"
-    no_node = _imported(*_NO_NODE)
-    if no_node is not None and isinstance(error, no_node):
-        return "zarr.json, .zgroup or .zarray: not found, or not reachable"
     if isinstance(error, FileNotFoundError):
         return "not found, or not reachable"
     if isinstance(error, KeyError):

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from stereocell.bundle.write import write_bundle
 from stereocell.engine.run import Engine
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.ktx2 import encode_2d, encode_3d
+from stereocell.steps.write_bundle import write_bundle
 from stereocell.transfer.opacity import evaluate, make_transfer_functions
 from support.bundles import write_tiles
 from support.sealed_files import seal
@@ -32,7 +32,7 @@ def write_out(folder: Path, volume: np.ndarray | None = None) -> Path:
     viewer = folder / "viewer"
     viewer.mkdir(parents=True)
     (viewer / "index.html").write_text("<!doctype html>")
-    write_bundle(write_tiles(folder / "stage"), folder / "bundle", viewer, run=Engine(0).run)
+    write_bundle(write_tiles(folder / "stage"), folder / "bundle", viewer, engine=Engine(0))
     if volume is not None:
         replace_volume(folder / "bundle", volume)
     return folder

@@ -20,11 +20,14 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.format import Format
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import Candidate, candidate, choose, lines
-from stereocell.read.spacing import Grid, Triple
+from stereocell.read.spacing import Grid, Triple, um_per
+from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _MADE_UP = re.compile(r"Channel:\d+(:\d+)*")  # bioio's name where the file has none
+_GIVEN = "--spacing-um z,y,x replaces it"
+_UNIT = Subject("unit of the voxel size", remedy=_GIVEN)
 
 
 class _DaskArray:
@@ -68,9 +71,12 @@ def read_image(location: Location, *, series: int = 0) -> Image:
     if (count := array.size("c")) > MAX_CHANNELS:
         raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     named = (*names[:count], *[None] * (count - len(names)))
-    grid = Grid(array.shape, _spacing(image))
-    title, notes = Path(location.path).stem, ("read by bioio", *notes, *_sign_notes(image))
-    return Image((array,), (grid,), named, (None,) * count, 1, title=title, notes=notes)
+    spacing, more = _settle_spacing(image)
+    grid = Grid(array.shape, spacing)
+    notes = ("read by bioio", *notes, *_sign_notes(image), *more)
+    return Image(
+        (array,), (grid,), named, (None,) * count, 1, title=Path(location.path).stem, notes=notes
+    )
 
 
 def _sign_notes(image: Any) -> tuple[str, ...]:
@@ -103,18 +109,54 @@ def _candidates(image: Any) -> list[Candidate]:
         sizes = {axis: int(getattr(image.dims, axis, 1)) for axis in "TCZYX"}
         z, y, x = (sizes[axis] for axis in "ZYX")
         found.append(
-            candidate((z, y, x), channels=sizes["C"], times=sizes["T"], spacing_um=_spacing(image))
+            candidate(
+                (z, y, x),
+                channels=sizes["C"],
+                times=sizes["T"],
+                spacing_um=_settle_spacing(image)[0],
+            )
         )
     return found
 
 
-def _spacing(image: Any) -> Triple | None:
-    """Return the spacing (z, y, x), um, as bioio's plugins have it; None: not stated."""
-    sizes = [getattr(image.physical_pixel_sizes, axis) for axis in "ZYX"]
-    if any(size is None for size in sizes):
-        return None
-    z, y, x = (abs(float(size)) for size in sizes)
-    return z, y, x
+def _settle_spacing(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
+    """Return the spacing (z, y, x), um, and notes; None: a plugin does not state all three.
+
+    A plugin states each size twice, as `physical_pixel_sizes` and `scale`. The unit stands apart,
+    in `dimension_properties`, where a plugin knows one.
+    """
+    found: list[float] = []
+    notes: list[str] = []
+    has_units = True
+    for axis in "ZYX":
+        size = getattr(image.physical_pixel_sizes, axis)
+        if size is None:
+            return None, ()
+        unit = _part(image, "dimension_properties", axis, "unit")
+        per = 1.0 if unit is None else um_per(str(unit))
+        if per is None:
+            return None, ()
+        has_units &= unit is not None
+        statements = [Statement(abs(float(size)) * per, "physical_pixel_sizes")]
+        if (scale := _part(image, "scale", axis)) is not None:
+            statements.append(Statement(abs(float(scale)) * per, "scale", Trust.REPEATED))
+        settled = settle(
+            Subject(f"voxel spacing along {axis.lower()}", "um", 1e-3, _GIVEN), statements
+        )
+        found.append(settled.number)
+        notes += settled.notes
+    if not has_units:
+        notes += settle(
+            _UNIT, [Statement("um", "as in most plugins of bioio", Trust.ASSUMED)]
+        ).notes
+    return (found[0], found[1], found[2]), tuple(notes)
+
+
+def _part(value: Any, *names: str) -> Any:
+    """Return a part of a part of an object; None: it is absent, as in other versions of bioio."""
+    for name in names:
+        value = getattr(value, name, None)
+    return value
 
 
 FORMAT = Format(

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from zarr.abc.store import Store
 
 from stereocell.model.errors import SourceError
-from stereocell.read.formats.ome_zarr.store import GuardedStore, open_array, open_store, quiet
+from stereocell.read.formats.ome_zarr.store import (
+    GuardedStore,
+    open_array,
+    open_store,
+    zarr_boundary,
+)
 from stereocell.read.hdf5_file.chunks import ChunkIndex
 from stereocell.read.hdf5_file.tree import Hdf5Tree, require_readable
 from stereocell.read.tables.anndata import read_anndata
@@ -34,7 +39,7 @@ _LONGEST_TEXT = 4096  # bytes, of texts of one length
 def read_anndata_zarr(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     """Return a table of AnnData in Zarr. Raises SourceError."""
     where = location.shown
-    with quiet(), one_line(where, _EXPECTED):
+    with zarr_boundary(where, _EXPECTED):
         store = open_store(location)
         root = zarr.open_group(GuardedStore(store, location), mode="r")
         return read_anndata(_ZarrNode(location, store, root), where, key, wanted, labels)

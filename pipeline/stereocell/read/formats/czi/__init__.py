@@ -22,7 +22,7 @@ FORMAT = Format(
     title="CZI",
     open=_open,
     list_series=_list_series,
-    library=Library("pylibCZIrw", extra="czi"),
+    library=Library("pylibCZIrw", extra="czi", reads=".czi (Zeiss)"),
     endings=(".czi",),
     marks=(Mark("a CZI file of Zeiss", rb"ZISRAWFILE"),),
     guides=(

@@ -3,7 +3,7 @@
 from typing import Any
 
 from stereocell.read.chunk_counts import Absent, Spans
-from stereocell.read.format import Format, Guide
+from stereocell.read.format import Format, Guide, Library
 from stereocell.read.hdf5_file.signature import SIGNATURE, is_hdf5
 from stereocell.read.image import Image
 from stereocell.storage.file_states import FileStates
@@ -34,6 +34,9 @@ FORMAT = Format(
         Mark("a MATLAB 7.3 file", rb"MATLAB 7\.3"),  # HDF5 behind a block of 512 bytes
     ),
     is_unmarked=is_hdf5,
+    decoders=Library(
+        "hdf5plugin", extra="hdf5", reads="HDF5 packed by Blosc, zstd, LZ4 and others"
+    ),
     count_absent=_count_absent,
     guides=(
         Guide(

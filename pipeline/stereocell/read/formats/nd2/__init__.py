@@ -27,7 +27,7 @@ FORMAT = Format(
     title="ND2",
     open=_open,
     list_series=_list_series,
-    library=Library("nd2", extra="nd2"),
+    library=Library("nd2", extra="nd2", reads=".nd2 (Nikon)"),
     endings=(".nd2",),
     marks=(Mark("an ND2 file of Nikon", rb"\xda\xce\xbe\x0a"),),
     is_unmarked=_is_old,

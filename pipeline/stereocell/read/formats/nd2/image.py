@@ -12,10 +12,11 @@ from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.formats.nd2.frames import BEGIN, Nd2Frames
+from stereocell.read.formats.nd2.statements import settle_spacing, volume_of
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.series import Candidate, candidate, list_images, read_chosen
-from stereocell.read.spacing import PartialTriple, grid_of
+from stereocell.read.spacing import grid_of
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -37,7 +38,7 @@ class _File:
             self.nd2: Any = stack.enter_context(library.ND2File(path))
             self.sizes = {str(axis): int(size) for axis, size in self.nd2.sizes.items()}
             self.dtype = np.dtype(self.nd2.dtype)
-            self.spacing = _spacing(self.nd2, self.sizes)
+            self.spacing, self.notes = settle_spacing(self.nd2, self.sizes)
             frame_bytes = _frame_bytes(self.nd2.attributes)
         self.frames = Nd2Frames(path, self.where, frame_bytes)
 
@@ -96,7 +97,7 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
         raise SourceError(f"{file.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     with one_line(file.where, "an ND2 file with metadata of its axes"):
         _require_distances(file)
-        notes = (*notes, *_order_notes(file))
+        notes = (*notes, *file.notes, *_order_notes(file))
     loops = [axis for axis in file.sizes if axis not in _IN_FRAME]
     lengths = [file.sizes[axis] for axis in loops]
 
@@ -153,28 +154,9 @@ def _missing_notes(file: _File, numbers: list[list[int]], time: int) -> tuple[st
     return (note,) if missing else ()
 
 
-def _spacing(nd2: Any, sizes: dict[str, int]) -> PartialTriple:
-    """Return the spacing (z, y, x), um; None each: not stated, where the library has 1."""
-    size = nd2.voxel_size()
-    z, y, x = (float(value) if value > 0 else None for value in (size.z, size.y, size.x))
-    volume = _volume(nd2)
-    if volume is not None:
-        x, y, z = (
-            one if is_stated else None
-            for one, is_stated in zip((x, y, z), volume.axesCalibrated, strict=True)
-        )
-    return (z if "Z" in sizes else None), y, x
-
-
-def _volume(nd2: Any) -> Any:
-    """Return the library's description of the axes; None: the file has none."""
-    channels = getattr(nd2.metadata, "channels", None) or [None]
-    return getattr(channels[0], "volume", None)
-
-
 def _require_distances(file: _File) -> None:
     """Raise SourceError where an axis of the images is time, as in a line scan."""
-    volume = _volume(file.nd2)
+    volume = volume_of(file.nd2)
     for axis, kind in zip("xy", volume.axesInterpretation if volume else (), strict=False):
         if kind != "distance":
             raise SourceError(

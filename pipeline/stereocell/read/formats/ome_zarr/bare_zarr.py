@@ -22,14 +22,18 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.flipped_array import FlippedArray
 from stereocell.read.formats.ome_zarr.collections import is_collection, ome_of
 from stereocell.read.formats.ome_zarr.coordinates import Beside, beside, named_dimensions
-from stereocell.read.formats.ome_zarr.store import files_of, notes_on_names, open_array, quiet
+from stereocell.read.formats.ome_zarr.store import (
+    files_of,
+    notes_on_names,
+    open_array,
+    zarr_boundary,
+)
 from stereocell.read.formats.ome_zarr.values import with_values
 from stereocell.read.image import MAX_CHANNELS, Image
 from stereocell.read.series import likely_image
 from stereocell.read.spacing import grid_of
 from stereocell.read.statements import Statement, Trust
 from stereocell.read.value_scale import ignored_note
-from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _LISTED = 12  # arrays that a message names
@@ -113,7 +117,7 @@ def read_only_array(
     """
     if not location.is_local:  # most addresses can't be listed
         return None
-    with quiet(), one_line(location.shown, "a group whose arrays can be listed"):
+    with zarr_boundary(location.shown, "a group whose arrays can be listed"):
         members = islice(group.members(max_depth=None), _MAX_NODES)
         nodes: list[tuple[str, Any]] = list(members)
     found = [(path, node) for path, node in nodes if _is_volume(node)]

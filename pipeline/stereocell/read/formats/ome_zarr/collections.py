@@ -16,8 +16,7 @@ import zarr
 
 from stereocell.model.counted import counted
 from stereocell.model.errors import SourceError
-from stereocell.read.formats.ome_zarr.store import GuardedStore, open_store, quiet
-from stereocell.storage.library_errors import one_line
+from stereocell.read.formats.ome_zarr.store import GuardedStore, open_store, zarr_boundary
 from stereocell.storage.location import Location, is_own, require_own_key
 
 CONTAINER = "bioformats2raw.layout"
@@ -43,7 +42,7 @@ class ZarrTree:
     def find(self, path: str) -> Mapping[str, Any] | None:
         """Return the OME attributes of a group; None: it is none, or can't be read."""
         try:
-            with one_line(self.location.shown, "a group"):
+            with zarr_boundary(self.location.shown, "a group"):
                 group = zarr.open_group(
                     self.store, path=path, mode="r", zarr_format=self.zarr_format
                 )
@@ -54,7 +53,7 @@ class ZarrTree:
     def dtype(self, path: str) -> str:
         """Return the type of an array's numbers; empty where it can't be read."""
         try:
-            with one_line(self.location.shown, "an array"):
+            with zarr_boundary(self.location.shown, "an array"):
                 array = zarr.open_array(
                     self.store, path=path, mode="r", zarr_format=self.zarr_format
                 )
@@ -108,7 +107,7 @@ def image_of_level(location: Location) -> str:
     source, _, name = location.source.rstrip("/").rpartition("/")
     image = replace(location, source=source)
     try:
-        with quiet(), one_line(image.shown, "a group"):
+        with zarr_boundary(image.shown, "a group"):
             group = zarr.open_group(GuardedStore(open_store(image), image), mode="r")
             multiscales = ome_of(group.metadata.attributes).get("multiscales")
     except SourceError:

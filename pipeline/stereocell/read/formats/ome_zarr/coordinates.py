@@ -26,14 +26,13 @@ from stereocell.read.formats.ome_zarr.store import (
     files_of,
     open_array,
     open_store,
-    quiet,
+    zarr_boundary,
 )
 from stereocell.read.formats.ome_zarr.values import with_values
 from stereocell.read.formats.ome_zarr.zip_file import is_zipped
 from stereocell.read.spacing import Triple, um_per
 from stereocell.read.stated_texts import text_of
 from stereocell.read.statements import Statement, Subject, Trust, settle
-from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 
@@ -168,7 +167,7 @@ def _groups(location: Location, store: Store, path: str) -> Iterator[_Group]:
 
 def _group(location: Location, store: Store | None, path: str) -> _Group | None:
     try:
-        with quiet(), one_line(location.shown, "a group"):
+        with zarr_boundary(location.shown, "a group"):
             store = store or open_store(location)
             group = zarr.open_group(GuardedStore(store, location), path=path, mode="r")
             return _Group(location, store, path, group)
@@ -184,7 +183,7 @@ def _positions(
         return None
     for one in groups:
         path = f"{one.path}/{name}".lstrip("/")
-        with quiet(), one_line(f"{one.location.shown}/{path}", "an array of positions"):
+        with zarr_boundary(f"{one.location.shown}/{path}", "an array of positions"):
             node = one.group.get(name)
             if not isinstance(node, zarr.Array) or node.shape != (size,):
                 continue

@@ -49,7 +49,7 @@ from stereocell.read.formats.ome_zarr.store import (
     notes_on_names,
     open_array,
     open_store,
-    quiet,
+    zarr_boundary,
 )
 from stereocell.read.formats.ome_zarr.values import value_attributes, with_values
 from stereocell.read.image import MAX_CHANNELS, Color, Image
@@ -140,7 +140,7 @@ def _read(
     is_part  it is the one image of a container, and no container itself
     """
     where = location.shown
-    with quiet(), one_line(where, "the group of one OME-Zarr image, or a Zarr array"):
+    with zarr_boundary(where, "the group of one OME-Zarr image, or a Zarr array"):
         store = open_store(location)
         guard = GuardedStore(store, location)
         node = zarr.open(guard, mode="r")
@@ -236,7 +236,7 @@ def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
     version, titled = ngff.version_of(ome), where
     expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
     if not ngff.is_known(version):
-        with quiet(), one_line(where, "a group whose arrays can be listed"):
+        with zarr_boundary(where, "a group whose arrays can be listed"):
             group = zarr.open_group(tree.store, mode="r", zarr_format=tree.zarr_format)
             path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
         titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"

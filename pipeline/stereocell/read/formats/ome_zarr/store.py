@@ -11,8 +11,8 @@ import lzma
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Sequence, Set
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ import zstandard
 from zarr.abc.buffer import Buffer
 from zarr.abc.store import ByteRequest, RangeByteRequest, Store
 from zarr.core.buffer import BufferPrototype
+from zarr.errors import NodeNotFoundError
 from zarr.storage import FsspecStore, LocalStore, WrapperStore
 
 from stereocell.model.errors import SourceError
@@ -240,10 +241,21 @@ def codec_name(codec: Any) -> str:
     return str(name)
 
 
-def quiet() -> AbstractContextManager[None]:
-    """Silence zarr's warnings of metadata that other writers leave, which a user can't change."""
+@contextmanager
+def zarr_boundary(where: str, expected: str) -> Iterator[None]:
+    """Turn an error of zarr inside the block into a SourceError of one line: see `one_line`.
+
+    zarr's warnings of metadata that other writers leave are silenced: a user can't change these.
+    """
     starts = "Both zarr.json|Numcodecs codecs|Object at |Found an empty list of filters"
-    return without_warning(starts, UserWarning)
+    with without_warning(starts, UserWarning), one_line(where, expected):
+        try:
+            yield
+        except NodeNotFoundError as error:
+            raise SourceError(
+                f"{where}: zarr.json, .zgroup or .zarray: not found, or not reachable; expected "
+                f"{expected}"
+            ) from error
 
 
 def open_store(location: Location) -> Store:
@@ -299,7 +311,7 @@ def open_array(
     item_bytes  of a value in a chunk, where the array's type does not say it: of texts
     """
     where = f"{location.shown}: {title} {path!r:.80}" if path else location.shown
-    with quiet(), one_line(where, "a Zarr array"):
+    with zarr_boundary(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
         # The codecs of a sharded array pack its inner chunks, not the shard as a whole.

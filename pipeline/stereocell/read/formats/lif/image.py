@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from stereocell.model.color import linear_color
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.format import Format, Guide, Library
+from stereocell.read.formats.lif.statements import settle_lengths
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.plane_positions import falling_notes
 from stereocell.read.series import Candidate, candidate, list_images, read_chosen
-from stereocell.read.spacing import Grid, Triple
-from stereocell.storage.first_bytes import Mark
+from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
@@ -152,7 +151,11 @@ def _candidate(image: Any) -> Candidate:
     z, y, x, channels, times = (int(sizes.get(axis, 1)) for axis in "ZYXCT")
     others = [f"{size} {_OTHERS.get(axis, axis)}" for axis, size in _other_axes(image).items()]
     return candidate(
-        (z, y, x), channels=channels, times=times, spacing_um=_spacing(image), others=others
+        (z, y, x),
+        channels=channels,
+        times=times,
+        spacing_um=settle_lengths(image)[0],
+        others=others,
     )
 
 
@@ -190,19 +193,9 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     if len(places) > 1:
         notes = (*notes, *falling_notes("place along z", float(places[0]), float(places[-1])))
     names, colors = _channels(image, count)
-    grid = Grid(array.shape, _spacing(image))
-    return Image((array,), (grid,), names, colors, 1, stack.close, notes=notes)
-
-
-def _spacing(image: Any) -> Triple | None:
-    """Return the spacing (z, y, x), um, of the planes' places in m; None: not stated."""
-    found = []
-    for axis in "ZYX":
-        places = np.asarray(image.coords.get(axis, ()), float)
-        if len(places) > 1 and places[-1] != places[0]:
-            step = abs(float(places[-1] - places[0])) / (len(places) - 1)
-            found.append(step * _UM_PER_METER)
-    return (found[0], found[1], found[2]) if len(found) == 3 else None
+    spacing, more = settle_lengths(image)
+    grid = Grid(array.shape, spacing)
+    return Image((array,), (grid,), names, colors, 1, stack.close, notes=(*notes, *more))
 
 
 def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
@@ -215,16 +208,3 @@ def _channels(image: Any, count: int) -> tuple[tuple[str | None, ...], tuple[Col
         colors.append(linear_color(rgb) if rgb else None)
     lacking = [None] * (count - len(names))
     return (*names, *lacking), (*colors, *lacking)
-
-
-FORMAT = Format(
-    title="LIF",
-    open=read_image,
-    list_series=list_series,
-    library=Library("liffile", extra="lif"),
-    endings=(".lif",),
-    marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
-    guides=(
-        Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
-)
