@@ -8,14 +8,13 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
-from stereocell.bundle.tile_part import BundleTile, TileChannel
-from stereocell.bundle.write_tile import export_tile
-from stereocell.formats.gltf import choose_step
+from stereocell.bundle.tile_part import BundleTile, TileChannel, read_part
+from stereocell.bundle.write import Composed
+from stereocell.bundle.write_tile import write_tile
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.first_view import NOT_BUILT, write_coarse_tiles, write_view
 from stereocell.model.tiling import Tile
@@ -23,10 +22,7 @@ from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
 from stereocell.planning.unit_steps import unit_steps
 from stereocell.steps.unit_files import is_whole
-from stereocell.steps.write_stage_tile import StageTile
 from stereocell.usd.composed_appearance import ComposedAppearance
-from stereocell.usd.read_appearances import read_appearances
-from stereocell.usd.read_stage import hinted_box, open_stage, tile_prims
 from stereocell.usd.written_files import STAGE_NAME
 
 
@@ -98,17 +94,18 @@ class PartialView:
         survey = read_survey(out_folder)
         steps = unit_steps(plan, survey)
         units = {name: out_folder.unit_dir(name, step.key) for name, step in steps.items()}
-        tiles = [stage_tile_step(plan, tile, units, {}) for tile in plan.tiles]
-        stage_step(plan, survey, tiles, {}).write(self._stage.parent)
-        stage = open_stage(self._stage)
-        appearances = tuple(read_appearances(stage))
-        boxes = [hinted_box(prim) for prim in tile_prims(stage)]
-        coarse = write_coarse_tiles(plan, self._scratch / "coarse", self._read, appearances)
+        folder = self._stage.parent
+        tiles = [stage_tile_step(plan, tile, units, {}, folder) for tile in plan.tiles]
+        stage_step(plan, survey, tiles, {}).write(folder)
+        composed = Composed.open(self._stage)
+        coarse = write_coarse_tiles(
+            plan, self._scratch / "coarse", self._read, composed.appearances
+        )
         self._survey = _Survey(
             plan,
             units,
-            appearances,
-            choose_step(float(max((high - low).max() for low, high in boxes))),
+            composed.appearances,
+            composed.step_m,
             plan.opens_cut and any(survey[one.id].is_body for one in plan.channels),
             {tile.id: tile for tile in coarse},
         )
@@ -120,14 +117,12 @@ class PartialView:
 
     def _export(self, survey: _Survey, tile: Tile) -> BundleTile:
         """Return a tile with its surfaces, written by way of the stage, and its coarse volumes."""
-        step = stage_tile_step(survey.plan, tile, survey.units, {})
+        step = stage_tile_step(survey.plan, tile, survey.units, {}, self._stage.parent)
         # without volumes, which are most of the work: the coarse ones stay
-        step = replace(step, shared=frozenset(unit.channel_id for unit in step.units))
-        record = self._scratch / "records" / f"{tile.id}.json"
-        StageTile(step, record, self._stage.parent).keep()
-        parts = self._scratch / "parts"
-        export = partial(export_tile, self._stage, parts, appearances=survey.appearances)
-        built, _ = export(tile.id, step_m=survey.step_m)
+        replace(step, shared=frozenset(unit.channel_id for unit in step.units)).run()
+        part = self._scratch / "parts" / tile.id
+        write_tile(self._stage, part, appearances=survey.appearances, step_m=survey.step_m)
+        built = read_part(part)
         shutil.rmtree(self._stage.parent / "tiles" / tile.id)
         coarse = survey.coarse[tile.id]
         merged = map(_merge, built.channels, coarse.channels)
