@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import zstandard
 from jsonschema import Draft202012Validator
+from pxr import Sdf
 from scipy.spatial import cKDTree
 
 from stereocell.engine.run import Engine
@@ -18,6 +19,7 @@ from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.mesh import Baked
 from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import schema_path
+from stereocell.usd.written_files import write_list
 from support import spheres
 from support.bundles import TILES, channel, files, load, volumes, write, write_tiles
 from support.glbs import decoded_colors, decoded_positions_m, read
@@ -284,3 +286,21 @@ def test_a_part_that_names_files_elsewhere_is_made_again(stage, bundle, tmp_path
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"first", "again", "parts", "secret.txt"}
     assert (tmp_path / "secret.txt").read_text("utf-8") == "private"
+
+
+def test_a_bundle_that_goes_on_names_edited_layers_of_finished_tiles(tmp_path):
+    stage, parts = write_tiles(tmp_path / "stage"), tmp_path / "parts"
+    write_list(stage.parent, {}, stage.parent)
+    edited = stage.parent / "tiles" / "r0_c0" / "tile.usdc"
+    layer = Sdf.Layer.FindOrOpen(str(edited))
+    layer.documentation = "a long note " * 200
+    layer.Save()
+    told = []
+    for name in ("first", "again"):  # the second one finds the tiles of the first one finished
+        told.append([])
+        write_bundle(
+            stage, tmp_path / name, None, engine=Engine(0), parts=parts, report_line=told[-1].append
+        )
+    assert [line for line in told[0] if line.startswith(f"{edited}: changed since")]
+    assert told[1] == told[0]
+    assert files(tmp_path / "again") == files(tmp_path / "first")

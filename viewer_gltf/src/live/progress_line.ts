@@ -43,7 +43,9 @@ export class ProgressLine {
   /** @param state null: the server does not answer */
   update(state: BuildState | null): void {
     const doing = state?.doing ?? null;
-    setText(this.words, state === null ? GONE : wordsOf(state));
+    const words = state === null ? GONE : wordsOf(state);
+    setText(this.words, words);
+    this.words.title = words; // a narrow window cuts them
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
     this.root.dataset.doing = doing ?? "gone";
     const may = state?.mayControl === true;
