@@ -32,6 +32,7 @@ export const LAYERS: readonly string[] = [
   PARTS,
   "notebook",
   "bench",
+  "source",
   "page",
   "app",
 ];
