@@ -1,5 +1,6 @@
 /** Parts of the page that nobody needs before the first picture. */
 import { hasAddress } from "../bundle/address";
+import { isHeld } from "../bundle/held_files";
 import type { PartHost } from "../host/part";
 import { OfflinePart } from "../offline/part";
 import { pixelShare } from "../render/pixel_share";
@@ -23,7 +24,7 @@ export function startLater(
   keptToo: readonly string[],
 ): Later {
   if (pixelShare() < 1) say(FEWER_PIXELS);
-  void OfflinePart.start(host, say, keptToo);
+  if (!isHeld(host.bundle.base)) void OfflinePart.start(host, say, keptToo);
   const isFollowed = hasAddress() && follows(location.search, window.parent !== window);
   return { addressBar: isFollowed ? new AddressBar(host, opened) : null };
 }

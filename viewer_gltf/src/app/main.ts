@@ -5,8 +5,8 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../panel/html/forced_colors.css";
-import { bundleAddress, pageAddress } from "../bundle/address";
-import { BundleError } from "../bundle/errors";
+import { bundleAddress, namesBundle, pageAddress, sourceAddress } from "../bundle/address";
+import { BundleError, MissingError } from "../bundle/errors";
 import { fileAddress } from "../bundle/fetch";
 import type { Manifest } from "../bundle/generated/bundle";
 import { type Bundle, loadBundle } from "../bundle/load";
@@ -26,6 +26,7 @@ import type { Opened } from "../share/address_bar";
 import { flightAsked } from "../share/bench_parameter";
 import { loadLink, openAddress } from "../share/open_address";
 import { isLight, isPlain, panelOf } from "../share/page_parameters";
+import type { ShownSource } from "../source/open_source";
 import type { XrSupport } from "../state/stereo";
 import { startSplit } from "../stereo/start_split";
 import { CARDBOARD_V2 } from "../xr/cardboard/viewer_profile";
@@ -105,11 +106,10 @@ function followSystem(host: Host, search: string): void {
 async function open(parent: HTMLElement): Promise<Host> {
   dressPage();
   checkWebGl2();
-  sayAtStart("Reading the bundle");
   const page = pageAddress();
   const { search, hash } = new URL(page);
-  const [bundle, readLink] = await Promise.all([
-    loadBundle(bundleAddress(page)),
+  const [{ bundle, notes }, readLink] = await Promise.all([
+    openShown(parent, page),
     loadLink(withTyped(hash)),
   ]);
   document.title = `${bundle.manifest.specimen.name} · StereoCell`;
@@ -121,6 +121,7 @@ async function open(parent: HTMLElement): Promise<Host> {
   host.panel.learn({ subtitle: describeSize(bundle.manifest) });
   const ofPage = new Page(host, parent, said);
   host.add(ofPage);
+  for (const text of notes) host.dispatch({ type: "notify", text }, false);
   openAddress(host, search, readLink);
   const { viewpoint, renderer } = host.display;
   openedAs = { state: host.state, camera: viewpoint.cameraView };
@@ -139,6 +140,24 @@ async function open(parent: HTMLElement): Promise<Host> {
   const flight_s = flightAsked(search);
   if (flight_s !== null) await offerBench(host, parent, flight_s, support.isAvailable);
   return host;
+}
+
+/** What the address names: a bundle, or a source that the page reads by itself. Without either a person chooses one. */
+async function openShown(parent: HTMLElement, page: string): Promise<ShownSource> {
+  const source = sourceAddress(page);
+  if (source !== null) {
+    sayAtStart("Reading the source");
+    const { openAddress } = await import("../source/open_source");
+    return openAddress(source, sayAtStart);
+  }
+  sayAtStart("Reading the bundle");
+  try {
+    return { bundle: await loadBundle(bundleAddress(page)), notes: [] };
+  } catch (error) {
+    if (!(error instanceof MissingError) || namesBundle(page)) throw error;
+    const { chooseSource } = await import("../source/start_page");
+    return chooseSource(parent);
+  }
 }
 
 /** The host, with the picture and all that lies over it. */
@@ -250,7 +269,8 @@ opened.catch((error: unknown) => {
     showFatal(app, "The viewer failed", String(error));
     throw error;
   }
-  showFatal(app, "This bundle can't be shown", error.message);
+  const kind = error.name === "SourceError" ? "source" : "bundle";
+  showFatal(app, `This ${kind} can't be shown`, error.message);
 });
 let host: Host | null = null;
 let later: Later | null = null;
