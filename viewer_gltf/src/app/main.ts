@@ -9,6 +9,7 @@ import { bundleAddress, namesBundle, pageAddress, sourceAddress } from "../bundl
 import { BundleError, MissingError } from "../bundle/errors";
 import { fileAddress } from "../bundle/fetch";
 import type { Manifest } from "../bundle/generated/bundle";
+import { isHeld } from "../bundle/held_files";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
@@ -122,6 +123,10 @@ async function open(parent: HTMLElement): Promise<Host> {
   const ofPage = new Page(host, parent, said);
   host.add(ofPage);
   for (const text of notes) host.dispatch({ type: "notify", text }, false);
+  if (isHeld(bundle.base)) {
+    const { refuseDrops } = await import("../source/dropped");
+    refuseDrops((text) => said.say(text));
+  }
   openAddress(host, search, readLink);
   const { viewpoint, renderer } = host.display;
   openedAs = { state: host.state, camera: viewpoint.cameraView };

@@ -21,6 +21,18 @@ function folderOf(folder: FileSystemDirectoryEntry): LocalSource {
   return { kind: "folder", name: folder.name, find };
 }
 
+/** Keeps the browser from leaving the page for a file that is dropped on a picture, and says how to open it. */
+export function refuseDrops(say: (text: string) => void): void {
+  addEventListener("dragover", (event) => event.preventDefault());
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    const { search } = location;
+    const isNamed = new URLSearchParams(search).has("source");
+    const way = isNamed ? "open the page without ?source=" : "reload the page";
+    say(`To open another file, ${way}.`);
+  });
+}
+
 /** The folder of files that a person has chosen, each of which knows its path; null: there is none. */
 export function chosenFolder(files: FileList): LocalSource | null {
   const [first] = files;

@@ -48,8 +48,10 @@ export async function makeBundle(image: OpenedImage, report: Report): Promise<Bu
   const volumes: CoarseVolume[] = [];
   for (const [i, channel] of image.channels.entries()) {
     const count = image.channels.length;
-    report(count === 1 ? "Reading the volume" : `Reading channel ${i + 1} of ${count}`);
-    volumes.push(await channel.read());
+    const what = count === 1 ? "the volume" : `channel ${i + 1} of ${count}`;
+    report(`Reading ${what}`);
+    const onShare = (share: number) => report(`Reading ${what}: ${Math.round(100 * share)} %`);
+    volumes.push(await channel.read(onShare));
   }
   report("Preparing the picture");
   await new Promise((resolve) => setTimeout(resolve)); // lets the browser draw the words

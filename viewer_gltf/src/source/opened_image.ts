@@ -11,8 +11,8 @@ export type ImageChannel = Readonly<{
   window: Window | null;
   /** Whether the channel shows at the opening. */
   opens: boolean;
-  /** Reads the voxels. Throws SourceError. */
-  read: () => Promise<CoarseVolume>;
+  /** Reads the voxels, and calls back with the share of them that has come, 0..1. Throws SourceError. */
+  read: (onShare?: (share: number) => void) => Promise<CoarseVolume>;
 }>;
 
 /** A source that was opened: its metadata, and the way to its voxels. */

@@ -63,8 +63,9 @@ export async function openZarr(
     canonical === null ? stored : turnedGrid(stored, canonical);
   const apart = triple((i) => place.step[i] * spacing_um[i]);
   const block = blockFor(levelShape, apart, each);
-  const read = async (index: number): Promise<CoarseVolume> => {
-    const voxels = await readLevel(array, image.axes, index, name);
+  const read = async (index: number, onShare?: (share: number) => void): Promise<CoarseVolume> => {
+    const queue = new Queue(AT_ONCE, onShare);
+    const voxels = await readLevel(array, image.axes, index, queue, name);
     if (counts.found === 0 && counts.missing > 0) {
       throw new SourceError(
         `${name}: none of the ${counts.missing} chunks that level ${image.levels[level].path} names is there: whoever ` +
@@ -172,11 +173,12 @@ async function readLevel(
   array: Level,
   axes: readonly string[],
   channel: number,
+  queue: Queue,
   name: string,
 ): Promise<StoredVoxels> {
   const selection = axes.map((axis) => (axis === "t" ? 0 : axis === "c" ? channel : null));
   const chunk = await explained(name, () =>
-    zarr.get(array, selection, { createQueue: () => new Queue(AT_ONCE) }),
+    zarr.get(array, selection, { createQueue: () => queue }),
   );
   const left = axes.filter((axis) => axis !== "t" && axis !== "c");
   const { data, shape, stride } = chunk as zarr.Chunk<zarr.NumberDataType>;
@@ -193,11 +195,18 @@ async function readLevel(
 /** Runs jobs, so many at a time; none is started once one has failed. */
 class Queue {
   private readonly jobs: (() => Promise<void>)[] = [];
+  private added = 0;
+  private done = 0;
 
-  constructor(private readonly limit: number) {}
+  /** @param onShare called with the share of the jobs that is done, 0..1 */
+  constructor(
+    private readonly limit: number,
+    private readonly onShare?: (share: number) => void,
+  ) {}
 
   add(job: () => Promise<void>): void {
     this.jobs.push(job);
+    this.added++;
   }
 
   onIdle() {
@@ -208,6 +217,7 @@ class Queue {
     for (let job = this.jobs.shift(); job !== undefined; job = this.jobs.shift()) {
       try {
         await job();
+        this.onShare?.(++this.done / this.added);
       } catch (error) {
         this.jobs.length = 0;
         throw error;

@@ -19,7 +19,7 @@ export function channelsOf(
   stated: readonly NgffChannel[],
   chosen: readonly number[],
   dtype: string,
-  read: (index: number) => Promise<CoarseVolume>,
+  read: (index: number, onShare?: (share: number) => void) => Promise<CoarseVolume>,
 ): readonly ImageChannel[] {
   const names = unique(chosen.map((index) => stated[index]?.label ?? `Channel${index}`));
   const areNone = chosen.every((index) => stated[index]?.active === false);
@@ -28,7 +28,7 @@ export function channelsOf(
     color: stated[index]?.color ?? null,
     window: usefulWindow(stated[index]?.window ?? null, dtype),
     opens: areNone || stated[index]?.active !== false,
-    read: () => read(index),
+    read: (onShare) => read(index, onShare),
   }));
 }
 

@@ -83,6 +83,28 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     });
 
+    it("has slices and links as a bundle has", async () => {
+      other.headers = CORS;
+      await stand.viewer.open(`${addressOf(`${other.address}/v04.ome.zarr`)}&slices=on`);
+      await stand.viewer.settled();
+      const { page } = stand.viewer;
+      await expect.poll(() => page.locator("[data-slice] canvas").count()).toBe(3);
+      const values = page.locator(".slices .values").first();
+      await expect.poll(() => values.textContent()).toMatch(/Left.*\d/);
+      await stand.viewer.show("Right", false);
+      const link = await stand.viewer.writeLink();
+      expect(link).toContain("source=");
+      await stand.viewer.page.goto("about:blank");
+      await stand.viewer.open(link);
+      await stand.viewer.settled();
+      const { state } = await stand.viewer.snapshot();
+      expect(state.channels.map(({ shown }) => shown)).toEqual([true, false]);
+      expect(state.notices).toEqual([T_NOTE]);
+      const drawn = await middles();
+      expect(drawn.red.length).toBeGreaterThan(100); // the slices leave it a part of the page
+      expect(drawn.green.length).toBe(0);
+    });
+
     it.each(["v05.ome.zarr", "sharded.ome.zarr", "sharded.ozx"])("shows %s", async (name) => {
       other.headers = CORS;
       await open(name);
@@ -198,7 +220,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       };
       /** Requests for anything but the viewer's own parts. */
       const asked = () =>
-        stand.host.requests.filter(({ path }) => !path.startsWith("/app/assets/"));
+        stand.host.requests.filter(({ path }) => !/^\/app\/(assets|environments)\//.test(path));
 
       it("a NIfTI file that is dropped, of which nothing leaves it", async () => {
         const bytes = [...(await readFile(join(folder, "head.nii.gz")))];
@@ -213,6 +235,26 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(volumes.length + Number(state.mode === "traced")).toBeGreaterThan(0);
         expect(await stand.viewer.page.title()).toBe("NIfTI · StereoCell");
         expect(asked()).toEqual([]);
+      });
+
+      it("a folder of OME-Zarr that is dropped, and no second one on its picture", async () => {
+        await start();
+        const { page } = stand.viewer;
+        const devtools = await page.context().newCDPSession(page);
+        const drop = async (name: string) => {
+          const data = { items: [], files: [join(folder, name)], dragOperationsMask: 1 };
+          for (const type of ["dragEnter", "dragOver", "drop"] as const) {
+            await devtools.send("Input.dispatchDragEvent", { type, x: 100, y: 100, data });
+          }
+        };
+        await drop("sharded.ome.zarr");
+        const { state } = await shown();
+        expect(state.channels.map(({ name }) => name)).toEqual(["Left", "Right"]);
+        expect(asked()).toEqual([]);
+        await drop("v05.ome.zarr");
+        const said = page.locator("[data-said]");
+        await expect.poll(() => said.textContent()).toBe("To open another file, reload the page.");
+        expect((await stand.viewer.snapshot()).state.channels.length).toBe(2);
       });
 
       it("a folder of OME-Zarr that is chosen", async () => {
