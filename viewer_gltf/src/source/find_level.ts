@@ -2,7 +2,7 @@
  * The level at which a channel's bodies begin: where two means stand for the values with the least cross entropy.
  *
  * A build looks for the level at which a surface is sharpest, by passes over all voxels; this one needs the histogram
- * alone. On six volumes (brain cells, an MR head, nuclei, an ovule, a whole mouse brain) it lay within 0.15 of the window
+ * alone. On six channels (brain cells, an MR head, nuclei, an ovule, a mouse brain) it lay within 0.15 of the window
  * from the level of `stereocell view`, and within 0.05 on all but one. Otsu's lay up to 0.19 away, and the pipeline's
  * adaptive threshold up to 0.6.
  *
