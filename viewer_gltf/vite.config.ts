@@ -162,7 +162,7 @@ export default defineConfig({
             { name: oneChunk(PAGE, "index"), priority: 1 },
             { name: "objects", test: /\/src\/objects\// }, // what their section shares with them, too
             { name: "source_codecs", test: /\/src\/source\/(codecs\/|unpack)|\/zstddec-stream/ },
-            { name: "source", test: /\/src\/source\/|\/node_modules\/(@?zarrita|ktx-parse)\// },
+            { name: "source", test: /\/src\/source\/|\/node_modules\/@?zarrita\// },
           ],
         },
       },

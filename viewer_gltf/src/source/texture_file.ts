@@ -1,21 +1,23 @@
-/** KTX2 textures with a zstd frame for each level, as the pipeline writes them; but no frame is compressed. */
-import {
-  createDefaultContainer,
-  KHR_DF_MODEL_RGBSDA,
-  KHR_DF_TRANSFER_LINEAR,
-  KHR_SUPERCOMPRESSION_ZSTD,
-  VK_FORMAT_R8_UNORM,
-  VK_FORMAT_R8G8_UNORM,
-  VK_FORMAT_R8G8B8A8_UNORM,
-  write,
-} from "ktx-parse";
+/**
+ * KTX2 textures with a zstd frame for each level, as pipeline/stereocell/formats/ktx2.py writes them; but no frame is
+ * compressed. The writer of ktx-parse would come into the page's first file, whose reader of KTX2 is in the same module.
+ *
+ * References: KTX 2.0 specification, Khronos, revision 2.0.4
+ */
 
-const FORMATS = {
-  1: VK_FORMAT_R8_UNORM,
-  2: VK_FORMAT_R8G8_UNORM,
-  4: VK_FORMAT_R8G8B8A8_UNORM,
-} as const;
-const CHANNEL_TYPES = [0, 1, 2, 15]; // R, G, B, A of KHR_DF_MODEL_RGBSDA
+const IDENTIFIER = [0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
+const HEADER_BYTES = 80;
+/** Of a level in the index: offset, length and unpacked length, uint64 each. */
+const LEVEL_BYTES = 24;
+/** Of the data format descriptor: its own size, the basic block, and each sample. */
+const [SIZE_BYTES, BLOCK_BYTES, SAMPLE_BYTES] = [4, 24, 16];
+/** R8_UNORM, R8G8_UNORM and R8G8B8A8_UNORM of Vulkan, by the number of components. */
+const VK_FORMATS = { 1: 9, 2: 16, 4: 37 } as const;
+const CHANNEL_TYPES = [0, 1, 2, 15]; // red, green, blue, alpha
+const SCHEME_ZSTD = 2;
+/** Version of the descriptor; its colour model RGBSDA, primaries BT.709 and linear transfer are all number 1. */
+const DESCRIPTOR_VERSION = 2;
+const WRITER = "KTXwriter\0StereoCell\0";
 
 /** Bytes of a zstd block, at most. */
 const MAX_BLOCK = 128 * 1024;
@@ -52,36 +54,42 @@ export function writeKtx2(
   channels: 1 | 2 | 4,
   levels: readonly Uint8Array[],
 ): Texture {
-  const container = createDefaultContainer();
-  container.vkFormat = FORMATS[channels];
-  [container.pixelWidth, container.pixelHeight] = size;
-  container.pixelDepth = channels === 4 ? 0 : size[2]; // the LUT is a 2D texture
-  container.levelCount = levels.length;
-  container.supercompressionScheme = KHR_SUPERCOMPRESSION_ZSTD;
-  container.levels = levels.map((data) => ({
-    levelData: storeZstd(data),
-    uncompressedByteLength: data.length,
-  }));
-  const [descriptor] = container.dataFormatDescriptor;
-  descriptor.colorModel = KHR_DF_MODEL_RGBSDA;
-  descriptor.transferFunction = KHR_DF_TRANSFER_LINEAR;
-  descriptor.bytesPlane = [channels, 0, 0, 0, 0, 0, 0, 0];
-  descriptor.samples = Array.from({ length: channels }, (_, i) => ({
-    bitOffset: 8 * i,
-    bitLength: 7,
-    channelType: CHANNEL_TYPES[i],
-    samplePosition: [0, 0, 0, 0],
-    sampleLower: 0,
-    sampleUpper: 255,
-  }));
-  const file = new Uint8Array(write(container));
-  // KTX 2.0, section 3.9: the level index starts at byte 80, three uint64 a level.
+  const frames = levels.map(storeZstd);
+  const descriptorBytes = SIZE_BYTES + BLOCK_BYTES + SAMPLE_BYTES * channels;
+  const descriptor = HEADER_BYTES + LEVEL_BYTES * levels.length;
+  const writer = descriptor + descriptorBytes;
+  const writerBytes = 4 + 4 * Math.ceil(WRITER.length / 4);
+  const first = writer + writerBytes;
+  const file = new Uint8Array(frames.reduce((end, frame) => end + frame.length, first));
   const view = new DataView(file.buffer);
-  return {
-    file,
-    levels: levels.map((_, i) => ({
-      offset: Number(view.getBigUint64(80 + 24 * i, true)),
-      length: Number(view.getBigUint64(88 + 24 * i, true)),
-    })),
-  };
+  const put32 = (at: number, ...values: readonly number[]) =>
+    values.forEach((value, i) => {
+      view.setUint32(at + 4 * i, value, true);
+    });
+  file.set(IDENTIFIER);
+  const depth = channels === 4 ? 0 : size[2]; // the LUT is a 2D texture
+  put32(12, VK_FORMATS[channels], 1, size[0], size[1], depth, 0, 1, levels.length, SCHEME_ZSTD);
+  put32(48, descriptor, descriptorBytes, writer, writerBytes);
+  put32(descriptor, descriptorBytes, 0);
+  const block = descriptor + SIZE_BYTES + 4;
+  put32(block, DESCRIPTOR_VERSION | ((descriptorBytes - SIZE_BYTES) << 16));
+  file.set([1, 1, 1, 0, 0, 0, 0, 0, channels], block + 4);
+  for (let i = 0; i < channels; i++) {
+    const sample = descriptor + SIZE_BYTES + BLOCK_BYTES + SAMPLE_BYTES * i;
+    put32(sample, (8 * i) | (7 << 16) | (CHANNEL_TYPES[i] << 24), 0, 0, 255);
+  }
+  put32(writer, WRITER.length);
+  file.set(new TextEncoder().encode(WRITER), writer + 4);
+  const places = new Array<{ offset: number; length: number }>(frames.length);
+  for (let i = frames.length - 1, offset = first; i >= 0; i--) {
+    const { length } = frames[i];
+    file.set(frames[i], offset);
+    const numbers = [offset, length, levels[i].length];
+    numbers.forEach((value, k) => {
+      view.setBigUint64(HEADER_BYTES + LEVEL_BYTES * i + 8 * k, BigInt(value), true);
+    });
+    places[i] = { offset, length };
+    offset += length;
+  }
+  return { file, levels: places };
 }
