@@ -25,6 +25,8 @@ const BOOT = new URL("../boot/", import.meta.url);
 const STYLE = /<link rel="stylesheet"[^>]* href="\.\/([^"]+\.css)"/;
 /** What is packed already gains nothing. */
 const SHRINKS = new Set([".js", ".css", ".html", ".json", ".svg", ".wasm", ".webmanifest"]);
+/** Parts of the page that read a source without a bundle. */
+const OF_SOURCES = /(^|\/)source[_-]/;
 /** Less than a packet of the network. */
 const MIN_BYTES = 1000;
 
@@ -108,6 +110,7 @@ async function listFiles(folder: string, plain: string): Promise<void> {
   if (!FILES.test(code)) throw new Error(`${path}: no place for the list of files`);
   const names = (await filesOf(folder))
     .filter((name) => name !== SERVICE_WORKER && name !== PAGE && name !== plain)
+    .filter((name) => !OF_SOURCES.test(name)) // a source is shown with a network alone
     .concat(`${plain}.gz`)
     .sort();
   const list = JSON.stringify(JSON.stringify(names));

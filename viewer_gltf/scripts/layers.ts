@@ -31,6 +31,7 @@ export const LAYERS: readonly string[] = [
   "host",
   PARTS,
   "live",
+  "source",
   "app",
 ];
 

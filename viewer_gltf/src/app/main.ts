@@ -6,9 +6,10 @@ import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../panel/html/forced_colors.css";
 import type { Report } from "../bench/report";
-import { bundleAddress, pageAddress } from "../bundle/address";
-import { BundleError } from "../bundle/errors";
+import { bundleAddress, namesBundle, pageAddress, sourceAddress } from "../bundle/address";
+import { BundleError, MissingError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
+import { isHeld } from "../bundle/held_files";
 import type { LiveHost } from "../bundle/live_host";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
@@ -21,6 +22,7 @@ import type { Theme } from "../render/theme";
 import { withTyped } from "../share/address";
 import { loadLink, openAddress } from "../share/open_address";
 import { isLight, isPlain, panelOf } from "../share/page_parameters";
+import type { ShownSource } from "../source/open_source";
 import type { StereoCellApi } from "./automation_api";
 import * as parts from "./parts";
 
@@ -64,16 +66,40 @@ function followSystem(host: Host, search: string): void {
 async function open(parent: HTMLElement): Promise<Host> {
   dressPage();
   checkWebGl2();
-  sayAtStart("Reading the bundle");
   const page = pageAddress();
   const { search, hash } = new URL(page);
-  const [bundle, readLink] = await Promise.all([
-    loadBundle(bundleAddress(page)),
+  const [{ bundle, notes }, readLink] = await Promise.all([
+    openShown(parent, page),
     loadLink(withTyped(hash)),
   ]);
-  const made = await openIn(parent, bundle, (host) => openAddress(host, search, readLink));
+  const made = await openIn(parent, bundle, (host) => {
+    for (const text of notes) host.dispatch({ type: "notify", text }, false);
+    openAddress(host, search, readLink);
+  });
+  if (isHeld(bundle.base)) {
+    const { refuseDrops } = await import("../source/dropped");
+    refuseDrops((text) => made.announce(text));
+  }
   if (bundle.live !== undefined) followBuild(bundle, bundle.live);
   return made;
+}
+
+/** What the address names: a bundle, or a source that the page reads by itself. Without either a person chooses one. */
+async function openShown(parent: HTMLElement, page: string): Promise<ShownSource> {
+  const source = sourceAddress(page);
+  if (source !== null) {
+    sayAtStart("Reading the source");
+    const { openAddress } = await import("../source/open_source");
+    return openAddress(source, sayAtStart);
+  }
+  sayAtStart("Reading the bundle");
+  try {
+    return { bundle: await loadBundle(bundleAddress(page)), notes: [] };
+  } catch (error) {
+    if (!(error instanceof MissingError) || namesBundle(page)) throw error;
+    const { chooseSource } = await import("../source/start_page");
+    return chooseSource(parent);
+  }
 }
 
 /** Follows the build behind the page: each newer view takes the place of the one before. */
@@ -130,7 +156,8 @@ opened.catch((error: unknown) => {
     showFatal(app, "The viewer failed", String(error));
     throw error;
   }
-  showFatal(app, "This bundle can't be shown", error.message);
+  const kind = error.name === "SourceError" ? "source" : "bundle";
+  showFatal(app, `This ${kind} can't be shown`, error.message);
 });
 let host: Host | null = null;
 void opened.then(

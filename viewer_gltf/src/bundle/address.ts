@@ -30,6 +30,31 @@ export function viewerAddress(): string {
 }
 
 /**
+ * The address of a source that the page is to read by itself, which `?source=` names relative to the page or absolute;
+ * null: the page shows a bundle. A document that brings its bundle along reads no source.
+ * Throws BundleError if it names no address of the web, or if the page is to show a bundle as well.
+ */
+export function sourceAddress(page: string): string | null {
+  const asked = new URL(page).searchParams;
+  const named = asked.get("source");
+  if (globalThis.stereocellHost?.bundle !== undefined || !named) return null;
+  if (asked.has("bundle")) {
+    throw new BundleError("?source= and ?bundle=: found both, expected one of them");
+  }
+  const url = URL.canParse(named, page) ? new URL(named, page) : null;
+  if (url === null || !/^https?:$/.test(url.protocol)) {
+    throw new BundleError(`?source=: expected an image's address on the web, found "${named}"`);
+  }
+  url.hash = "";
+  return url.href;
+}
+
+/** Whether the address names a bundle, which may lie beside the page without a name. */
+export function namesBundle(page: string): boolean {
+  return globalThis.stereocellHost !== undefined || new URL(page).searchParams.has("bundle");
+}
+
+/**
  * The folder that holds the bundle, with a closing slash. `?bundle=` names the folder or its
  * manifest.json, relative to the page or absolute; without it the bundle lies beside the page. A document that
  * brings its bundle along opens no other.

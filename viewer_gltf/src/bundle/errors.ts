@@ -3,6 +3,11 @@ export class BundleError extends Error {
   override readonly name: string = "BundleError";
 }
 
+/** A file that the host does not have. */
+export class MissingError extends BundleError {
+  override readonly name = "MissingError";
+}
+
 /** A fault that may be gone a second later: no connection, or a host that is busy. */
 export class TemporaryError extends BundleError {
   override readonly name = "TemporaryError";

@@ -1,7 +1,8 @@
-/** Fetch files of a bundle. Every fault becomes a BundleError that names the file. */
-import { BundleError, TemporaryError } from "./errors";
+/** Fetch files of a bundle, from a host or from the page itself. Every fault becomes a BundleError that names the file. */
+import { BundleError, MissingError, TemporaryError } from "./errors";
 import type { FileRef } from "./generated/bundle";
 import { checkHash } from "./hash";
+import { heldResponse, isHeld } from "./held_files";
 import { noteAsked } from "./request_log";
 import { withRetries } from "./retry";
 
@@ -43,7 +44,7 @@ function noticeOf(url: string, fault: string): string {
 async function requestOnce(url: string, path: string, options: RequestInit): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(url, options);
+    response = isHeld(url) ? heldResponse(url) : await fetch(url, options);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
     const fault = "can't be reached, or forbids this page";
@@ -52,7 +53,7 @@ async function requestOnce(url: string, path: string, options: RequestInit): Pro
       notice: noticeOf(url, fault),
     });
   }
-  if (response.status === 404) throw new BundleError(`${path}: not found (404) at ${url}`);
+  if (response.status === 404) throw new MissingError(`${path}: not found (404) at ${url}`);
   if (!response.ok) {
     const { status } = response;
     const message = `${path}: the host answered ${status} for ${url}`;

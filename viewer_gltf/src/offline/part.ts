@@ -1,4 +1,5 @@
 /** A visit without a network, as a part of the viewer. Its code loads after the first picture. */
+import { isHeld } from "../bundle/held_files";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 
 class OfflinePart implements Part {
@@ -7,7 +8,9 @@ class OfflinePart implements Part {
   constructor(private readonly host: PartHost) {}
 
   async afterOverview(): Promise<void> {
-    if (this.host.bundle.live !== undefined) return; // the bundle is not whole yet
+    const { bundle } = this.host;
+    // a view of a source that is being built, or a bundle that the page itself has made
+    if (bundle.live !== undefined || isHeld(bundle.base)) return;
     const { KeepOffline } = await import("./keep_offline");
     await KeepOffline.start(this.host);
   }

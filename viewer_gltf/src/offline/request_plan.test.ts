@@ -57,6 +57,7 @@ describe("the answer to a request", () => {
     expect(ownBundle(page)).toBeNull();
     expect(ownBundle(`${FOLDER}?bundle=http://`)).toBeNull();
     expect(ownBundle("blob:https://host/5f0e")).toBeNull();
+    expect(ownBundle(`${FOLDER}?source=x.zarr`)).toBeNull(); // a source is read anew at each visit
     expect(plan("https://far/x/manifest.json", page)).toEqual({ kind: "none" });
     expect(plan(`${FOLDER}manifest.json`, page)).toEqual({ kind: "none" });
   });

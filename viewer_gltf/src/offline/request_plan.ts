@@ -4,7 +4,7 @@
  * Hashed files never change under their name and come from the store first; what may change under
  * its name (the page, the manifest, the icons) comes from the network first.
  */
-import { bundleAddress } from "../bundle/address";
+import { bundleAddress, sourceAddress } from "../bundle/address";
 import { BundleError } from "../bundle/errors";
 import type { FileRef } from "../bundle/generated/bundle";
 
@@ -33,6 +33,7 @@ const MANIFEST = "manifest.json";
 export function ownBundle(page: string): string | null {
   if (!/^https?:/.test(page)) return null; // a worker made from a blob asks too
   try {
+    if (sourceAddress(page) !== null) return null;
     const base = bundleAddress(page);
     return new URL(base).origin === new URL(page).origin ? base : null;
   } catch (error) {

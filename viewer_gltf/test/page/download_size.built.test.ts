@@ -48,6 +48,7 @@ const OPTIONAL = new RegExp(
     "screen_stereo",
     "shading",
     "slices",
+    "source[_-]",
     "split_session",
     "placed_card",
     "unclipped",

@@ -63,7 +63,9 @@ export class Host {
         async (bytes) => {
           if (host.delay_ms > 0) await new Promise((done) => setTimeout(done, host.delay_ms));
           const type = TYPES[extname(path)] ?? "text/html";
-          const headers = { ...host.headers, "Content-Type": type };
+          const length = { "Content-Length": String(bytes.length) };
+          const sized = request.method === "HEAD" ? length : {};
+          const headers = { ...host.headers, "Content-Type": type, ...sized };
           const asked =
             host.hasRanges && answer === undefined ? /^bytes=(\d+)-(\d+)$/.exec(range ?? "") : null;
           if (asked === null) {

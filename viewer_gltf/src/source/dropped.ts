@@ -1,0 +1,43 @@
+/** What a person drops on the page, as a source. */
+import type { LocalSource } from "./open_source";
+
+/** The first file or folder of a drop; null: there is none. To be called within the event. */
+export function droppedSource({ items, files }: DataTransfer): LocalSource | null {
+  const entry = [...items]
+    .map((item) => item.webkitGetAsEntry?.() ?? null)
+    .find((one) => one !== null);
+  if (entry?.isDirectory) return folderOf(entry as FileSystemDirectoryEntry);
+  const [file] = files;
+  return file === undefined ? null : { kind: "file", file };
+}
+
+function folderOf(folder: FileSystemDirectoryEntry): LocalSource {
+  const find = (path: string) =>
+    new Promise<File | null>((resolve, reject) => {
+      const found = (entry: FileSystemEntry) =>
+        (entry as FileSystemFileEntry).file(resolve, reject);
+      folder.getFile(path, {}, found, () => resolve(null));
+    });
+  return { kind: "folder", name: folder.name, find };
+}
+
+/** Keeps the browser from leaving the page for a file that is dropped on a picture, and says how to open it. */
+export function refuseDrops(say: (text: string) => void): void {
+  addEventListener("dragover", (event) => event.preventDefault());
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    const { search } = location;
+    const isNamed = new URLSearchParams(search).has("source");
+    const way = isNamed ? "open the page without ?source=" : "reload the page";
+    say(`To open another file, ${way}.`);
+  });
+}
+
+/** The folder of files that a person has chosen, each of which knows its path; null: there is none. */
+export function chosenFolder(files: FileList): LocalSource | null {
+  const [first] = files;
+  if (first === undefined) return null;
+  const [name] = first.webkitRelativePath.split("/");
+  const byPath = new Map([...files].map((file) => [file.webkitRelativePath, file]));
+  return { kind: "folder", name, find: async (path) => byPath.get(`${name}/${path}`) ?? null };
+}

@@ -1,0 +1,67 @@
+/** Opens a source in the page, without a server: the entry of this folder, which is loaded when a source is to be shown. */
+import type { Bundle } from "../bundle/load";
+import { type ByteSource, LocalFile, LocalFolder } from "./byte_source";
+import { makeBundle } from "./make_bundle";
+import type { OpenedImage, Report } from "./opened_image";
+import { openNifti } from "./read_nifti";
+import { openZarr } from "./read_zarr";
+import { RemoteFile, RemoteFolder } from "./remote_file";
+import { SourceError } from "./source_error";
+import { ZipStore } from "./zip_store";
+
+/** A source as the viewer shows it, and sentences that appear as notices do. */
+export type ShownSource = Readonly<{ bundle: Bundle; notes: readonly string[] }>;
+
+const NIFTI = /\.nii(\.gz)?$/i;
+const ARCHIVE = /\.(ozx|zip)$/i;
+const ENDINGS = /(\.ome)?\.(zarr(\.zip)?|ozx|zip)$|\.nii(\.gz)?$/i;
+
+/** Opens the image at an address of the web. Throws SourceError. */
+export async function openAddress(address: string, report: Report): Promise<ShownSource> {
+  const url = new URL(address);
+  const path = url.pathname.replace(/\/+$/, "");
+  report(`Asking ${url.host}`);
+  if (NIFTI.test(path) || ARCHIVE.test(path))
+    return shown(await openFile(new RemoteFile(url), report), report);
+  const name = nameOf(path) || url.host;
+  return shown(await openZarr(new RemoteFolder(url), name), report);
+}
+
+/** A file or a folder of this machine, as a person has dropped or chosen it. */
+export type LocalSource =
+  | Readonly<{ kind: "file"; file: File }>
+  | Readonly<{ kind: "folder"; name: string; find: (path: string) => Promise<File | null> }>;
+
+/** Opens a file or a folder of this machine, of which nothing leaves it. Throws SourceError. */
+export async function openLocal(source: LocalSource, report: Report): Promise<ShownSource> {
+  if (source.kind === "file")
+    return shown(await openFile(new LocalFile(source.file), report), report);
+  const name = nameOf(source.name);
+  return shown(await openZarr(new LocalFolder(source.find), name), report);
+}
+
+async function openFile(file: ByteSource, report: Report): Promise<OpenedImage> {
+  const { name } = file;
+  if (NIFTI.test(name)) return openNifti(file, report);
+  if (ARCHIVE.test(name)) return openZarr(await ZipStore.open(file), nameOf(name));
+  throw new SourceError(
+    `${name}: expected a NIfTI file (.nii, .nii.gz), an OME-Zarr folder or a zipped one (.ozx): for other formats, and ` +
+      "DICOM, use stereocell view.",
+  );
+}
+
+async function shown(image: OpenedImage, report: Report): Promise<ShownSource> {
+  return { bundle: await makeBundle(image, report), notes: image.notes };
+}
+
+/** The last part of a path, without the endings of formats. */
+function nameOf(path: string): string {
+  const last = path.split("/").filter(Boolean).pop() ?? "";
+  let name = last;
+  try {
+    name = decodeURIComponent(last);
+  } catch {
+    // a folder's name may hold a % of its own
+  }
+  return name.replace(ENDINGS, "") || name;
+}

@@ -1,0 +1,36 @@
+import type { Rgb } from "../math/color";
+import type { CoarseVolume, Triple } from "./coarse_volume";
+import type { Window } from "./find_window";
+
+/** A channel that is shown. */
+export type ImageChannel = Readonly<{
+  name: string;
+  /** Linear RGB; null: the source states none. */
+  color: Rgb | null;
+  /** Values that the source states as the ends of the window; null: it states none. */
+  window: Window | null;
+  /** Whether the channel shows at the opening. */
+  opens: boolean;
+  /** Reads the voxels, and calls back with the share of them that has come, 0..1. Throws SourceError. */
+  read: (onShare?: (share: number) => void) => Promise<CoarseVolume>;
+}>;
+
+/** A source that was opened: its metadata, and the way to its voxels. */
+export type OpenedImage = Readonly<{
+  name: string;
+  /** Voxels of the finest level (z, y, x), and their distance in um. */
+  shape: Triple;
+  spacing_um: Triple;
+  /** 4 x 4, column-major, um: from the world of the voxels, whose origin is the first one, to the world. */
+  placement: readonly number[];
+  /** Whether the sides of a patient are known. */
+  hasSides: boolean;
+  /** Whether stored values may be below 0. */
+  isSigned: boolean;
+  channels: readonly ImageChannel[];
+  /** Sentences for the user, which appear as notices do. */
+  notes: readonly string[];
+}>;
+
+/** Reports how far it has come, in words. */
+export type Report = (text: string) => void;

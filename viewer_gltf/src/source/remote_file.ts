@@ -1,0 +1,204 @@
+/**
+ * Files of a source at a host. A page may read another host's files only if that host allows it, so each refusal says
+ * whose turn it is: the reader's, or that of whoever runs the host.
+ *
+ * Requests carry no cookie and no Referer. Parts are asked for by their first and last byte, which needs no leave of the
+ * host beforehand (a "preflight" of CORS); a number of last bytes would.
+ */
+import { TemporaryError } from "../bundle/errors";
+import { withRetries } from "../bundle/retry";
+import { type ByteRange, type ByteSource, type FileStore, placeOf } from "./byte_source";
+import { SourceError } from "./source_error";
+
+const OPTIONS: RequestInit = { credentials: "omit", referrerPolicy: "no-referrer" };
+/** HTTP status of an answer to a range. */
+const PART = 206;
+/** Answers of a host that has no such file. Buckets that list nothing answer 403 for those. */
+const NO_FILE = [403, 404];
+/** Answers that may be better a moment later. */
+const BUSY = 429;
+const FIRST_SERVER_FAULT = 500;
+
+/** The host lets no other page read an answer: of a file, or where there is none. */
+class RefusedError extends SourceError {}
+
+/** The response; null where there is no such file. Throws SourceError, or TemporaryError after some tries. */
+async function ask(url: URL, options: RequestInit = {}): Promise<Response | null> {
+  return withRetries(async () => {
+    let response: Response;
+    try {
+      response = await fetch(url, { ...OPTIONS, ...options });
+    } catch (error) {
+      throw await refusalOf(url, error);
+    }
+    const { status, ok } = response;
+    if (NO_FILE.includes(status)) return null;
+    if (ok) return response;
+    const message = `The host ${url.host} answers ${status} for ${url.pathname}`;
+    if (status === BUSY || status >= FIRST_SERVER_FAULT) {
+      throw new TemporaryError(`${message}: try again later, or ask whoever runs it.`);
+    }
+    throw new SourceError(`${message}: check the address, or ask whoever runs the host.`);
+  });
+}
+
+/** The reason why a page may not read an address, and who can change that. */
+async function refusalOf(url: URL, cause: unknown): Promise<SourceError> {
+  const { host } = url;
+  const isLocal = /^(localhost|127\.0\.0\.1|\[::1\])$/.test(url.hostname);
+  if (globalThis.location?.protocol === "https:" && url.protocol === "http:" && !isLocal) {
+    return new SourceError(
+      `A page of https may read nothing over http: whoever runs ${host} has to offer the files over https.`,
+      { cause },
+    );
+  }
+  try {
+    await fetch(url, { ...OPTIONS, mode: "no-cors" });
+  } catch {
+    const text = `The host ${host} can't be reached: check the address and the network.`;
+    return new SourceError(text, { cause });
+  }
+  const origin = globalThis.location?.origin ?? "*";
+  return new RefusedError(
+    `The host ${host} does not let other pages read its files: whoever runs it has to answer with ` +
+      `Access-Control-Allow-Origin: ${origin} (or *), which is CORS.`,
+    { cause },
+  );
+}
+
+async function bodyOf(response: Response, url: URL): Promise<Uint8Array<ArrayBuffer>> {
+  try {
+    return new Uint8Array(await response.arrayBuffer());
+  } catch (error) {
+    throw new SourceError(
+      `The connection to ${url.host} broke within ${url.pathname}: try again.`,
+      { cause: error },
+    );
+  }
+}
+
+/** A part of the file at an address; null where there is no such file. */
+async function partOf(
+  url: URL,
+  { offset, length }: Readonly<{ offset: number; length: number }>,
+): Promise<Uint8Array<ArrayBuffer> | null> {
+  if (length === 0) return new Uint8Array(0);
+  const response = await ask(url, { headers: { Range: `bytes=${offset}-${offset + length - 1}` } });
+  if (response === null) return null;
+  if (response.status !== PART) {
+    await response.body?.cancel();
+    throw new SourceError(
+      `The host ${url.host} sends no parts of files, by which a zip file or a sharded image is read: whoever runs it ` +
+        "has to turn on HTTP range requests, or to offer the image unpacked and without shards.",
+    );
+  }
+  const bytes = await bodyOf(response, url);
+  if (bytes.length === length) return bytes;
+  throw new SourceError(
+    `${url.pathname}: found ${bytes.length} of ${length} bytes from ${offset} on: the file is cut short, so whoever ` +
+      `runs ${url.host} has to upload it again.`,
+  );
+}
+
+/** The size of the file at an address; null where there is no such file. */
+async function sizeOf(url: URL): Promise<number | null> {
+  const response = await ask(url, { method: "HEAD" });
+  if (response === null) return null;
+  const size = Number(response.headers.get("Content-Length") ?? Number.NaN);
+  if (Number.isFinite(size)) return size;
+  throw new SourceError(
+    `The host ${url.host} states no Content-Length for ${url.pathname}: whoever runs it has to let pages read that header.`,
+  );
+}
+
+function missing(url: URL): SourceError {
+  return new SourceError(
+    `${url.href}: not found: check the address, or ask whoever runs ${url.host} whether the file is public.`,
+  );
+}
+
+/** One file at an address. */
+export class RemoteFile implements ByteSource {
+  private found: Promise<number> | null = null;
+
+  constructor(private readonly url: URL) {}
+
+  get name(): string {
+    return decodeURIComponent(this.url.pathname.split("/").pop() ?? "");
+  }
+
+  size(): Promise<number> {
+    this.found ??= sizeOf(this.url).then((size) => {
+      if (size === null) throw missing(this.url);
+      return size;
+    });
+    return this.found;
+  }
+
+  async read(offset: number, length: number): Promise<Uint8Array<ArrayBuffer>> {
+    const bytes = await partOf(this.url, { offset, length });
+    if (bytes === null) throw missing(this.url);
+    return bytes;
+  }
+
+  async stream(): Promise<ReadableStream<Uint8Array<ArrayBuffer>>> {
+    const response = await ask(this.url);
+    if (response?.body == null) throw missing(this.url);
+    return response.body;
+  }
+}
+
+/**
+ * The files below a folder's address. Its query, such as a token, goes with each.
+ *
+ * Many hosts let pages read their files, but not the answer that there is none. So a refusal stands for a missing file;
+ * where no file at all could be read, it is the fault.
+ */
+export class RemoteFolder implements FileStore {
+  refusal: SourceError | null = null;
+  private hasRead = false;
+  private readonly sizes = new Map<string, Promise<number | null>>();
+
+  constructor(private readonly root: URL) {}
+
+  async get(key: string): Promise<Uint8Array<ArrayBuffer> | undefined> {
+    const url = this.at(key);
+    return this.noted(async () => {
+      const response = await ask(url);
+      return response === null ? null : bodyOf(response, url);
+    });
+  }
+
+  async getRange(key: string, range: ByteRange): Promise<Uint8Array<ArrayBuffer> | undefined> {
+    const url = this.at(key);
+    if ("offset" in range) return this.noted(() => partOf(url, range));
+    const size = this.sizes.get(key) ?? sizeOf(url);
+    this.sizes.set(key, size);
+    return this.noted(async () => {
+      const found = await size;
+      return found === null ? null : partOf(url, placeOf(range, found));
+    });
+  }
+
+  /** What a job has read; undefined where there is no such file. */
+  private async noted<T>(job: () => Promise<T | null>): Promise<T | undefined> {
+    try {
+      const found = await job();
+      if (found === null) return undefined;
+      this.hasRead = true;
+      this.refusal = null;
+      return found;
+    } catch (error) {
+      if (!(error instanceof RefusedError)) throw error;
+      if (!this.hasRead) this.refusal ??= error;
+      return undefined;
+    }
+  }
+
+  private at(key: string): URL {
+    const url = new URL(this.root);
+    const path = key.split("/").map(encodeURIComponent).join("/");
+    url.pathname = url.pathname.replace(/\/*$/, "") + path;
+    return url;
+  }
+}

@@ -1,0 +1,101 @@
+/** The levels of an OME-Zarr image: which one is shown, and where its voxels lie. */
+import * as zarr from "zarrita";
+import { type LevelPlace, READ_FACTOR, type Triple, triple, volumeOf } from "./coarse_volume";
+import type { NgffImage } from "./ngff";
+import { SourceError } from "./source_error";
+import { explained } from "./zarr_faults";
+
+/** Most bytes of a chunk once it is unpacked. */
+const MAX_CHUNK_BYTES = 1 << 28;
+const NUMBERS = /^(u?int(8|16|32|64)|float(32|64))$/;
+
+export type Store = zarr.AsyncReadable;
+export type Level = zarr.Array<zarr.DataType, Store>;
+
+export async function openLevel(
+  store: Store,
+  image: NgffImage,
+  level: number,
+  name: string,
+): Promise<Level> {
+  const { path } = image.levels[level];
+  const where = `${name}: level ${path}`;
+  const array = await explained(where, () =>
+    zarr.open(zarr.root(store).resolve(path), { kind: "array" }),
+  );
+  const { shape, dtype, chunks } = array;
+  if (shape.length !== image.axes.length || shape.some((n) => n < 1)) {
+    throw new SourceError(
+      `${where}: found the shape ${shape.join(" x ")}, expected ${image.axes.length} axes as \`axes\` has them.`,
+    );
+  }
+  if (!NUMBERS.test(dtype)) {
+    throw new SourceError(
+      `${where}: found voxels of type ${dtype}, expected whole numbers, or real ones of 32 or 64 bits.`,
+    );
+  }
+  const bytes = chunks.reduce((product, n) => product * n, Number(/\d+/.exec(dtype)?.[0]) / 8);
+  if (bytes > MAX_CHUNK_BYTES) {
+    throw new SourceError(
+      `${where}: found chunks of ${Math.round(bytes / 1e6)} MB, too large for a page: whoever made the image has to ` +
+        `write smaller ones, or open it by: stereocell view`,
+    );
+  }
+  return array;
+}
+
+/**
+ * The finest level that is small enough; the coarsest is shown by the means of blocks where none is.
+ *
+ * @param most voxels of a channel that are shown, at most
+ */
+export async function chooseLevel(
+  store: Store,
+  image: NgffImage,
+  finest: Level,
+  most: number,
+  name: string,
+): Promise<Readonly<{ level: number; array: Level }>> {
+  const last = image.levels.length - 1;
+  const mostRead = READ_FACTOR * most;
+  for (let level = 0; ; level++) {
+    const array = level === 0 ? finest : await openLevel(store, image, level, name);
+    const voxels = volumeOf(spatial(image.axes, array.shape));
+    if (voxels <= (level === last ? mostRead : most)) return { level, array };
+    if (level === last) {
+      const millions = (n: number) => `${Math.round(n / 1e6)} million voxels`;
+      throw new SourceError(
+        `${name}: its coarsest level has ${millions(voxels)} a channel and a page reads ${millions(mostRead)}: whoever ` +
+          "made the image has to add coarser levels, or open it by: stereocell view",
+      );
+    }
+  }
+}
+
+/** What an image has along z, y and x. */
+export const spatial = (axes: readonly string[], values: readonly number[]): Triple =>
+  triple((i) => values[axes.indexOf("zyx"[i])]);
+
+/** Where a level's voxels lie: by the stated scales, or by its shape where there are none. */
+export function placeOfLevel(
+  { levels }: NgffImage,
+  level: number,
+  shape: Triple,
+  levelShape: Triple,
+  scale: Triple,
+): LevelPlace {
+  const own = levels[level];
+  const step = triple((i) => {
+    const byShape = shape[i] / levelShape[i];
+    if (own.scale_um === null) return byShape;
+    const stated = own.scale_um[i] / scale[i];
+    // all levels cover one field: a level whose scale says otherwise is placed by its shape
+    return Math.abs(shape[i] / stated - levelShape[i]) <= 1 + 1e-6 ? stated : byShape;
+  });
+  const [to, from] = [own.shift_um, levels[0].shift_um];
+  const first = triple((i) => {
+    if (level === 0 || to === null || from === null) return (step[i] - 1) / 2;
+    return (to[i] - from[i]) / scale[i];
+  });
+  return { first, step };
+}
