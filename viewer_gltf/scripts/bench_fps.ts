@@ -51,7 +51,8 @@ async function measure(bundle: string, name: string): Promise<void> {
     await page.locator("[data-bench=split]").click();
     const canvas = page.locator(".bench canvas");
     await canvas.waitFor({ timeout: 0 });
-    const report: Report | null = await page.evaluate(() => window.stereocell?.bench ?? null);
+    const found = await page.evaluate(() => window.stereocell?.bench ?? null);
+    const report = found as Report | null;
     if (report === null) throw new Error(`${bundle}: the page has no report`);
     const file = join(out, name);
     await writeFile(`${file}.json`, `${JSON.stringify(report, null, 2)}\n`);

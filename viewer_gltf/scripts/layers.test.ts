@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { against, arrowsOf, circles, partsOf } from "./layers";
+import { against, arrowsOf, circles, partsOf, usersOfHost } from "./layers";
 
 const arrow = (from: string, to: string) => ({ from, to });
 
@@ -42,6 +42,17 @@ describe("the layers", () => {
     const wrong = [arrow("ruler/part.ts", "slices/part.ts"), arrow("host/a.ts", "ruler/b.ts")];
     expect(against([...fine, ...wrong], parts)).toEqual(wrong);
     expect(against([arrow("app/a.ts", "ruler/b.ts")])).toHaveLength(1);
+  });
+
+  it("know the files above the host, which may not reach through it", () => {
+    const files = [
+      "slices/part.ts",
+      "slices/part.test.ts",
+      "app/main.ts",
+      "host/host.ts",
+      "xr/a.ts",
+    ];
+    expect(usersOfHost(files, partsOf(files))).toEqual(["slices/part.ts", "app/main.ts"]);
   });
 
   it("refuse a folder that is none of them", () => {

@@ -4,7 +4,6 @@
  * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
  */
 
-import type { Report } from "../bench/report";
 import type { Snapshot } from "../host/snapshot";
 
 export interface StereoCellApi {
@@ -16,8 +15,8 @@ export interface StereoCellApi {
   /** Resolves when nothing is loading any more and the picture shows all of it. */
   settled(): Promise<void>;
   snapshot(): Snapshot;
-  /** What the benchmark (`?bench`) has found; null: it has not been run. */
-  readonly bench: Report | null;
+  /** What the benchmark (`?bench`) has found, as bench/report.ts has it; null: it has not been run. */
+  readonly bench: object | null;
 }
 
 declare global {

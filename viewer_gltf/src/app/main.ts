@@ -5,7 +5,6 @@ import "../panel/html/widgets.css";
 import "../panel/html/controls.css";
 import "../panel/html/overlays.css";
 import "../panel/html/forced_colors.css";
-import type { Report } from "../bench/report";
 import { bundleAddress, namesBundle, pageAddress, sourceAddress } from "../bundle/address";
 import { BundleError, MissingError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -181,7 +180,7 @@ addEventListener("unhandledrejection", (event) => reportBug(event.reason));
 const api: StereoCellApi = {
   apiVersion: 1,
   get bench() {
-    return (host?.service("bench")?.report ?? null) as Report | null;
+    return host?.service("bench")?.report ?? null;
   },
   ready,
   get frames() {

@@ -76,7 +76,11 @@ export class Host implements PartHost {
       announce: (text) => this.announce(text),
       onChange: () => this.changed.emit(this.state),
     });
-    this.panel = this.makePanel();
+    this.panel = new PanelModel(manifest, () => ({
+      ...{ manifest, state: this.state, undo: this.undo },
+      snapshot: () => this.display.snapshot(),
+      sections: (view) => this.parts.sections(view),
+    }));
     this.taps = new Taps(this, this.parts, signal);
     this.commands = new Commands({
       ...{ host: this, parts: this.parts, taps: this.taps },
@@ -220,15 +224,6 @@ export class Host implements PartHost {
       onStereo: () => this.changed.emit(this.state),
       onFrame: () => this.drawn.emit(),
     });
-  }
-
-  private makePanel(): PanelModel {
-    const { manifest } = this.bundle;
-    return new PanelModel(manifest, () => ({
-      ...{ manifest, state: this.state, undo: this.undo },
-      snapshot: () => this.display.snapshot(),
-      sections: (view) => this.parts.sections(view),
-    }));
   }
 
   /** Brings the display and the parts to the state. */

@@ -59,17 +59,16 @@ export function makeSurfaceFrame(
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
 /** What the shaders of surfaces include of a part: see insertions/surface.vert.glsl and surface.frag.glsl. */
-const PART_CHUNKS = [
-  ...["part/vertex_declared", "part/vertex_place", "part/vertex_end"],
-  ...["part/fragment_declared", "part/fragment_color"],
-] as const;
+type PartChunk =
+  | `part/vertex_${"declared" | "place" | "end"}`
+  | `part/fragment_${"declared" | "color"}`;
 
 /** What some surfaces have beside all others. */
 export type SurfacePart = Readonly<{
   /** Of the text: the same for the same one. */
   key: string;
   uniforms: Readonly<Record<string, { value: unknown }>>;
-  chunks: Readonly<Record<(typeof PART_CHUNKS)[number], string>>;
+  chunks: Readonly<Record<PartChunk, string>>;
 }>;
 
 /** How much of a surface is left. */
