@@ -24,7 +24,7 @@ from skimage.filters import threshold_li
 from zarr.codecs import GzipCodec, ZstdCodec
 
 from stereocell.formats.ktx2 import decode_finest
-from stereocell.live.first_view import write_first_view
+from stereocell.live.first_view import read_channels, write_first_view
 from stereocell.model.channel import SurfaceLevel
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.preset_choice import load_for
@@ -180,7 +180,7 @@ def first_view(source: Path) -> dict[str, Any]:
     dataset = open_source(as_asked(plan.source, plan.settings.plan))
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        write_first_view(plan, dataset, root, None)
+        write_first_view(plan, read_channels(plan, dataset), root)
         manifest = json.loads((root / "manifest.json").read_text())
         for channel in manifest["channels"]:
             (volume,) = json.loads((root / channel["volumes"]["path"]).read_text())["volumes"]

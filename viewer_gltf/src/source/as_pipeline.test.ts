@@ -94,8 +94,10 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     expect(specimen.name).toBe(view.specimen.name);
     expect(specimen.modality).toBe(view.specimen.modality);
     expect(specimen.sides).toEqual(view.specimen.sides);
-    expect(tiles.map(({ id, representation }) => [id, representation])).toEqual(
-      view.tiles.map(({ id, representation }) => [id, representation]),
+    expect(
+      tiles.map(({ id, representation, unfinished }) => [id, representation, unfinished]),
+    ).toEqual(
+      view.tiles.map(({ id, representation, unfinished }) => [id, representation, unfinished]),
     );
     for (const end of ["min", "max"] as const) {
       for (const axis of [0, 1, 2]) {

@@ -102,7 +102,7 @@ async function describe(
       ...(kind.modality === "MR" ? { cut: { normal: [1, 0, 0], offset_um: middle } } : {}),
       bounds_um: world,
     },
-    tiles: [{ id: TILE, representation: "volume", bounds_um: world }],
+    tiles: [{ id: TILE, representation: "mesh", bounds_um: world, unfinished: true }],
     channels: [...channels],
     files: await put(files, "files.json", index),
   };
