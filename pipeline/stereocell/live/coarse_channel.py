@@ -12,6 +12,7 @@ from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 
 READ_VOXELS = 48_000_000  # most voxels of a channel that are read
+SLAB_VOXELS = 16_000_000  # approximate number of voxels that are read at a time
 SAMPLED_VOXELS = 6_000_000  # approximate number of values on which a window is found
 _Triple = tuple[int, int, int]
 
@@ -68,12 +69,18 @@ def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> 
     axis = dataset.slice_axis(level)
     # All planes of a block are read, or its middle ones where there are too many voxels.
     count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
+    # Where all planes are read, many blocks are read together: a chunk holds several planes.
+    together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
+    step = factor[axis] * (together if count == factor[axis] else 1)
+    end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
     blocks, sample = [], []
-    for start in range(box.start[axis], box.stop[axis] - factor[axis] + 1, factor[axis]):
+    for start in range(box.start[axis], end, step):
         middle = start + (factor[axis] - count) // 2
-        read = dataset.read(channel.index, box.slab(axis, middle, middle + count), level).voxels
+        stop = min(start + step, end) if step > factor[axis] else middle + count
+        read = dataset.read(channel.index, box.slab(axis, middle, stop), level).voxels
         blocks.append(_means(read, tuple(count if i == axis else factor[i] for i in range(3))))
-        sample.append(_spread(read, SAMPLED_VOXELS * factor[axis] // box.shape[axis]))
+        share = min(step, end - start) / box.shape[axis]
+        sample.append(_spread(read, round(SAMPLED_VOXELS * share)))
     # Places are converted from voxels of this level to voxels of the planned level.
     fine = plan.spacing_um
     scale = tuple(a / b for a, b in zip(spacing, fine, strict=True))
