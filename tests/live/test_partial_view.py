@@ -40,7 +40,7 @@ def view_of(source: Path, out: Path, scratch: Path) -> PartialView:
     settings, choice = load_for(source, None, None, flags={"plan": {"tile_size": (32, 48, 72)}})
     plan = settle(str(source), settings, choice)
     read = read_channels(plan, open_source(as_asked(plan.source, plan.settings.plan)))
-    return PartialView(plan, read, out, scratch)
+    return PartialView(plan, read, out, scratch, rest=0)
 
 
 @pytest.mark.slow
@@ -96,6 +96,21 @@ def test_units_of_an_earlier_build_show_at_once(source: Path, tmp_path: Path) ->
     assert view.finished == 2
     assert not any("unfinished" in tile for tile in manifest_of(folder)["tiles"])
     assert view.add("r0_c0") is None
+
+
+@pytest.mark.slow
+def test_a_view_waits_where_the_last_one_took_long_and_the_last_tile_does_not(
+    source: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert build(source, out) == ""
+    view = view_of(source, out, tmp_path / "scratch")
+    view._rest = 1e6
+    assert view.add("r0_c0") is not None
+    assert view.add("r1_c0") is None
+    assert view.finished == 2
+    assert view.add(None) is not None
+    assert view.add(None) is None
 
 
 @pytest.mark.slow

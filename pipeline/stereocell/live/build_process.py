@@ -267,7 +267,7 @@ class _Watcher:
 
     def __call__(self, label: str, done: int, total: int, name: str) -> None:
         if label == "units":
-            self._look(name.split("/")[0] if name else None)
+            self._look(name.split("/")[0] if name and done < total else None)
         self._pipe.send(_Task(label, done, total, self._view.finished))
         if self._pipe.poll() and self._pipe.recv() == "pause":
             self._pipe.send("paused")

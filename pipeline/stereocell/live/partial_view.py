@@ -6,6 +6,7 @@ two views share are hard links.
 
 import os
 import shutil
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +25,8 @@ from stereocell.planning.unit_steps import unit_steps
 from stereocell.steps.unit_files import is_whole
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.written_files import STAGE_NAME
+
+REST = 10.0  # so that views take at most a tenth of the time of a build
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +48,21 @@ class PartialView:
     read     the coarse voxels that it shows, by the ID of the voxels
     out      the folder of the build
     scratch  the folder of the views
+    rest     time between two views, as a multiple of that which the last one took: of many tiles
+             only some bring a view
     """
 
     def __init__(
-        self, plan: Plan, read: Mapping[str, CoarseChannel], out: Path, scratch: Path
+        self,
+        plan: Plan,
+        read: Mapping[str, CoarseChannel],
+        out: Path,
+        scratch: Path,
+        *,
+        rest: float = REST,
     ) -> None:
         self._plan, self._read, self._out, self._scratch = plan, read, out, scratch
+        self._rest, self._next_s, self._has_news = rest, 0.0, False
         self._survey: _Survey | None = None
         self._finished: dict[str, BundleTile] = {}
         self._views = 0
@@ -64,6 +76,7 @@ class PartialView:
         """Return the folder of a new view if a tile has just got its surfaces; None: none has.
 
         tile_id  the tile to which a unit has come; None: all tiles are looked at, as at the start
+                 and the end, and no time has to pass before a view
 
         A build of another plan than that of the first view has no views of its own: the source or
         what is known of it has changed meanwhile.
@@ -80,7 +93,14 @@ class PartialView:
         ]
         for tile in news:
             self._finished[tile.id] = self._export(survey, tile)
-        return self._write(survey) if news else None
+        self._has_news |= bool(news)
+        began_s = time.monotonic()
+        if not self._has_news or (tile_id is not None and began_s < self._next_s):
+            return None
+        root = self._write(survey)
+        end_s = time.monotonic()
+        self._has_news, self._next_s = False, end_s + self._rest * (end_s - began_s)
+        return root
 
     def _begin(self) -> _Survey | None:
         """Prepare the views: write the stage that all tiles share, and the coarse volumes anew.
