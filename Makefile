@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -307,6 +307,9 @@ careless: setup browser ## Ten minutes of scripted, careless use of a built bund
 
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py
+
+bench-live: setup ## How soon `stereocell view SOURCE` shows a source, and how it answers beside a build
+	$(BIN)/python tests/bench/live_view.py
 
 bench-start: setup ## How long `import stereocell` and `stereocell --help` take
 	$(BIN)/python tests/bench/start.py

@@ -1,0 +1,131 @@
+"""How soon a source is seen, at which cost, and how quickly its server answers beside a build.
+
+    .venv/bin/python tests/bench/live_view.py [SOURCE ...]
+
+The sources are those of `STEREOCELL_DATA`, and the CyCIF sample. Of each, `stereocell view` is
+started ROUNDS times without a build: seconds from the start of the command until the page, and
+until all files of the first view have been fetched; CPU seconds until then; the files' bytes. Then
+one file is asked for again and again, alone and beside the build.
+"""
+
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+ROUNDS = 3
+REQUESTS = 200
+DATA = Path(os.environ.get("STEREOCELL_DATA", "../shared/data")).resolve()
+SOURCES = {
+    "ovule": [f"{DATA}/ovule_plantseg/sample_ovule.h5:/raw"],
+    "GE CT": [f"{DATA}/ct_head_ge"],
+    "brain cells": [f"{DATA}/brain_cells_2ch/brain_cells_2ch.ome.tif"],
+    "7 T MRI": [f"{DATA}/mri_t1_7t"],
+    "mouse brain": [f"{DATA}/mouse_brain/mouse_brain.ome.tif"],
+    "nuclei": [f"{DATA}/nuclei_stardist/img3d.tif", "--spacing-um", "1,0.5,0.5"],
+}
+
+
+def main(words: list[str]) -> None:
+    given = {word: [str(Path(word).resolve())] for word in words} or {
+        name: flags for name, flags in SOURCES.items() if Path(flags[0].split(":")[0]).exists()
+    }
+    print(f"{'':12} page s  view s  CPU s   MB   alone ms  beside a build ms (median, 95 %)")
+    with tempfile.TemporaryDirectory() as folder:
+        if not words:
+            sample = f"{folder}/cycif.ome.zarr"
+            cell = ["sample", "cycif", sample, "--grid", "3x2"]
+            subprocess.run([sys.executable, "-m", "stereocell.cli", *cell], check=True)
+            given["CyCIF sample"] = [sample, "--grid", "3x2"]
+        for name, flags in given.items():
+            print(f"{name[-12:]:12} {measured(flags, folder)}", flush=True)
+
+
+def measured(flags: list[str], folder: str) -> str:
+    """Return a row of the table."""
+    first = []
+    for _ in range(ROUNDS):
+        with viewing([*flags, "--no-build"], folder) as (server, address, began_s):
+            page_s = time.perf_counter() - began_s
+            files = fetch_view(address)
+            view_s = time.perf_counter() - began_s
+            first.append((page_s, view_s, cpu_s(server.pid), sum(files.values()) / 1e6))
+            alone = latencies_ms(address, max(files, key=lambda path: files[path]))
+    with viewing([*flags, "--out", f"{folder}/out-{time.monotonic_ns()}"], folder) as (
+        server,
+        address,
+        _,
+    ):
+        files = fetch_view(address)
+        time.sleep(5)  # the build has begun by then
+        beside = latencies_ms(address, max(files, key=lambda path: files[path]))
+    page_s, view_s, spent_s, megabytes = map(statistics.median, zip(*first, strict=True))
+    return (
+        f"{page_s:6.1f} {view_s:7.1f} {spent_s:6.1f} {megabytes:5.2f}   "
+        f"{alone[0]:4.1f} {alone[1]:4.1f}    {beside[0]:4.1f} {beside[1]:4.1f}"
+    )
+
+
+@contextmanager
+def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
+    """Yield `stereocell view`, its address, and when it was started."""
+    began_s = time.perf_counter()
+    command = [sys.executable, "-m", "stereocell.cli", "view", *flags]
+    with subprocess.Popen(
+        [*command, "--json", "--no-browser", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        cwd=folder,
+    ) as server:
+        assert server.stdout is not None
+        line = server.stdout.readline()
+        assert line, f"view {flags[0]} has ended"
+        address = json.loads(line)["address"]
+        get(address)
+        try:
+            yield server, address, began_s
+        finally:
+            server.send_signal(signal.SIGINT)
+            server.communicate(timeout=120)
+
+
+def fetch_view(address: str) -> dict[str, int]:
+    """Fetch all files of a view; return their bytes by path."""
+    files = json.loads(get(f"{address}manifest.json"))["files"]["path"]
+    listed = json.loads(get(address + files))
+    return {path: len(get(address + path)) for path in listed}
+
+
+def latencies_ms(address: str, path: str) -> tuple[float, float]:
+    """Return the median and the 95th percentile of the time that a file's first 64 kB take, ms."""
+    took = []
+    for _ in range(REQUESTS):
+        start = time.perf_counter()
+        get(address + path, Range="bytes=0-65535")
+        took.append(1000 * (time.perf_counter() - start))
+        time.sleep(0.02)
+    return statistics.median(took), statistics.quantiles(took, n=20)[-1]
+
+
+def get(address: str, **headers: str) -> bytes:
+    with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:
+        return bytes(answer.read())
+
+
+def cpu_s(process: int) -> float:
+    """Return the CPU seconds of a process so far."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
