@@ -99,8 +99,11 @@ def test_light_and_steps_are_the_viewer_s() -> None:
     shade = (VIEWER / "gpu" / "chunks" / "shade.glsl").read_text("utf-8")
     for name in ("NOISE_STEP", "BOUNDARY_STEP", "FLAT_STEP", "SCATTERED"):
         assert constant(name, march) == constant(name, shade)
-    for name, file in (("MAX_STEPS", "march_frame.ts"), ("OPAQUE", "tile_raymarch.ts")):
-        theirs = (VIEWER / "volumes" / file).read_text("utf-8")
+    for name, file in (
+        ("MAX_STEPS", "voxels/march_frame.ts"),
+        ("OPAQUE", "volumes/tile_raymarch.ts"),
+    ):
+        theirs = (VIEWER / file).read_text("utf-8")
         assert constant(name, march) == constant(name, theirs)
     shader = SHADER.read_text("utf-8")
     for lamp, name in (("key", "KEY_AT"), ("fill", "FILL_AT")):
