@@ -1,9 +1,10 @@
-"""A service on loopback for each test."""
+"""A service on loopback for each test, and no answer of another test."""
 
 from collections.abc import Iterator
 
 import pytest
 
+from stereocell.read.addresses import resolve as module
 from support.recorded_service import Service, serving
 
 
@@ -17,3 +18,8 @@ def service() -> Iterator[Service]:
 def other_service() -> Iterator[Service]:
     with serving() as found:
         yield found
+
+
+@pytest.fixture(autouse=True)
+def forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_known", {})
