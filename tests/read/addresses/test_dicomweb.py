@@ -16,6 +16,7 @@ import pydicom
 import pytest
 
 from stereocell import api, read
+from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.planning.settings import Settings
 from stereocell.planning.settle import settle
@@ -147,18 +148,23 @@ def test_a_count_that_differs_is_noted(pacs: Service) -> None:
     assert "counts 9 instances in the series and has sent 8" in resolve(address(pacs)).notes[1]
 
 
+@pytest.mark.parametrize("command", ["plan", pytest.param("build", marks=pytest.mark.slow)])
 def test_no_command_leaves_the_identity_behind(
-    pacs: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    command: str,
+    pacs: Service,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from stereocell.cli.__main__ import main
-
     monkeypatch.setenv(dicomweb.TOKEN, SECRET)
     caplog.set_level(logging.DEBUG)
     out = tmp_path / "out"
-    assert main(["plan", address(pacs), "-o", str(out)]) == 0
+    assert main([command, address(pacs), "-o", str(out)]) == 0
     words = [NAME, "MRN-4711", STUDY, SECRET]
     assert find(out, words) == []
-    assert not any(word in caplog.text for word in words)
+    printed = "".join(capsys.readouterr()) + caplog.text
+    assert [word for word in words if word in printed] == []
     assert "DICOMweb: one series" in (out / "plan.json").read_text("utf-8")
 
 
@@ -297,7 +303,7 @@ def test_names_in_an_answer_are_not_used(pacs: Service, instances: list[bytes]) 
     pacs.answers[path] = Answer(body, headers={"Content-Type": TYPE})
     folder = Path(resolve(address(pacs)).source)
     assert sorted(os.listdir(folder)) == [f"{n:06d}.dcm" for n in range(1, 9)]
-    assert os.listdir(folder.parent) == ["dicom"]
+    assert sorted(os.listdir(folder.parent)) == [".lock", "dicom"]
 
 
 # Forms

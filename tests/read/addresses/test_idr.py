@@ -22,7 +22,7 @@ ID = "6001240"
 def resource(service: Service, monkeypatch: pytest.MonkeyPatch) -> Service:
     """The Resource with one image of study idr0062, whose data lie nowhere yet."""
     monkeypatch.setattr(idr, "PAGES", service.url)
-    monkeypatch.setattr(idr, "DATA", f"{service.url}/idr/zarr")
+    monkeypatch.setattr(idr, "DATA", (f"{service.url}/idr/zarr", f"{service.url}/second"))
     path = [
         {"type": "experimenter", "id": 2},
         {"type": "project", "id": 801, "childCount": 1},
@@ -80,6 +80,17 @@ def test_an_image_without_ome_zarr_says_so(resource: Service) -> None:
         resolve(f"{PAGE}/iviewer/?images={ID}")
     looked = [path for path in resource.paths if path.startswith("/idr/zarr/")]
     assert len(looked) == 3 * 3 + 2
+    assert not any(path.startswith("/second") for path in resource.paths)
+
+
+def test_the_other_name_of_the_bucket_is_asked_where_the_first_is_down(resource: Service) -> None:
+    resource.answers[f"/idr/zarr/v0.5/idr0062A/{ID}.zarr/zarr.json"] = Answer(b"", 503)
+    resource.put(f"/second/v0.4/idr0062A/{ID}.zarr/.zattrs")
+    found = resolve(f"{PAGE}/iviewer/?images={ID}")
+    assert found.source == f"{resource.url}/second/v0.4/idr0062A/{ID}.zarr"
+    resource.answers[f"/second/v0.5/idr0062A/{ID}.zarr/zarr.json"] = Answer(b"", 503)
+    with pytest.raises(SourceError, match="HTTP 503"):
+        resolve(f"{PAGE}/iviewer/?images={ID}&again=1")
 
 
 def test_a_bucket_that_refuses_absent_files_is_no_fault(resource: Service) -> None:

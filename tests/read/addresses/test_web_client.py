@@ -1,6 +1,8 @@
 """The client of services against servers that answer badly, or lead elsewhere."""
 
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -78,24 +80,46 @@ def test_a_server_that_is_down_is_one_line() -> None:
         WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
 
 
-@pytest.mark.parametrize(
-    "sent", [b"", b"nonsense\r\n\r\n", b"HTTP/1.1 200 OK\r\nA: " + b"b" * 99999]
-)
-def test_a_server_that_speaks_no_http_is_one_line(sent: bytes) -> None:
+CHUNKED = b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n"
+
+
+@contextmanager
+def sending(sent: bytes) -> Iterator[str]:
+    """Answer one request with bytes as they are; yield the address."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
 
         def answer() -> None:
             other, _ = listening.accept()
-            other.recv(1000)
-            other.sendall(sent)
-            other.close()
+            with other:
+                other.recv(1000)
+                other.sendall(sent)
 
         thread = Thread(target=answer)
         thread.start()
-        url = f"http://127.0.0.1:{listening.getsockname()[1]}"
-        with pytest.raises(SourceError, match=r"^the service: "):
-            WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
         thread.join()
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        b"nonsense\r\n\r\n",
+        b"HTTP/1.1 200 OK\r\nA: " + b"b" * 99999,
+        CHUNKED + b"5\r\n[1, 2\r\n",
+        CHUNKED + b"5\r\n[1",
+        CHUNKED + b"-5\r\n[1, 2]\r\n0\r\n\r\n",
+        CHUNKED + b"zz\r\n[1, 2]\r\n0\r\n\r\n",
+    ],
+)
+def test_a_server_that_speaks_no_http_is_one_line(sent: bytes) -> None:
+    with sending(sent) as url, pytest.raises(SourceError, match=r"^the service: "):
+        WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
+
+
+def test_an_answer_in_chunks_is_read() -> None:
+    with sending(CHUNKED + b"3\r\n[1,\r\n3\r\n 2]\r\n0\r\n\r\n") as url:
+        assert WebClient([url], shown="the service").fetch_json(f"{url}/a") == [1, 2]
 
 
 def test_a_silent_server_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

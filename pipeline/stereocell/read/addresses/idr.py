@@ -14,7 +14,10 @@ from stereocell.read.addresses.resolved import NotThereError, Resolved, other_fo
 from stereocell.read.addresses.web_client import WebClient
 
 PAGES = "https://idr.openmicroscopy.org"
-DATA = "https://uk1s3.embassy.ebi.ac.uk/idr/zarr"
+DATA = (  # two names of one bucket; the second one is asked where the first one is down
+    "https://livingobjects.ebi.ac.uk/idr/zarr",
+    "https://uk1s3.embassy.ebi.ac.uk/idr/zarr",
+)
 FORMS = (
     "https://idr.openmicroscopy.org/webclient/?show=image-ID",
     "https://idr.openmicroscopy.org/webclient/img_detail/ID/",
@@ -34,17 +37,31 @@ def resolve(address: str) -> Resolved | None:
         return None
     if not (number := _image_in(parts.path, parse_qs(parts.query))):
         raise other_form(address[:200], "the Image Data Resource", FORMS)
-    client = WebClient([PAGES, DATA], shown=f"IDR image {number}")
+    client = WebClient([PAGES, *DATA], shown=f"IDR image {number}")
     studies = _studies(client, number)
+    place = _find(client, studies, number)
+    return Resolved(place, (f"IDR image {number} is read from {place}",))
+
+
+def _find(client: WebClient, studies: list[str], number: str) -> str:
+    """Return the address of an image's OME-Zarr, of the newest version that is there."""
+    names = []
     for version in _VERSIONS:
         folders = [] if version in ("v0.1", "v0.2") else [f"{one}/" for one in studies]
-        name = "zarr.json" if version == "v0.5" else ".zattrs"
-        for folder in (*folders, ""):
-            place = f"{DATA}/{version}/{folder}{number}.zarr"
-            if client.is_there(f"{place}/{name}"):
-                return Resolved(place, (f"IDR image {number} is read from {place}",))
+        names += [f"{version}/{folder}{number}.zarr" for folder in (*folders, "")]
+    for base in DATA:
+        try:
+            for name in names:
+                file = "zarr.json" if name.startswith("v0.5") else ".zattrs"
+                if client.is_there(f"{base}/{name}/{file}"):
+                    return f"{base}/{name}"
+        except SourceError:
+            if base == DATA[-1]:
+                raise
+            continue
+        break
     raise SourceError(
-        f"IDR image {number}: no OME-Zarr at {DATA} ({_VERSIONS[0]} to {_VERSIONS[-1]}), expected "
+        f"IDR image {number}: no OME-Zarr at {base} ({_VERSIONS[0]} to {_VERSIONS[-1]}), expected "
         f"an image that has one: {_SAMPLES} lists them; other images can be downloaded"
     )
 
