@@ -58,7 +58,7 @@ class Service:
 
 
 @contextmanager
-def serving() -> Iterator[Service]:
+def serving(host: str = "127.0.0.1") -> Iterator[Service]:
     """Run a service on loopback."""
     service = Service()
 
@@ -81,16 +81,16 @@ def serving() -> Iterator[Service]:
                 self.send_header(key, value)
             self.end_headers()
             with suppress(ConnectionError):
-                self.wfile.write(answer.body)
+                self.wfile.write(answer.body if self.command != "HEAD" else b"")
             self.close_connection = True
 
-        do_POST = do_GET
+        do_POST = do_HEAD = do_GET
 
         def log_message(self, *args: Any) -> None:
             """Tests read `asked`; nothing goes to stderr."""
 
-    http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    service.url = f"http://127.0.0.1:{http.server_address[1]}"
+    http = ThreadingHTTPServer((host, 0), Handler)
+    service.url = f"http://{host}:{http.server_address[1]}"
     thread = Thread(target=http.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
     thread.start()
     try:

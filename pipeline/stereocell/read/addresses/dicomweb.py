@@ -17,9 +17,9 @@ from urllib.parse import quote, urlsplit
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.addresses import fetched_folder
 from stereocell.read.addresses.multipart import boundary_of, split_parts
-from stereocell.read.addresses.public_hosts import is_public, numbers_of, split_address
 from stereocell.read.addresses.resolved import NotThereError, Resolved, other_form, wrong_answer
 from stereocell.read.addresses.web_client import WebClient
+from stereocell.storage.public_hosts import is_public, numbers_of, split_address
 
 TOKEN = "STEREOCELL_DICOMWEB_TOKEN"  # the environment's name for the bearer token
 FORMS = ("https://HOST/.../studies/UID/series/UID", "https://HOST/.../studies/UID")

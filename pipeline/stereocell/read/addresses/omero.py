@@ -4,8 +4,8 @@ import re
 from urllib.parse import parse_qs, urlsplit
 
 from stereocell.model.errors import UsageError
-from stereocell.read.addresses.public_hosts import require_public
 from stereocell.read.addresses.resolved import Resolved, other_form
+from stereocell.storage.public_hosts import require_public
 
 FORMS = (
     "https://HOST/.../vizarr/?source=ADDRESS",

@@ -12,14 +12,14 @@ from typing import Any
 from urllib.parse import quote, urljoin, urlsplit
 
 from stereocell.model.errors import SourceError
-from stereocell.read.addresses.public_hosts import (
+from stereocell.read.addresses.resolved import NotThereError, wrong_answer
+from stereocell.storage.location import SILENCE_S
+from stereocell.storage.public_hosts import (
     numbers_of,
     origin_of,
     public_numbers_of,
     split_address,
 )
-from stereocell.read.addresses.resolved import NotThereError, wrong_answer
-from stereocell.storage.location import SILENCE_S
 
 ANSWER_BYTES = 16 << 20  # largest answer in JSON or XML
 ANSWER_S = 60.0  # s for such an answer, from its first byte to its last

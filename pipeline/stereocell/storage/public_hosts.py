@@ -8,7 +8,7 @@ it can name it.
 
 import ipaddress
 import socket
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import SplitResult, urljoin, urlsplit
 
 from stereocell.model.errors import SourceError
 
@@ -87,3 +87,13 @@ def require_public(address: str) -> None:
     """
     if not address.startswith("s3://"):
         public_numbers_of(address)
+
+
+def require_public_redirect(address: str, target: str) -> None:
+    """Raise SourceError where a public host redirects into a private network.
+
+    A host in a private network that a person has named may redirect within it.
+    """
+    target = urljoin(address, target)
+    if origin_of(target)[:2] != origin_of(address)[:2] and all(map(is_public, numbers_of(address))):
+        public_numbers_of(target)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from stereocell.model.errors import SourceError
-from stereocell.read.addresses.public_hosts import (
+from stereocell.storage.public_hosts import (
     is_public,
     public_numbers_of,
     require_public,
