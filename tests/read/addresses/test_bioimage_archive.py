@@ -113,6 +113,8 @@ def test_a_bad_answer_is_one_line(archive: Service, answer: bytes, words: str) -
         "https://uk1s3.embassy.ebi.ac.uk/../../a.zarr",
         "https://uk1s3.embassy.ebi.ac.uk/%2e%2e/a.zarr",
         "https://uk1s3.embassy.ebi.ac.uk/a.zip",
+        "https://uk1s3.embassy.ebi.ac.uk/\x1b[31m/a.zarr",
+        "https://uk1s3.embassy.ebi.ac.uk/a\n/b.zarr",
         "file:///etc/a.zarr",
     ],
 )

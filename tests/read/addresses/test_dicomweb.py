@@ -168,6 +168,13 @@ def test_no_command_leaves_the_identity_behind(
     assert "DICOMweb: one series" in (out / "plan.json").read_text("utf-8")
 
 
+def test_the_series_of_an_address_are_listed(
+    pacs: Service, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", address(pacs), "-o", str(tmp_path / "out"), "--series", "list"]) == 0
+    assert "MR" in capsys.readouterr().out
+
+
 # The token
 
 

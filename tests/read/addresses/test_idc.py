@@ -22,6 +22,12 @@ UUID = "0a1b2c3d-1111-4222-8333-444455556666"
 STUDY, SERIES = "1.3.6.1.4.1.14519.5.2.1.1", "1.3.6.1.4.1.14519.5.2.1.2"
 VIEWER = "https://viewer.imaging.datacommons.cancer.gov"
 
+LAUGHS = (
+    "<!DOCTYPE a [<!ENTITY a0 'aaaaaaaaaa'>"
+    + "".join(f"<!ENTITY a{n + 1} '{f'&a{n};' * 10}'>" for n in range(9))
+    + "]><a><Contents><Key>&a9;</Key></Contents></a>"
+).encode()  # 10 GB of one letter
+
 
 def listing(sizes: dict[str, Any], *, token: str = "") -> bytes:
     items = "".join(
@@ -149,6 +155,7 @@ def test_a_bad_answer_of_the_index_is_one_line(commons: Service, answer: Any, wo
     [
         (listing({}), "no such series"),
         (b"<html><body>moved<br></html>", "found no XML"),
+        (LAUGHS, "found no XML"),
         (listing({f"{UUID}/../../etc/passwd": 9}), "expected UUID/NAME.dcm"),
         (listing({f"{UUID}/..%2Fa.dcm": 9}), "expected UUID/NAME.dcm"),
         (listing({"a.dcm": 9}), "expected UUID/NAME.dcm"),

@@ -66,7 +66,10 @@ def test_an_image_in_the_network_is_refused(inner: str) -> None:
         resolve(f"https://hms-dbmi.github.io/vizarr/?source={inner}")
 
 
-@pytest.mark.parametrize("inner", ["file:///etc/passwd", "/etc/passwd", "javascript:1", "a.zarr"])
+@pytest.mark.parametrize(
+    "inner",
+    ["file:///etc/passwd", "/etc/passwd", "javascript:1", "a.zarr", "https://a/%1b[31m.zarr"],
+)
 def test_an_image_at_no_address_is_refused(inner: str) -> None:
     with pytest.raises(UsageError, match="expected an http"):
         resolve(f"https://hms-dbmi.github.io/vizarr/?source={inner}")

@@ -20,7 +20,7 @@ FORMS = (
     "https://www.ebi.ac.uk/bioimage-archive/study/S-BIADn of one image",
     "https://uk1s3.embassy.ebi.ac.uk/bia-integrator-data/.../NAME.zarr",
 )
-_ZARR = re.compile(r"https?://(?!.*(?:\.\.|%2e))[^?#]+\.zarr(?:/[^?#]*)?", re.I)
+_ZARR = re.compile(r"https?://(?!.*(?:\.\.|%2e|[^!-~]))[^?#]+\.zarr(?:/[^?#]*)?", re.I)
 _FORMATS = (".ome.zarr", ".zarr")
 _UUID = r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 _ACCESSION = r"S-[A-Z]{3,6}\d{1,6}"

@@ -38,7 +38,7 @@ def resolve(address: str) -> Resolved | None:
     if len(found) > 1:
         raise UsageError(f"{parts.hostname}: a link to {len(found)} images, expected one source=")
     place = found[0]
-    if not place.startswith(("http://", "https://", "s3://")):
+    if not place.startswith(("http://", "https://", "s3://")) or not place.isprintable():
         raise UsageError(
             f"{parts.hostname}: source={place!r:.120}, expected an http(s) or s3 address"
         )
