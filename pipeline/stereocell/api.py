@@ -126,6 +126,7 @@ def open_volume(source: str | Path, **options: Any) -> "Dataset":
     """
     from stereocell import read
     from stereocell.planning.setting_names import named_as_settings
+    from stereocell.read.addresses.resolve import resolve
 
     with named_as_settings(has_sections=False):
-        return read.open(source, **options)
+        return read.open(resolve(source).source, **options)

@@ -17,8 +17,10 @@ from stereocell import read
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.tiling import Box
 from stereocell.read.source_place import require_apart
+from stereocell.storage import public_hosts
 from stereocell.storage.location import Location
 from support.phantoms import f_phantom, write_ome_tiff
+from support.recorded_service import serving
 
 BOX = Box((1, 3, 5), (4, 30, 21))
 FORMATS = ("tiny_zarr_04", "tiny_zarr_05", "tiny_tiff")
@@ -120,6 +122,30 @@ def test_any_address_that_fsspec_knows_works(fixture: str, request: pytest.Fixtu
         )
     finally:
         memory.rm(f"/{path.name}", recursive=True)
+
+
+@pytest.mark.parametrize("fixture", FORMATS)
+def test_a_public_host_does_not_redirect_into_a_private_network(
+    fixture: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """127.0.0.2 stands for a private host here, and 127.0.0.1 for a public one."""
+    path: Path = request.getfixturevalue(fixture)
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    with serving() as public, serving("127.0.0.2") as private:
+        for file in files:
+            name = f"/{file.relative_to(path.parent).as_posix()}"
+            private.put(name, file.read_bytes())
+            public.redirect(name, f"{private.url}{name}")
+        address = f"{public.url}/{path.name}"
+        if fixture != "tiny_tiff":  # whose reader needs ranges
+            assert read.open(address).fingerprint == read.open(path).fingerprint
+        private.asked.clear()
+        monkeypatch.setattr(public_hosts, "is_public", lambda number: number == "127.0.0.1")
+        # for TIFF, fsspec tells no reason
+        words = "not reachable" if fixture == "tiny_tiff" else "private network"
+        with pytest.raises(SourceError, match=words):
+            read.open(address)
+        assert private.asked == []
 
 
 def test_secrets_in_an_address_are_not_shown() -> None:

@@ -23,6 +23,7 @@ from stereocell.building import phases
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.storage import location
+from stereocell.storage.http_redirects import checks
 from stereocell.storage.location import Location
 from support import phantoms
 from support.error_lines import error_line
@@ -375,4 +376,5 @@ def test_a_web_host_may_be_slow_but_not_silent(
 def test_what_the_user_has_of_web_clients_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     told = {"timeout": ClientTimeout(total=7), "trust_env": True}
     monkeypatch.setitem(fsspec.config.conf, "http", {"client_kwargs": told})
-    assert Location.of("https://a/b.ome.zarr").storage_options == {"client_kwargs": told}
+    options = Location.of("https://a/b.ome.zarr").storage_options["client_kwargs"]
+    assert options == {**told, "trace_configs": checks()}

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from stereocell.engine.run import Watch
+from stereocell.read.addresses.resolve import remember, resolve
+from stereocell.read.addresses.resolved import Resolved
 from stereocell.storage.processes import cores
 
 RunToLine = Callable[[argparse.Namespace], str]  # returns the line of an error; empty: it went well
@@ -23,9 +25,11 @@ def build_behind(
     that it holds. It returns the line of its error; empty: it went well.
     """
     build = {"command": "build", "handler": handler, "input": str(options.out), "force": False}
-    return partial(_build, options.run_to_line, {**vars(options), **build})
+    found = resolve(str(options.out))  # what was fetched is not fetched again
+    return partial(_build, options.run_to_line, {**vars(options), **build}, found)
 
 
-def _build(run: RunToLine, given: dict[str, Any], out: Path, watch: Watch) -> str:
+def _build(run: RunToLine, given: dict[str, Any], found: Resolved, out: Path, watch: Watch) -> str:
+    remember(str(given["input"]), found)
     given = {**given, "out": out, "workers": cores(), "scheduler": "", "watch": watch}
     return run(argparse.Namespace(**given))

@@ -118,9 +118,11 @@ def _series(options: argparse.Namespace) -> Answer | None:
     if options.series != "list":
         return None
     from stereocell import read
+    from stereocell.read.addresses.resolve import resolve
 
-    lines = read.list_series(options.input)
-    order = read.series_order(options.input) if len(lines) > 1 else ""
+    source = resolve(options.input).source
+    lines = read.list_series(source)
+    order = read.series_order(source) if len(lines) > 1 else ""
     print_unless_json(options, "\n".join([*lines, *([f"order: {order}"] if order else [])]))
     return Answer({"series": list(lines)})
 

@@ -21,6 +21,7 @@ from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import print_notes
 from stereocell.planning.settings import Settings
 from stereocell.planning.settle import settle
+from stereocell.read.addresses.resolve import may_know
 from stereocell.read.image import printable
 from stereocell.read.known_formats import find_format
 from stereocell.steps.open_source import open_source
@@ -38,7 +39,7 @@ def is_source(place: Path | str) -> bool:
     """
     if isinstance(place, Path) and place.exists():
         return contents_of(place).kind in (Kind.FILE, Kind.FOLDER)
-    if str(place).startswith(("http://", "https://")):
+    if may_know(place):
         return True
     return find_format(Location.of(place)) is not None
 

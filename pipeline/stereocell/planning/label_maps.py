@@ -15,11 +15,11 @@ from stereocell.planning.label_grids import (
     settle_spacing,
 )
 from stereocell.planning.settings import PlanOptions, Settings
+from stereocell.read.addresses.resolve import resolve
 from stereocell.read.dataset import Dataset
 from stereocell.read.remarks import CAST
 from stereocell.steps.labels import Labels, Triple
 from stereocell.steps.open_source import SourceRef
-from stereocell.storage.location import Location
 
 SELF = "."  # in place of a path: the input itself
 _SHOWN = 4  # names in a note
@@ -117,8 +117,8 @@ def _opened(image: Dataset, source: str, name: str, place: str, options: PlanOpt
     if SELF in (name, place):
         ref = as_asked(source, options, fingerprint=image.fingerprint)
         return _Opened(_as_stored(image), ref, (0.0, 0.0, 0.0))
-    where = Location.of(place or f"{source.rstrip('/')}/labels/{name}").source
-    ref = SourceRef(where, 0, ())
+    resolved = resolve(place or f"{source.rstrip('/')}/labels/{name}")
+    ref = SourceRef(resolved.source, 0, ())
     try:
         dataset = open_anew(ref)
     except SourceError as error:
@@ -127,7 +127,7 @@ def _opened(image: Dataset, source: str, name: str, place: str, options: PlanOpt
             raise SourceError(f"--labels {name}: {error}{remedy}") from error
         return _without_size(image, ref, options, error)
     dataset, ref, note = _at_time(image, _as_stored(dataset), ref, options)
-    notes = [note] if note else []
+    notes = [*resolved.notes, *([note] if note else [])]
     origin = origin_on(image, dataset)
     if has_other_spacing(image, dataset):
         notes += settle_spacing(image, dataset)

@@ -19,8 +19,8 @@ from stereocell.planning.input_files import as_asked
 from stereocell.planning.settings import HOUNSFIELD, NO_PRESET, Settings, load
 from stereocell.planning.tracer_name import tracer_word
 from stereocell.read import Dataset
+from stereocell.read.addresses.resolve import resolve
 from stereocell.steps.open_source import open_source
-from stereocell.storage.location import Location
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct", **dict.fromkeys(TRACER_MODALITIES, "pet")}
 _BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
@@ -54,7 +54,7 @@ def load_for(
     settings = load(None, None, flags=flags, where=where)
     options = settings.plan
     try:
-        location = Location.of(source).source
+        location = resolve(source).source
         dataset = open_source(as_asked(location, options))
         if (
             options.taken_as == HOUNSFIELD
@@ -74,7 +74,7 @@ def _doubts_of(source: str | Path, preset: str, settings: Settings) -> tuple[str
     try:
         if settings.plan.taken_as == HOUNSFIELD:
             return ()
-        dataset = open_source(as_asked(Location.of(source).source, settings.plan))
+        dataset = open_source(as_asked(resolve(source).source, settings.plan))
         if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
             return ()
         doubt = _doubt(dataset, preset)

@@ -24,9 +24,9 @@ from stereocell.planning.plan_notes import (
     told_of_gaps,
 )
 from stereocell.planning.settings import INTENSITY, Settings
+from stereocell.read.addresses.resolve import resolve
 from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import CAST
-from stereocell.storage.location import Location
 from stereocell.textures.map_packages import (
     require_map_packages,
 )
@@ -39,7 +39,8 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
 
     Raises StereoCellError where the source can't be read, or the settings don't fit it.
     """
-    location = Location.of(source).source
+    resolved = resolve(source)
+    location = resolved.source
     options = settings.plan
     if settings.surface.wrap == "alpha-wrap":
         find_wrapper()
@@ -112,7 +113,15 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
     # numbers of objects are read as they are
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
     kind = [modality.note] if modality.note else []
-    notes = (*read, *choice, *kind, *gaps, *objects, *ignored_notes(settings, channels))
+    notes = (
+        *resolved.notes,
+        *read,
+        *choice,
+        *kind,
+        *gaps,
+        *objects,
+        *ignored_notes(settings, channels),
+    )
     return replace(plan, notes=notes, is_hounsfield=modality.is_hounsfield)
 
 

@@ -4,6 +4,7 @@ A module or package of `read/formats` holds one format, with its row as `FORMAT`
 library only when a source is opened, since the rows of all formats are loaded together.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -61,6 +62,7 @@ class Format:
     endings          of its files' names, in lower case, the usual one first
     loose_endings    of files whose first bytes may state another format, which is then taken
     folder_endings   of its folders' names: all in such a folder is of the format
+    addresses        recognises an address whose names have no ending
     holds            recognises a source on this machine by looking into it. An ending is not enough
                      for a format that has both
     marks            recognise a file whose name has no ending of a format
@@ -90,6 +92,7 @@ class Format:
     endings: tuple[str, ...] = ()
     loose_endings: tuple[str, ...] = ()
     folder_endings: tuple[str, ...] = ()
+    addresses: re.Pattern[str] | None = None
     holds: Callable[[Location], bool] | None = None
     marks: tuple[Mark, ...] = ()
     needs_ending: bool = False

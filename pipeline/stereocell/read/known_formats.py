@@ -51,7 +51,9 @@ def find_format(location: Location) -> Format | None:
     last = location.parts[-1].lower() if location.parts else ""
     named = (one for one in formats if last.endswith(one.endings))
     if not location.is_local:
-        return next(named, None)
+        shown = location.shown
+        at = (one for one in formats if one.addresses is not None and one.addresses.search(shown))
+        return next(named, None) or next(at, None)
     looking = (one for one in formats if one.holds is not None and one.holds(location))
     named = (one for one in named if one.holds is None)
     loosely = (one for one in formats if last.endswith(one.loose_endings))

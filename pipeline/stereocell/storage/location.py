@@ -114,7 +114,8 @@ class Location:
         s3: signed requests where this machine's environment holds credentials or `FSSPEC_S3`
         requests it, else anonymous ones, which public buckets accept. The endpoint comes from the
         usual environment (`AWS_ENDPOINT_URL`); timeouts of `FSSPEC_S3` take precedence.
-        http: a timeout for silence only; else aiohttp stops any transfer after 5 minutes.
+        http: a timeout for silence only; else aiohttp stops any transfer after 5 minutes. Redirects
+        of public hosts into a private network are refused.
         """
         scheme = urlsplit(self.source).scheme
         if scheme in ("http", "https"):
@@ -140,11 +141,13 @@ def _http_client() -> dict[str, Any]:
     """Return aiohttp's settings: ours, overridden by the user's for fsspec."""
     from aiohttp import ClientTimeout  # slow to import, and only the network needs it
 
+    from stereocell.storage.http_redirects import checks
+
     waits = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
     configured: dict[str, Any] = {}
     for protocol in ("http", "https"):  # fsspec has one file system for both
         configured |= fsspec.config.conf.get(protocol, {}).get("client_kwargs", {})
-    return {"timeout": waits, **configured}
+    return {"timeout": waits, "trace_configs": checks(), **configured}
 
 
 def does_answer(files: AbstractFileSystem, path: str) -> bool:

@@ -1,6 +1,7 @@
 """OME-Zarr, and Zarr without its metadata."""
 
 import os
+import re
 from typing import Any
 
 from stereocell.read.chunk_counts import Absent, Spans
@@ -9,6 +10,9 @@ from stereocell.read.formats.ome_zarr.archive import ARCHIVE_ENDINGS, ZARR_FILES
 from stereocell.read.image import Image
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
+
+# DANDI names the Zarr in its bucket by a UUID alone
+_OF_DANDI = re.compile(r"/zarr/[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}(/|$)")
 
 
 def _open(location: Location, *, series: int = 0, axes: str = "") -> Image:
@@ -45,6 +49,7 @@ FORMAT = Format(
     is_remote=True,
     endings=ARCHIVE_ENDINGS,
     folder_endings=(".zarr", ".ome.zarr"),
+    addresses=_OF_DANDI,
     holds=_holds,
     count_absent=_count_absent,
     guides=(

@@ -1,0 +1,1 @@
+"""Addresses that people copy from a browser, and the data behind them."""

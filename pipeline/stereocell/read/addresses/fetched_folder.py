@@ -1,0 +1,68 @@
+"""Folders for files that are fetched for one command: their owner's alone, and removed at its end.
+
+`tempfile.mkdtemp` makes a folder that nobody else can enter, with a name that holds nothing of the
+address. A process that is killed leaves its folder behind. The system's lock (flock) on a file in
+it ends with the process, so the next command finds out and removes the folder. Windows has no
+flock: there such a folder stays.
+"""
+
+import atexit
+import os
+import shutil
+import sys
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+_PREFIX = "stereocell-fetched-"
+_LOCK = ".lock"
+
+
+def new_folder(name: str) -> Path:
+    """Return a new, empty folder of this name, which is removed when this process ends."""
+    _remove_abandoned()
+    outer = Path(tempfile.mkdtemp(prefix=_PREFIX))
+    atexit.register(_remove, outer, os.getpid())
+    _hold(outer)
+    folder = outer / name
+    folder.mkdir(mode=0o700)
+    return folder
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder of `new_folder` at once, since fetching has failed."""
+    _remove(folder.parent, os.getpid())
+
+
+def _remove(outer: Path, owner: int) -> None:
+    if os.getpid() == owner:  # no process that was forked meanwhile
+        shutil.rmtree(outer, ignore_errors=True)
+
+
+def _hold(outer: Path) -> None:
+    """Lock a folder until this process ends."""
+    if sys.platform == "win32":
+        return
+    part = outer / f"{_LOCK}.part"
+    file = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)  # open until the process ends
+    fcntl.flock(file, fcntl.LOCK_EX)
+    part.rename(outer / _LOCK)  # only now, since others take a file without a lock for abandoned
+
+
+def _remove_abandoned() -> None:
+    """Remove the folders of this user's processes that were killed."""
+    if sys.platform == "win32":
+        return
+    for outer in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        with suppress(OSError):  # another command removes it, too; or it is another user's
+            if outer.is_symlink() or outer.stat().st_uid != os.getuid():
+                continue
+            file = os.open(outer / _LOCK, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(outer, ignore_errors=True)
+            finally:
+                os.close(file)

@@ -1,0 +1,91 @@
+"""Split an answer of several parts (RFC 2046), as WADO-RS sends instances, while it comes in."""
+
+import re
+from collections.abc import Iterator
+from email.message import Message
+
+from stereocell.model.errors import SourceError
+from stereocell.read.addresses.resolved import wrong_answer
+
+_HEADER_BYTES = 1 << 16  # largest header of a part
+_BOUNDARY = re.compile(r"[0-9A-Za-z'()+_,\-./:=? ]{0,69}[0-9A-Za-z'()+_,\-./:=?]")
+
+
+def boundary_of(content_type: str, shown: str) -> bytes:
+    """Return what separates the parts. Raises SourceError for an answer of another type."""
+    message = Message()
+    message["Content-Type"] = content_type.replace("\r", " ").replace("\n", " ")
+    found = message.get_content_type()
+    if found != "multipart/related":
+        words = "a web page" if found == "text/html" else f"{content_type or 'no type'!r:.80}"
+        raise wrong_answer(shown, words, "multipart/related; type=application/dicom")
+    boundary = message.get_boundary() or ""
+    if not _BOUNDARY.fullmatch(boundary):
+        raise wrong_answer(shown, "parts without a boundary", "multipart/related; boundary=...")
+    return boundary.encode("ascii")
+
+
+def split_parts(blocks: Iterator[bytes], boundary: bytes, shown: str) -> Iterator[bytes | None]:
+    """Yield the bytes of each part in pieces, and None behind each part.
+
+    The headers of a part are skipped: no name in them is used. Raises SourceError where the answer
+    ends before its last part does.
+    """
+    delimiter = b"\r\n--" + boundary
+    held = _Held(blocks, shown)
+    held.bytes += b"\r\n"  # the first delimiter may stand at the very beginning
+    for _ in held.until(delimiter):
+        pass  # a preamble means nothing
+    while not held.starts_with(b"--"):
+        skipped = 0
+        for piece in held.until(b"\r\n"):  # spaces behind a boundary
+            skipped += len(piece)
+            _require_short(skipped, shown)
+        if held.starts_with(b"\r\n"):
+            del held.bytes[:2]
+        else:
+            for piece in held.until(b"\r\n\r\n"):
+                skipped += len(piece)
+                _require_short(skipped, shown)
+        yield from held.until(delimiter)
+        yield None
+
+
+def _require_short(count: int, shown: str) -> None:
+    if count > _HEADER_BYTES:
+        raise wrong_answer(shown, "a part with an endless header", "parts of DICOM")
+
+
+class _Held:
+    """The bytes of an answer that have come in and are not used yet."""
+
+    def __init__(self, blocks: Iterator[bytes], shown: str) -> None:
+        self._blocks, self._shown = blocks, shown
+        self.bytes = bytearray()
+
+    def starts_with(self, mark: bytes) -> bool:
+        """Return whether the next bytes are these."""
+        while len(self.bytes) < len(mark):
+            self._fill()
+        return self.bytes.startswith(mark)
+
+    def until(self, mark: bytes) -> Iterator[bytes]:
+        """Yield the bytes ahead of a mark in pieces, and drop the mark."""
+        while (at := self.bytes.find(mark)) < 0:
+            certain = len(self.bytes) - len(mark) + 1
+            if certain > 0:
+                yield bytes(self.bytes[:certain])
+                del self.bytes[:certain]
+            self._fill()
+        if at:
+            yield bytes(self.bytes[:at])
+        del self.bytes[: at + len(mark)]
+
+    def _fill(self) -> None:
+        block = next(self._blocks, b"")
+        if not block:
+            raise SourceError(
+                f"{self._shown}: the server's answer ends within a part, expected all parts: "
+                "run the same command again"
+            )
+        self.bytes += block

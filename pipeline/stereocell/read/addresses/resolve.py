@@ -1,0 +1,55 @@
+"""Find the data behind an address that a person has copied from a browser.
+
+It is called where a person's words come in, ahead of `read.open`. A plan holds what it returns. So
+no worker asks a service again, and no file that a stranger has written sends requests anywhere.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from threading import Lock
+
+from stereocell.read.addresses import bioimage_archive, dandi, dicomweb, idc, idr, omero
+from stereocell.read.addresses.resolved import Resolved
+from stereocell.read.known_formats import find_format
+from stereocell.storage.location import Location
+
+# In the order in which they are asked: hosts first, then forms that any host may have
+RESOLVERS: tuple[Callable[[str], Resolved | None], ...] = (
+    idc.resolve,
+    idr.resolve,
+    dandi.resolve,
+    bioimage_archive.resolve,
+    dicomweb.resolve,
+    omero.resolve,
+)
+_known: dict[str, Resolved] = {}  # what this process has found
+_one_at_a_time = Lock()
+
+
+def resolve(source: str | Path) -> Resolved:
+    """Return the data behind a source: itself, unless it is an address of a known service.
+
+    Raises StereoCellError where the service doesn't have it, or the address has another form than
+    those that are understood. Files that are fetched lie in a folder until this process ends.
+    """
+    location = Location.of(source)
+    if location.is_local or not may_know(location.source) or find_format(location) is not None:
+        return Resolved(location.source)
+    with _one_at_a_time:
+        if location.source not in _known:
+            answers = (ask(location.source) for ask in RESOLVERS)
+            found = next((one for one in answers if one is not None), None)
+            if found is None:
+                return Resolved(location.source)
+            _known[location.source] = found
+        return _known[location.source]
+
+
+def remember(source: str | Path, found: Resolved) -> None:
+    """Take over what another process of the same command has found."""
+    _known[Location.of(source).source] = found
+
+
+def may_know(source: str | Path) -> bool:
+    """Return whether a source is an address that a service may know."""
+    return str(source).startswith(("http://", "https://", "s3://idc-open-data"))
