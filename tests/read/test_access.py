@@ -141,7 +141,7 @@ def test_a_public_host_does_not_redirect_into_a_private_network(
             assert read.open(address).fingerprint == read.open(path).fingerprint
         private.asked.clear()
         monkeypatch.setattr(public_hosts, "is_public", lambda number: number == "127.0.0.1")
-        # for TIFF, fsspec tells no reason
+        # fsspec leaves out the reason where it opens a TIFF
         words = "not reachable" if fixture == "tiny_tiff" else "private network"
         with pytest.raises(SourceError, match=words):
             read.open(address)

@@ -41,7 +41,8 @@ def find_format(location: Location) -> Format | None:
     """Return the format of a source by its name and its content; None: neither has one.
 
     The order is: a folder's name, a look into the source, the ending of a file's name, its first
-    bytes, and at last a format that takes what is left, as DICOM takes folders.
+    bytes, and at last a format that takes what is left, as DICOM takes folders. At an address only
+    the names count.
     """
     formats = [one for one in known_formats().values() if one.name != OTHER]
     for part in reversed(location.parts):

@@ -1,7 +1,7 @@
 """Imaging Data Commons: a series in its public buckets, as files in a folder.
 
 A series lies as `BUCKET/CRDC_SERIES_UUID/INSTANCE.dcm`. Links to the viewer have the UIDs of DICOM;
-the index of the Commons (its API, version 3) tells bucket and UUID by them.
+the index of the Commons (its API, version 3) gives bucket and UUID for them.
 """
 
 import re
