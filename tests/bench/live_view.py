@@ -94,7 +94,7 @@ def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[st
         try:
             yield server, address, began_s
         finally:
-            server.send_signal(signal.SIGINT)
+            server.send_signal(signal.SIGTERM)
             server.communicate(timeout=120)
 
 

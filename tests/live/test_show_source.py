@@ -13,7 +13,9 @@ import pytest
 
 from stereocell.cli.__main__ import main
 from stereocell.live.show_source import is_source
+from support.digests import digests_of
 from support.phantoms import f_phantom, write_ome_tiff
+from support.server.timeouts import connect
 
 
 @pytest.mark.slow
@@ -55,6 +57,31 @@ def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Pat
     assert "first view: f after" in told
     assert list(scratch.iterdir()) == []
     assert sorted(tmp_path.iterdir()) == [source, scratch]
+
+
+@pytest.mark.slow
+def test_a_source_is_built_behind_the_page_and_a_stopped_command_goes_on(tmp_path: Path) -> None:
+    source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
+    command = [sys.executable, "-m", "stereocell.cli", "serve", str(source), "--json"]
+    command += ["--port", "0", "--out", "out", "--tile-size", "32,48,72"]
+    for is_stopped in (True, False):
+        with subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        ) as server:
+            assert server.stdout is not None
+            try:
+                address = json.loads(server.stdout.readline())["address"]
+                with connect(address.replace("http", "ws", 1) + "live") as socket:
+                    while not is_stopped or not (tmp_path / "out" / "plan.json").exists():
+                        if json.loads(socket.recv())["doing"] == "complete":
+                            break
+            finally:
+                server.send_signal(signal.SIGTERM)
+                server.communicate(timeout=120)
+    assert main(["build", str(source), "-o", str(tmp_path / "plain"), *command[-2:]]) == 0
+    # in this process the viewer is a small one, so that the page differs
+    for part in ("stage", "bundle/channels", "bundle/volumes", "bundle/luts"):
+        assert digests_of(tmp_path / "out" / part) == digests_of(tmp_path / "plain" / part)
 
 
 def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:

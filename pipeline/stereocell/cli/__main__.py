@@ -119,7 +119,6 @@ def _run(options: argparse.Namespace) -> int:
         from stereocell.live.show_source import is_source
 
         options.is_source = is_source(options.out)
-        options.run_to_line = run_to_line
     if name not in LIGHT:
         require_address_space(name)
         options.places = _given_places(options)

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +27,13 @@ def build_behind(
     """
     build = {"command": "build", "handler": handler, "input": str(options.out), "force": False}
     found = resolve(str(options.out))  # what was fetched is not fetched again
-    return partial(_build, options.run_to_line, {**vars(options), **build}, found)
+    return partial(_build, {**vars(options), **build}, found)
 
 
-def _build(run: RunToLine, given: dict[str, Any], found: Resolved, out: Path, watch: Watch) -> str:
+def _build(given: dict[str, Any], found: Resolved, out: Path, watch: Watch) -> str:
+    # by its name: where Python runs the command's module, that is called __main__, which names
+    # another module in this process
+    run: RunToLine = import_module("stereocell.cli.__main__").run_to_line
     remember(str(given["input"]), found)
     given = {**given, "out": out, "workers": cores(), "scheduler": "", "watch": watch}
     return run(argparse.Namespace(**given))

@@ -147,9 +147,11 @@ class BuildProcess:
             return
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_run, args=(self._build, self._coarse, theirs))
+        process = context.Process(target=_run, args=(theirs,))
         process.start()
         theirs.close()
+        with suppress(OSError):  # it has ended already, and its end is heard
+            ours.send((self._build, self._coarse))
         self._process, self._pipe = process, ours
         self._began_s, self._paused_s = time.monotonic(), 0.0
         self._set(doing=doing, line="", left_s=None)
@@ -249,13 +251,14 @@ def _share_of(task: _Task) -> float:
     return before + SHARES[task.label] * task.done / max(1, task.total)
 
 
-def _run(build: Build, coarse: Coarse, pipe: "Connection[Any, Any]") -> None:
-    """Build, in the process of its own."""
-    from stereocell.live.partial_view import PartialView  # it imports USD, and the page waits
+def _run(pipe: "Connection[Any, Any]") -> None:
+    """Build, in the process of its own. What it builds comes by the pipe, however large that is."""
+    with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
+        from stereocell.live.partial_view import PartialView  # it imports USD, and the page waits
 
-    _lower_priority()
-    view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch)
-    with suppress(BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
+        _lower_priority()
+        build, coarse = pipe.recv()
+        view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch)
         pipe.send(_End(build(_Watcher(view, pipe))))
 
 

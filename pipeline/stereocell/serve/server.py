@@ -169,7 +169,7 @@ class BundleServer:
         live: Live | None = None,
     ) -> None:
         """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
-        bundle, bricks = _places(out)
+        bundle, bricks = _places(out) if live is None else (live.bundle, None)
         library = stage = None
         if bricks is not None:
             library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
