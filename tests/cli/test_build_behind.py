@@ -35,9 +35,8 @@ def test_what_the_page_has_fetched_is_not_fetched_again(
 
     monkeypatch.setattr(module, "RESOLVERS", (find,))
     monkeypatch.setattr(module, "_known", {})
-    build = pickle.dumps(
-        build_behind(argparse.Namespace(out=ADDRESS, run_to_line=source_of), handler)
-    )
+    monkeypatch.setattr("stereocell.cli.__main__.run_to_line", source_of)
+    build = pickle.dumps(build_behind(argparse.Namespace(out=ADDRESS), handler))
     monkeypatch.setattr(module, "_known", {})  # as in a new process
     assert pickle.loads(build)(tmp_path, lambda *task: None) == FOUND.source
     assert asked == [ADDRESS]
