@@ -29,7 +29,7 @@ SOURCES = {
     "GE CT": [f"{DATA}/ct_head_ge"],
     "brain cells": [f"{DATA}/brain_cells_2ch/brain_cells_2ch.ome.tif"],
     "7 T MRI": [f"{DATA}/mri_t1_7t"],
-    "mouse brain": [f"{DATA}/mouse_brain/mouse_brain.ome.tif"],
+    "mouse brain": [f"{DATA}/mouse_brain/mouse_brain.ome.tif", "--spacing-um", "25,25,25"],
     "nuclei": [f"{DATA}/nuclei_stardist/img3d.tif", "--spacing-um", "1,0.5,0.5"],
 }
 
@@ -88,8 +88,10 @@ def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[st
     ) as server:
         assert server.stdout is not None
         line = server.stdout.readline()
-        assert line, f"view {flags[0]} has ended"
-        address = json.loads(line)["address"]
+        told = json.loads(line or "{}")
+        if "address" not in told:
+            raise SystemExit(f"{flags[0]}: {told.get('error', 'the command has ended')}")
+        address = told["address"]
         get(address)
         try:
             yield server, address, began_s
