@@ -1,4 +1,4 @@
-"""What a server's answer leads to must be public, however its host is written."""
+"""An address in a server's answer must be public, however its host is written."""
 
 import socket
 from typing import Any

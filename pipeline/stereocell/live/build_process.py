@@ -48,7 +48,7 @@ _KILLED = "the build was stopped from outside"
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What is known of a build.
+    """The state of a build, which the server sends to the page.
 
     label, done, total  its running tasks
     tiles               how many tiles have their surfaces
@@ -91,7 +91,7 @@ class _End:
 
 @dataclass(frozen=True, slots=True)
 class Coarse:
-    """What the views of a build are made of; see `partial_view.PartialView`."""
+    """The inputs of the views of a build; see `partial_view.PartialView`."""
 
     plan: Plan
     read: Mapping[str, CoarseChannel]

@@ -31,7 +31,7 @@ REST = 10.0  # so that views take at most a tenth of the time of a build
 
 @dataclass(frozen=True, slots=True)
 class _Survey:
-    """What is the same for all views of a build, once its survey is known."""
+    """The inputs that all views of a build share. The survey of the build decides them."""
 
     plan: Plan
     units: Mapping[str, Path]

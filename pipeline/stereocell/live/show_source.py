@@ -119,7 +119,9 @@ def show_source(
             if build is None:
                 _print(f"for surfaces: stereocell build {shlex.quote(source)} -o OUT")
             else:
-                _print(f"built behind the page into {build.out}; --no-build only shows")
+                _print(
+                    f"built behind the page into {printable(str(build.out))}; --no-build only shows"
+                )
                 build.start(Coarse(plan, read, build.out, scratch))
 
         threading.Thread(target=write, daemon=True).start()

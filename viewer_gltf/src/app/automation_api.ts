@@ -15,7 +15,7 @@ export interface StereoCellApi {
   /** Resolves when nothing is loading any more and the picture shows all of it. */
   settled(): Promise<void>;
   snapshot(): Snapshot;
-  /** What the benchmark (`?bench`) has found, as bench/report.ts has it; null: it has not been run. */
+  /** The report of the benchmark (`?bench`), as bench/report.ts defines it; null: the benchmark has not run. */
   readonly bench: object | null;
 }
 

@@ -83,7 +83,10 @@ async function open(parent: HTMLElement): Promise<Host> {
   return made;
 }
 
-/** What the address names: a bundle, or a source that the page reads by itself. Without either a person chooses one. */
+/**
+ * Opens the bundle that the address names, or the source, which the page then reads by itself. If the address names
+ * neither and no bundle lies beside the page, the user chooses a source.
+ */
 async function openShown(parent: HTMLElement, page: string): Promise<ShownSource> {
   const source = sourceAddress(page);
   if (source !== null) {

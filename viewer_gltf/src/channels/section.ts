@@ -31,10 +31,10 @@ export const PAGE = 6;
 /** Steps of a window's slider: the volumes have 8 bits. */
 const WINDOW_STEPS = 255;
 
-/** What is known of the channels beside the state. */
+/** Facts about the channels that the state does not hold. */
 export type ChannelFacts = Readonly<{
   ranges: Ranges;
-  /** Of the channel with the open joint histogram, if it has come. */
+  /** The joint histogram of the channel whose histogram is open; null: it has not come yet. */
   histogram?: Histogram | null;
   /** Some colours of each label map's objects. */
   objectColors?: ReadonlyMap<string, readonly string[]>;

@@ -19,7 +19,7 @@ export type Focus = Readonly<{
   hasOverview: boolean;
 }>;
 
-/** What an eye needs of a form. */
+/** The values that a form is given for each eye. */
 export type StreamView = Readonly<{
   camera: Camera;
   width_px: number;

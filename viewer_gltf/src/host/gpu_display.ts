@@ -142,7 +142,7 @@ export class GpuDisplay implements Display {
     return { focusTiles, mayRefine, hasOverview: this.forms.hasOverview };
   }
 
-  /** What all shaders of the scene share. */
+  /** The renderer of frames, whose uniforms all shaders of the scene share. */
   get frame(): FrameRenderer {
     return this.loop.scene.picture;
   }

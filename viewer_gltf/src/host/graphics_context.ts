@@ -2,7 +2,7 @@
 import type { Action } from "../state/actions";
 import { DROPPED } from "./faults";
 
-/** What the context holds is gone by `forget`, and comes again by `renew`. */
+/** An owner of textures and buffers: `forget` drops those of a lost context, `renew` makes them again. */
 type Holder = Readonly<{ forget: () => void; renew: () => void }>;
 
 /** Forgets what a lost context held, and says so as long as it is lost. */

@@ -168,7 +168,7 @@ export interface Display {
   snapshot(): Snapshot;
 }
 
-/** What the shaders of a frame share, by reference, and where a form adds what it lays over the scene. */
+/** The uniforms that the shaders of a frame share by reference, and the place where a form adds objects over the scene. */
 export type SharedFrame = Pick<FrameRenderer, "marchFrame" | "surfaceFrame" | "sceneDepth" | "add">;
 
 /** The host as the parts see it. */
