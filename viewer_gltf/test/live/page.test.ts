@@ -69,6 +69,17 @@ describeInChromium("a source that is built behind the page", () => {
     const middle = first.at(first.width / 2, first.height / 2);
     expect(isBackground(middle), "volumes without a build").toBe(false);
 
+    // the line of the build is as wide as the page, however narrow that is
+    const { width, height } = page.viewportSize() as { width: number; height: number };
+    await page.setViewportSize({ width: 320, height });
+    const widths = () =>
+      page.evaluate(() => [
+        document.body.scrollWidth,
+        document.querySelector(".build")?.scrollWidth,
+      ]);
+    await expect.poll(widths).toEqual([320, 320]);
+    await page.setViewportSize({ width, height });
+
     await viewer.recolor(state.channels[0].id, "#33cc66");
     await viewer.drag([200, 200], [260, 230]);
     const before = await look();
