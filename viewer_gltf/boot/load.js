@@ -1,4 +1,4 @@
-// Fetches the viewer's code packed by gzip, whether or not the host packs, and shows how much has come.
+// Fetches the viewer's code and style packed by gzip, whether or not the host packs, and shows how much has come.
 // BUILD is filled in by scripts/finish_build.ts.
 (() => {
   const BUILD = {};
@@ -11,21 +11,10 @@
     words.textContent = `Loading the viewer: ${kB(come)} of ${kB(BUILD.bytes)}`;
   };
 
-  const fetchStyle = () =>
-    new Promise((resolve, reject) => {
-      const link = document.createElement("link");
-      Object.assign(link, {
-        rel: "stylesheet",
-        href: BUILD.style,
-        onload: resolve,
-        onerror: reject,
-      });
-      document.head.append(link);
-    });
-
-  const fetchCode = async () => {
-    const { body, ok, status } = await fetch(BUILD.packed);
-    if (!ok || body === null) throw new Error(`the host answers ${status} for ${BUILD.packed}`);
+  // Fetches a file that is packed by gzip, unpacks it, and returns an address of what it contains.
+  const fetchPacked = async (path, type, onProgress) => {
+    const { body, ok, status } = await fetch(path);
+    if (!ok || body === null) throw new Error(`the host answers ${status} for ${path}`);
     const parts = [];
     let come = 0;
     for (const reader = body.getReader(); ; ) {
@@ -33,7 +22,7 @@
       if (done) break;
       parts.push(value);
       come += value.length;
-      show(come);
+      onProgress(come);
     }
     const [first, second] = parts[0] ?? [];
     const isPacked = first === 0x1f && second === 0x8b;
@@ -41,20 +30,38 @@
     const plain = isPacked
       ? sent.stream().pipeThrough(new DecompressionStream("gzip"))
       : sent.stream();
-    const code = await new Response(plain).blob();
-    if (code.size !== BUILD.length) throw new Error(`${BUILD.packed} is cut short`);
-    return URL.createObjectURL(code.slice(0, code.size, "text/javascript"));
+    const content = await new Response(plain).blob();
+    if (content.size !== BUILD.lengths[path]) throw new Error(`${path} is cut short`);
+    return URL.createObjectURL(content.slice(0, content.size, type));
+  };
+
+  const linkStyle = (href) =>
+    new Promise((resolve, reject) => {
+      const link = document.createElement("link");
+      Object.assign(link, { rel: "stylesheet", href, onload: resolve, onerror: reject });
+      document.head.append(link);
+    });
+
+  // older browsers can't unpack: they take the plain files
+  const canUnpack = typeof DecompressionStream !== "undefined";
+
+  const fetchStyle = async () => {
+    const { style, packedStyle } = BUILD;
+    await linkStyle(canUnpack ? await fetchPacked(packedStyle, "text/css", () => {}) : style);
+  };
+
+  const fetchCode = async () => {
+    const { plain, packed } = BUILD;
+    return canUnpack
+      ? await fetchPacked(packed, "text/javascript", show)
+      : new URL(plain, location.href).href;
   };
 
   const start = async () => {
     globalThis.stereocellBase = new URL(BUILD.base, location.href).href;
     const style = fetchStyle();
     style.catch(() => undefined); // it is awaited below
-    // older browsers can't unpack: they take it plain
-    const code =
-      typeof DecompressionStream === "undefined"
-        ? new URL(BUILD.plain, location.href).href
-        : await fetchCode();
+    const code = await fetchCode();
     await style;
     words.textContent = "Starting the viewer";
     globalThis.stereocellCode = import(code);

@@ -1,8 +1,8 @@
 /**
  * What is done to the built page:
  *
- * 1. The viewer's code is packed by gzip into one file that the page's own script fetches and unpacks
- *    (boot/load.js), so that any static host sends a third of it. In the place of the code stands a
+ * 1. The viewer's code and style are packed by gzip into files that the page's own script fetches and
+ *    unpacks (boot/load.js), so that any static host sends a third of them. In the place of the code stands a
  *    module that hands its exports on to the parts that are fetched later; the code itself lies beside,
  *    for browsers that can't unpack.
  * 2. The page gets that script, a skeleton to look at meanwhile (boot/skeleton.css), and the hashes of
@@ -57,7 +57,11 @@ export function handOn(names: readonly string[]): string {
 }
 
 /** The code in a file of its own, to be packed beside; in its old place what hands its exports on. */
-async function splitCode(folder: string, entry: string, exports: readonly string[]) {
+async function splitCode(
+  folder: string,
+  entry: string,
+  exports: readonly string[],
+): Promise<string> {
   const code = movable(await readFile(join(folder, entry), "utf8"), basename(entry));
   const plain = entry.replace(/index(-[^/]*)$/, "viewer$1");
   if (plain === entry) throw new Error(`${entry}: expected a name with index-`);
@@ -66,18 +70,23 @@ async function splitCode(folder: string, entry: string, exports: readonly string
     throw new Error(`${entry}: needs ${needed} as it starts: it can't move`);
   await writeFile(join(folder, plain), code);
   await writeFile(join(folder, entry), handOn(exports));
-  return { plain, code: Buffer.from(code) };
+  return plain;
 }
 
-/** The page's script, with what it needs to know of the code. */
-async function scriptFor(plain: string, code: Buffer, style: string): Promise<string> {
+/** The page's script, with what it needs to know of code and style. */
+async function scriptFor(folder: string, plain: string, style: string): Promise<string> {
+  const code = await readFile(join(folder, plain));
   const build = {
     base: `${dirname(plain)}/`,
     packed: `${plain}.gz`,
     plain,
+    packedStyle: `${style}.gz`,
     style,
     bytes: (await gzipped(code)).length,
-    length: code.length,
+    lengths: {
+      [`${plain}.gz`]: code.length,
+      [`${style}.gz`]: (await readFile(join(folder, style))).length,
+    },
   };
   const script = await readFile(new URL("load.js", BOOT), "utf8");
   const bare = script.replace(/^ *\/\/.*\n/gm, "").replace(/^ +/gm, "");
@@ -94,24 +103,25 @@ async function writePage(path: string, script: string): Promise<void> {
     '<progress value="0" aria-label="Loading the viewer"></progress><p role="status"></p></main><aside></aside></div>';
   const page = (await readFile(path, "utf8"))
     .replace(/\s*<script type="module"[^>]*><\/script>/, "")
-    .replace(/\s*<link rel="stylesheet"[^>]*>/, "")
+    // a disabled link is not fetched; by its address later parts see that the style is there
+    .replace('<link rel="stylesheet"', "$& disabled")
     .replace("</head>", () => `<style>${style}</style>\n  </head>`)
     .replace('<div id="app">', (opening) => `${opening}${skeleton}`)
     .replace("</body>", () => `<script>${script}</script>\n  </body>`)
     .replace("script-src 'self'", `script-src 'self' blob: ${hashOf(script)}`)
-    .replace("style-src 'self'", `style-src 'self' ${hashOf(style)}`);
+    .replace("style-src 'self'", `style-src 'self' blob: ${hashOf(style)}`);
   await writeFile(path, page);
 }
 
 /** Tell the service worker, which has a fixed name, the viewer's files. */
-async function listFiles(folder: string, plain: string): Promise<void> {
+async function listFiles(folder: string, packed: readonly string[]): Promise<void> {
   const path = join(folder, SERVICE_WORKER);
   const code = await readFile(path, "utf8");
   if (!FILES.test(code)) throw new Error(`${path}: no place for the list of files`);
   const names = (await filesOf(folder))
-    .filter((name) => name !== SERVICE_WORKER && name !== PAGE && name !== plain)
+    .filter((name) => name !== SERVICE_WORKER && name !== PAGE && !packed.includes(name))
     .filter((name) => !OF_SOURCES.test(name)) // a source is shown with a network alone
-    .concat(`${plain}.gz`)
+    .concat(packed.map((name) => `${name}.gz`))
     .sort();
   const list = JSON.stringify(JSON.stringify(names));
   await writeFile(
@@ -154,9 +164,9 @@ export function finishBuild(): Plugin {
       // parts that are fetched later have styles of their own
       const [, style] = (await readFile(page, "utf8")).match(STYLE) ?? [];
       if (entry?.type !== "chunk" || style === undefined) throw new Error("no code, or no style");
-      const { plain, code } = await splitCode(folder, entry.fileName, entry.exports);
-      await writePage(page, await scriptFor(plain, code, style));
-      await listFiles(folder, plain);
+      const plain = await splitCode(folder, entry.fileName, entry.exports);
+      await writePage(page, await scriptFor(folder, plain, style));
+      await listFiles(folder, [plain, style]);
       await compressAll(folder);
     },
   };
