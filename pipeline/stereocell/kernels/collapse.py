@@ -46,7 +46,14 @@ from numpy.typing import NDArray
 from stereocell.kernels.compiled import in_place, step
 from stereocell.kernels.half_edges import Ints
 from stereocell.kernels.interface_rings import CORNER, ON_LINE, fill_sheets
-from stereocell.kernels.mesh_rings import check_link, collect_ring, is_surface, mark_ring, move_onto
+from stereocell.kernels.mesh_rings import (
+    check_link,
+    collect_again,
+    collect_ring,
+    is_surface,
+    mark_ring,
+    move_onto,
+)
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.quadrics import CLASSES, NEVER, SURE, add_plane, class_of, price_of
 from stereocell.kernels.ring_checks import check_normals, measure_ring, measure_stray
@@ -220,10 +227,7 @@ def replay(mesh: Mesh, past: Ints, work: Work) -> int:
             differs[u] = differs[v] = True
             mark_ring(u, mesh, ring, differs)
             continue
-        collect_ring(u, mesh, ring)
-        chosen = 0
-        while ring.near[chosen] != v:
-            chosen += 1
+        chosen = collect_again(u, v, mesh, ring)
         move_onto(u, chosen, mesh, ring, measure_stray(u, v, mesh, ring))
         work.made[made, 0], work.made[made, 1] = u, v
         made += 1

@@ -29,6 +29,23 @@ def collect_ring(u: int, mesh: Mesh, ring: Ring) -> bool:
 
 
 @step
+def collect_again(u: int, v: int, mesh: Mesh, ring: Ring) -> int:
+    """Write of the ring of u what its move onto v needs; return the number of v among neighbours.
+
+    Of a vertex within an interface, that is its triangles, and v alone.
+    """
+    if not is_surface(mesh) and not mesh.on_line[u]:
+        collect_triangles(u, mesh, ring)
+        ring.near[0] = v
+        return 0
+    collect_ring(u, mesh, ring)
+    chosen = 0
+    while ring.near[chosen] != v:
+        chosen += 1
+    return chosen
+
+
+@step
 def mark_ring(u: int, mesh: Mesh, ring: Ring, marks: Flags) -> None:
     """Mark the neighbours of u."""
     if is_surface(mesh):
