@@ -8,7 +8,7 @@ import "../panel/html/forced_colors.css";
 import { bundleAddress, namesBundle, pageAddress, sourceAddress } from "../bundle/address";
 import { BundleError, MissingError } from "../bundle/errors";
 import type { Manifest } from "../bundle/generated/bundle";
-import { isHeld } from "../bundle/held_files";
+import { isHeld, releaseFiles } from "../bundle/held_files";
 import type { LiveHost } from "../bundle/live_host";
 import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
@@ -72,13 +72,10 @@ async function open(parent: HTMLElement): Promise<Host> {
     loadLink(withTyped(hash)),
   ]);
   const made = await openIn(parent, bundle, (host) => {
-    for (const text of notes) host.dispatch({ type: "notify", text }, false);
+    notify(host, notes);
     openAddress(host, search, readLink);
   });
-  if (isHeld(bundle.base)) {
-    const { refuseDrops } = await import("../source/dropped");
-    refuseDrops((text) => made.announce(text));
-  }
+  if (isHeld(bundle.base)) void followDrops(parent);
   if (bundle.live !== undefined) followBuild(bundle, bundle.live);
   return made;
 }
@@ -102,6 +99,31 @@ async function openShown(parent: HTMLElement, page: string): Promise<ShownSource
     const { chooseSource } = await import("../source/start_page");
     return chooseSource(parent);
   }
+}
+
+/** Shows each further file or folder that is dropped, in the place of the one before. */
+async function followDrops(parent: HTMLElement): Promise<void> {
+  const [{ acceptDrops }, { openLocal }] = await Promise.all([
+    import("../source/dropped"),
+    import("../source/open_source"),
+  ]);
+  acceptDrops(async (source) => {
+    const before = host ?? (await opened);
+    try {
+      const { bundle, notes } = await openLocal(source, (text) => before.announce(text));
+      before.dispose();
+      releaseFiles(before.bundle.base);
+      host = await openIn(parent, bundle, (after) => notify(after, notes));
+      await host.noteOverview();
+    } catch (error) {
+      if (!(error instanceof BundleError)) throw error;
+      before.dispatch({ type: "notify", text: error.message });
+    }
+  });
+}
+
+function notify(host: Host, notes: readonly string[]): void {
+  for (const text of notes) host.dispatch({ type: "notify", text }, false);
 }
 
 /** Follows the build behind the page: each newer view takes the place of the one before. */

@@ -19,6 +19,11 @@ export function holdFiles(files: HeldFiles): string {
   return base;
 }
 
+/** Lets go of the files of a folder; what has been read stays valid. */
+export function releaseFiles(base: string): void {
+  folders.delete(base);
+}
+
 /** Whether an address is that of held files, or of their folder. */
 export function isHeld(address: string): boolean {
   return address.startsWith(SCHEME);

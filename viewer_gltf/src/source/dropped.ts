@@ -21,15 +21,18 @@ function folderOf(folder: FileSystemDirectoryEntry): LocalSource {
   return { kind: "folder", name: folder.name, find };
 }
 
-/** Keeps the browser from leaving the page for a file that is dropped on a picture, and says how to open it. */
-export function refuseDrops(say: (text: string) => void): void {
-  addEventListener("dragover", (event) => event.preventDefault());
+/** Opens each further source that is dropped on a picture, one at a time. */
+export function acceptDrops(open: (source: LocalSource) => Promise<void>): void {
+  let isBusy = false;
+  addEventListener("dragover", (event) => event.preventDefault()); // else the browser opens the file itself
   addEventListener("drop", (event) => {
     event.preventDefault();
-    const { search } = location;
-    const isNamed = new URLSearchParams(search).has("source");
-    const way = isNamed ? "open the page without ?source=" : "reload the page";
-    say(`To open another file, ${way}.`);
+    const source = event.dataTransfer && droppedSource(event.dataTransfer);
+    if (source === null || isBusy) return;
+    isBusy = true;
+    void open(source).finally(() => {
+      isBusy = false;
+    });
   });
 }
 

@@ -203,6 +203,19 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       });
     });
 
+    it("shows a source to each eye of the split screen", async () => {
+      other.headers = CORS;
+      await open("v04.ome.zarr");
+      await stand.viewer.page.keyboard.press("P");
+      await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
+      const half = { y: 0, width: 240, height: 360 };
+      const isRed = ([r, g, b]: readonly number[]) => r > 60 && r > 2 * g && r > 2 * b;
+      for (const x of [0, 240]) {
+        const eye = async () => (await takePicture(stand.viewer.page, { x, ...half })).count(isRed);
+        await expect.poll(eye, { timeout: 20_000 }).toBeGreaterThan(200);
+      }
+    });
+
     describe("takes a source of this device", () => {
       const start = async () => {
         await stand.viewer.page.goto(
@@ -237,7 +250,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(asked()).toEqual([]);
       });
 
-      it("a folder of OME-Zarr that is dropped, and no second one on its picture", async () => {
+      it("a folder of OME-Zarr that is dropped, then others on its picture", async () => {
         await start();
         const { page } = stand.viewer;
         const devtools = await page.context().newCDPSession(page);
@@ -251,10 +264,15 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         const { state } = await shown();
         expect(state.channels.map(({ name }) => name)).toEqual(["Left", "Right"]);
         expect(asked()).toEqual([]);
-        await drop("v05.ome.zarr");
-        const said = page.locator("[data-said]");
-        await expect.poll(() => said.textContent()).toBe("To open another file, reload the page.");
-        expect((await stand.viewer.snapshot()).state.channels.length).toBe(2);
+        await drop("head.nii.gz");
+        const names = async () => (await stand.viewer.snapshot()).state.channels.map((c) => c.name);
+        await expect.poll(names).toEqual(["NIfTI"]);
+        expect(await page.locator("#app main.view").count()).toBe(1);
+
+        await writeFile(join(folder, "notes.txt"), "no image");
+        await drop("notes.txt");
+        await expect.poll(async () => (await notices()).join()).toContain("notes.txt: expected");
+        expect(await names()).toEqual(["NIfTI"]);
       });
 
       it("a folder of OME-Zarr that is chosen", async () => {
