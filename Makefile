@@ -203,7 +203,9 @@ VITEST := cd $(VIEWER) && npm exec --silent -- vitest run
 
 test-here: setup ## A package's tests, not the slow ones:  T=meshes; of the viewer: T=panel
 	@found=; \
-	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; $(PYTEST) -m "not slow" "tests/$$T" || exit; fi; \
+	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; code=0; $(PYTEST) -m "not slow" "tests/$$T" || code=$$?; \
+	  [ $$code != 5 ] || printf 'all tests of %s are slow: %s tests/%s runs them\n' "$$T" $(BIN)/pytest "$$T"; \
+	  [ $$code = 0 ] || [ $$code = 5 ] || exit $$code; fi; \
 	if [ -n "$$T" ] && [ -e "$(VIEWER)/src/$$T" ]; then found=1; $(VITEST) --project unit "src/$$T" || exit; fi; \
 	[ -n "$$found" ] || { printf 'T is %s, expected a folder of tests or of %s, as T=meshes\n' "$$T" $(VIEWER)/src >&2; exit 2; }
 
