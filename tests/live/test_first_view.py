@@ -141,7 +141,7 @@ def test_of_a_large_source_without_a_pyramid_some_planes_are_read(
     found = read_coarse(dataset, plan, plan.channels[0], 500)
     assert sum(read) <= 1.5 * 40_000 < f_phantom(2).size
     # the middle of the first block: 8 voxels along each axis
-    assert found.first == pytest.approx([(step - 1) / 2 for step in found.step])
+    assert found.grid.first == pytest.approx([(step - 1) / 2 for step in found.grid.step])
 
 
 def test_voxels_between_coarse_ones_are_interpolated_and_continue_at_the_ends(
@@ -153,7 +153,7 @@ def test_voxels_between_coarse_ones_are_interpolated_and_continue_at_the_ends(
     source = write_ome_tiff(tmp_path / "ramp.ome.tif", ramp, spacing=(1.0, 1.0, 1.0))
     plan, dataset = planned(source)
     read = read_coarse(dataset, plan, plan.channels[0], 16 * 64 * 64 // 64)
-    assert read.step == (4.0, 4.0, 4.0)
+    assert read.grid.step == (4.0, 4.0, 4.0)
     places = (np.array([2.0]), np.array([30.0]), np.array([-3.0, 10.0, 11.5, 70.0]))
     assert read.at(places).ravel().tolist() == [16.0, 101.0, 116.0, 616.0]
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -49,7 +50,8 @@ def live(tmp_path: Path) -> Live:
             (tmp_path / folder / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / folder / name).write_text(text)
     (tmp_path / "secret").write_text("secret")
-    return Live(tmp_path / "page", tmp_path / "first", Future(), 10, FakeBuild(tmp_path / "out"))
+    fine: Any = SimpleNamespace(plan=SimpleNamespace(tiles=range(10)))  # of which none is read
+    return Live(tmp_path / "page", tmp_path / "first", Future(), fine, FakeBuild(tmp_path / "out"))
 
 
 @contextmanager
@@ -75,6 +77,7 @@ def test_the_page_comes_before_the_first_view(live: Live) -> None:
         response, body = ask(port, "/manifest.json")
         assert body == b"first"
         assert response.headers["Stereocell-Live"] == "version=1; folder="
+        assert response.headers["Stereocell-Bricks"] == "version=1"
         assert text_of(port, "/luts/A.ktx2") == "first"
         assert ask(port, "/missing")[0].status == 404
 
@@ -99,6 +102,9 @@ def test_the_manifest_is_that_of_the_newest_view_and_names_its_folder(
         response, body = ask(port, "/manifest.json")
         assert body == b"second"
         assert response.headers["Stereocell-Live"] == "version=1; folder=g1/"
+        assert response.headers["Stereocell-Bricks"] == "version=1; folder=g1/"
+        own = ask(port, "/g1/manifest.json")[0]
+        assert own.headers["Stereocell-Bricks"] == "version=1; folder=g1/"
         assert text_of(port, "/g1/luts/A.ktx2") == "second"
         assert text_of(port, "/luts/A.ktx2") == "first"  # for a page that still shows it
 
@@ -176,7 +182,7 @@ def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_here:
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:
     live.first.set_result(None)
-    only = Live(live.page, live.bundle, live.first, 1, None)
+    only = Live(live.page, live.bundle, live.first, live.fine, None)
     with serving(only) as port:
         assert "Stereocell-Live" not in ask(port, "/manifest.json")[0].headers
         refused = pytest.raises((ConnectionClosed, InvalidStatus))

@@ -14,6 +14,7 @@ from pathlib import Path
 from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_view import read_channels, write_first_view
 from stereocell.model.errors import OutputError
 from stereocell.planning.input_files import as_asked
@@ -63,14 +64,14 @@ class Live:
     page    the folder of the viewer
     bundle  the folder of the first view, once `first` has a result
     first   done once the first view is written; its error is why that can't be
-    tiles   how many there are
+    fine    the tiles that are looked at, read from the source
     build   the build behind the view; None: it is only looked at
     """
 
     page: Path
     bundle: Path
     first: Future[None]
-    tiles: int
+    fine: FineTiles
     build: BuildProcess | None
 
 
@@ -104,12 +105,14 @@ def show_source(
         print_notes(plan)  # a build prints them itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
-        live = Live(page, scratch / "bundle", first, len(plan.tiles), build)
+        fine = FineTiles(plan, dataset)
+        live = Live(page, scratch / "bundle", first, fine, build)
 
         def write() -> None:
             try:
                 read = read_channels(plan, dataset)
-                write_first_view(plan, read, live.bundle)
+                sizes = fine.sizes()
+                write_first_view(plan, read, live.bundle, sizes)
             except BaseException as error:  # the command raises it
                 first.set_exception(error)
                 return
@@ -122,7 +125,7 @@ def show_source(
                 _print(
                     f"built behind the page into {printable(str(build.out))}; --no-build only shows"
                 )
-                build.start(Coarse(plan, read, build.out, scratch))
+                build.start(Coarse(plan, read, build.out, scratch, sizes))
 
         threading.Thread(target=write, daemon=True).start()
         try:

@@ -4,6 +4,8 @@
                     build has a bundle, that with its bricks and values
     /manifest.json  of the newest view, whose folder the header Stereocell-Live names
     /g1/, /g2/      the views that came later: surfaces where a tile is finished
+    /bricks         a websocket with the bricks of the first view, made of the source; those of a
+                    later one are at /g1/bricks
     /live           a websocket with the state of the build, which takes commands
 
 The server sends the state whenever it changes, at most four times a second: see
@@ -34,8 +36,10 @@ from stereocell.bundle.manifest import MANIFEST
 from stereocell.live.build_process import COMMANDS
 from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
+from stereocell.serve.brick_session import BrickEndpoint
 from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
-from stereocell.serve.static_files import BundleFiles
+from stereocell.serve.live_bricks import LiveBricks
+from stereocell.serve.static_files import BundleFiles, bricks_header
 
 LIVE_HEADER = "Stereocell-Live"
 _EACH_S = 0.25  # s between two states
@@ -48,6 +52,8 @@ class LiveApp:
         """built: returns the application that serves a whole bundle."""
         self._live, self._build, self._make_built = live, live.build, built
         self._built: ASGIApp | None = None
+        self._bricks = LiveBricks(live.fine, live.bundle.parent)
+        self._endpoint = BrickEndpoint()
         self._sockets = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -59,7 +65,7 @@ class LiveApp:
         elif (app := self._find_built()) is not None and self._folder_of(scope) is None:
             await app(scope, receive, send)
         elif scope["type"] == "websocket":
-            await WebSocket(scope, receive, send).close()
+            await self._send_bricks(WebSocket(scope, receive, send))
         else:
             await self._answer(scope, receive, send)
 
@@ -73,7 +79,20 @@ class LiveApp:
         """Return the folder of the later view that a path names; None: it names none."""
         if self._build is None:
             return None
-        return self._build.views.get(scope["path"].lstrip("/").partition("/")[0])
+        return self._build.views.get(_first_of(scope["path"]))
+
+    async def _send_bricks(self, socket: WebSocket) -> None:
+        """Talk to one client that asks for the bricks of a view."""
+        folder = self._folder_of(socket.scope)
+        path = "/bricks" if folder is None else f"/{_first_of(socket.scope['path'])}/bricks"
+        if socket.scope["path"] != path or not self._live.first.done():
+            await socket.close()
+            return
+        if folder is None or self._build is None:
+            library = self._bricks.library(self._live.bundle, {})
+        else:
+            library = self._bricks.library(folder, self._build.holders)
+        await self._endpoint.talk(socket, library)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer from the folder of a view."""
@@ -87,6 +106,8 @@ class LiveApp:
             newest = self._build.state.folder
             folder = self._build.views.get(newest.rstrip("/"))
             headers = {LIVE_HEADER: f"version=1; folder={newest if folder else ''}"}
+        if path == MANIFEST:
+            headers |= bricks_header("" if folder is None else f"{folder.name}/")
         answer = await self._file(folder, path, headers, scope, receive)
         await answer(scope, receive, send)
 
@@ -127,7 +148,7 @@ class LiveApp:
         sent = ""
         try:
             while True:
-                about = {"all_tiles": self._live.tiles, "may_control": may_control}
+                about = {"all_tiles": len(self._live.fine.plan.tiles), "may_control": may_control}
                 text = json.dumps({**asdict(build.state), **about})
                 if text != sent:
                     await socket.send_text(text)
@@ -154,8 +175,14 @@ class LiveApp:
             if message["type"] == "lifespan.startup":
                 await send({"type": "lifespan.startup.complete"})
             elif message["type"] == "lifespan.shutdown":
+                self._endpoint.close()
                 await send({"type": "lifespan.shutdown.complete"})
                 return
+
+
+def _first_of(path: str) -> str:
+    """Return the first part of a path, as `g1`."""
+    return path.lstrip("/").partition("/")[0]
 
 
 def _is_here(socket: WebSocket) -> bool:
