@@ -1,7 +1,9 @@
 """Read a channel coarsely: no more voxels than a first view needs, however large the source is."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +81,11 @@ def find_grid(dataset: Dataset, plan: Plan, voxels: int) -> CoarseGrid:
         READ_VOXELS, voxels
     ):
         level += 1
+    return grid_at(dataset, plan, level, voxels)
+
+
+def grid_at(dataset: Dataset, plan: Plan, level: int, voxels: int) -> CoarseGrid:
+    """Return such blocks of one level of a source."""
     box = _region_at(dataset, plan, level)
     spacing, origin = dataset.levels[level].spacing_um, dataset.levels[level].origin_um
     factor = _factor(box.shape, spacing, voxels)
@@ -93,6 +100,26 @@ def find_grid(dataset: Dataset, plan: Plan, voxels: int) -> CoarseGrid:
     return CoarseGrid(level, box, factor, (first[0], first[1], first[2]), (z, y, x))
 
 
+def slabs_of(grid: CoarseGrid, axis: int) -> Iterator[tuple[Box, _Triple]]:
+    """Yield the boxes of voxels that are read, one after the other, and the block of each.
+
+    axis  of z, y, x: the source's images lie across it
+
+    All planes of a block are read, or its middle ones where there are too many voxels.
+    """
+    box, factor = grid.box, grid.factor
+    count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
+    z, y, x = (count if i == axis else factor[i] for i in range(3))
+    # Where all planes are read, many blocks are read together: a chunk holds several planes.
+    together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
+    step = factor[axis] * (together if count == factor[axis] else 1)
+    end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
+    for start in range(box.start[axis], end, step):
+        middle = start + (factor[axis] - count) // 2
+        stop = min(start + step, end) if step > factor[axis] else middle + count
+        yield box.slab(axis, middle, stop), (z, y, x)
+
+
 def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> CoarseChannel:
     """Return a channel by means of blocks of voxels; see `find_grid`.
 
@@ -102,22 +129,13 @@ def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> 
     Raises SourceError where voxels can't be read.
     """
     grid = find_grid(dataset, plan, voxels)
-    level, box, factor = grid.level, grid.box, grid.factor
-    axis = dataset.slice_axis(level)
-    # All planes of a block are read, or its middle ones where there are too many voxels.
-    count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
-    # Where all planes are read, many blocks are read together: a chunk holds several planes.
-    together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
-    step = factor[axis] * (together if count == factor[axis] else 1)
-    end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
+    axis = dataset.slice_axis(grid.level)
     blocks, sample = [], []
-    for start in range(box.start[axis], end, step):
-        middle = start + (factor[axis] - count) // 2
-        stop = min(start + step, end) if step > factor[axis] else middle + count
-        read = dataset.read(channel.index, box.slab(axis, middle, stop), level).voxels
-        blocks.append(_means(read, tuple(count if i == axis else factor[i] for i in range(3))))
-        share = min(step, end - start) / box.shape[axis]
-        sample.append(_spread(read, round(SAMPLED_VOXELS * share)))
+    for slab, block in slabs_of(grid, axis):
+        read = dataset.read(channel.index, slab, grid.level).voxels
+        blocks.append(_means(read, block))
+        planes = blocks[-1].shape[axis] * grid.factor[axis]
+        sample.append(_spread(read, round(SAMPLED_VOXELS * planes / grid.box.shape[axis])))
     return CoarseChannel(np.concatenate(blocks, axis), grid, np.concatenate(sample))
 
 
@@ -160,13 +178,17 @@ def _factor(shape: _Triple, spacing: tuple[float, float, float], voxels: int) ->
         edge *= 1.05
 
 
-def _means(voxels: NDArray[np.generic], block: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the means of whole blocks, float32 (z, y, x)."""
+def in_blocks(voxels: NDArray[Any], block: _Triple) -> NDArray[Any]:
+    """Return the whole blocks of voxels, (z, block z, y, block y, x, block x)."""
     counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
     whole = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
     z, y, x = counts
-    parts = whole.reshape(z, block[0], y, block[1], x, block[2])
-    return np.asarray(parts.mean(axis=(1, 3, 5), dtype=np.float32))
+    return whole.reshape(z, block[0], y, block[1], x, block[2])
+
+
+def _means(voxels: NDArray[Any], block: _Triple) -> NDArray[np.float32]:
+    """Return the means of whole blocks, float32 (z, y, x)."""
+    return np.asarray(in_blocks(voxels, block).mean(axis=(1, 3, 5), dtype=np.float32))
 
 
 def _spread(voxels: NDArray[np.generic], most: int) -> NDArray[np.float32]:

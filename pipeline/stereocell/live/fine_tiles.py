@@ -33,7 +33,12 @@ class FineTiles:
     dataset: Dataset
 
     def sizes(self) -> dict[str, tuple[int, int, int]]:
-        """Return the voxels (x, y, z) that each tile is read with, with the apron, by its ID."""
+        """Return the voxels (x, y, z) that each tile is read with, with the apron, by its ID.
+
+        Objects of a label map are not read so: their build is finer.
+        """
+        if not self.plan.channels:
+            return {}
         return {tile.id: self._size(tile) for tile in self.plan.tiles}
 
     def read(

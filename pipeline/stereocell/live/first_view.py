@@ -6,7 +6,7 @@ same schema, so that every viewer of bundles shows it. Its voxels alone are coar
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
@@ -21,12 +21,14 @@ from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_
 from stereocell.bundle.write_volume import write_volume
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel, places_in, read_coarse
+from stereocell.live.coarse_labels import read_coarse_labels
 from stereocell.live.first_appearance import first_appearance
 from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
-from stereocell.model.errors import SourceError
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Tile
 from stereocell.model.world_box import WorldPoint, move_box, world_box
+from stereocell.planning.channels import Channel
+from stereocell.planning.object_tables import appearance_of_labels
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
@@ -38,6 +40,7 @@ from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 # Largest number of voxels in a first view, all channels together: about 1 MB compressed
 VOXELS = 4_000_000
 NOT_BUILT = "its surface is not built yet"
+OBJECTS_NOT_BUILT = "its objects are not built yet"
 Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
 
 
@@ -56,16 +59,22 @@ class _CoarseVolume:
 def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
     """Return the coarse voxels of a plan's channels, by the ID of their voxels.
 
-    Raises SourceError where the source can't be read or has no channel.
+    Of label maps without an image they are the objects'. Raises SourceError where the source can't
+    be read.
     """
-    shared = plan.shared_volumes
-    channels = [channel for channel in plan.channels if channel.id not in shared]
-    if not channels:
-        raise SourceError(f"{plan.name}: objects of a label map are shown once they are built")
+    shown = _shown(plan)
+    channels = [channel for channel in shown.channels if channel.id not in shown.shared_volumes]
     each = max(10_000, VOXELS // len(channels))
+    labels = {one.id: one for one in plan.labels if not plan.channels}
+
+    def read(channel: Channel) -> CoarseChannel:
+        if channel.id in labels:
+            return read_coarse_labels(plan, labels[channel.id], each)
+        return read_coarse(dataset, plan, channel, each)
+
     with ThreadPoolExecutor(cores()) as pool:
-        read = pool.map(lambda one: read_coarse(dataset, plan, one, each), channels)
-        return {one.voxels_id: coarse for one, coarse in zip(channels, read, strict=True)}
+        found = pool.map(read, channels)
+        return {one.voxels_id: coarse for one, coarse in zip(channels, found, strict=True)}
 
 
 def write_first_view(
@@ -82,10 +91,22 @@ def write_first_view(
         found = list(
             pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
         )
-    appearances = [composed(appearance) for appearance, _ in found]
-    tiles = write_coarse_tiles(plan, root, read, appearances, sizes or {})
+    appearances = [composed(appearance) for appearance, _ in found] or [
+        composed(replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT))
+        for one in plan.labels
+    ]
+    shown = _shown(plan)
+    tiles = write_coarse_tiles(shown, root, read, appearances, sizes or {})
     is_cut = plan.opens_cut and any(is_body for _, is_body in found)
-    write_view(plan, root, appearances, tiles, is_cut=is_cut)
+    write_view(shown, root, appearances, tiles, is_cut=is_cut)
+
+
+def _shown(plan: Plan) -> Plan:
+    """Return a plan with the channels of its first view: its own, or else its label maps."""
+    if plan.channels:
+        return plan
+    channels = tuple(Channel(one.channel, one.name, one.color) for one in plan.labels)
+    return replace(plan, channels=channels, labels=())
 
 
 def write_coarse_tiles(

@@ -83,6 +83,8 @@ class PartialView:
         tile_id  the tile to which a unit has come; None: all tiles are looked at, as at the start
                  and the end, and no time has to pass before a view
 
+        Of label maps without an image there is none: their objects show once all are built.
+
         A build of another plan than that of the first view has no views of its own: the source or
         what is known of it has changed meanwhile.
         """
@@ -112,6 +114,8 @@ class PartialView:
 
         The windows of the survey are those of all voxels, and hold from now on.
         """
+        if not self._plan.channels:
+            return None
         out_folder = OutFolder(self._out)
         plan = replace(out_folder.plan(), labels=())
         if (plan.fingerprint, plan.region) != (self._plan.fingerprint, self._plan.region):
