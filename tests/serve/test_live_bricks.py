@@ -16,6 +16,7 @@ from stereocell.live import coarse_channel, fine_tiles, first_view
 from stereocell.live.build_process import BuildProcess
 from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.partial_view import PartialView
+from stereocell.live.reading import Reading
 from stereocell.live.show_source import Live
 from stereocell.model.errors import SourceError
 from stereocell.planning.input_files import as_asked
@@ -29,6 +30,7 @@ from stereocell.steps.open_source import open_source
 from stereocell.transfer.joint_histogram import to_eight_bits
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
 from support.server.brick_client import BrickClient, look_at, reconstruct
+from support.server.requests import ask
 from support.server.running import running
 from support.server.timeouts import connect
 
@@ -120,6 +122,8 @@ def test_a_coarse_view_that_is_as_fine_as_the_source_announces_nothing(
     name = next(iter(library.volumes()))
     size = library.volumes()[name].entry["size"]
     assert list(library.open(*name).table.size[::-1]) == size  # of the file itself
+    with serving(fine_tiles_of(source), tmp_path / "view") as port:
+        assert "Stereocell-Bricks" not in ask(port, "/manifest.json")[0].headers
 
 
 def test_a_large_tile_is_read_as_finely_as_there_is_room_for(
@@ -183,8 +187,9 @@ def serving(fine: FineTiles, root: Path) -> Iterator[int]:
     page.mkdir()
     (page / "index.html").write_text("<html>")
     build = BuildProcess(lambda _: "", root.parent / "out")
-    build.views["g1"] = root
-    live = Live(page, root, first, fine, build)
+    if root.name != "view":
+        build.views[root.name] = root
+    live = Live(page, root, first, fine, build, Reading(lambda _: None))
     with running(BundleServer(live.bundle, 0, False, live=live)) as server:
         yield server.port
 
@@ -214,14 +219,20 @@ def sent(port: int, path: str, volumes: list[dict[str, str]]) -> BrickClient:
     return client
 
 
-@pytest.mark.parametrize("path", ["/bricks", "/g1/bricks"])
-def test_bricks_come_over_the_websocket_of_a_view(source: Path, tmp_path: Path, path: str) -> None:
+@pytest.mark.parametrize(
+    ("view", "path", "header"),
+    [("view", "", "version=1"), ("g1", "/g1", "version=1; folder=g1/")],
+)
+def test_bricks_come_over_the_websocket_of_a_view(
+    source: Path, tmp_path: Path, view: str, path: str, header: str
+) -> None:
     fine = fine_tiles_of(source)
-    root = tmp_path / "scratch" / "view"
+    root = tmp_path / "scratch" / view
     library = write_first_view(fine, root)
     volumes = [{"tile": tile, "channel": channel} for tile, channel in library.volumes()]
     with serving(fine, root) as port:
-        client = sent(port, path, volumes)
+        assert ask(port, f"{path}/manifest.json")[0].headers["Stereocell-Bricks"] == header
+        client = sent(port, f"{path}/bricks", volumes)
     assert client.done[1]["reason"] == "complete"
     for tree, volume in zip(client.trees.values(), volumes, strict=True):
         expected = voxels_of(library.open(volume["tile"], volume["channel"]))

@@ -1,6 +1,6 @@
 """Read a channel coarsely: no more voxels than a first view needs, however large the source is."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import prod
 from typing import Any
@@ -17,6 +17,7 @@ from stereocell.read import Dataset
 READ_VOXELS = 48_000_000  # most voxels of a channel that are read
 SLAB_VOXELS = 16_000_000  # approximate number of voxels that are read at a time
 SAMPLED_VOXELS = 6_000_000  # approximate number of values on which a window is found
+OnRead = Callable[[float], None]
 _Triple = tuple[int, int, int]
 _Places = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -120,8 +121,16 @@ def slabs_of(grid: CoarseGrid, axis: int) -> Iterator[tuple[Box, _Triple]]:
         yield box.slab(axis, middle, stop), (z, y, x)
 
 
-def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> CoarseChannel:
+def read_coarse(
+    dataset: Dataset,
+    plan: Plan,
+    channel: Channel,
+    voxels: int,
+    on_read: OnRead = lambda share: None,
+) -> CoarseChannel:
     """Return a channel by means of blocks of voxels; see `find_grid`.
+
+    on_read  is given the share, 0..1, of what is read, after each part of it
 
     Of a source without a pyramid every k-th plane is read, across the axis along which its images
     lie.
@@ -131,11 +140,13 @@ def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> 
     grid = find_grid(dataset, plan, voxels)
     axis = dataset.slice_axis(grid.level)
     blocks, sample = [], []
-    for slab, block in slabs_of(grid, axis):
+    slabs = list(slabs_of(grid, axis))
+    for slab, block in slabs:
         read = dataset.read(channel.index, slab, grid.level).voxels
         blocks.append(_means(read, block))
         planes = blocks[-1].shape[axis] * grid.factor[axis]
         sample.append(_spread(read, round(SAMPLED_VOXELS * planes / grid.box.shape[axis])))
+        on_read(1 / len(slabs))
     return CoarseChannel(np.concatenate(blocks, axis), grid, np.concatenate(sample))
 
 

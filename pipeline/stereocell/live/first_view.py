@@ -7,6 +7,7 @@ same schema, so that every viewer of bundles shows it. Its voxels alone are coar
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +21,7 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
 from stereocell.bundle.write_volume import write_volume
 from stereocell.isosurface.holder import Holder
-from stereocell.live.coarse_channel import CoarseChannel, places_in, read_coarse
+from stereocell.live.coarse_channel import CoarseChannel, OnRead, places_in, read_coarse
 from stereocell.live.coarse_labels import read_coarse_labels
 from stereocell.live.first_appearance import first_appearance
 from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
@@ -56,8 +57,12 @@ class _CoarseVolume:
     measured: Path | None = None
 
 
-def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
+def read_channels(
+    plan: Plan, dataset: Dataset, on_read: OnRead = lambda share: None
+) -> dict[str, CoarseChannel]:
     """Return the coarse voxels of a plan's channels, by the ID of their voxels.
+
+    on_read  is given the share, 0..1, of what is read, after each part of it; by any thread
 
     Of label maps without an image they are the objects'. Raises SourceError where the source can't
     be read.
@@ -70,11 +75,16 @@ def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
     def read(channel: Channel) -> CoarseChannel:
         if channel.id in labels:
             return read_coarse_labels(plan, labels[channel.id], each)
-        return read_coarse(dataset, plan, channel, each)
+        share_of_one = partial(_pass_on, on_read, len(channels))
+        return read_coarse(dataset, plan, channel, each, share_of_one)
 
     with ThreadPoolExecutor(cores()) as pool:
         found = pool.map(read, channels)
         return {one.voxels_id: coarse for one, coarse in zip(channels, found, strict=True)}
+
+
+def _pass_on(on_read: OnRead, channels: int, share: float) -> None:
+    on_read(share / channels)
 
 
 def write_first_view(

@@ -23,7 +23,7 @@ from stereocell.bundle.manifest import MANIFEST, REMEDY, read_manifest
 from stereocell.formats.brick_stream import HASH_BYTES, encode_tree
 from stereocell.formats.ktx2 import decode_finest
 from stereocell.formats.voxel_bvh import build
-from stereocell.model.errors import OutputError, SourceError
+from stereocell.model.errors import OutputError, SourceError, StereoCellError
 from stereocell.serve.tree_files import BrickFile, TreeFiles, Volume
 from stereocell.storage.json_files import read_json
 
@@ -72,6 +72,13 @@ class BrickLibrary:
                 self._volumes = _read_volumes(self._bundle)
                 self._stamp = stamp
             return self._volumes
+
+    def has_finer(self) -> bool:
+        """Return whether any tree has finer texels than the volume's file."""
+        try:
+            return any("finer_size" in volume.entry for volume in self.volumes().values())
+        except StereoCellError:  # whoever asks for a tree is told
+            return False
 
     def open(self, tile: str, channel: str) -> BrickFile:
         """Return a volume's tree; build it where necessary.

@@ -224,8 +224,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     let resident = this.residents.get(wanted.tile);
     if (resident === undefined) {
       if (sources.size === 0) return;
-      const isFiner = [...sources.values()].some(({ volume }) => volume.finer_size !== undefined);
-      resident = this.addTile(wanted.tile, isFiner);
+      resident = this.addTile(wanted.tile, this.isOfSource(wanted.channels));
     }
     this.residents.want(resident, wanted);
     const [first] = sources.values();
@@ -251,7 +250,13 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     this.onError(tooLong(longest, side));
   }
 
-  private addTile(tile: string, isFinerAsBricks: boolean): Resident {
+  private isOfSource(channels: readonly string[]): boolean {
+    const sources = channels.flatMap((id) => [...(this.channels.get(id)?.sources.values() ?? [])]);
+    return sources.some(({ volume }) => volume.finer_size !== undefined);
+  }
+
+  /** @param isOfSource whether the host has finer volumes than files, as of a source that is not built */
+  private addTile(tile: string, isOfSource: boolean): Resident {
     const onChange = () => {
       this.march(tile);
       this.onChange();
@@ -260,7 +265,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     const bricks = this.state !== null && isTraced(this.state) ? null : this.bricks;
     const files = new TileTexture(this.queue, onChange, this.onError);
     if (bricks === null) return this.residents.add(tile, files);
-    if (isFinerAsBricks) {
+    if (isOfSource) {
       const make = (refuse: () => void) => bricks.tile(tile, limits, onChange, refuse);
       return this.residents.add(tile, new SharpenedTile(files, make, onChange));
     }
