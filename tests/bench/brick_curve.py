@@ -29,8 +29,9 @@ from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import encode_tree
 from stereocell.formats.ktx2 import decode_finest
 from stereocell.formats.voxel_bvh import build
-from stereocell.serve.brick_library import BrickLibrary, Volume, invisible_below
+from stereocell.serve.brick_library import BrickLibrary, invisible_below
 from stereocell.serve.server import BundleServer
+from stereocell.serve.tree_files import Volume
 from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
 from support.server.brick_decoder import reassemble
 

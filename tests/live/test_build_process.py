@@ -24,7 +24,7 @@ def begin(tmp_path: Path) -> Iterator[Callable[[Any], BuildProcess]]:
         process = BuildProcess(partial(build, tmp_path), tmp_path / "out")
         started.append(process)
         nothing: Any = None  # there is no view to write
-        process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path))
+        process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path, {}))
         return process
 
     yield start
@@ -70,7 +70,7 @@ def test_a_build_is_paused_cancelled_and_continued(
 @pytest.mark.slow
 def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
     nothing: Any = None
-    coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path)
+    coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path, {})
     process = BuildProcess(partial(fake_build.steady, tmp_path), tmp_path / "out")
     process.do("cancel")
     process.start(coarse)

@@ -141,7 +141,7 @@ def test_of_a_large_source_without_a_pyramid_some_planes_are_read(
     found = read_coarse(dataset, plan, plan.channels[0], 500)
     assert sum(read) <= 1.5 * 40_000 < f_phantom(2).size
     # the middle of the first block: 8 voxels along each axis
-    assert found.first == pytest.approx([(step - 1) / 2 for step in found.step])
+    assert found.grid.first == pytest.approx([(step - 1) / 2 for step in found.grid.step])
 
 
 def test_voxels_between_coarse_ones_are_interpolated_and_continue_at_the_ends(
@@ -153,7 +153,7 @@ def test_voxels_between_coarse_ones_are_interpolated_and_continue_at_the_ends(
     source = write_ome_tiff(tmp_path / "ramp.ome.tif", ramp, spacing=(1.0, 1.0, 1.0))
     plan, dataset = planned(source)
     read = read_coarse(dataset, plan, plan.channels[0], 16 * 64 * 64 // 64)
-    assert read.step == (4.0, 4.0, 4.0)
+    assert read.grid.step == (4.0, 4.0, 4.0)
     places = (np.array([2.0]), np.array([30.0]), np.array([-3.0, 10.0, 11.5, 70.0]))
     assert read.at(places).ravel().tolist() == [16.0, 101.0, 116.0, 616.0]
 
@@ -167,3 +167,38 @@ def test_a_source_without_channels_of_its_own_is_refused_in_one_line(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("stereocell: ")
     assert str(tmp_path / "no.ome.zarr") in line
+
+
+def test_objects_of_a_label_map_show_as_a_volume_with_lines_between_them(tmp_path: Path) -> None:
+    labels = np.zeros((8, 24, 40), np.uint16)
+    labels[2:7, 4:20, 4:20], labels[2:7, 4:20, 20:36] = 3, 7
+    source = write_ome_tiff(tmp_path / "cells.ome.tif", labels, spacing=(1.0, 1.0, 1.0))
+    root = tmp_path / "view"
+    plan = write_view_of(source, root, labels={".": "."})
+    assert main(["check", str(root)]) == 0
+    (channel,) = manifest_of(root)["channels"]
+    assert (channel["id"], channel["surface"]) == (plan.labels[0].id, "none")
+    assert channel["surface_reason"] == first_view.OBJECTS_NOT_BUILT
+    assert channel["color"] == pytest.approx(plan.labels[0].color)
+    (entry,) = volumes_of(root, channel)
+    voxels = decode_finest((root / entry["file"]["path"]).read_bytes())[1:-1, 1:-1, 1:-1, 0]
+    assert (voxels[labels == 0] == 0).all()
+    assert (voxels[labels > 0] > 0).all()
+    # between the two objects a plane is fainter than what lies on either side
+    row = voxels[4, 12]
+    assert row[19] < row[18] == row[20] == 255
+
+
+def test_numbers_of_a_label_map_are_never_averaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(first_view, "VOXELS", 10_000)
+    # halves of 10 and 30: their mean is 20, which is no object, and air round them
+    labels = np.zeros((40, 40, 80), np.uint16)
+    labels[8:32, 8:32, 8:40], labels[8:32, 8:32, 40:72] = 10, 30
+    source = write_ome_tiff(tmp_path / "halves.ome.tif", labels, spacing=(1.0, 1.0, 1.0))
+    plan, dataset = planned(source, labels={".": "."})
+    (coarse,) = first_view.read_channels(plan, dataset).values()
+    assert coarse.voxels.size <= 10_000 < labels.size
+    assert coarse.voxels.max() == 1
+    assert coarse.voxels[0].max() == 0

@@ -12,7 +12,7 @@ import pytest
 from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError, StereoCellError
-from stereocell.serve import brick_library
+from stereocell.serve import tree_files
 from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError, invisible_below
 from support.server.brick_bundles import (
     phantom,
@@ -157,7 +157,7 @@ def test_bricks_are_read_without_pread_too(out, monkeypatch):
     file = library(out).open("r0_c0", "CD31")
     nodes = np.flatnonzero(file.table.nodes["length"]).tolist()
     bricks = file.read(nodes)
-    monkeypatch.setattr(brick_library, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(tree_files, "sys", SimpleNamespace(platform="win32"))
     monkeypatch.delattr(os, "pread")
     assert file.read(nodes) == bricks
     assert len(set(bricks)) > 1

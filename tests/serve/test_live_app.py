@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from stereocell.live.build_process import BuildProcess, State
+from stereocell.live.reading import Reading
 from stereocell.live.show_source import Live
 from stereocell.model.errors import SourceError
 from stereocell.serve import live_app
@@ -49,7 +51,11 @@ def live(tmp_path: Path) -> Live:
             (tmp_path / folder / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / folder / name).write_text(text)
     (tmp_path / "secret").write_text("secret")
-    return Live(tmp_path / "page", tmp_path / "first", Future(), 10, FakeBuild(tmp_path / "out"))
+    fine: Any = SimpleNamespace(plan=SimpleNamespace(tiles=range(10)))  # of which none is read
+    build = FakeBuild(tmp_path / "out")
+    return Live(
+        tmp_path / "page", tmp_path / "first", Future(), fine, build, Reading(lambda _: None)
+    )
 
 
 @contextmanager
@@ -77,6 +83,16 @@ def test_the_page_comes_before_the_first_view(live: Live) -> None:
         assert response.headers["Stereocell-Live"] == "version=1; folder="
         assert text_of(port, "/luts/A.ktx2") == "first"
         assert ask(port, "/missing")[0].status == 404
+
+
+def test_how_much_has_been_read_is_told_until_the_first_view_is_there(live: Live) -> None:
+    with serving(live) as port:
+        assert ask(port, "/")[0].headers["Server-Timing"] == "stereocell-reading"
+        live.reading.add(0.25)
+        assert json.loads(text_of(port, "/reading")) == {"share": 0.25}
+        live.first.set_result(None)
+        assert json.loads(text_of(port, "/reading")) == {"share": 1}
+        assert "Server-Timing" not in ask(port, "/")[0].headers
 
 
 def test_a_source_that_cant_be_read_is_answered_in_a_sentence(live: Live) -> None:
@@ -176,7 +192,7 @@ def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_here:
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:
     live.first.set_result(None)
-    only = Live(live.page, live.bundle, live.first, 1, None)
+    only = Live(live.page, live.bundle, live.first, live.fine, None, live.reading)
     with serving(only) as port:
         assert "Stereocell-Live" not in ask(port, "/manifest.json")[0].headers
         refused = pytest.raises((ConnectionClosed, InvalidStatus))

@@ -1,6 +1,8 @@
 """Write the source of the viewer's tests of `stereocell view`: the letter F, in a file.
 
-python -m support.live_source FILE.ome.tif
+python -m support.live_source FILE.ome.tif [SCALE]
+
+SCALE is how many voxels the smallest F's edge of a voxel has; 2 unless it is given.
 """
 
 import sys
@@ -9,4 +11,5 @@ from pathlib import Path
 from support.phantoms import f_phantom, write_ome_tiff
 
 if __name__ == "__main__":
-    write_ome_tiff(Path(sys.argv[1]), f_phantom(2), spacing=(1.0, 0.5, 0.5))
+    path, *scale = sys.argv[1:]
+    write_ome_tiff(Path(path), f_phantom(int(*scale or [2])), spacing=(1.0, 0.5, 0.5))

@@ -2,7 +2,7 @@
 
 import base64
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -31,30 +31,29 @@ class Holder:
 
     def at(self, box: Box) -> NDArray[np.bool_]:
         """Return which voxels of a box are left out, bool (z, y, x)."""
-        return np.asarray(self.mask[np.ix_(*self._cells(box))])
+        return self._at(_indices(box))
 
     def left_out_of(self, voxels: NDArray[Any], box: Box) -> NDArray[Any]:
         """Return voxels (z, y, x) of a box with air in place of what is left out, same dtype."""
+        return self.left_out_at(voxels, _indices(box))
+
+    def left_out_at(self, voxels: NDArray[Any], places: Sequence[NDArray[Any]]) -> NDArray[Any]:
+        """Return the same of voxels on a grid. places: its coordinates along z, y, x, in voxels."""
         air = np.minimum(voxels, np.asarray(AIR_HU).astype(voxels.dtype))
-        return np.where(self.at(box), air, voxels)
+        return np.where(self._at(places), air, voxels)
 
     def around(self, box: Box) -> "Holder | None":
         """Return the same if it leaves out voxels of a box, else None."""
         return self if self.at(box).any() else None
 
-    def _cells(self, box: Box) -> list[NDArray[np.intp]]:
-        """Return the cell of each voxel along each axis."""
-        return [
-            np.clip((np.arange(a, b) - first) * cells // (last - first), 0, cells - 1)
-            for a, b, first, last, cells in zip(
-                box.start,
-                box.stop,
-                self.region.start,
-                self.region.stop,
-                self.mask.shape,
-                strict=True,
+    def _at(self, places: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
+        cells = [
+            np.clip((along - first) * count // (last - first), 0, count - 1).astype(np.intp)
+            for along, first, last, count in zip(
+                places, self.region.start, self.region.stop, self.mask.shape, strict=True
             )
         ]
+        return np.asarray(self.mask[np.ix_(*cells)])
 
     def to_json(self) -> dict[str, Any]:
         """Return the same as texts and numbers; the mask as bits by zlib in base64."""
@@ -85,3 +84,8 @@ class Holder:
             lambda value: value if isinstance(value, cls) else cls.from_json(value),
             serialization=core_schema.plain_serializer_function_ser_schema(cls.to_json),
         )
+
+
+def _indices(box: Box) -> list[NDArray[np.intp]]:
+    """Return the indices of a box's voxels along each axis."""
+    return [np.arange(a, b) for a, b in zip(box.start, box.stop, strict=True)]

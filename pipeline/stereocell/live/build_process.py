@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from stereocell.engine.run import Watch, console
+from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
+from stereocell.live.first_view import Sizes
 from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan
 
@@ -82,6 +84,7 @@ class _Task:
 @dataclass(frozen=True, slots=True)
 class _View:
     folder: Path
+    holders: Mapping[str, Holder]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +100,7 @@ class Coarse:
     read: Mapping[str, CoarseChannel]
     out: Path
     scratch: Path
+    sizes: Sizes
 
 
 class BuildProcess:
@@ -111,6 +115,7 @@ class BuildProcess:
         self._changed = threading.Lock()
         self._state = State()
         self._views: dict[str, Path] = {}
+        self.holders: Mapping[str, Holder] = {}  # what the views leave out; see `PartialView`
         self._process: Any = None
         self._pipe: Connection[Any, Any] | None = None
         self._began_s = self._paused_s = 0.0
@@ -215,6 +220,7 @@ class BuildProcess:
             if isinstance(told, _Task):
                 self._take(told)
             elif isinstance(told, _View):
+                self.holders = told.holders
                 self._views[told.folder.name] = told.folder
                 self._set(folder=f"{told.folder.name}/")
             elif isinstance(told, _End) and self.state.doing != "cancelled":
@@ -258,7 +264,7 @@ def _run(pipe: "Connection[Any, Any]") -> None:
 
         _lower_priority()
         build, coarse = pipe.recv()
-        view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch)
+        view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch, sizes=coarse.sizes)
         pipe.send(_End(build(_Watcher(view, pipe))))
 
 
@@ -290,7 +296,7 @@ class _Watcher:
             console.print(f"views: {error}: the page shows surfaces at the end", markup=False)
             return
         if folder is not None:
-            self._pipe.send(_View(folder))
+            self._pipe.send(_View(folder, self._view.holders))
 
 
 def _lower_priority() -> None:

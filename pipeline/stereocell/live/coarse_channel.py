@@ -1,11 +1,14 @@
 """Read a channel coarsely: no more voxels than a first view needs, however large the source is."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Box
 from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
@@ -14,7 +17,27 @@ from stereocell.read import Dataset
 READ_VOXELS = 48_000_000  # most voxels of a channel that are read
 SLAB_VOXELS = 16_000_000  # approximate number of voxels that are read at a time
 SAMPLED_VOXELS = 6_000_000  # approximate number of values on which a window is found
+OnRead = Callable[[float], None]
 _Triple = tuple[int, int, int]
+_Places = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseGrid:
+    """The blocks of voxels whose means are taken.
+
+    level   of the source, which is read
+    box     its voxels of the planned region
+    factor  (z, y, x), voxels of a block
+    first   (z, y, x), centre of the first block, in voxels of the planned level
+    step    (z, y, x), distance between blocks, in voxels of the planned level
+    """
+
+    level: int
+    box: Box
+    factor: _Triple
+    first: tuple[float, float, float]
+    step: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,17 +45,15 @@ class CoarseChannel:
     """The means of blocks of a channel's voxels, over the planned region.
 
     voxels  float32 (z, y, x), voxel values
-    first   (z, y, x), centre of voxel (0, 0, 0), in voxels of the planned level
-    step    (z, y, x), distance between voxels, in voxels of the planned level
+    grid    where they lie
     sample  float32 (n,), values as they were read, without means: what a histogram is made of
     """
 
     voxels: NDArray[np.float32]
-    first: tuple[float, float, float]
-    step: tuple[float, float, float]
+    grid: CoarseGrid
     sample: NDArray[np.float32]
 
-    def at(self, places: tuple[NDArray[np.float64], ...]) -> NDArray[np.float32]:
+    def at(self, places: _Places) -> NDArray[np.float32]:
         """Return the voxels at places on a grid, by linear interpolation; float32 (z, y, x).
 
         places  the grid's coordinates along z, y and x, in voxels of the planned level; beyond the
@@ -41,7 +62,7 @@ class CoarseChannel:
         values = self.voxels
         for axis, along in enumerate(places):
             last = values.shape[axis] - 1
-            index = np.clip((along - self.first[axis]) / self.step[axis], 0, last)
+            index = np.clip((along - self.grid.first[axis]) / self.grid.step[axis], 0, last)
             low = np.minimum(index.astype(np.intp), max(last - 1, 0))
             share = (index - low).astype(np.float32)
             share = share.reshape([-1 if i == axis else 1 for i in range(3)])
@@ -50,53 +71,104 @@ class CoarseChannel:
         return values
 
 
-def read_coarse(dataset: Dataset, plan: Plan, channel: Channel, voxels: int) -> CoarseChannel:
-    """Return a channel by means of blocks of about equal edges in um, at most `voxels` of them.
+def find_grid(dataset: Dataset, plan: Plan, voxels: int) -> CoarseGrid:
+    """Return blocks of about equal edges in um, at most `voxels` of them, in the planned region.
 
-    Of a source with a pyramid its finest level of at most READ_VOXELS is read. Of a source without
-    one every k-th plane is read, across the axis along which its images lie.
-
-    Raises SourceError where voxels can't be read.
+    Of a source with a pyramid its finest level of at most READ_VOXELS is read, or of as many as
+    there are blocks.
     """
     level = plan.level
     while level + 1 < len(dataset.levels) and prod(_region_at(dataset, plan, level).shape) > max(
         READ_VOXELS, voxels
     ):
         level += 1
+    return grid_at(dataset, plan, level, voxels)
+
+
+def grid_at(dataset: Dataset, plan: Plan, level: int, voxels: int) -> CoarseGrid:
+    """Return such blocks of one level of a source."""
     box = _region_at(dataset, plan, level)
-    spacing = dataset.levels[level].spacing_um
+    spacing, origin = dataset.levels[level].spacing_um, dataset.levels[level].origin_um
     factor = _factor(box.shape, spacing, voxels)
-    axis = dataset.slice_axis(level)
-    # All planes of a block are read, or its middle ones where there are too many voxels.
-    count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
-    # Where all planes are read, many blocks are read together: a chunk holds several planes.
-    together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
-    step = factor[axis] * (together if count == factor[axis] else 1)
-    end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
-    blocks, sample = [], []
-    for start in range(box.start[axis], end, step):
-        middle = start + (factor[axis] - count) // 2
-        stop = min(start + step, end) if step > factor[axis] else middle + count
-        read = dataset.read(channel.index, box.slab(axis, middle, stop), level).voxels
-        blocks.append(_means(read, tuple(count if i == axis else factor[i] for i in range(3))))
-        share = min(step, end - start) / box.shape[axis]
-        sample.append(_spread(read, round(SAMPLED_VOXELS * share)))
     # Places are converted from voxels of this level to voxels of the planned level.
     fine = plan.spacing_um
-    scale = tuple(a / b for a, b in zip(spacing, fine, strict=True))
-    origin = dataset.levels[level].origin_um
     first = tuple(
         (origin[i] + (box.start[i] + (factor[i] - 1) / 2) * spacing[i] - plan.origin_um[i])
         / fine[i]
         for i in range(3)
     )
-    z, y, x = (float(f * s) for f, s in zip(factor, scale, strict=True))
-    return CoarseChannel(
-        np.concatenate(blocks, axis),
-        (first[0], first[1], first[2]),
-        (z, y, x),
-        np.concatenate(sample),
+    z, y, x = (float(f * (a / b)) for f, a, b in zip(factor, spacing, fine, strict=True))
+    return CoarseGrid(level, box, factor, (first[0], first[1], first[2]), (z, y, x))
+
+
+def slabs_of(grid: CoarseGrid, axis: int) -> Iterator[tuple[Box, _Triple]]:
+    """Yield the boxes of voxels that are read, one after the other, and the block of each.
+
+    axis  of z, y, x: the source's images lie across it
+
+    All planes of a block are read, or its middle ones where there are too many voxels.
+    """
+    box, factor = grid.box, grid.factor
+    count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
+    z, y, x = (count if i == axis else factor[i] for i in range(3))
+    # Where all planes are read, many blocks are read together: a chunk holds several planes.
+    together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
+    step = factor[axis] * (together if count == factor[axis] else 1)
+    end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
+    for start in range(box.start[axis], end, step):
+        middle = start + (factor[axis] - count) // 2
+        stop = min(start + step, end) if step > factor[axis] else middle + count
+        yield box.slab(axis, middle, stop), (z, y, x)
+
+
+def read_coarse(
+    dataset: Dataset,
+    plan: Plan,
+    channel: Channel,
+    voxels: int,
+    on_read: OnRead = lambda share: None,
+) -> CoarseChannel:
+    """Return a channel by means of blocks of voxels; see `find_grid`.
+
+    on_read  is given the share, 0..1, of what is read, after each part of it
+
+    Of a source without a pyramid every k-th plane is read, across the axis along which its images
+    lie.
+
+    Raises SourceError where voxels can't be read.
+    """
+    grid = find_grid(dataset, plan, voxels)
+    axis = dataset.slice_axis(grid.level)
+    blocks, sample = [], []
+    slabs = list(slabs_of(grid, axis))
+    for slab, block in slabs:
+        read = dataset.read(channel.index, slab, grid.level).voxels
+        blocks.append(_means(read, block))
+        planes = blocks[-1].shape[axis] * grid.factor[axis]
+        sample.append(_spread(read, round(SAMPLED_VOXELS * planes / grid.box.shape[axis])))
+        on_read(1 / len(slabs))
+    return CoarseChannel(np.concatenate(blocks, axis), grid, np.concatenate(sample))
+
+
+def places_in(lattice: Box, step: tuple[float, float, float]) -> _Places:
+    """Return the places (z, y, x) of a tile's volume, in voxels of the planned level.
+
+    lattice  the tile's lattice points
+
+    Along each axis they lie about `step` apart, from the first point to the last, and APRON more
+    lie beyond each.
+    """
+    z, y, x = (
+        _along(start, stop - 1, apart)
+        for start, stop, apart in zip(lattice.start, lattice.stop, step, strict=True)
     )
+    return z, y, x
+
+
+def _along(first: int, last: int, step: float) -> NDArray[np.float64]:
+    count = max(2, round((last - first) / step) + 1) if last > first else 1
+    apart = (last - first) / (count - 1) if count > 1 else step
+    return np.asarray(first + apart * np.arange(-APRON, count + APRON), np.float64)
 
 
 def _region_at(dataset: Dataset, plan: Plan, level: int) -> Box:
@@ -117,13 +189,17 @@ def _factor(shape: _Triple, spacing: tuple[float, float, float], voxels: int) ->
         edge *= 1.05
 
 
-def _means(voxels: NDArray[np.generic], block: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the means of whole blocks, float32 (z, y, x)."""
+def in_blocks(voxels: NDArray[Any], block: _Triple) -> NDArray[Any]:
+    """Return the whole blocks of voxels, (z, block z, y, block y, x, block x)."""
     counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
     whole = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
     z, y, x = counts
-    parts = whole.reshape(z, block[0], y, block[1], x, block[2])
-    return np.asarray(parts.mean(axis=(1, 3, 5), dtype=np.float32))
+    return whole.reshape(z, block[0], y, block[1], x, block[2])
+
+
+def _means(voxels: NDArray[Any], block: _Triple) -> NDArray[np.float32]:
+    """Return the means of whole blocks, float32 (z, y, x)."""
+    return np.asarray(in_blocks(voxels, block).mean(axis=(1, 3, 5), dtype=np.float32))
 
 
 def _spread(voxels: NDArray[np.generic], most: int) -> NDArray[np.float32]:

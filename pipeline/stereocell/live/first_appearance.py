@@ -28,7 +28,7 @@ def first_appearance(
     The window, the level and the transfer functions follow the rules of a build. A level is chosen
     without the connected components, which only all voxels show.
     """
-    spacing = tuple(a * b for a, b in zip(coarse.step, plan.spacing_um, strict=True))
+    spacing = tuple(a * b for a, b in zip(coarse.grid.step, plan.spacing_um, strict=True))
     z, y, x = spacing
     volume = Volume(coarse.voxels, (z, y, x))
     found = gather_array_evidence(volume, modality=plan.modality)

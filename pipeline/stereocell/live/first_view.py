@@ -6,8 +6,11 @@ same schema, so that every viewer of bundles shows it. Its voxels alone are coar
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from math import prod
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,13 +20,16 @@ from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
 from stereocell.bundle.write_volume import write_volume
-from stereocell.live.coarse_channel import CoarseChannel, read_coarse
+from stereocell.isosurface.holder import Holder
+from stereocell.live.coarse_channel import CoarseChannel, OnRead, places_in, read_coarse
+from stereocell.live.coarse_labels import read_coarse_labels
 from stereocell.live.first_appearance import first_appearance
 from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
-from stereocell.model.errors import SourceError
 from stereocell.model.tile_content import APRON
 from stereocell.model.tiling import Tile
 from stereocell.model.world_box import WorldPoint, move_box, world_box
+from stereocell.planning.channels import Channel
+from stereocell.planning.object_tables import appearance_of_labels
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
@@ -35,6 +41,8 @@ from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 # Largest number of voxels in a first view, all channels together: about 1 MB compressed
 VOXELS = 4_000_000
 NOT_BUILT = "its surface is not built yet"
+OBJECTS_NOT_BUILT = "its objects are not built yet"
+Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,25 +57,43 @@ class _CoarseVolume:
     measured: Path | None = None
 
 
-def read_channels(plan: Plan, dataset: Dataset) -> dict[str, CoarseChannel]:
+def read_channels(
+    plan: Plan, dataset: Dataset, on_read: OnRead = lambda share: None
+) -> dict[str, CoarseChannel]:
     """Return the coarse voxels of a plan's channels, by the ID of their voxels.
 
-    Raises SourceError where the source can't be read or has no channel.
+    on_read  is given the share, 0..1, of what is read, after each part of it; by any thread
+
+    Of label maps without an image they are the objects'. Raises SourceError where the source can't
+    be read.
     """
-    shared = plan.shared_volumes
-    channels = [channel for channel in plan.channels if channel.id not in shared]
-    if not channels:
-        raise SourceError(f"{plan.name}: objects of a label map are shown once they are built")
+    shown = _shown(plan)
+    channels = [channel for channel in shown.channels if channel.id not in shown.shared_volumes]
     each = max(10_000, VOXELS // len(channels))
+    labels = {one.id: one for one in plan.labels if not plan.channels}
+
+    def read(channel: Channel) -> CoarseChannel:
+        if channel.id in labels:
+            return read_coarse_labels(plan, labels[channel.id], each)
+        share_of_one = partial(_pass_on, on_read, len(channels))
+        return read_coarse(dataset, plan, channel, each, share_of_one)
+
     with ThreadPoolExecutor(cores()) as pool:
-        read = pool.map(lambda one: read_coarse(dataset, plan, one, each), channels)
-        return {one.voxels_id: coarse for one, coarse in zip(channels, read, strict=True)}
+        found = pool.map(read, channels)
+        return {one.voxels_id: coarse for one, coarse in zip(channels, found, strict=True)}
 
 
-def write_first_view(plan: Plan, read: Mapping[str, CoarseChannel], root: Path) -> None:
+def _pass_on(on_read: OnRead, channels: int, share: float) -> None:
+    on_read(share / channels)
+
+
+def write_first_view(
+    plan: Plan, read: Mapping[str, CoarseChannel], root: Path, sizes: Sizes | None = None
+) -> None:
     """Write a bundle of a plan's coarse volumes, without a page, into a folder.
 
     read    see `read_channels`
+    sizes   of the tiles' finer volumes, which a host has; see `FineTiles.sizes`; None: it has none
 
     Raises OutputError where a file can't be written.
     """
@@ -75,10 +101,22 @@ def write_first_view(plan: Plan, read: Mapping[str, CoarseChannel], root: Path) 
         found = list(
             pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
         )
-    appearances = [composed(appearance) for appearance, _ in found]
-    tiles = write_coarse_tiles(plan, root, read, appearances)
+    appearances = [composed(appearance) for appearance, _ in found] or [
+        composed(replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT))
+        for one in plan.labels
+    ]
+    shown = _shown(plan)
+    tiles = write_coarse_tiles(shown, root, read, appearances, sizes or {})
     is_cut = plan.opens_cut and any(is_body for _, is_body in found)
-    write_view(plan, root, appearances, tiles, is_cut=is_cut)
+    write_view(shown, root, appearances, tiles, is_cut=is_cut)
+
+
+def _shown(plan: Plan) -> Plan:
+    """Return a plan with the channels of its first view: its own, or else its label maps."""
+    if plan.channels:
+        return plan
+    channels = tuple(Channel(one.channel, one.name, one.color) for one in plan.labels)
+    return replace(plan, channels=channels, labels=())
 
 
 def write_coarse_tiles(
@@ -86,12 +124,27 @@ def write_coarse_tiles(
     root: Path,
     read: Mapping[str, CoarseChannel],
     appearances: Sequence[ComposedAppearance],
+    sizes: Sizes,
+    holders: Mapping[str, Holder] = MappingProxyType({}),
 ) -> list[BundleTile]:
-    """Write the coarse volumes of all tiles into a bundle, and return the tiles."""
+    """Write the coarse volumes of all tiles into a bundle, and return the tiles.
+
+    sizes    see `write_first_view`
+    holders  what is air in the volumes of a build, by the channel's ID
+    """
+
+    def write(tile: Tile) -> BundleTile:
+        coarse = {
+            channel.id: _coarse_voxels(
+                plan, tile, read[channel.voxels_id], appearance, holders.get(channel.id)
+            )
+            for channel, appearance in zip(plan.channels, appearances, strict=True)
+            if channel.id not in plan.shared_volumes
+        }
+        return _write_tile(plan, root, tile, appearances, coarse, sizes)
+
     with ThreadPoolExecutor(cores()) as pool:
-        return list(
-            pool.map(lambda tile: _write_tile(plan, root, tile, read, appearances), plan.tiles)
-        )
+        return list(pool.map(write, plan.tiles))
 
 
 def write_view(
@@ -163,46 +216,49 @@ def composed(appearance: Appearance) -> ComposedAppearance:
     )
 
 
+def _coarse_voxels(
+    plan: Plan,
+    tile: Tile,
+    coarse: CoarseChannel,
+    appearance: ComposedAppearance,
+    holder: Holder | None,
+) -> NDArray[np.uint8]:
+    """Return a tile's coarse voxels with the apron, window applied, (z, y, x)."""
+    places = places_in(tile.lattice(plan.region), coarse.grid.step)
+    values = coarse.at(places)
+    if holder is not None:
+        values = holder.left_out_at(values, places)
+    return to_eight_bits(values, appearance.window)
+
+
 def _write_tile(
     plan: Plan,
     root: Path,
     tile: Tile,
-    read: Mapping[str, CoarseChannel],
     appearances: Sequence[ComposedAppearance],
+    coarse: Mapping[str, NDArray[np.uint8]],
+    sizes: Sizes,
 ) -> BundleTile:
     lattice = tile.lattice(plan.region)
     first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])
     corners = world_box(first, last)
     low, high = (_point(corner) for corner in corners)
     matrix = np.array(plan.placement).T  # USD's matrices are for row vectors
-    shared = plan.shared_volumes
     channels = []
     for channel, appearance in zip(plan.channels, appearances, strict=True):
-        if channel.id in shared:
+        if channel.id not in coarse:
             channels.append(TileChannel(channel.id, (), (), (), None, (), None))
             continue
-        coarse = read[channel.voxels_id]
-        places = tuple(
-            _places(start, stop - 1, step)
-            for start, stop, step in zip(lattice.start, lattice.stop, coarse.step, strict=True)
-        )
-        voxels = to_eight_bits(coarse.at(places), appearance.window)
+        voxels = coarse[channel.id]
         depth, height, width = voxels.shape
         volume = _CoarseVolume((width, height, depth), low, high, matrix)
         entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels)
+        finer = sizes.get(tile.id, volume.size)
+        if prod(finer) > prod(volume.size):
+            entry["finer_size"] = list(finer)
         channels.append(TileChannel(channel.id, (), (), (), entry, tuple(files), joint))
     bounds = move_box(*corners, matrix)
     return BundleTile(tile.id, "mesh", _point(bounds[0]), _point(bounds[1]), tuple(channels))
-
-
-def _places(first: int, last: int, step: float) -> NDArray[np.float64]:
-    """Return places about `step` apart from first to last, and one more beyond each, for the apron.
-
-    All are in voxels of the planned level.
-    """
-    count = max(2, round((last - first) / step) + 1) if last > first else 1
-    apart = (last - first) / (count - 1) if count > 1 else step
-    return np.asarray(first + apart * np.arange(-APRON, count + APRON), np.float64)
 
 
 def _point(values: NDArray[np.float64]) -> WorldPoint:

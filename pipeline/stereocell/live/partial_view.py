@@ -16,8 +16,9 @@ from stereocell.building.survey_file import read_survey
 from stereocell.bundle.tile_part import BundleTile, TileChannel, read_part
 from stereocell.bundle.write import Composed
 from stereocell.bundle.write_tile import write_tile
+from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import NOT_BUILT, write_coarse_tiles, write_view
+from stereocell.live.first_view import NOT_BUILT, Sizes, write_coarse_tiles, write_view
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -48,6 +49,7 @@ class PartialView:
     read     the coarse voxels that it shows, by the ID of the voxels
     out      the folder of the build
     scratch  the folder of the views
+    sizes    see `write_first_view`
     rest     time between two views, as a multiple of that which the last one took: of many tiles
              only some bring a view
     """
@@ -59,13 +61,16 @@ class PartialView:
         out: Path,
         scratch: Path,
         *,
+        sizes: Sizes | None = None,
         rest: float = REST,
     ) -> None:
         self._plan, self._read, self._out, self._scratch = plan, read, out, scratch
+        self._sizes = sizes or {}
         self._rest, self._next_s, self._has_news = rest, 0.0, False
         self._survey: _Survey | None = None
         self._finished: dict[str, BundleTile] = {}
         self._views = 0
+        self.holders: Mapping[str, Holder] = {}  # what a build leaves out, by the channel's ID
 
     @property
     def finished(self) -> int:
@@ -77,6 +82,8 @@ class PartialView:
 
         tile_id  the tile to which a unit has come; None: all tiles are looked at, as at the start
                  and the end, and no time has to pass before a view
+
+        Of label maps without an image there is none: their objects show once all are built.
 
         A build of another plan than that of the first view has no views of its own: the source or
         what is known of it has changed meanwhile.
@@ -107,11 +114,15 @@ class PartialView:
 
         The windows of the survey are those of all voxels, and hold from now on.
         """
+        if not self._plan.channels:
+            return None
         out_folder = OutFolder(self._out)
         plan = replace(out_folder.plan(), labels=())
         if (plan.fingerprint, plan.region) != (self._plan.fingerprint, self._plan.region):
             return None
         survey = read_survey(out_folder)
+        found = {channel.id: survey[channel.id].holder for channel in plan.channels}
+        self.holders = {name: holder for name, holder in found.items() if holder is not None}
         steps = unit_steps(plan, survey)
         units = {name: out_folder.unit_dir(name, step.key) for name, step in steps.items()}
         folder = self._stage.parent
@@ -119,7 +130,12 @@ class PartialView:
         stage_step(plan, survey, tiles, {}).write(folder)
         composed = Composed.open(self._stage)
         coarse = write_coarse_tiles(
-            plan, self._scratch / "coarse", self._read, composed.appearances
+            plan,
+            self._scratch / "coarse",
+            self._read,
+            composed.appearances,
+            self._sizes,
+            self.holders,
         )
         self._survey = _Survey(
             plan,

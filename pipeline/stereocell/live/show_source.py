@@ -14,7 +14,9 @@ from pathlib import Path
 from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_view import read_channels, write_first_view
+from stereocell.live.reading import Reading
 from stereocell.model.errors import OutputError
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
@@ -63,15 +65,17 @@ class Live:
     page    the folder of the viewer
     bundle  the folder of the first view, once `first` has a result
     first   done once the first view is written; its error is why that can't be
-    tiles   how many there are
+    fine    the tiles that are looked at, read from the source
+    reading  how much has been read for the first view
     build   the build behind the view; None: it is only looked at
     """
 
     page: Path
     bundle: Path
     first: Future[None]
-    tiles: int
+    fine: FineTiles
     build: BuildProcess | None
+    reading: Reading
 
 
 def show_source(
@@ -93,6 +97,8 @@ def show_source(
     page = viewer_dist()
     if page is None:
         raise OutputError("the viewer is not built: run `make setup`")
+    if not Location.of(source).is_local:
+        _print(f"reading {printable(source)}")  # an answer may take a while
     plan = settle(source, settings, choice)
     dataset = open_source(as_asked(plan.source, plan.settings.plan))
     build = None
@@ -104,12 +110,14 @@ def show_source(
         print_notes(plan)  # a build prints them itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
-        live = Live(page, scratch / "bundle", first, len(plan.tiles), build)
+        fine = FineTiles(plan, dataset)
+        live = Live(page, scratch / "bundle", first, fine, build, Reading(_print))
 
         def write() -> None:
             try:
-                read = read_channels(plan, dataset)
-                write_first_view(plan, read, live.bundle)
+                read = read_channels(plan, dataset, live.reading.add)
+                sizes = fine.sizes()
+                write_first_view(plan, read, live.bundle, sizes)
             except BaseException as error:  # the command raises it
                 first.set_exception(error)
                 return
@@ -122,7 +130,7 @@ def show_source(
                 _print(
                     f"built behind the page into {printable(str(build.out))}; --no-build only shows"
                 )
-                build.start(Coarse(plan, read, build.out, scratch))
+                build.start(Coarse(plan, read, build.out, scratch, sizes))
 
         threading.Thread(target=write, daemon=True).start()
         try:

@@ -39,8 +39,8 @@ from stereocell.formats.brick_stream import (
     encode_frame,
 )
 from stereocell.model.errors import StereoCellError
-from stereocell.serve.brick_library import BrickFile, BrickLibrary, UnknownVolumeError
-from stereocell.serve.brick_order import View, order
+from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError
+from stereocell.serve.brick_order import PlacedTree, View, order
 from stereocell.serve.frame_window import FrameWindow
 from stereocell.serve.limits import (
     ACK_S,
@@ -55,6 +55,7 @@ from stereocell.serve.limits import (
     Refusal,
 )
 from stereocell.serve.message_reader import MessageReader
+from stereocell.serve.tree_files import BrickFile, FullError
 
 _AHEAD = 2048  # bricks considered for one frame
 _LOG = logging.getLogger(__name__)
@@ -62,16 +63,15 @@ T = TypeVar("T")
 
 
 class BrickEndpoint:
-    """The websocket part of a server: its connections share a library and threads."""
+    """The websocket part of a server: its connections share threads."""
 
-    def __init__(self, library: BrickLibrary) -> None:
-        self._library = library
+    def __init__(self) -> None:
         self._builder = ThreadPoolExecutor(1, "bricks-build")
         self._quick = ThreadPoolExecutor(2, "bricks-read")
         self._connections: Counter[str] = Counter()  # by the client's address
 
-    async def talk(self, socket: WebSocket) -> None:
-        """Talk to one client until it leaves or is closed."""
+    async def talk(self, socket: WebSocket, library: BrickLibrary) -> None:
+        """Talk to one client of a library until it leaves or is closed."""
         await socket.accept()
         address = socket.client.host if socket.client else ""
         counts = self._connections
@@ -81,7 +81,7 @@ class BrickEndpoint:
                 return
         counts[address] += 1
         try:
-            await BrickSession(socket, self._library, self._builder, self._quick).run()
+            await BrickSession(socket, library, self._builder, self._quick).run()
         finally:
             counts[address] -= 1
             counts += Counter()  # removes entries of 0
@@ -94,11 +94,22 @@ class BrickEndpoint:
 
 @dataclass(slots=True)
 class _Tree:
+    """An open tree. Its file may leave the server meanwhile, and is then made again.
+
+    lengths  bytes of each node's brick
+    sent     a byte per node: 1 where the client has its brick
+    """
+
     tile: str
     channel: str
     table_hash: str
-    nodes: int
-    sent: bytearray  # a byte per node: 1 where the client has its brick
+    placed: PlacedTree
+    lengths: NDArray[np.int64]
+    sent: bytearray
+
+    @property
+    def name(self) -> tuple[str, str]:
+        return self.tile, self.channel
 
 
 @dataclass(slots=True)
@@ -147,6 +158,7 @@ class BrickSession:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            self._library.release(self)
         errors = [error for task in done if (error := task.exception()) is not None]
         if any(isinstance(error, WebSocketDisconnect) for error in errors):
             return
@@ -210,9 +222,10 @@ class BrickSession:
             packed = base64.b64decode(message["nodes"], validate=True)
         except binascii.Error:
             raise Refusal(1007, "have: nodes is not base64") from None
-        if len(packed) != (tree.nodes + 7) // 8:
-            raise Refusal(1007, f"have: {len(packed)} bytes for {tree.nodes} nodes")
-        bits = np.unpackbits(np.frombuffer(packed, np.uint8), count=tree.nodes, bitorder="little")
+        nodes = len(tree.lengths)
+        if len(packed) != (nodes + 7) // 8:
+            raise Refusal(1007, f"have: {len(packed)} bytes for {nodes} nodes")
+        bits = np.unpackbits(np.frombuffer(packed, np.uint8), count=nodes, bitorder="little")
         tree.sent = bytearray(bits.tobytes())
 
     def _on_open(self, message: dict[str, Any]) -> None:
@@ -249,15 +262,19 @@ class BrickSession:
             except UnknownVolumeError as error:
                 self._report(wanted, "unknown", str(error))
                 continue
+            except FullError as error:
+                self._report(wanted, "full", "the server has no room for it now")
+                _LOG.error("%s", error)
+                continue
             except (StereoCellError, OSError) as error:
                 _LOG.error("%s", error)  # for this machine's user: it may name folders
                 self._report(wanted, "damaged", "can't be read; the server's terminal says why")
                 continue
             table = file.table
             number = len(self._trees)
-            self._trees.append(
-                _Tree(tile, channel, file.table_hash, len(table.nodes), bytearray(len(table.nodes)))
-            )
+            lengths = table.nodes["length"].astype(np.int64)
+            sent = bytearray(len(lengths))
+            self._trees.append(_Tree(tile, channel, file.table_hash, file.placed, lengths, sent))
             follows = wanted.get("table") != file.table_hash
             self._say(_describe(number, wanted, file, table_follows=follows))
             if follows:
@@ -286,13 +303,25 @@ class BrickSession:
 
     async def _plan(self, view: _Running) -> None:
         trees = {int(number): self._trees[int(number)] for number in view.message["trees"]}
-
-        work = partial(_plan, self._library, view.message, trees)
+        found = await self._in(self._quick, partial(_find_order, view.message, trees))
+        needed = [number for number in trees if (found[0] == number).any()]
+        names = [trees[number].name for number in needed]
         try:
-            view.files, view.order = await self._in(self._quick, work)
+            await self._in(self._quick, partial(self._library.hold, self, names))
+            files = {number: await self._file(trees[number]) for number in needed}
         except (StereoCellError, OSError) as error:
             _LOG.error("%s", error)
             raise Refusal(1012, "the bundle was written anew, connect again") from None
+        view.files, view.order = files, found
+
+    async def _file(self, tree: _Tree) -> BrickFile:
+        """Return a tree's file; it is made again where it has left the server meanwhile."""
+        file = await self._in(self._quick, partial(self._library.open_built, *tree.name))
+        if file is None:
+            file = await self._in(self._builder, partial(self._library.open, *tree.name))
+        if file.table_hash != tree.table_hash:
+            raise StereoCellError(f"tile {tree.tile}, channel {tree.channel}: another volume now")
+        return file
 
     async def _send_batch(self, view: _Running) -> None:
         order, files = view.order, view.files
@@ -342,6 +371,7 @@ class BrickSession:
         view = self._view
         assert view is not None
         self._view = None
+        self._library.release(self)
         counts = {"bricks": view.bricks, "bytes": view.bytes}
         self._say({"type": "done", "view": view.id, "reason": reason, **counts})
 
@@ -377,27 +407,8 @@ def _describe(
     }
 
 
-def _plan(
-    library: BrickLibrary, message: dict[str, Any], trees: dict[int, _Tree]
-) -> tuple[dict[int, BrickFile], NDArray[np.int64]]:
-    """Return the files of a view's trees, and the order of the bricks that the client lacks."""
-    files = {}
-    for number, tree in trees.items():
-        file = library.open_built(tree.tile, tree.channel)
-        if file is None or file.table_hash != tree.table_hash:
-            raise Refusal(1012, "the bundle was written anew, connect again")
-        files[number] = file
-    found = _find_order(message, files)
-    for number, tree in trees.items():  # here, so that the event loop is not blocked
-        sent = np.frombuffer(tree.sent, np.uint8)
-        here = found[0] == number
-        here[here] = sent[found[1, here]] != 0
-        found = found[:, ~here]
-    return files, found
-
-
-def _find_order(message: dict[str, Any], files: dict[int, BrickFile]) -> NDArray[np.int64]:
-    """Return int64 (3, n): number of the tree, node, bytes of a view's bricks, in order."""
+def _find_order(message: dict[str, Any], trees: dict[int, _Tree]) -> NDArray[np.int64]:
+    """Return int64 (3, n): number of the tree, node, bytes of the bricks that a view lacks."""
 
     def vector(key: str) -> NDArray[np.float64]:
         return np.array(message[key], dtype=np.float64)
@@ -410,10 +421,11 @@ def _find_order(message: dict[str, Any], files: dict[int, BrickFile]) -> NDArray
         float(message["texel_px"]),
         float(message.get("error_grey", 0.0)),
     )
-    numbers = list(files)
-    tree, node, _ = order(view, [files[number].placed for number in numbers])
-    sizes = np.zeros(len(node), dtype=np.int64)
+    numbers = list(trees)
+    tree, node, _ = order(view, [trees[number].placed for number in numbers])
+    sizes, is_sent = np.zeros(len(node), dtype=np.int64), np.zeros(len(node), dtype=np.bool_)
     for i, number in enumerate(numbers):
         here = tree == i
-        sizes[here] = files[number].table.nodes["length"][node[here]]
-    return np.stack([np.array(numbers)[tree], node, sizes])
+        sizes[here] = trees[number].lengths[node[here]]
+        is_sent[here] = np.frombuffer(trees[number].sent, np.uint8)[node[here]] != 0
+    return np.stack([np.array(numbers)[tree], node, sizes])[:, ~is_sent]

@@ -4,6 +4,9 @@
                     build has a bundle, that with its bricks and values
     /manifest.json  of the newest view, whose folder the header Stereocell-Live names
     /g1/, /g2/      the views that came later: surfaces where a tile is finished
+    /bricks         a websocket with the bricks of the first view, made of the source; those of a
+                    later one are at /g1/bricks
+    /reading        how much has been read for the first view, as {"share": 0.4}
     /live           a websocket with the state of the build, which takes commands
 
 The server sends the state whenever it changes, at most four times a second: see
@@ -26,7 +29,7 @@ from ipaddress import ip_address
 from pathlib import Path
 
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -34,10 +37,16 @@ from stereocell.bundle.manifest import MANIFEST
 from stereocell.live.build_process import COMMANDS
 from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
+from stereocell.serve.brick_library import BrickLibrary
+from stereocell.serve.brick_session import BrickEndpoint
+from stereocell.serve.headers import policy
 from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
-from stereocell.serve.static_files import BundleFiles
+from stereocell.serve.live_bricks import LiveBricks
+from stereocell.serve.static_files import BundleFiles, bricks_header
 
 LIVE_HEADER = "Stereocell-Live"
+READING = "stereocell-reading"  # on the page: `/reading` tells how far the first view is
+_NOW = {"Cache-Control": "no-store", **policy("application/json")}
 _EACH_S = 0.25  # s between two states
 
 
@@ -48,6 +57,8 @@ class LiveApp:
         """built: returns the application that serves a whole bundle."""
         self._live, self._build, self._make_built = live, live.build, built
         self._built: ASGIApp | None = None
+        self._bricks = LiveBricks(live.fine, live.bundle.parent)
+        self._endpoint = BrickEndpoint()
         self._sockets = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -59,7 +70,7 @@ class LiveApp:
         elif (app := self._find_built()) is not None and self._folder_of(scope) is None:
             await app(scope, receive, send)
         elif scope["type"] == "websocket":
-            await WebSocket(scope, receive, send).close()
+            await self._send_bricks(WebSocket(scope, receive, send))
         else:
             await self._answer(scope, receive, send)
 
@@ -73,7 +84,22 @@ class LiveApp:
         """Return the folder of the later view that a path names; None: it names none."""
         if self._build is None:
             return None
-        return self._build.views.get(scope["path"].lstrip("/").partition("/")[0])
+        return self._build.views.get(_first_of(scope["path"]))
+
+    async def _send_bricks(self, socket: WebSocket) -> None:
+        """Talk to one client that asks for the bricks of a view."""
+        folder = self._folder_of(socket.scope)
+        path = "/bricks" if folder is None else f"/{_first_of(socket.scope['path'])}/bricks"
+        if socket.scope["path"] != path or not self._live.first.done():
+            await socket.close()
+            return
+        await self._endpoint.talk(socket, self._library(folder))
+
+    def _library(self, folder: Path | None) -> BrickLibrary:
+        """Return the bricks of a later view, or of the first one."""
+        if folder is None or self._build is None:
+            return self._bricks.library(self._live.bundle, {})
+        return self._bricks.library(folder, self._build.holders)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer from the folder of a view."""
@@ -81,6 +107,10 @@ class LiveApp:
             await PlainTextResponse("expected GET", 405)(scope, receive, send)
             return
         path, folder, headers = scope["path"].lstrip("/"), self._folder_of(scope), {}
+        if path == "reading":
+            about = {"share": 1.0 if self._live.first.done() else self._live.reading.share}
+            await JSONResponse(about, headers=_NOW)(scope, receive, send)
+            return
         if folder is not None:
             path = path.partition("/")[2]
         elif path == MANIFEST and self._build is not None:
@@ -103,13 +133,16 @@ class LiveApp:
         if folder is None:
             of_page = await BundleFiles(self._live.page, {}).answer(request)
             if of_page.status_code != 404:
+                if not self._live.first.done():
+                    of_page.headers["Server-Timing"] = READING
                 return of_page
             try:
                 await asyncio.shield(asyncio.wrap_future(self._live.first))
             except StereoCellError:  # the command reports it, and ends
                 return PlainTextResponse("the source can't be shown: see the terminal", 503)
-            folder = self._live.bundle
-        return await BundleFiles(folder, headers).answer(request)
+        if path == MANIFEST and self._library(folder).has_finer():
+            headers = headers | bricks_header("" if folder is None else f"{folder.name}/")
+        return await BundleFiles(folder or self._live.bundle, headers).answer(request)
 
     async def _talk(self, socket: WebSocket) -> None:
         """Send one client the state until it leaves, and take its commands."""
@@ -127,7 +160,7 @@ class LiveApp:
         sent = ""
         try:
             while True:
-                about = {"all_tiles": self._live.tiles, "may_control": may_control}
+                about = {"all_tiles": len(self._live.fine.plan.tiles), "may_control": may_control}
                 text = json.dumps({**asdict(build.state), **about})
                 if text != sent:
                     await socket.send_text(text)
@@ -154,8 +187,14 @@ class LiveApp:
             if message["type"] == "lifespan.startup":
                 await send({"type": "lifespan.startup.complete"})
             elif message["type"] == "lifespan.shutdown":
+                self._endpoint.close()
                 await send({"type": "lifespan.shutdown.complete"})
                 return
+
+
+def _first_of(path: str) -> str:
+    """Return the first part of a path, as `g1`."""
+    return path.lstrip("/").partition("/")[0]
 
 
 def _is_here(socket: WebSocket) -> bool:

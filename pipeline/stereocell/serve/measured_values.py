@@ -19,8 +19,9 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response
 from stereocell.formats.vdb import MEASURED_NAME
 from stereocell.formats.vdb_read import VdbValues
 from stereocell.model.errors import StereoCellError
-from stereocell.serve.brick_library import BrickLibrary, Volume
+from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.headers import policy
+from stereocell.serve.tree_files import Volume
 from stereocell.storage.file_list import find_faults, read_list
 
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page

@@ -19,6 +19,7 @@ import webbrowser
 from collections.abc import AsyncIterator
 from concurrent.futures import Future
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import uvicorn
@@ -38,7 +39,7 @@ from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
 from stereocell.serve.live_app import LiveApp
 from stereocell.serve.measured_values import VALUES_HEADER, MeasuredValues
-from stereocell.serve.static_files import BRICKS_HEADER, BundleFiles, ShrunkError
+from stereocell.serve.static_files import BundleFiles, ShrunkError, bricks_header
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
@@ -120,8 +121,8 @@ def make_app(
 def _bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) -> ASGIApp:
     """Return the application without its checks of access; see `make_app`."""
     values = None if library is None or stage is None else MeasuredValues(library, stage)
-    endpoint = None if library is None else BrickEndpoint(library)
-    announced = ({} if endpoint is None else BRICKS_HEADER) | (
+    endpoint = None if library is None else BrickEndpoint()
+    announced = ({} if endpoint is None else bricks_header()) | (
         {} if values is None else VALUES_HEADER
     )
     files = BundleFiles(bundle, announced)
@@ -133,8 +134,8 @@ def _bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) 
             endpoint.close()
 
     routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
-    if endpoint is not None:
-        routes.insert(0, WebSocketRoute("/bricks", endpoint.talk))
+    if library is not None and endpoint is not None:
+        routes.insert(0, WebSocketRoute("/bricks", partial(endpoint.talk, library=library)))
     if values is not None:
         routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
     app = Starlette(routes=routes, lifespan=lifespan)

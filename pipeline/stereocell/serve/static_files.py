@@ -25,11 +25,15 @@ from starlette.types import Receive, Scope, Send
 from stereocell.formats.media_types import media_type
 from stereocell.serve.headers import policy
 
-BRICKS_HEADER = {"Stereocell-Bricks": "version=1"}  # announces /bricks to a page
 _HEADERS = {"Cache-Control": "no-cache"}
 _ENCODINGS = {"br": ".br", "gzip": ".gz"}  # the shorter first
 _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
 _DIGITS = 18  # digits of a number in a Range header: no file has more bytes
+
+
+def bricks_header(folder: str = "") -> dict[str, str]:
+    """Return the header that announces `/bricks` to a page, or that of a folder, as `g1/`."""
+    return {"Stereocell-Bricks": "version=1" + (f"; folder={folder}" if folder else "")}
 
 
 class ShrunkError(Exception):

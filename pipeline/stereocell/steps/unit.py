@@ -94,7 +94,7 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
     """
     clock = Clock()
     with clock("volume"):
-        kept = cut_voxels(volume.voxels, given)
+        kept = cut_voxels(volume.voxels, given.lattice, given.holder)
         eight_bit = to_eight_bits(kept, given.intensity_window)
         measured = find_measured(kept, given)
     if given.iso is None:
@@ -252,12 +252,12 @@ class _Shading:
         )
 
 
-def cut_voxels(voxels: NDArray[Any], given: UnitInput) -> NDArray[Any]:
+def cut_voxels(voxels: NDArray[Any], lattice: Lattice, holder: Holder | None) -> NDArray[Any]:
     """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat.
 
-    A table or a holder that the surface leaves out is air in them: volume and surface agree.
+    voxels  (z, y, x), of the lattice's window
+    holder  what the surface leaves out, as a table: it is air, so that volume and surface agree
     """
-    lattice = given.lattice
     own, region, start = lattice.own, lattice.region, lattice.window.start
     inside, beyond, firsts, ends = [], [], [], []
     for a, b, low, high, w in zip(
@@ -269,9 +269,9 @@ def cut_voxels(voxels: NDArray[Any], given: UnitInput) -> NDArray[Any]:
         inside.append(slice(first - w, end - w))
         beyond.append((first - (a - APRON), b + APRON - end))
     kept = voxels[tuple(inside)]
-    if given.holder is not None:
+    if holder is not None:
         (z0, y0, x0), (z1, y1, x1) = firsts, ends
-        kept = given.holder.left_out_of(kept, Box((z0, y0, x0), (z1, y1, x1)))
+        kept = holder.left_out_of(kept, Box((z0, y0, x0), (z1, y1, x1)))
     return np.pad(kept, beyond, mode="edge")
 
 

@@ -104,7 +104,9 @@ def compare_unit(task: SourceTask) -> UnitFinding:
         if composed is None and not task.shares_volume:
             problems.append("no volume in the stage")
         elif composed is not None:
-            problems += _compare_volume(cut_voxels(volume.voxels, given), composed, task)
+            problems += _compare_volume(
+                cut_voxels(volume.voxels, given.lattice, given.holder), composed, task
+            )
     return UnitFinding(f"{task.tile_id}/{task.channel_id}", levels, tuple(problems), cover)
 
 

@@ -10,6 +10,8 @@ import type { ViewerState } from "../state/viewer_state";
 
 /** Time between two looks at whether the page may change, ms. */
 const LOOK_MS = 200;
+/** Longest time that a page whose picture is there is prepared for what would make it sharper, ms. */
+const SHARPEN_MS = 20_000;
 
 let pointersDown = 0;
 for (const kind of ["pointerdown", "pointerup", "pointercancel"]) {
@@ -35,7 +37,8 @@ async function atRest(host: Host): Promise<void> {
 }
 
 /**
- * Makes a second page behind the shown one, brings it to the same view, and shows it once its picture is whole.
+ * Makes a second page behind the shown one, brings it to the same view, and shows it once its picture is as
+ * sharp, or nearly.
  *
  * @param make makes a page's content in an element, and returns its host
  */
@@ -52,7 +55,9 @@ export async function exchange(
     after = await make(parent);
     const start = after.state;
     carry(before, after, start);
-    await after.display.settled();
+    const isThere = after.display.overviewShown();
+    const isLate = isThere.then(() => new Promise((resolve) => setTimeout(resolve, SHARPEN_MS)));
+    await Promise.race([after.display.settled(), isLate]);
     await atRest(before);
     carry(before, after, start); // what the user did meanwhile
     await after.display.nextFrame();

@@ -15,6 +15,7 @@ import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { Host } from "../host/host";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
+import { isReading, whileReading } from "../live/reading";
 import { showFatal } from "../panel/html/overlays";
 import { sizeText } from "../probe/measure";
 import type { Theme } from "../render/theme";
@@ -93,7 +94,10 @@ async function openShown(parent: HTMLElement, page: string): Promise<ShownSource
   }
   sayAtStart("Reading the bundle");
   try {
-    return { bundle: await loadBundle(bundleAddress(page)), notes: [] };
+    const base = bundleAddress(page);
+    const bundle = loadBundle(base);
+    const shown = isReading() ? whileReading(base, bundle, sayAtStart) : bundle;
+    return { bundle: await shown, notes: [] };
   } catch (error) {
     if (!(error instanceof MissingError) || namesBundle(page)) throw error;
     const { chooseSource } = await import("../source/start_page");

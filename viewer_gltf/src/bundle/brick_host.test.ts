@@ -10,6 +10,15 @@ describe("the address of the bricks", () => {
     expect(of("version=1", "https://10.0.0.7:8000/x/")).toBe("wss://10.0.0.7:8000/bricks");
   });
 
+  it("is that of a view of a source, where it has its own", () => {
+    const folder = "version=1; folder=g12/";
+    expect(of(folder, "http://localhost:8000/")).toBe("ws://localhost:8000/g12/bricks");
+    expect(of(folder, "http://localhost:8000/g12/")).toBe("ws://localhost:8000/g12/bricks");
+    for (const folder of ["", "../", "g1", "//elsewhere/", "g1/../"]) {
+      expect(of(`version=1; folder=${folder}`, "http://localhost/"), folder).toBeNull();
+    }
+  });
+
   it("is none where the host has none, or newer ones", () => {
     expect(of(null, "http://localhost/")).toBeNull();
     expect(of("version=2", "http://localhost/")).toBeNull();

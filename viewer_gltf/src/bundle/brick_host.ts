@@ -1,12 +1,13 @@
 /** Whether a host sends bricks by view. Pure. */
 
-/** The server's word for it, on every answer. */
+/** The server's word for it, on every answer; with the folder of a view that has bricks of its own. */
 const HEADER = "Stereocell-Bricks";
 
 /** The websocket's address; null: the host has none. */
 export function bricksAddress(headers: Headers, base: string): string | null {
-  if (headers.get(HEADER)?.trim() !== "version=1") return null;
-  const url = new URL("/bricks", base);
+  const found = /^version=1(?:; folder=(g\d+\/))?$/.exec(headers.get(HEADER)?.trim() ?? "");
+  if (found === null) return null;
+  const url = new URL(`/${found[1] ?? ""}bricks`, base);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }

@@ -21,6 +21,11 @@ function count(change: 1 | -1): void {
   if (change === 1 || waiting === 0) listener(waiting);
 }
 
+/** Reports that a connection is awaited besides, or no longer. */
+export function noteWait(isWaiting: boolean): void {
+  count(isWaiting ? 1 : -1);
+}
+
 /** The pause, or less where the network comes back or the job is no longer wanted. */
 function rest(pause_ms: number, signal: AbortSignal | null | undefined): Promise<void> {
   const isOffline = globalThis.navigator?.onLine === false;

@@ -6,7 +6,7 @@ import { showsBelow } from "../voxels/bricks/shows_below";
 import type { Appearance } from "../voxels/march_tables";
 import type { VolumeLimits } from "../voxels/mip_levels";
 import type { Packed } from "../voxels/tile_texture";
-import type { VolumeSource } from "../voxels/volume_source";
+import { type VolumeSource, volumeOfBricks } from "../voxels/volume_source";
 import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import { frameOf } from "./texel_frame";
 
@@ -109,7 +109,7 @@ export class TracedMedium {
       const { shown } = brickTile;
       this.packed = shown;
       const [source] = brickTile.kept.values();
-      const frame = frameOf([source.volume]);
+      const frame = frameOf([volumeOfBricks(source.volume)]);
       const { channels, level, texture, index, bricks } = shown;
       const release = () => undefined; // the texture is the tile's own
       const { size } = frame;

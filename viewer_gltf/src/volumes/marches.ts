@@ -11,6 +11,7 @@ import type { Appearance } from "../voxels/march_tables";
 import { brickCounts } from "../voxels/skip_bricks";
 import type { Packed } from "../voxels/tile_texture";
 import { opacities } from "../voxels/transfer_luts";
+import { volumeOfBricks } from "../voxels/volume_source";
 import type { ChannelAppearances } from "./channel_appearances";
 import { OccupancyClient } from "./empty_space_client";
 import type { Marched } from "./light/depth_shading";
@@ -111,11 +112,14 @@ export class Marches implements DrawnMarches {
     return true;
   }
 
-  private marchOf(resident: Resident, { channels }: Packed): TileMarch {
+  private marchOf(resident: Resident, packed: Packed): TileMarch {
     const { march: before } = resident;
-    if (before?.channelCount === channels.length) return before;
+    const { channels } = packed;
+    const volume = volumeOf(packed, resident);
+    const isSameGrid = before?.volume.size.join() === volume.size.join();
+    if (before?.channelCount === channels.length && isSameGrid) return before;
     before?.dispose();
-    const march = new TileMarch(volumeOf(channels[0], resident), channels.length, this.frame);
+    const march = new TileMarch(volume, channels.length, this.frame);
     resident.march = march;
     this.group.add(march.mesh);
     return march;
@@ -185,10 +189,10 @@ export class Marches implements DrawnMarches {
   }
 }
 
-function volumeOf(channel: string, { texture }: Resident): TileVolume {
+function volumeOf({ channels: [channel], index }: Packed, { texture }: Resident): TileVolume {
   const source = texture.kept.get(channel);
   if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
-  return source.volume;
+  return index === null ? source.volume : volumeOfBricks(source.volume);
 }
 
 /** The box round several marched tiles, um, world. */

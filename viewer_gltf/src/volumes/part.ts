@@ -72,7 +72,10 @@ class VolumesPart implements Part, Form {
   }
 
   stream(view: StreamView): void {
-    this.bricks?.look(viewOf(view, this.host.viewpoint.specimen));
+    if (this.bricks === null) return;
+    const looked = viewOf(view, this.host.viewpoint.specimen);
+    this.marched.sharpen(looked);
+    this.bricks.look(looked);
   }
 
   retryFailed(): void {

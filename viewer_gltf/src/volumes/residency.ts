@@ -1,6 +1,7 @@
 /** Which tiles have volumes on the GPU: how much each may take, how far it has faded in, which leave. */
 import type { WantedTile } from "../state/representation";
 import type { BrickTile } from "../voxels/bricks/brick_atlas";
+import type { SharpenedTile } from "../voxels/bricks/sharpened_tile";
 import type { Packed, TileTexture } from "../voxels/tile_texture";
 import type { TileMarch } from "./tile_raymarch";
 
@@ -12,7 +13,7 @@ const KEPT_TILES = 2;
 const WITH_OLD_LEVEL = 9 / 8;
 
 export type Resident = {
-  readonly texture: TileTexture | BrickTile;
+  readonly texture: TileTexture | BrickTile | SharpenedTile;
   march: TileMarch | null;
   /** The source of the march's tables. */
   packed: Packed | null;

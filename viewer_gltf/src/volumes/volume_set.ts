@@ -1,5 +1,7 @@
 /** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
 import { BundleError } from "../bundle/errors";
+import type { Bounds } from "../bundle/generated/bundle";
+import type { TileVolume } from "../bundle/generated/volumes";
 import type { Bundle } from "../bundle/load";
 import type { Volumes } from "../host/services";
 import type { Vec3 } from "../math/vec3";
@@ -9,6 +11,9 @@ import { isTraced } from "../state/parameters/volumes";
 import type { WantedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
 import type { BrickService } from "../voxels/bricks/brick_service";
+import { tilesToSharpen } from "../voxels/bricks/looked_at";
+import type { BrickView } from "../voxels/bricks/protocol";
+import { SharpenedTile } from "../voxels/bricks/sharpened_tile";
 import { LoadQueue } from "../voxels/load_queue";
 import type { MarchFrame } from "../voxels/march_frame";
 import { levelsToFetch, type VolumeLimits } from "../voxels/mip_levels";
@@ -35,6 +40,8 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
   private hasReportedLimit = false;
+  /** Of each tile, um, world. */
+  private readonly bounds: ReadonlyMap<string, Bounds>;
 
   constructor(
     bundle: Bundle,
@@ -46,6 +53,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     private readonly bricks: BrickService | null = null,
   ) {
     this.residents = new Residency(limits.bytes);
+    this.bounds = new Map(bundle.manifest.tiles.map(({ id, bounds_um }) => [id, bounds_um]));
     const onList = () => {
       if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
       this.onChange();
@@ -178,6 +186,23 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     for (const [tile] of this.residents.byTile) this.march(tile);
   }
 
+  /** In every frame: ask for finer volumes of what is looked at, of one tile at a time. */
+  sharpen(view: BrickView): void {
+    const { all } = this.residents;
+    if (!this.mayRefine || all.some(({ texture }) => isSharpening(texture))) return;
+    const coarse = this.wanted.flatMap(({ tile: id }) => {
+      const texture = this.residents.get(id)?.texture;
+      if (!(texture instanceof SharpenedTile && texture.canSharpen)) return [];
+      const [{ volume }] = texture.kept.values();
+      return [
+        { id, bounds_um: this.bounds.get(id) ?? volume.bounds_um, texel_um: texelOf(volume) },
+      ];
+    });
+    const [next] = tilesToSharpen(coarse, view);
+    const texture = next === undefined ? null : this.residents.get(next)?.texture;
+    if (texture instanceof SharpenedTile) texture.sharpen();
+  }
+
   /** From the next `follow` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
@@ -199,7 +224,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     let resident = this.residents.get(wanted.tile);
     if (resident === undefined) {
       if (sources.size === 0) return;
-      resident = this.addTile(wanted.tile);
+      resident = this.addTile(wanted.tile, this.isOfSource(wanted.channels));
     }
     this.residents.want(resident, wanted);
     const [first] = sources.values();
@@ -225,22 +250,37 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     this.onError(tooLong(longest, side));
   }
 
-  private addTile(tile: string): Resident {
+  private isOfSource(channels: readonly string[]): boolean {
+    const sources = channels.flatMap((id) => [...(this.channels.get(id)?.sources.values() ?? [])]);
+    return sources.some(({ volume }) => volume.finer_size !== undefined);
+  }
+
+  /** @param isOfSource whether the host has finer volumes than files, as of a source that is not built */
+  private addTile(tile: string, isOfSource: boolean): Resident {
     const onChange = () => {
       this.march(tile);
       this.onChange();
     };
     const limits = { ...this.limits, bytes: this.residents.share(this.wanted.length) };
     const bricks = this.state !== null && isTraced(this.state) ? null : this.bricks;
-    const texture =
-      bricks?.tile(tile, limits, onChange, () => this.replace(tile)) ??
-      new TileTexture(this.queue, onChange, this.onError);
-    return this.residents.add(tile, texture);
+    const files = new TileTexture(this.queue, onChange, this.onError);
+    if (bricks === null) return this.residents.add(tile, files);
+    if (isOfSource) {
+      const make = (refuse: () => void) => bricks.tile(tile, limits, onChange, refuse);
+      return this.residents.add(tile, new SharpenedTile(files, make, onChange));
+    }
+    const made = bricks.tile(tile, limits, onChange, () => this.replace(tile));
+    return this.residents.add(tile, made ?? files);
   }
 
   /** A tile that can't be had as bricks comes as files. */
   private replace(tile: string): void {
-    if (this.residents.get(tile) === undefined) return;
+    const resident = this.residents.get(tile);
+    if (resident === undefined) return;
+    if (resident.texture instanceof SharpenedTile) {
+      resident.texture.blur();
+      return;
+    }
     this.bricks?.refuse(tile);
     this.residents.drop(tile);
     if (this.state !== null) this.follow(this.state, this.wanted, this.mayRefine);
@@ -277,4 +317,13 @@ function tooLong(longest: number, side: number): BundleError {
     `This device draws volumes of at most ${side} voxels along an edge: ` +
       `those of ${longest} are shown at a coarser level.`,
   );
+}
+
+function isSharpening(texture: Resident["texture"]): boolean {
+  return texture instanceof SharpenedTile && texture.isSharpening;
+}
+
+/** Longest edge of a texel, um. */
+function texelOf({ bounds_um: { min, max }, size, apron }: TileVolume): number {
+  return Math.max(...size.map((n, i) => (max[i] - min[i]) / Math.max(1, n - 2 * apron - 1)));
 }

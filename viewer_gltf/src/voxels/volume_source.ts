@@ -8,6 +8,11 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import { compressedLevel, readLevel, readTexture } from "../bundle/ktx2";
 import { brickCounts } from "./skip_bricks";
 
+/** A volume as its tree of bricks has it: of the texels that a host reads from the source, where these are finer. */
+export function volumeOfBricks(volume: TileVolume): TileVolume {
+  return volume.finer_size === undefined ? volume : { ...volume, size: volume.finer_size };
+}
+
 export class VolumeSource {
   private whole: Uint8Array<ArrayBuffer> | null = null;
   /** What has come of a volume stays while it is wanted: another set of channels packs it anew. */

@@ -65,8 +65,13 @@ export class BrickTile {
   ) {}
 
   get isLoading(): boolean {
-    const isComing = this.shown === null && this.trees.size > 0;
+    const isComing = this.shown === null && this.trees.size > 0 && !this.link.isAway;
     return this.link.isBusy || this.isStale || isComing;
+  }
+
+  /** Whether all that the view wants of it has come, and shows. */
+  get isComplete(): boolean {
+    return this.shown !== null && !this.isLoading && !this.link.isAway;
   }
 
   get bytes(): number {

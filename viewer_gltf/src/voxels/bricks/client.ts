@@ -1,11 +1,14 @@
 /** The messages between the thread that draws and its worker for `/bricks`. */
 import { TemporaryError } from "../../bundle/errors";
-import type { BrickView } from "./protocol";
+import { noteWait } from "../../bundle/retry";
+import { type BrickView, TEXEL_PX } from "./protocol";
 import { parseTable, STORED_BYTES, type Table } from "./tree";
 
 export type LinkAsk =
   | Readonly<{ type: "connect"; address: string }>
   | Readonly<{ type: "open"; tile: string; channel: string; source: string }>
+  /** Nothing of this volume is wanted any more. */
+  | Readonly<{ type: "close"; tile: string; channel: string }>
   | (Readonly<{ type: "view"; texel_px: number; budget: number }> & BrickView);
 
 export type LinkMessage =
@@ -22,6 +25,8 @@ export type LinkMessage =
   | Readonly<{ type: "refused"; tile: string; channel: string; text: string }>
   /** The answer could not be read; the connection begins anew. */
   | Readonly<{ type: "fault"; text: string }>
+  /** The host does not answer, and is tried again; or it answers again. */
+  | Readonly<{ type: "away"; isAway: boolean }>
   /** No connection any more. */
   | Readonly<{ type: "lost"; reason: string }>;
 
@@ -38,8 +43,6 @@ export type Taker = Readonly<{
 const VIEW_EVERY_MS = 200;
 /** Most bytes of bricks for one view: bricks with the largest error come first. */
 const BUDGET_BYTES = 64 * 1024 * 1024;
-/** Longest edge of a texel on the screen, px: beyond it the client asks for finer ones. */
-const TEXEL_PX = 1;
 
 export class BrickLink {
   isBusy = false;
@@ -47,8 +50,10 @@ export class BrickLink {
   private readonly takers = new Map<string, Taker>();
   private last = "";
   private asked_ms = 0;
-  /** Whether there is a connection, or may be one again. */
+  /** Whether there is a connection, or may be one soon. */
   isOpen = true;
+  /** Whether the host does not answer at present. What has come stays, and nothing is awaited. */
+  isAway = false;
 
   /** @param address of the websocket */
   constructor(
@@ -66,19 +71,27 @@ export class BrickLink {
   /** Take what comes of a volume, from the start: also what came before. */
   open(tile: string, channel: string, source: string, taker: Taker): void {
     this.takers.set(`${tile}/${channel}`, taker);
-    this.isBusy = true;
+    this.isBusy = !this.isAway;
     this.last = ""; // the same view then asks for more
     this.post({ type: "open", tile, channel, source });
   }
 
   close(tile: string, channel: string, taker: Taker): void {
     const name = `${tile}/${channel}`;
-    if (this.takers.get(name) === taker) this.takers.delete(name);
+    if (this.takers.get(name) !== taker) return;
+    this.takers.delete(name);
+    this.post({ type: "close", tile, channel });
   }
 
   /** Sets the present view; to be called in every frame. */
   look(view: BrickView, now_ms: number): void {
-    if (!this.isOpen || this.takers.size === 0 || now_ms - this.asked_ms < VIEW_EVERY_MS) return;
+    if (
+      !this.isOpen ||
+      this.isAway ||
+      this.takers.size === 0 ||
+      now_ms - this.asked_ms < VIEW_EVERY_MS
+    )
+      return;
     const text = JSON.stringify(view);
     if (text === this.last) return;
     this.last = text;
@@ -112,6 +125,9 @@ export class BrickLink {
       case "fault":
         this.onError(new TemporaryError(message.text, { notice: message.text }));
         break;
+      case "away":
+        this.setAway(message.isAway);
+        break;
       case "lost":
         this.isOpen = this.isBusy = false;
         for (const taker of this.takers.values()) taker.onRefused("the connection was lost");
@@ -119,11 +135,22 @@ export class BrickLink {
     }
   }
 
+  private setAway(isAway: boolean): void {
+    if (isAway) this.isBusy = false;
+    else this.isOpen = true;
+    if (isAway === this.isAway) return;
+    this.isAway = isAway;
+    this.last = ""; // the same view asks again
+    noteWait(isAway);
+    this.onDone();
+  }
+
   private post(ask: LinkAsk): void {
     this.worker.postMessage(ask);
   }
 
   dispose(): void {
+    if (this.isAway) noteWait(false);
     this.worker.terminate();
     this.takers.clear();
   }

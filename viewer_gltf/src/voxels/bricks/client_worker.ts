@@ -67,9 +67,11 @@ function connect(): void {
     trees.clear();
     askedFor.clear();
     // a host that never answered has no bricks after all
-    const wait = hasOpened || tries === 0 ? RETRY_MS[tries++] : undefined;
-    if (wait === undefined) post({ type: "lost", reason });
-    else setTimeout(connect, wait);
+    const isHost = hasOpened || tries === 0;
+    if (hasOpened && tries > 0) post({ type: "away", isAway: true });
+    if (!isHost || tries === RETRY_MS.length) post({ type: "lost", reason });
+    if (isHost) setTimeout(connect, RETRY_MS[Math.min(tries, RETRY_MS.length - 1)]);
+    tries++;
   };
 }
 
@@ -92,6 +94,7 @@ async function hear(message: ServerMessage): Promise<void> {
   if (message.type === "welcome") {
     tries = 0;
     hasOpened = true;
+    post({ type: "away", isAway: false });
     if (volumes.size > 0) await open([...volumes.values()]);
   } else if (message.type === "tree") {
     const { tree, tile, channel, source, table: hash, table_bytes, table_follows } = message;
@@ -244,9 +247,11 @@ async function openOne(volume: Volume): Promise<void> {
   }
 }
 
-/** Trees with a table here; the server knows which of their bricks the cache has. */
+/** Trees with a table here, of volumes that are wanted; the server knows which of their bricks the cache has. */
 function readyTrees(): readonly number[] {
-  return [...trees].filter(([, { isBegun }]) => isBegun).map(([number]) => number);
+  return [...trees]
+    .filter(([, { isBegun, tile, channel }]) => isBegun && volumes.has(`${tile}/${channel}`))
+    .map(([number]) => number);
 }
 
 /** Ask for what the view wants of all trees that are open. */
@@ -277,6 +282,8 @@ self.addEventListener("message", ({ data }: MessageEvent<LinkAsk>) => {
     const { tile, channel, source } = data;
     volumes.set(`${tile}/${channel}`, { tile, channel, source });
     turn = turn.then(() => openOne({ tile, channel, source })).catch(fail);
+  } else if (data.type === "close") {
+    volumes.delete(`${data.tile}/${data.channel}`);
   } else {
     view = data;
     ask();

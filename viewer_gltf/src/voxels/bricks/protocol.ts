@@ -4,6 +4,9 @@ import { BundleError } from "../../bundle/errors";
 export const TABLE_FRAME = 1;
 export const BRICKS_FRAME = 2;
 
+/** Longest edge of a texel on the screen, px: beyond it the client asks for finer ones. */
+export const TEXEL_PX = 1;
+
 /** The camera, in the world, um. */
 export type BrickView = Readonly<{
   /** Projection x view, column-major. */

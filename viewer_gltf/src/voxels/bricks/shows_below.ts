@@ -2,13 +2,16 @@
 import { type Appearance, floorOf } from "../march_tables";
 import type { TileTexture } from "../tile_texture";
 import { BrickTile } from "./brick_atlas";
+import { SharpenedTile } from "./sharpened_tile";
 
 /** Whether functions show what bricks leave out. */
 export function showsBelow(
-  texture: TileTexture | BrickTile,
+  texture: TileTexture | BrickTile | SharpenedTile,
   appearances: readonly Appearance[],
 ): boolean {
-  if (!(texture instanceof BrickTile)) return false;
+  if (!(texture instanceof BrickTile || texture instanceof SharpenedTile)) return false;
   const { thresholds } = texture;
-  return appearances.some(({ table }, c) => Math.round(255 * floorOf(table)) < thresholds[c]);
+  return thresholds.some(
+    (threshold, c) => Math.round(255 * floorOf(appearances[c].table)) < threshold,
+  );
 }

@@ -1,0 +1,94 @@
+"""Read one tile of a source as finely as a build does, in 8 bits of a view's window."""
+
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.isosurface.holder import Holder
+from stereocell.live.coarse_channel import find_grid, places_in, read_coarse
+from stereocell.model.errors import SourceError
+from stereocell.model.lattice import Lattice
+from stereocell.model.tile_content import APRON
+from stereocell.model.tiling import Tile
+from stereocell.planning.input_files import first_states
+from stereocell.planning.plan import Plan
+from stereocell.planning.plan_source import source_of
+from stereocell.read import Dataset
+from stereocell.steps.unit import cut_voxels
+from stereocell.transfer.joint_histogram import to_eight_bits
+
+# Largest tile that is read at the planned level, voxels: about 350 MB while its tree is made
+PLANNED_VOXELS = 1 << 26
+COARSER_VOXELS = 1 << 24  # voxels of a larger tile, which is read coarser than planned
+
+
+@dataclass(frozen=True, slots=True)
+class FineTiles:
+    """The tiles of a plan's source."""
+
+    plan: Plan
+    dataset: Dataset
+
+    def sizes(self) -> dict[str, tuple[int, int, int]]:
+        """Return the voxels (x, y, z) that each tile is read with, with the apron, by its ID.
+
+        Objects of a label map are not read so: their build is finer.
+        """
+        if not self.plan.channels:
+            return {}
+        return {tile.id: self._size(tile) for tile in self.plan.tiles}
+
+    def read(
+        self, tile_id: str, channel_id: str, window: tuple[float, float], holder: Holder | None
+    ) -> NDArray[np.uint8]:
+        """Return a tile's voxels with the apron, uint8 (z, y, x): those of a build, if all fit.
+
+        window  voxel values that become 0 and 255
+        holder  what is air in the volume of a build; None: nothing is
+
+        Raises SourceError where the source can't be read, or has changed since it was planned.
+        """
+        try:
+            voxels = self._read(tile_id, channel_id, holder)
+        except SourceError:
+            self._require_unchanged()
+            raise
+        self._require_unchanged()
+        return to_eight_bits(voxels, window)
+
+    def _read(self, tile_id: str, channel_id: str, holder: Holder | None) -> NDArray[Any]:
+        plan, tile = self.plan, self.plan.tile(tile_id)
+        channel = next(one for one in plan.channels if one.id == channel_id)
+        own = tile.lattice(plan.region)
+        if self._is_planned(tile):
+            box = own.grown((APRON, APRON, APRON), plan.region)
+            lattice = Lattice(box, own, plan.region, plan.spacing_um, plan.origin_um)
+            read = self.dataset.read(channel.index, box, plan.level).voxels
+            return cut_voxels(read, lattice, holder)
+        coarse = read_coarse(self.dataset, replace(plan, region=own), channel, COARSER_VOXELS)
+        places = places_in(own, coarse.grid.step)
+        voxels = coarse.at(places)
+        return voxels if holder is None else holder.left_out_at(voxels, places)
+
+    def _require_unchanged(self) -> None:
+        states = first_states(source_of(self.plan))
+        if states is not None and states.changed():
+            raise SourceError(
+                f"{self.plan.source}: changed since it was opened, expected a source that does not "
+                "change while it is shown: end the command and run it again"
+            )
+
+    def _is_planned(self, tile: Tile) -> bool:
+        return prod(tile.lattice(self.plan.region).shape) <= PLANNED_VOXELS
+
+    def _size(self, tile: Tile) -> tuple[int, int, int]:
+        own = tile.lattice(self.plan.region)
+        if self._is_planned(tile):
+            depth, height, width = (n + 2 * APRON for n in own.shape)
+        else:
+            grid = find_grid(self.dataset, replace(self.plan, region=own), COARSER_VOXELS)
+            depth, height, width = (len(along) for along in places_in(own, grid.step))
+        return width, height, depth

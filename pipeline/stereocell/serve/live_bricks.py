@@ -1,0 +1,40 @@
+"""Bricks of the views of a source: their trees are made of the source, tile by tile, on request.
+
+All views share one folder of trees beside them, which is bounded.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stereocell.isosurface.holder import Holder
+from stereocell.live.fine_tiles import FineTiles
+from stereocell.serve.brick_library import BrickLibrary
+from stereocell.serve.tree_files import TreeFiles, Volume
+
+MOST_BYTES = 2 << 30  # of all trees of a source
+_FOLDER = "bricks"
+
+
+class LiveBricks:
+    """The libraries of a source's views."""
+
+    def __init__(self, fine: FineTiles, scratch: Path) -> None:
+        """scratch: the folder of the views, in which the trees get a folder of their own."""
+        self._fine = fine
+        self._trees = TreeFiles(scratch / _FOLDER, MOST_BYTES)
+        self._libraries: dict[Path, BrickLibrary] = {}
+
+    def library(self, view: Path, holders: Mapping[str, Holder]) -> BrickLibrary:
+        """Return the library of a view.
+
+        holders  what its volumes leave out, by the channel's ID
+        """
+
+        def read(volume: Volume) -> NDArray[np.uint8]:
+            holder = holders.get(volume.channel)
+            return self._fine.read(volume.tile, volume.channel, volume.window, holder)
+
+        return self._libraries.setdefault(view, BrickLibrary(view, self._trees, read))

@@ -1,0 +1,121 @@
+/**
+ * The volumes of one tile of a source that is not built: coarse ones from files, until finer ones have come as
+ * bricks, which the host makes of the source when it is asked for them. Stands in for `TileTexture`.
+ */
+import type { Packed, TileTexture } from "../tile_texture";
+import type { VolumeSource } from "../volume_source";
+import type { BrickTile } from "./brick_atlas";
+
+export class SharpenedTile {
+  private finer: BrickTile | null = null;
+  /** Whether the finer volumes are drawn. */
+  private isSharp = false;
+  private isRefused = false;
+
+  /** @param make returns the finer volumes, of which nothing has come yet; null: there are none any more */
+  constructor(
+    private readonly coarse: TileTexture,
+    private readonly make: (onRefused: () => void) => BrickTile | null,
+    private readonly onChange: () => void,
+  ) {}
+
+  private get drawn(): TileTexture | BrickTile {
+    return this.isSharp && this.finer !== null ? this.finer : this.coarse;
+  }
+
+  get shown(): Packed | null {
+    return this.drawn.shown;
+  }
+
+  get old(): Packed | null {
+    return this.drawn.old;
+  }
+
+  get fresh(): number {
+    return this.drawn.fresh;
+  }
+
+  get isLoading(): boolean {
+    return this.coarse.isLoading || this.isSharpening;
+  }
+
+  /** Whether finer volumes are on their way, or come by view. */
+  get isSharpening(): boolean {
+    return this.finer?.isLoading === true;
+  }
+
+  /** Whether finer volumes may be asked for now: there are some, and the coarse ones show. */
+  get canSharpen(): boolean {
+    const hasFiner = [...this.kept.values()].some(({ volume }) => volume.finer_size !== undefined);
+    const isIdle = this.finer === null && !this.isRefused && !this.coarse.isLoading;
+    return isIdle && hasFiner && this.coarse.shown !== null;
+  }
+
+  get bytes(): number {
+    return this.coarse.bytes + (this.finer?.bytes ?? 0);
+  }
+
+  get kept(): ReadonlyMap<string, VolumeSource> {
+    return this.coarse.kept;
+  }
+
+  /** Of each channel: what is left out of what is drawn can't be seen if nothing up to this intensity shows. */
+  get thresholds(): readonly number[] {
+    return this.isSharp ? (this.finer?.thresholds ?? []) : [];
+  }
+
+  hasFailed(channel: string): boolean {
+    return this.coarse.hasFailed(channel);
+  }
+
+  retryFailed(): void {
+    this.coarse.retryFailed();
+  }
+
+  /** Load these channels and levels of the coarse volumes. Of other channels than before nothing finer has come. */
+  want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
+    const names = [...sources.keys()];
+    const isSame = names.join() === [...this.kept.keys()].join();
+    if (!isSame && sources.size > 0) {
+      this.dropFiner();
+      this.isRefused = false;
+    }
+    this.coarse.want(sources, levels, finest);
+  }
+
+  /** Ask for the finer volumes. */
+  sharpen(): void {
+    this.finer = this.make(() => this.blur());
+    if (this.finer === null) this.isRefused = true;
+    else this.finer.want(this.kept);
+  }
+
+  /** From now on, and until other channels are wanted, the coarse volumes are drawn. */
+  blur(): void {
+    this.isRefused = true;
+    this.dropFiner();
+    this.onChange();
+  }
+
+  advance(dt_s: number): boolean {
+    const isFading = this.coarse.advance(dt_s);
+    const isStale = this.finer?.advance(dt_s) === true;
+    // the coarse volumes are drawn until all has come that the view wants: the first bricks are coarser than they are
+    if (!this.isSharp && this.finer?.isComplete === true) {
+      this.isSharp = true;
+      this.onChange();
+    }
+    return isFading || isStale;
+  }
+
+  private dropFiner(): void {
+    this.finer?.dispose();
+    this.finer = null;
+    this.isSharp = false;
+  }
+
+  dispose(): void {
+    this.dropFiner();
+    this.coarse.dispose();
+  }
+}
