@@ -1,4 +1,5 @@
 /** Start: find the bundle, show it, or report on the page why not. */
+import "../panel/html/colors.css";
 import "../panel/html/page.css";
 import "../panel/html/panel.css";
 import "../panel/html/widgets.css";
