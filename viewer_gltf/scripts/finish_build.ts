@@ -127,8 +127,9 @@ async function filesOf(folder: string): Promise<string[]> {
     .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1));
 }
 
-async function compressAll(folder: string): Promise<void> {
-  const names = (await filesOf(folder)).filter((name) => SHRINKS.has(extname(name)));
+/** Write compressed files beside those of `files` that shrink. */
+export async function compressAll(folder: string, files: readonly string[]): Promise<void> {
+  const names = files.filter((name) => SHRINKS.has(extname(name)));
   const compress = async (name: string) => {
     const bytes = await readFile(join(folder, name));
     if (bytes.length < MIN_BYTES) return;
@@ -157,7 +158,7 @@ export function finishBuild(): Plugin {
       const { plain, code } = await splitCode(folder, entry.fileName, entry.exports);
       await writePage(page, await scriptFor(plain, code, style));
       await listFiles(folder, plain);
-      await compressAll(folder);
+      await compressAll(folder, await filesOf(folder));
     },
   };
 }
