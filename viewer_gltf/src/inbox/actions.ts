@@ -46,9 +46,8 @@ export function actionsOf(item: Item, situation: Situation): readonly Action[] {
     case "understood":
       return [LOOK, BUILD, DELETE];
     case "cancelled":
-      return [LOOK, { ...BUILD, label: "Build again" }, DELETE];
     case "failed":
-      return situation.isUnderstood ? [LOOK, { ...BUILD, label: "Try again" }, DELETE] : [DELETE];
+      return situation.isUnderstood ? [LOOK, { ...BUILD, label: "Build again" }, DELETE] : [DELETE];
     case "queued":
       return [...open, { name: "cancel", label: "Leave the queue" }, DELETE];
     case "building":

@@ -1,7 +1,7 @@
 /** One item on the page. The card stays while its item changes, so that focus and place stay. */
 import { arrange, element, setText } from "../dom/element";
 import { type Action, type ActionName, actionsOf, canChoose, type Situation } from "./actions";
-import { factsView, notesView, slicesView } from "./facts";
+import { factsView, notesView, slicesView, summaryOf } from "./facts";
 import type { Item, Limits } from "./inbox_state";
 import type { Choices } from "./server";
 import { isSameForm, settingsForm } from "./settings_form";
@@ -18,6 +18,8 @@ export type Shown = Readonly<{
   situation: Situation;
   understood: Understood | null;
   limits: Limits;
+  /** The name of what was dropped here: the server reports no name of a file; or empty. */
+  ownName: string;
   /** Whether an action of the person is under way. */
   isBusy: boolean;
   /** Why the last action was refused; or empty. */
@@ -30,6 +32,7 @@ export class Card {
   readonly root: HTMLElement;
   private readonly title: HTMLElement;
   private readonly badge = element("span", { className: "badge" }, { state: "" });
+  private readonly summary = element("p", { className: "summary" });
   private readonly words = element("p", { className: "words" }, { words: "" });
   private readonly fault = element("p", { className: "fault", role: "alert" }, { fault: "" });
   private readonly bar = element("progress", { max: 1 });
@@ -58,6 +61,7 @@ export class Card {
       { className: "card" },
       { item: id },
       element("header", {}, {}, this.title, this.badge),
+      this.summary,
       this.words,
       this.bar,
       this.fault,
@@ -74,11 +78,13 @@ export class Card {
 
   update(shown: Shown): void {
     this.shown = shown;
-    const { item, situation, understood, limits, fault } = shown;
+    const { item, situation, understood, limits, ownName, fault } = shown;
     const { upload, isMoving } = situation;
     this.root.dataset.doing = item.doing;
     this.root.dataset.upload = upload?.doing ?? "";
-    setText(this.title, item.title || understood?.title || "Without a title");
+    this.root.dataset.rests = String(!canChoose(item));
+    setText(this.title, titleOf(item, ownName));
+    setText(this.summary, understood === null ? "" : summaryOf(understood));
     setText(this.badge, stateName(item, upload));
     setText(this.words, wordsOf(item, upload, isMoving, limits));
     setText(this.fault, fault);
@@ -162,6 +168,11 @@ export class Card {
     if (this.shown === null || this.shown.isBusy) return;
     this.calls.act(this.shown.item, name, this.keep.checked);
   }
+}
+
+/** The title of an item, which has none before it is understood. */
+export function titleOf({ title, doing }: Item, ownName: string): string {
+  return title || ownName || (doing === "uploading" ? "An upload" : "A new image");
 }
 
 /** What tells a control from the others of its form. */

@@ -31,11 +31,21 @@ export function slicesView(
 }
 
 export function factsView(understood: Understood): HTMLElement {
-  const rows = factsOf(understood).flatMap(([label, text]) => [
-    element("dt", { textContent: label }),
-    element("dd", { textContent: text }),
-  ]);
+  const rows = factsOf(understood).map(([label, text]) =>
+    element(
+      "div",
+      {},
+      {},
+      element("dt", { textContent: label }),
+      element("dd", { textContent: text }),
+    ),
+  );
   return element("dl", { className: "facts" }, {}, ...rows);
+}
+
+/** Format and size in one line, for a card that shows no more. */
+export function summaryOf({ format, sizeText }: Understood): string {
+  return [format, sizeText].filter((part) => part !== "").join(" · ");
 }
 
 /** Labels and texts; what is not known is left out. */

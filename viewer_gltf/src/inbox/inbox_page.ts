@@ -2,7 +2,7 @@
 import { arrange, element, setText } from "../dom/element";
 import { type ActionName, isRead } from "./actions";
 import { ask } from "./ask";
-import { Card } from "./card";
+import { Card, titleOf } from "./card";
 import { DropZone } from "./drop_zone";
 import { type Dropped, filesOfHandles } from "./dropped_files";
 import type { InboxState, Item } from "./inbox_state";
@@ -36,6 +36,8 @@ export class InboxPage {
   private state: InboxState | null = null;
   private readonly memories = new Map<string, Memory>();
   private readonly uploads = new Map<string, Upload>();
+  /** The name of what was dropped on this page, by item. */
+  private readonly names = new Map<string, string>();
   private running: Promise<void> = Promise.resolve();
   private withHandles: ReadonlySet<string> = new Set();
   private readonly zone: DropZone;
@@ -133,6 +135,7 @@ export class InboxPage {
       this.zone.say("These files are being uploaded already.");
       return;
     }
+    this.names.set(id, nameOf(files));
     await keepHandles(id, handles);
     const upload = new Upload(id, files, offset, this.server, state.limits.piece, () =>
       this.render(),
@@ -191,8 +194,8 @@ export class InboxPage {
   }
 
   private async remove(item: Item): Promise<void> {
-    const title = item.title || "this image";
-    if (!(await ask(`Delete ${title}?`, deletionWords(item), "Delete"))) return;
+    const title = titleOf(item, this.names.get(item.id) ?? "");
+    if (!(await ask(`Delete "${title}"?`, deletionWords(item), "Delete"))) return;
     this.uploads.get(item.id)?.cancel();
     const isGone = await this.busy(item, () => this.server.remove(item.id));
     if (!isGone) return;
@@ -281,6 +284,7 @@ export class InboxPage {
     if (isRead(item) && memory.asked < memory.reading) void this.learn(item, memory);
     const isMoving = memory.moved_ms > 0 && performance.now() - memory.moved_ms < MOVING_MS;
     const { understood, isBusy, fault, reading } = memory;
+    const ownName = this.names.get(item.id) ?? "";
     const situation = {
       upload,
       mayUpload,
@@ -288,8 +292,9 @@ export class InboxPage {
       hasHandles: this.withHandles.has(item.id),
       isUnderstood: understood !== null,
     };
-    memory.card.update({ item, situation, understood, limits, isBusy, fault, reading });
-    this.sayAloud(item, memory, wordsOf(item, upload, situation.isMoving, limits));
+    memory.card.update({ item, situation, understood, limits, ownName, isBusy, fault, reading });
+    const words = wordsOf(item, upload, situation.isMoving, limits);
+    this.sayAloud(item, memory, `${titleOf(item, ownName)}: ${words}`);
     return memory.card.root;
   }
 
@@ -315,8 +320,14 @@ export class InboxPage {
     if (state === memory.said) return;
     const isFirst = memory.said === "";
     memory.said = state;
-    if (!isFirst || item.doing === "uploading") setText(this.aloud, `${item.title}: ${words}`);
+    if (!isFirst || item.doing === "uploading") setText(this.aloud, words);
   }
+}
+
+/** The folder or file that was dropped; of several, the first and how many. */
+function nameOf({ files }: UploadFiles): string {
+  const tops = [...new Set(files.map(({ name }) => name.split("/")[0]))];
+  return tops.length === 1 ? tops[0] : `${tops[0]} and ${tops.length - 1} more`;
 }
 
 function topTitle(): HTMLElement {

@@ -100,7 +100,7 @@ function readItem(found: Found): Item | null {
     allTiles: positive(found.all_tiles, 0),
     left_s: typeof found.left_s === "number" ? found.left_s : null,
     page: pageOf(found.page),
-    hasUpload: found.has_upload === true,
+    hasUpload: found.has_upload === true && found.total !== 0, // of an address there is none
     keepsUpload: found.keep_upload === true,
   };
 }

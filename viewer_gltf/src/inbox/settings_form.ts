@@ -13,6 +13,13 @@ const PRESETS: Readonly<Record<string, string>> = {
   "ct-bone": "CT: bones",
   pet: "PET or SPECT",
   vessels: "Vessels (angiogram)",
+  none: "Another kind",
+};
+
+/** What lies around the structures of an image. */
+const BACKGROUNDS: Readonly<Record<string, string>> = {
+  dark: "Dark",
+  bright: "Bright",
 };
 
 type OnChange = (choices: Choices) => void;
@@ -28,9 +35,15 @@ export function settingsForm(
   form.onsubmit = (event) => event.preventDefault(); // the page's policy lets no form be sent
   form.append(
     titleField(understood, name, onChange),
-    ...select("preset", "Kind of image", preset && named(preset), name, onChange),
+    ...select("preset", "Kind of image", preset && named(preset, PRESETS), name, onChange),
     ...select("series", "Series", series, name, onChange),
-    ...select("background", "Background", background, name, onChange),
+    ...select(
+      "background",
+      "Background",
+      background && named(background, BACKGROUNDS),
+      name,
+      onChange,
+    ),
     ...channelField(understood, onChange),
   );
   return form;
@@ -43,8 +56,8 @@ export function isSameForm(a: Understood, b: Understood): boolean {
   return a.title === b.title && shape(a) === shape(b);
 }
 
-function named({ value, options }: Choice): Choice {
-  const words = ({ id, text }: Option) => ({ id, text: PRESETS[id] ?? text });
+function named({ value, options }: Choice, names: Readonly<Record<string, string>>): Choice {
+  const words = ({ id, text }: Option) => ({ id, text: names[id] ?? text });
   return { value, options: options.map(words) };
 }
 
@@ -90,7 +103,7 @@ function channelField(
       { type: "checkbox", value: id, checked: chosenChannels.includes(id) },
       { setting: "channels" },
     );
-    const known = channels.find((channel) => channel.id === id);
+    const known = channels.find((channel) => channel.name === text);
     return { box, label: element("label", {}, {}, box, ...channelWords(text, known)) };
   });
   const change = (changed: HTMLInputElement) => {

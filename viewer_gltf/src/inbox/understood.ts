@@ -54,7 +54,7 @@ export function readUnderstood(answer: unknown): Understood {
     modality: textOf(found.modality),
     voxels: numbersOf(found.size_voxels),
     spacing_um: numbersOf(found.spacing_um),
-    sizeText: textOf(found.size_text),
+    sizeText: textOf(found.size_text).replaceAll(" x ", " × "),
     tiles: positive(found.tiles, 0),
     bytesEstimate: positive(found.bytes_estimate, 0),
     notes: textsOf(found.notes),

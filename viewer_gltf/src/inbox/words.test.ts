@@ -97,7 +97,7 @@ describe("what a person can do", () => {
     [item({ doing: "queued" }), ["cancel", "delete"]],
     [item({ doing: "building", page: VIEW }), ["open", "pause", "cancel", "delete"]],
     [item({ doing: "paused" }), ["continue", "cancel", "delete"]],
-    [item({ doing: "cancelled" }), ["look", "build", "delete"]],
+    [item({ doing: "cancelled" }), ["delete"]],
     [item({ doing: "failed" }), ["delete"]],
     [item({ doing: "built", page: VIEW }), ["open", "delete"]],
   ] as const)("%o", (shown, names) => expect(can(shown)).toEqual(names));
@@ -107,7 +107,10 @@ describe("what a person can do", () => {
     expect(can(UPLOADING, { hasHandles: true })).toEqual(["go-on", "delete"]);
     expect(can(UPLOADING, { hasHandles: true, isMoving: true })).toEqual(["delete"]);
     expect(can(UPLOADING, { upload: upload({ doing: "lost" }) })).toEqual(["retry", "delete"]);
-    expect(can(item({ doing: "failed" }), { isUnderstood: true })).toContain("build");
+    for (const doing of ["failed", "cancelled"] as const) {
+      const names = ["look", "build", "delete"];
+      expect(can(item({ doing }), { isUnderstood: true })).toEqual(names);
+    }
   });
 
   it("is to look, and no more, without the right to upload", () => {

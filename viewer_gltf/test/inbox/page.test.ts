@@ -163,7 +163,7 @@ describeInChromium("the inbox", () => {
     // a name or a note is never markup
     expect(await card().locator("li").textContent()).toContain("<b>bold</b>");
     expect(await card().locator("dd").allTextContents()).toEqual([
-      ...["DICOM, MR", "18.2 x 20.1 x 15.0 cm", "256 × 256 × 180", "0.7 × 0.7 × 0.8 mm"],
+      ...["DICOM, MR", "18.2 × 20.1 × 15.0 cm", "256 × 256 × 180", "0.7 × 0.7 × 0.8 mm"],
       "2 tiles, about 31 MB",
     ]);
 

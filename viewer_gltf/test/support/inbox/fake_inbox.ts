@@ -133,7 +133,7 @@ export class FakeInbox {
     if (known !== undefined) return [200, { id, offset: known.bytes }];
     const files = asked.files ?? [];
     const total = files.reduce((sum, [, bytes]) => sum + bytes, 0);
-    const title = asked.address ?? files[0][0].split("/")[0];
+    const title = ""; // a name of a file may be that of a patient
     const doing = asked.address === undefined ? "uploading" : "understanding";
     const item = { id, title, doing, line: "", bytes: 0, total, place: 0, share: 0, label: "" };
     const rest = { tiles: 0, all_tiles: 0, left_s: null, page: "", keep_upload: false };
