@@ -5,7 +5,7 @@ import type { NamedFile } from "./upload_files";
 type OnFound = (count: number) => void;
 
 /** Files that are asked for at a time: each answer takes a moment, and a folder has thousands. */
-const AT_A_TIME = 32;
+const AT_A_TIME = 64;
 
 /** What was dropped: the files, and handles that a later visit can read again, where the browser has those. */
 export type Dropped = Readonly<{

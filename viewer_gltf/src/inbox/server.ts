@@ -85,7 +85,7 @@ export class Server {
   async sendPiece(
     id: string,
     offset: number,
-    piece: Blob,
+    piece: ArrayBuffer,
     signal: AbortSignal,
   ): Promise<PieceAnswer> {
     const headers = {

@@ -26,6 +26,9 @@ const MOST_WAIT_MS = 30_000;
 /** How much the last piece counts in the mean rate, 0..1. */
 const NEWEST_SHARE = 0.2;
 
+/** Bytes of the stream from `start` to `end`, in memory; null: a file can't be read. */
+type Piece = Readonly<{ start: number; end: number; bytes: Promise<ArrayBuffer | null> }>;
+
 /** Statuses that pass: the server is busy, full or starts again. */
 const isPassing = (status: number) => status >= 500 || status === 408 || status === 429;
 
@@ -33,6 +36,8 @@ export class Upload {
   private pieceBytes = FIRST_BYTES;
   /** Mean bytes a second; null: nothing was sent yet. */
   private rate: number | null = null;
+  /** The piece after the one that is being sent: a folder's many files take time to open. */
+  private next: Piece | null = null;
   private wait_ms = FIRST_WAIT_MS;
   private readonly cancelled = new AbortController();
   /** Ends the request or the wait that is under way; the upload goes on. */
@@ -86,17 +91,24 @@ export class Upload {
   }
 
   private async sendNext(): Promise<void> {
-    const { sent, total } = this.state;
-    const end = Math.min(total, sent + Math.min(this.pieceBytes, this.mostBytes));
+    const { sent } = this.state;
+    const { end, bytes } = this.next?.start === sent ? this.next : this.read(sent);
+    this.next = null;
+    const body = await bytes;
+    if (this.isOver) return;
+    if (body === null) {
+      const name = await findUnreadable(this.files.filesIn(sent, end));
+      this.refuse(`${name ?? "A file"} has changed or is gone. Drop the files again.`);
+      return;
+    }
+    if (end < this.state.total) this.next = this.read(end);
     const began_ms = performance.now();
     const answer = await this.attempt((signal) =>
-      this.server.sendPiece(this.id, sent, this.files.piece(sent, end), signal),
+      this.server.sendPiece(this.id, sent, body, signal),
     );
     if (this.isOver) return;
     if (answer === null) {
-      const name = await findUnreadable(this.files.filesIn(sent, end));
-      if (name === null) this.lose("");
-      else this.refuse(`${name} has changed or is gone. Drop the files again.`);
+      this.lose("");
       return;
     }
     const { status, offset } = answer;
@@ -107,6 +119,15 @@ export class Upload {
       this.measure(end - sent, (performance.now() - began_ms) / 1000);
       this.moveTo(offset ?? end);
     }
+  }
+
+  private read(start: number): Piece {
+    const end = Math.min(this.state.total, start + Math.min(this.pieceBytes, this.mostBytes));
+    const bytes = this.files
+      .piece(start, end)
+      .arrayBuffer()
+      .catch(() => null);
+    return { start, end, bytes };
   }
 
   /** Waits, and asks where the server has got to. */

@@ -41,7 +41,7 @@ export class UploadFiles {
     return this.partsIn(start, end).map(({ index }) => this.files[index]);
   }
 
-  /** The bytes from `start` to `end`, by reference: nothing is read before the piece is sent. */
+  /** The bytes from `start` to `end`, by reference: nothing is read yet. */
   piece(start: number, end: number): Blob {
     const parts = this.partsIn(start, end).map(({ index, from, to }) => {
       const { file } = this.files[index];

@@ -143,6 +143,18 @@ describeInChromium("the inbox", () => {
     expect(faults).toEqual([]);
   });
 
+  it("names a file that changes on the disk meanwhile, and sends nothing of it", async () => {
+    server.delay_ms = 150;
+    await drop("series");
+    await expect.poll(() => only()?.bytes).toBeGreaterThan(300 * KB);
+    const last = join(folder, "series/039.dcm");
+    const content = await readFile(last);
+    await writeFile(last, Buffer.alloc(3 * BYTES));
+    await expectWords(/^series\/039\.dcm has changed or is gone\. Drop the files again\.$/);
+    await writeFile(last, content);
+    expect(only().bytes).toBeLessThanOrEqual(39 * BYTES);
+  });
+
   it("goes on by one click after a reload, where the browser kept the folder", async () => {
     server.delay_ms = 150;
     await drop("series");
