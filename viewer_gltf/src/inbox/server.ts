@@ -85,7 +85,7 @@ export class Server {
   async sendPiece(
     id: string,
     offset: number,
-    piece: ArrayBuffer,
+    piece: Blob,
     signal: AbortSignal,
   ): Promise<PieceAnswer> {
     const headers = {

@@ -61,7 +61,7 @@ class Store {
     if (fault === "behind") this.bytes = this.bytes.slice(0, 1000);
     if (how.method === "PATCH") {
       const offset = Number(new Headers(how.headers).get("Upload-Offset"));
-      const body = new Uint8Array(how.body as ArrayBuffer);
+      const body = new Uint8Array(await (how.body as Blob).arrayBuffer());
       if (offset !== this.bytes.length) return this.answer(409);
       const kept = fault === "cut" ? body.slice(0, body.length >> 1) : body;
       this.bytes = new Uint8Array(Buffer.concat([this.bytes, kept]));
