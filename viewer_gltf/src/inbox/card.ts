@@ -5,6 +5,7 @@ import { factsView, notesView, slicesView, summaryOf } from "./facts";
 import type { Item, Limits } from "./inbox_state";
 import type { Choices } from "./server";
 import { isSameForm, settingsForm } from "./settings_form";
+import { spacingField } from "./spacing_field";
 import type { Understood } from "./understood";
 import { shareOf, stateName, wordsOf } from "./words";
 
@@ -36,6 +37,7 @@ export class Card {
   private readonly words = element("p", { className: "words" }, { words: "" });
   private readonly fault = element("p", { className: "fault", role: "alert" }, { fault: "" });
   private readonly bar = element("progress", { max: 1 });
+  private readonly question: HTMLElement;
   private readonly what = element("div", { className: "what" });
   private readonly keep = element("input", { type: "checkbox", className: "switch" });
   private readonly keepRow: HTMLElement;
@@ -56,6 +58,7 @@ export class Card {
     });
     const keepWords = element("span", {}, {}, keepName, why);
     this.keepRow = element("label", { className: "keep" }, { keep: "" }, this.keep, keepWords);
+    this.question = this.spacingQuestion();
     this.root = element(
       "article",
       { className: "card" },
@@ -65,6 +68,7 @@ export class Card {
       this.words,
       this.bar,
       this.fault,
+      this.question,
       this.what,
       this.keepRow,
       this.actions,
@@ -91,12 +95,33 @@ export class Card {
     this.fault.hidden = fault === "";
     this.showShare(shareOf(item, upload), item.doing === "uploading" ? "Upload" : "Build");
     if (understood !== null) this.showUnderstood(understood, shown);
-    this.what.hidden = understood === null;
+    this.question.hidden = !item.asksSpacing || !situation.mayUpload;
+    this.what.hidden = understood === null || item.asksSpacing;
     this.what.dataset.old = String(item.doing === "understanding");
     if (this.form !== null) {
       this.form.hidden = !situation.mayUpload || !canChoose(item);
     }
     this.showActions(actionsOf(item, situation), shown);
+  }
+
+  /** Asks for the voxel spacing where the files state none: nothing can be read without. */
+  private spacingQuestion(): HTMLElement {
+    const field = spacingField(`ask-${this.id}`, [], () => undefined);
+    const go = element("button", { type: "submit", className: "primary", textContent: "Go on" });
+    const form = element(
+      "form",
+      { className: "question", noValidate: true, ariaLabel: "Voxel spacing" },
+      {},
+      field.root,
+      element("div", { className: "buttons" }, {}, go),
+    );
+    form.onsubmit = (event) => {
+      event.preventDefault(); // the page's policy lets no form be sent
+      const spacing_um = field.read();
+      if (spacing_um === null) form.querySelector("input")?.focus();
+      else if (this.shown !== null) this.calls.choose(this.shown.item, { spacing_um });
+    };
+    return form;
   }
 
   private showShare(share: number | null, name: string): void {

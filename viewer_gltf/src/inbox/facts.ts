@@ -4,25 +4,21 @@ import { sizeText } from "../math/length_text";
 import type { Understood } from "./understood";
 import { bytesText } from "./words";
 
-/** The plane that a slice across an axis shows. */
-const PLANES: Readonly<Record<string, string>> = { x: "yz", y: "xz", z: "xy" };
-
 /** @param address of an image below the item's folder */
 export function slicesView(
   { slices, title, channels }: Understood,
   address: (image: string) => string,
 ): HTMLElement {
   const hasContours = channels.some(({ hasSurface }) => hasSurface);
-  const figures = slices.map(({ axis, image }) => {
-    const plane = PLANES[axis] ?? axis;
-    const alt = `Middle ${plane} slice of ${title}${hasContours ? ", with the proposed surface as a contour" : ""}`;
+  const figures = slices.map(({ axis, name, image }) => {
+    const alt = `Middle ${name} slice of ${title}${hasContours ? ", with the proposed surface as a contour" : ""}`;
     const picture = element("img", { alt, src: address(image), decoding: "async" });
     return element(
       "figure",
       {},
       { slice: axis },
       picture,
-      element("figcaption", { textContent: plane }),
+      element("figcaption", { textContent: name }),
     );
   });
   const view = element("div", { className: "slices-row" }, {}, ...figures);

@@ -5,7 +5,7 @@ import { readUnderstood } from "./understood";
 const ITEM = {
   ...{ id: "a1", title: "Head", doing: "building", line: "", bytes: 10, total: 10, place: 0 },
   ...{ share: 0.4, label: "units", tiles: 1, all_tiles: 4, left_s: 30, page: "items/a1/view/" },
-  ...{ has_upload: true, keep_upload: false },
+  ...{ has_upload: true, keep_upload: false, asks: "" },
 };
 const LIMITS = { bytes: 100, files: 5, piece: 8, free_bytes: 70, hours: 24 };
 const read = (items: unknown[], more = {}) =>
@@ -23,6 +23,7 @@ describe("a message of the server", () => {
           ...{ id: "a1", title: "Head", doing: "building", line: "", bytes: 10, total: 10 },
           ...{ place: 0, share: 0.4, label: "units", tiles: 1, allTiles: 4, left_s: 30 },
           ...{ page: "items/a1/view/", hasUpload: true, keepsUpload: false },
+          asksSpacing: false,
         },
       ],
     });
@@ -48,7 +49,7 @@ describe("what was understood", () => {
       format: "OME-TIFF",
       size_voxels: [9, 8, 7],
       slices: [
-        { axis: "z", image: "slices/z.png" },
+        { axis: "z", name: "axial", image: "slices/z.png" },
         { axis: "y", image: "../secret.png" },
       ],
       channels: [{ id: "0", name: "DNA", color: "url(x)", has_surface: true }],
@@ -57,12 +58,14 @@ describe("what was understood", () => {
         channels: { value: ["0"], options: [{ id: "0", name: "DNA" }] },
         series: { value: "2", options: [{ id: "2", text: "T1, 180 slices" }] },
         background: null,
+        spacing_um: { value: [0.5, 0.5, 2] },
       },
     });
-    expect(found.slices).toEqual([{ axis: "z", image: "slices/z.png" }]);
+    expect(found.slices).toEqual([{ axis: "z", name: "axial", image: "slices/z.png" }]);
     expect(found.channels).toEqual([{ id: "0", name: "DNA", color: "", hasSurface: true }]);
     expect(found.preset?.options.map(({ text }) => text)).toEqual(["mri", "ct"]);
     expect(found.series?.options).toEqual([{ id: "2", text: "T1, 180 slices" }]);
+    expect(found.chosenSpacing_um).toEqual([0.5, 0.5, 2]);
     expect([found.background, found.channelOptions]).toEqual([null, [{ id: "0", text: "DNA" }]]);
   });
 

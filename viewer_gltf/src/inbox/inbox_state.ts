@@ -38,6 +38,8 @@ export type Item = Readonly<{
   left_s: number | null;
   /** The folder below this page where it can be looked at; or empty. */
   page: string;
+  /** Whether the files state no voxel spacing, so that a person has to. */
+  asksSpacing: boolean;
   hasUpload: boolean;
   keepsUpload: boolean;
 }>;
@@ -100,6 +102,7 @@ function readItem(found: Found): Item | null {
     allTiles: positive(found.all_tiles, 0),
     left_s: typeof found.left_s === "number" ? found.left_s : null,
     page: pageOf(found.page),
+    asksSpacing: found.asks === "spacing_um",
     hasUpload: found.has_upload === true && found.total !== 0, // of an address there is none
     keepsUpload: found.keep_upload === true,
   };

@@ -24,6 +24,8 @@ export type Choices = Readonly<
     series: string;
     background: string;
     title: string;
+    /** x, y, z */
+    spacing_um: readonly number[];
   }>
 >;
 
@@ -34,6 +36,8 @@ export type Begun = Readonly<{ id: string; offset: number }>;
 /** The answer to a piece. `offset`: how far the server has got; null: it does not say. */
 export type PieceAnswer = Readonly<{ status: number; offset: number | null; line: string }>;
 
+/** Characters of a line that is shown. */
+const LONGEST = 600;
 /** Time after which a request that answers nothing counts as lost, ms. */
 const PATIENCE_MS = 30_000;
 
@@ -143,13 +147,15 @@ function begunOf(answer: unknown): Begun {
 
 /** Why the server has refused, by its own words or by the status alone. */
 async function lineOf(answer: Response): Promise<string> {
+  const text = await answer.text().catch(() => "");
   try {
-    const { line } = (await answer.json()) as { line?: unknown };
+    const { line } = JSON.parse(text) as { line?: unknown };
     if (typeof line === "string" && line !== "") return line;
   } catch {
-    // the answer of something else, such as a proxy
+    // the server's lowest layer answers with a line of plain text, and a proxy with a page
   }
-  if (answer.status === 403) return "This page may only look on: open the invitation to upload.";
+  const type = answer.headers.get("Content-Type") ?? "";
+  if (type.startsWith("text/plain") && text !== "") return text.slice(0, LONGEST);
   return `The server has refused this with status ${answer.status}.`;
 }
 

@@ -1,6 +1,7 @@
 /** The few settings of an item that matter. Each change is handed on at once. */
 import { element } from "../dom/element";
 import type { Choices } from "./server";
+import { spacingField } from "./spacing_field";
 import type { Channel, Choice, Option, Understood } from "./understood";
 
 /** Presets in a person's words; the others stand under their own names. */
@@ -44,6 +45,7 @@ export function settingsForm(
       name,
       onChange,
     ),
+    ...spacingOf(understood, name, onChange),
     ...channelField(understood, onChange),
   );
   return form;
@@ -51,9 +53,12 @@ export function settingsForm(
 
 /** Of two contents, whether one form serves both: then it stays, with focus and place. */
 export function isSameForm(a: Understood, b: Understood): boolean {
-  const shape = ({ preset, series, background, ...rest }: Understood) =>
-    JSON.stringify([preset, series, background, rest.chosenChannels, rest.channelOptions]);
-  return a.title === b.title && shape(a) === shape(b);
+  const shape = ({ title, preset, series, background, ...rest }: Understood) =>
+    JSON.stringify([
+      ...[title, preset, series, background],
+      ...[rest.chosenChannels, rest.channelOptions, rest.chosenSpacing_um],
+    ]);
+  return shape(a) === shape(b);
 }
 
 function named({ value, options }: Choice, names: Readonly<Record<string, string>>): Choice {
@@ -90,6 +95,16 @@ function select(
   const list = element("select", { id: `${name}-${setting}` }, { setting }, ...options);
   list.onchange = () => onChange({ [setting]: list.value });
   return [field(label, list)];
+}
+
+function spacingOf(
+  { chosenSpacing_um }: Understood,
+  name: string,
+  onChange: OnChange,
+): readonly HTMLElement[] {
+  if (chosenSpacing_um.length === 0) return [];
+  const { root } = spacingField(name, chosenSpacing_um, (spacing_um) => onChange({ spacing_um }));
+  return [root];
 }
 
 function channelField(

@@ -25,11 +25,13 @@ export type Understood = Readonly<{
   bytesEstimate: number;
   notes: readonly string[];
   channels: readonly Channel[];
-  /** The middle slices: across which axis, and the image below the item's folder. */
-  slices: readonly Readonly<{ axis: string; image: string }>[];
+  /** The middle slices: across which axis, the plane's name, and the image below the item's folder. */
+  slices: readonly Readonly<{ axis: string; name: string; image: string }>[];
   preset: Choice | null;
   series: Choice | null;
   background: Choice | null;
+  /** x, y, z; empty: it can't be changed. */
+  chosenSpacing_um: readonly number[];
   /** Which channels are built. */
   chosenChannels: readonly string[];
   channelOptions: readonly Option[];
@@ -63,6 +65,7 @@ export function readUnderstood(answer: unknown): Understood {
     preset: readChoice(choices.preset),
     series: readChoice(choices.series),
     background: readChoice(choices.background),
+    chosenSpacing_um: numbersOf(foundOf(choices.spacing_um).value),
     chosenChannels: textsOf(channels.value),
     channelOptions: optionsOf(channels.options),
   };
@@ -78,9 +81,11 @@ function readChannel(found: Found): Channel {
   };
 }
 
-function readSlice({ axis, image }: Found): Understood["slices"] {
+function readSlice({ axis, name, image }: Found): Understood["slices"] {
   const path = textOf(image);
-  return /^slices\/[\w-]+\.png$/.test(path) ? [{ axis: textOf(axis), image: path }] : [];
+  return /^slices\/[\w-]+\.png$/.test(path)
+    ? [{ axis: textOf(axis), name: textOf(name) || textOf(axis), image: path }]
+    : [];
 }
 
 /** null: there is nothing to choose. */

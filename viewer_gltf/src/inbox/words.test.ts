@@ -7,7 +7,7 @@ import { bytesText, deletionWords, refusalOf, shareOf, stateName, wordsOf } from
 const item = (changes: Partial<Item>): Item => ({
   ...{ id: "a1", title: "Head", doing: "understood", line: "", bytes: 0, total: 0, place: 0 },
   ...{ share: 0, label: "", tiles: 0, allTiles: 0, left_s: null, page: "" },
-  ...{ hasUpload: true, keepsUpload: false },
+  ...{ hasUpload: true, keepsUpload: false, asksSpacing: false },
   ...changes,
 });
 const upload = (changes: Partial<Progress>): Progress => ({

@@ -29,7 +29,7 @@ const UNDERSTOOD = {
     { id: "0", name: "T1", color: "#ffcc88", has_surface: true, level: 162, unit: "" },
     { id: "1", name: "T2", color: "#88ccff", has_surface: false, level: null, unit: "" },
   ],
-  slices: ["z", "y", "x"].map((axis) => ({ axis, image: `slices/${axis}.png` })),
+  slices: ["z", "y", "x"].map((axis) => ({ axis, name: axis, image: `slices/${axis}.png` })),
   choices: {
     preset: { value: "mri", options: ["mri", "ct", "vessels"] },
     channels: {
@@ -236,6 +236,15 @@ describeInChromium("the inbox", () => {
     expect(await page.getByLabel("Or paste an address").inputValue()).toBe("");
     server.change(only().id, { doing: "failed", line: "https://host/a.ome.zarr: not found" });
     await expectWords(/^https:\/\/host\/a\.ome\.zarr: not found$/);
+    server.change(only().id, { line: "no voxel size: state it", asks: "spacing_um" });
+    const asked = card().getByRole("form", { name: "Voxel spacing" });
+    for (const [axis, length] of ["0,5", "0.5", "2"].entries()) {
+      await asked.getByRole("textbox").nth(axis).fill(length);
+    }
+    await page.keyboard.press("Enter");
+    await expect
+      .poll(() => server.requests.at(-1))
+      .toBe(`PUT items/${only().id}/choices {"spacing_um":[0.5,0.5,2]}`);
   });
 
   it("lets those who may only look, look: on a phone as well", async () => {

@@ -1,0 +1,65 @@
+/** Three fields for the voxel spacing, which some files state wrongly or not at all. */
+import { element } from "../dom/element";
+
+export type SpacingField = Readonly<{
+  root: HTMLElement;
+  /** x, y, z in um; null: a field has no length. */
+  read: () => readonly number[] | null;
+}>;
+
+/** A length above 0, with a point or a comma; null: the text is none. */
+export function lengthOf(text: string): number | null {
+  const value = Number(text.trim().replace(",", "."));
+  return text.trim() !== "" && Number.isFinite(value) && value > 0 ? value : null;
+}
+
+/**
+ * @param name tells the fields of one item from those of another
+ * @param spacing_um x, y, z; empty: not known
+ * @param onChange called once all three have a length
+ */
+export function spacingField(
+  name: string,
+  spacing_um: readonly number[],
+  onChange: (spacing_um: readonly number[]) => void,
+): SpacingField {
+  const inputs = ["x", "y", "z"].map((axis, i) => {
+    const known = spacing_um[i];
+    const input = element(
+      "input",
+      {
+        type: "text",
+        inputMode: "decimal",
+        autocomplete: "off",
+        id: `${name}-spacing-${axis}`,
+        value: known === undefined ? "" : String(Number(known.toPrecision(6))),
+        ariaLabel: `Voxel spacing along ${axis}, in micrometres`,
+      },
+      { setting: `spacing-${axis}` },
+    );
+    return { axis, input };
+  });
+  const read = () => {
+    const values = inputs.map(({ input }) => lengthOf(input.value));
+    return values.every((value) => value !== null) ? values : null;
+  };
+  for (const { input } of inputs) {
+    input.onchange = () => {
+      input.ariaInvalid = String(input.value !== "" && lengthOf(input.value) === null);
+      const values = read();
+      if (values !== null) onChange(values);
+    };
+  }
+  const fields = inputs.map(({ axis, input }) =>
+    element(
+      "span",
+      { className: "axis" },
+      {},
+      element("span", { textContent: axis, ariaHidden: "true" }),
+      input,
+    ),
+  );
+  const legend = element("legend", { textContent: "Voxel spacing, µm" });
+  const row = element("div", { className: "axes" }, {}, ...fields);
+  return { root: element("fieldset", { className: "spacing" }, {}, legend, row), read };
+}
