@@ -13,13 +13,7 @@ export function slicesView(
   const figures = slices.map(({ axis, name, image }) => {
     const alt = `Middle ${name} slice of ${title}${hasContours ? ", with the proposed surface as a contour" : ""}`;
     const picture = element("img", { alt, src: address(image), decoding: "async" });
-    return element(
-      "figure",
-      {},
-      { slice: axis },
-      picture,
-      element("figcaption", { textContent: name }),
-    );
+    return element("figure", {}, { slice: axis }, picture);
   });
   const view = element("div", { className: "slices-row" }, {}, ...figures);
   view.hidden = figures.length === 0;

@@ -275,8 +275,9 @@ export class InboxPage {
     for (const id of this.memories.keys()) if (!ids.has(id)) this.memories.delete(id);
   }
 
-  private show(item: Item, { limits, mayUpload }: InboxState): HTMLElement {
-    const memory = this.memoryOf(item);
+  private show(found: Item, { limits, mayUpload }: InboxState): HTMLElement {
+    const memory = this.memoryOf(found);
+    const item = { ...found, allTiles: found.allTiles || memory.understood?.tiles || 0 };
     const upload = this.progressOf(item);
     if (item.bytes > memory.bytes) memory.moved_ms = performance.now();
     memory.bytes = item.bytes;

@@ -7,6 +7,9 @@ export type SpacingField = Readonly<{
   read: () => readonly number[] | null;
 }>;
 
+/** Digits that a field shows. */
+const DIGITS = 4;
+
 /** A length above 0, with a point or a comma; null: the text is none. */
 export function lengthOf(text: string): number | null {
   const value = Number(text.trim().replace(",", "."));
@@ -32,15 +35,18 @@ export function spacingField(
         inputMode: "decimal",
         autocomplete: "off",
         id: `${name}-spacing-${axis}`,
-        value: known === undefined ? "" : String(Number(known.toPrecision(6))),
+        value: known === undefined ? "" : String(Number(known.toPrecision(DIGITS))),
         ariaLabel: `Voxel spacing along ${axis}, in micrometres`,
       },
       { setting: `spacing-${axis}` },
     );
-    return { axis, input };
+    return { axis, input, known, text: input.value };
   });
   const read = () => {
-    const values = inputs.map(({ input }) => lengthOf(input.value));
+    // a field that nobody has changed keeps the digits that it does not show
+    const values = inputs.map(({ input, known, text }) =>
+      known !== undefined && input.value === text ? known : lengthOf(input.value),
+    );
     return values.every((value) => value !== null) ? values : null;
   };
   for (const { input } of inputs) {

@@ -66,7 +66,7 @@ export function wordsOf(
         return `It is built after ${item.place - 1} other${plural(item.place - 1)}.`;
       return "It is built next.";
     case "building":
-      return `${partWords(item.label)}${tilesText(item)}${leftWords(item.left_s)}.`;
+      return `${partWords(item.label)}${item.label === "units" ? tilesText(item) : ""}${leftWords(item.left_s)}.`;
     case "paused":
       return `Paused${tilesText(item)}. What is finished is kept.`;
     case "cancelled":
