@@ -10,6 +10,15 @@ export type SpacingField = Readonly<{
 /** Digits that a field shows. */
 const DIGITS = 4;
 
+/** Units of a field: the sign, the name, and how many um. */
+const MICROMETRE = { sign: "µm", name: "micrometres", um: 1 };
+const MILLIMETRE = { sign: "mm", name: "millimetres", um: 1000 };
+
+/** Scanners state their spacing in mm. A spacing that is not known is that of a microscope's file. */
+function unitOf(spacing_um: readonly number[]) {
+  return Math.max(0, ...spacing_um) < 100 ? MICROMETRE : MILLIMETRE;
+}
+
 /** A length above 0, with a point or a comma; null: the text is none. */
 export function lengthOf(text: string): number | null {
   const value = Number(text.trim().replace(",", "."));
@@ -26,6 +35,7 @@ export function spacingField(
   spacing_um: readonly number[],
   onChange: (spacing_um: readonly number[]) => void,
 ): SpacingField {
+  const unit = unitOf(spacing_um);
   const inputs = ["x", "y", "z"].map((axis, i) => {
     const known = spacing_um[i];
     const input = element(
@@ -35,8 +45,8 @@ export function spacingField(
         inputMode: "decimal",
         autocomplete: "off",
         id: `${name}-spacing-${axis}`,
-        value: known === undefined ? "" : String(Number(known.toPrecision(DIGITS))),
-        ariaLabel: `Voxel spacing along ${axis}, in micrometres`,
+        value: known === undefined ? "" : String(Number((known / unit.um).toPrecision(DIGITS))),
+        ariaLabel: `Voxel spacing along ${axis}, in ${unit.name}`,
       },
       { setting: `spacing-${axis}` },
     );
@@ -44,9 +54,11 @@ export function spacingField(
   });
   const read = () => {
     // a field that nobody has changed keeps the digits that it does not show
-    const values = inputs.map(({ input, known, text }) =>
-      known !== undefined && input.value === text ? known : lengthOf(input.value),
-    );
+    const values = inputs.map(({ input, known, text }) => {
+      if (known !== undefined && input.value === text) return known;
+      const length = lengthOf(input.value);
+      return length && length * unit.um;
+    });
     return values.every((value) => value !== null) ? values : null;
   };
   for (const { input } of inputs) {
@@ -65,7 +77,7 @@ export function spacingField(
       input,
     ),
   );
-  const legend = element("legend", { textContent: "Voxel spacing, µm" });
+  const legend = element("legend", { textContent: `Voxel spacing, ${unit.sign}` });
   const row = element("div", { className: "axes" }, {}, ...fields);
   return { root: element("fieldset", { className: "spacing" }, {}, legend, row), read };
 }

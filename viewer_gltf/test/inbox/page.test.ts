@@ -9,6 +9,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, expect, it } from "vitest";
 import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
+import { drop } from "../support/inbox/drop";
 import { FakeInbox } from "../support/inbox/fake_inbox";
 
 const KB = 1000;
@@ -85,17 +86,6 @@ describeInChromium("the inbox", () => {
     await rm(folder, { recursive: true, force: true });
   });
 
-  /** Drops files and folders as a person does: by the browser's own events. */
-  async function drop(...names: readonly string[]): Promise<void> {
-    const session = await page.context().newCDPSession(page);
-    const files = names.map((name) => join(folder, name));
-    const data = { items: [], files, dragOperationsMask: 1 };
-    for (const type of ["dragEnter", "dragOver", "drop"] as const) {
-      await session.send("Input.dispatchDragEvent", { type, x: 200, y: 200, data });
-    }
-    await session.detach();
-  }
-
   const card = () => page.locator("article").first();
   const words = () => card().locator("[data-words]");
   const press = (action: string) => card().locator(`[data-action="${action}"]`).click();
@@ -124,7 +114,7 @@ describeInChromium("the inbox", () => {
   it("takes a folder whole, though the connection is cut twice and the page is loaded again", async () => {
     server.cuts.push(700 * KB + 7, 1200 * KB + 1);
     server.delay_ms = 150;
-    await drop("series");
+    await drop(page, join(folder, "series"));
     await expect.poll(() => only()?.bytes).toBeGreaterThan(1200 * KB);
     expect(server.cuts).toEqual([]);
     expect(await card().locator("h2").textContent()).toBe("series");
@@ -133,7 +123,7 @@ describeInChromium("the inbox", () => {
     const before = Number(only().bytes);
     expect(before).toBeLessThan(TOTAL);
     server.delay_ms = 0;
-    await drop("series");
+    await drop(page, join(folder, "series"));
     await expect.poll(() => only().doing).toBe("understood");
     const { id } = only();
     expect(server.items).toHaveLength(1);
@@ -145,7 +135,7 @@ describeInChromium("the inbox", () => {
 
   it("names a file that changes on the disk meanwhile, and sends nothing of it", async () => {
     server.delay_ms = 150;
-    await drop("series");
+    await drop(page, join(folder, "series"));
     await expect.poll(() => only()?.bytes).toBeGreaterThan(300 * KB);
     const last = join(folder, "series/039.dcm");
     const content = await readFile(last);
@@ -157,7 +147,7 @@ describeInChromium("the inbox", () => {
 
   it("goes on by one click after a reload, where the browser kept the folder", async () => {
     server.delay_ms = 150;
-    await drop("series");
+    await drop(page, join(folder, "series"));
     await expect.poll(() => only()?.bytes).toBeGreaterThan(300 * KB);
     await page.reload();
     server.delay_ms = 0;
