@@ -1,6 +1,6 @@
 /** The inbox: files that are dropped, sent over faults, understood, looked at, built and deleted. */
 import { createHash } from "node:crypto";
-import { mkdir, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { mkdir, mkdtemp, readdir, readFile, rm, stat, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import axe from "axe-core";
@@ -110,6 +110,24 @@ describeInChromium("the inbox", () => {
     );
     return violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html}`));
   }
+
+  it("is a small page of its own files, and lets nothing else in", async () => {
+    const html = await readFile(join(DIST, "inbox.html"), "utf8");
+    const [, policy] = /http-equiv="Content-Security-Policy"\s+content="([^"]*)"/.exec(html) ?? [];
+    expect(policy.split("; ").sort()).toEqual([
+      ...["base-uri 'none'", "connect-src 'self'", "default-src 'none'", "form-action 'none'"],
+      ...["img-src 'self'", "script-src 'self'", "style-src 'self'"],
+    ]);
+    const linked = [...html.matchAll(/(?:src|href)="\.\/([^"]+)"/g)].map(([, path]) => path);
+    expect(linked.every((path) => /^(inbox_assets\/|icon\.svg$)/.test(path))).toBe(true);
+    const code = await readdir(join(DIST, "inbox_assets"));
+    const sizes = await Promise.all(
+      code.map(async (name) => (await stat(join(DIST, "inbox_assets", name))).size),
+    );
+    expect(Math.max(...sizes)).toBeLessThan(100 * KB); // three alone has 700 kB
+    const worker = await readFile(join(DIST, "sw.js"), "utf8");
+    expect(worker).not.toContain("inbox"); // the viewer keeps none of it for offline
+  });
 
   it("takes a folder whole, though the connection is cut twice and the page is loaded again", async () => {
     server.cuts.push(700 * KB + 7, 1200 * KB + 1);
