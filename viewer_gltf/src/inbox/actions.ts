@@ -47,7 +47,10 @@ export function actionsOf(item: Item, situation: Situation): readonly Action[] {
       return [LOOK, BUILD, DELETE];
     case "cancelled":
     case "failed":
-      return situation.isUnderstood ? [LOOK, { ...BUILD, label: "Build again" }, DELETE] : [DELETE];
+      // a spacing that is missing is asked for on the card
+      return situation.isUnderstood && !item.asksSpacing
+        ? [LOOK, { ...BUILD, label: "Build again" }, DELETE]
+        : [DELETE];
     case "queued":
       return [...open, { name: "cancel", label: "Leave the queue" }, DELETE];
     case "building":

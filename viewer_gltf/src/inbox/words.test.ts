@@ -111,6 +111,8 @@ describe("what a person can do", () => {
     for (const doing of ["failed", "cancelled"] as const) {
       const names = ["look", "build", "delete"];
       expect(can(item({ doing }), { isUnderstood: true })).toEqual(names);
+      const asking = item({ doing, asksSpacing: true });
+      expect(can(asking, { isUnderstood: true })).toEqual(["delete"]);
     }
   });
 
