@@ -61,7 +61,7 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 VIEWER := viewer_gltf
 VIEWER_READY := $(VIEWER)/node_modules/.ready
 VIEWER_DIST := $(VIEWER)/dist/index.html
-VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/scripts/types.ts $(VIEWER)/index.html $(VIEWER)/*.ts $(VIEWER)/*.json schemas -type f 2>/dev/null) \
+VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/scripts/types.ts $(VIEWER)/*.html $(VIEWER)/*.ts $(VIEWER)/*.json schemas -type f 2>/dev/null) \
   pipeline/stereocell/filters/min_max_bricks.py pipeline/stereocell/formats/voxel_bvh.py
 ifndef CHROMIUM
 export CHROMIUM := $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)

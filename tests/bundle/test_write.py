@@ -253,6 +253,19 @@ def test_viewer_is_copied_and_listed(stage, tmp_path):
     assert {"index.html", "assets/main.js"} <= load(tmp_path / "bundle" / "files.json").keys()
 
 
+def test_the_page_of_the_inbox_is_in_no_bundle(stage, tmp_path):
+    for folder in ("assets", "inbox_assets"):
+        (tmp_path / "dist" / folder).mkdir(parents=True)
+        (tmp_path / "dist" / folder / "main.js").write_text("start()")
+    for name in ("index.html", "inbox.html", "inbox.html.gz"):
+        (tmp_path / "dist" / name).write_text("<!doctype html>")
+    write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
+    listed = load(tmp_path / "bundle" / "files.json").keys()
+    copied = [p.relative_to(tmp_path / "bundle").as_posix() for p in tmp_path.rglob("bundle/**/*")]
+    assert "assets/main.js" in listed
+    assert not [name for name in (*listed, *copied) if name.startswith("inbox")]
+
+
 def test_viewer_that_is_not_built_is_named(stage, tmp_path):
     with pytest.raises(OutputError, match=r"dist: no index\.html, expected the built viewer"):
         write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))

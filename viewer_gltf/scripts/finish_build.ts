@@ -137,8 +137,9 @@ async function filesOf(folder: string): Promise<string[]> {
     .map((entry) => join(entry.parentPath, entry.name).slice(folder.length + 1));
 }
 
-async function compressAll(folder: string): Promise<void> {
-  const names = (await filesOf(folder)).filter((name) => SHRINKS.has(extname(name)));
+/** Write compressed files beside those of `files` that shrink. */
+export async function compressAll(folder: string, files: readonly string[]): Promise<void> {
+  const names = files.filter((name) => SHRINKS.has(extname(name)));
   const compress = async (name: string) => {
     const bytes = await readFile(join(folder, name));
     if (bytes.length < MIN_BYTES) return;
@@ -167,7 +168,7 @@ export function finishBuild(): Plugin {
       const plain = await splitCode(folder, entry.fileName, entry.exports);
       await writePage(page, await scriptFor(folder, plain, style));
       await listFiles(folder, [plain, style]);
-      await compressAll(folder);
+      await compressAll(folder, await filesOf(folder));
     },
   };
 }

@@ -33,6 +33,7 @@ export const LAYERS: readonly string[] = [
   "live",
   "source",
   "app",
+  "inbox",
 ];
 
 /** A file and one that it imports, below src/. */

@@ -6,14 +6,21 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import FileRef, write_file
 from stereocell.model.errors import OutputError
 
+# The page of `stereocell serve --inbox`, compressed too, and its folder: it shows no bundle
+_INBOX = ("inbox.html", "inbox.html.br", "inbox.html.gz", "inbox_assets")
+
 
 def copy_viewer(viewer_dist: Path, root: Path) -> list[FileRef]:
-    """Copy the built viewer; return its files. Raises OutputError on a clash of names."""
+    """Copy the built viewer without the inbox; return its files.
+
+    Raises OutputError on a clash of names.
+    """
     refs = []
     for source in sorted(viewer_dist.rglob("*")):
-        if not source.is_file():
+        inside = source.relative_to(viewer_dist)
+        if not source.is_file() or inside.parts[0] in _INBOX:
             continue
-        path = source.relative_to(viewer_dist).as_posix()
+        path = inside.as_posix()
         if path in (MANIFEST, FILES) or (root / path).exists():
             raise OutputError(f"{source}: the bundle has a {path} of its own")
         refs.append(write_file(root, path, source.read_bytes()))

@@ -1,4 +1,5 @@
 /** Start: find the bundle, show it, or report on the page why not. */
+import "../panel/html/colors.css";
 import "../panel/html/page.css";
 import "../panel/html/panel.css";
 import "../panel/html/widgets.css";
@@ -16,8 +17,8 @@ import { element } from "../dom/element";
 import { Host } from "../host/host";
 import { leaveWheelToHolder } from "../interaction/frame_wheel";
 import { isReading, whileReading } from "../live/reading";
+import { sizeText } from "../math/length_text";
 import { showFatal } from "../panel/html/overlays";
-import { sizeText } from "../probe/measure";
 import type { Theme } from "../render/theme";
 import { withTyped } from "../share/address";
 import { loadLink, openAddress } from "../share/open_address";

@@ -1,50 +1,27 @@
-/** The websocket to the build behind the page. It connects again whenever the connection is lost. */
+/** The websocket to the build behind the page. */
+import { LastingSocket } from "../dom/lasting_socket";
 import { type BuildState, readBuildState } from "./build_state";
 
 export type Command = "pause" | "continue" | "cancel";
 
-/** Time after which a lost connection is tried again, ms: first, and at most. */
-const FIRST_MS = 500;
-const MOST_MS = 10_000;
-
 export class BuildFeed {
-  private socket: WebSocket | null = null;
-  private wait_ms = FIRST_MS;
-  private timer = 0;
-  private isDisposed = false;
+  private readonly socket: LastingSocket;
 
   /** @param onState is given each state; null: the server does not answer */
-  constructor(
-    private readonly address: string,
-    private readonly onState: (state: BuildState | null) => void,
-  ) {
-    this.connect();
+  constructor(address: string, onState: (state: BuildState | null) => void) {
+    const read = (text: string) => {
+      const state = readBuildState(text);
+      if (state !== null) onState(state);
+      return state !== null;
+    };
+    this.socket = new LastingSocket(address, read, () => onState(null));
   }
 
   send(command: Command): void {
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(command);
+    this.socket.send(command);
   }
 
   dispose(): void {
-    this.isDisposed = true;
-    clearTimeout(this.timer);
-    this.socket?.close();
-  }
-
-  private connect(): void {
-    const socket = new WebSocket(this.address);
-    this.socket = socket;
-    socket.addEventListener("message", ({ data }) => {
-      const state = typeof data === "string" ? readBuildState(data) : null;
-      if (state === null) return;
-      this.wait_ms = FIRST_MS;
-      this.onState(state);
-    });
-    socket.addEventListener("close", () => {
-      if (this.isDisposed) return;
-      this.onState(null);
-      this.timer = window.setTimeout(() => this.connect(), this.wait_ms);
-      this.wait_ms = Math.min(MOST_MS, 2 * this.wait_ms);
-    });
+    this.socket.dispose();
   }
 }

@@ -78,8 +78,13 @@ export function wordsOf(state: BuildState): string {
     case "pausing":
       return "Pausing after the running tasks.";
     case "building":
-      return `${PARTS[state.label] ?? "Reading the source"}${tilesOf(state)}${leftOf(state)}`;
+      return `${partWords(state.label)}${tilesOf(state)}${leftWords(state.left_s)}`;
   }
+}
+
+/** The running part of a build, as `units`; the source is read before the first one. */
+export function partWords(label: string): string {
+  return PARTS[label] ?? "Reading the source";
 }
 
 function tilesOf({ tiles, allTiles, label, done, total }: BuildState): string {
@@ -87,7 +92,8 @@ function tilesOf({ tiles, allTiles, label, done, total }: BuildState): string {
   return total > 1 ? `: ${done} of ${total}` : "";
 }
 
-function leftOf({ left_s }: BuildState): string {
+/** The time until an end, as `, about 40 s left`; empty: it is not known. */
+export function leftWords(left_s: number | null): string {
   if (left_s === null) return "";
   if (left_s < 90) return `, about ${Math.max(5, Math.ceil(left_s / 5) * 5)} s left`;
   if (left_s < 5400) return `, about ${Math.round(left_s / 60)} min left`;

@@ -8,7 +8,7 @@ import type { ObjectTable } from "./table";
 type Context = CanvasRenderingContext2D;
 
 const BINS = 64;
-/** The page's own: see panel/html/page.css. */
+/** The page's own: see panel/html/colors.css. */
 const [INK, LINE, TEXT, DIM] = ["#0b0d12", "#3a4458", "#e6e9f0", "#a3adbd"];
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
 /** Most points of a scatter plot: more would be one on the other. */

@@ -12,8 +12,8 @@ import {
 } from "../marks/clip_handles";
 import type { Box } from "../math/box";
 import { type Clip, moveFace, movePlane, spinPlane } from "../math/clip";
+import { distanceText } from "../math/length_text";
 import { AXES } from "../math/vec3";
-import { distanceText } from "../probe/measure";
 import type { Action } from "../state/actions";
 
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;

@@ -3,10 +3,8 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 import { distanceBetween } from "../math/distance";
 import {
-  distanceText,
   measuredText,
   measurementText,
-  sizeText,
   type VolumeLevel,
   valueAt,
   valueText,
@@ -149,32 +147,5 @@ describe("the distance of two points", () => {
 
   it("has a unit of values where the source states one", () => {
     expect(valueText(-1000.4, [-1024, 2000], "HU")).toBe("-1000 HU");
-  });
-
-  it("is written with three digits in the unit that keeps it short", () => {
-    const said = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
-    expect(said.map(distanceText)).toEqual([
-      "0 µm",
-      "12.3 nm",
-      "457 nm",
-      "1.00 µm",
-      "1.00 µm",
-      "10.0 µm",
-      "12.3 µm",
-      "123 µm",
-      "999 µm",
-      "1.00 mm",
-      "12.3 mm",
-      "1500 mm",
-    ]);
-  });
-});
-
-describe("a size", () => {
-  it("is in the unit of its longest edge", () => {
-    expect(sizeText([231_000, 215_000, 255_000])).toBe("231 × 215 × 255 mm");
-    expect(sizeText([67.06, 26.74, 13.16])).toBe("67.1 × 26.7 × 13.2 µm");
-    expect(sizeText([1200, 90, 4.5])).toBe("1.2 × 0.09 × 0.0045 mm");
-    expect(sizeText([0.5, 0, 0.25])).toBe("500 × 0 × 250 nm");
   });
 });

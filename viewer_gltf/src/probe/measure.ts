@@ -3,6 +3,7 @@ import { Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
+import { distanceText } from "../math/length_text";
 import type { Vec3 } from "../math/vec3";
 import { angleOf, lengthOf } from "../state/measurements";
 import type { MeasureKind } from "../state/parameters/tools";
@@ -21,7 +22,6 @@ export type Window = readonly [number, number];
 
 /** Tolerance at the rim: the matrices round, and points of the rim still are inside. */
 const RIM = 1e-6;
-const DIGITS = 3;
 
 /** What a measurement comes to: a length, an angle, a length and how many points. */
 export function measurementText(kind: MeasureKind, points: readonly Vec3[]): string {
@@ -31,29 +31,6 @@ export function measurementText(kind: MeasureKind, points: readonly Vec3[]): str
   }
   const length = distanceText(lengthOf(points));
   return kind === "line" ? `${length}, ${points.length} points` : length;
-}
-
-/** mm from 1000 um on, nm below 1 um. */
-function lengthUnitOf(rounded_um: number): readonly [string, number] {
-  return rounded_um >= 1000 ? ["mm", 1e-3] : rounded_um < 1 ? ["nm", 1e3] : ["µm", 1];
-}
-
-/** Edges in the unit of the longest: `231 × 215 × 255 mm`. */
-export function sizeText(edges_um: readonly number[]): string {
-  const rounded = edges_um.map((edge) => Number(edge.toPrecision(DIGITS)));
-  const [unit, factor] = lengthUnitOf(Math.max(...rounded));
-  const texts = rounded.map((edge) => String(Number((edge * factor).toPrecision(DIGITS))));
-  return `${texts.join(" × ")} ${unit}`;
-}
-
-/** Three digits are more than a hand can point. */
-export function distanceText(distance_um: number): string {
-  const rounded = Number(distance_um.toPrecision(DIGITS)); // so that 999.9 um is 1.00 mm
-  if (rounded === 0) return "0 µm";
-  const [unit, factor] = lengthUnitOf(rounded);
-  const value = distance_um * factor;
-  const whole = Math.floor(Math.log10(rounded * factor) + 1e-9) + 1;
-  return `${value.toFixed(Math.max(0, DIGITS - Math.max(1, whole)))} ${unit}`;
 }
 
 /**

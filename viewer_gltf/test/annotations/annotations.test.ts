@@ -39,7 +39,11 @@ describeInChromium("marks", () => {
     await page.goto("about:blank");
     await page.mouse.move(-1, -1);
     await page.goto("http://marks.test/");
-    for (const sheet of ["panel/html/page.css", "annotations/annotations.css"]) {
+    for (const sheet of [
+      "panel/html/colors.css",
+      "panel/html/page.css",
+      "annotations/annotations.css",
+    ]) {
       const content = await readFile(new URL(`../../src/${sheet}`, import.meta.url), "utf8");
       await page.addStyleTag({ content });
     }

@@ -33,6 +33,7 @@ const OPTIONAL = new RegExp(
     "fflate",
     "frame_port",
     "HDRLoader",
+    "inbox",
     "interaction",
     "key_list",
     "keep_offline",

@@ -3,7 +3,7 @@
 import type { Mark, Rect, Tone } from "./draw_list";
 import { histogramPicture } from "./histogram_image";
 
-/** The page's own colours: see html/page.css. */
+/** The page's own colours: see html/colors.css. */
 const COLORS: Readonly<Record<string, string>> = {
   back: "#12151d",
   raised: "#242b39",

@@ -1,8 +1,8 @@
-/** The page's colours in both themes, against the contrasts of WCAG 2.1 (1.4.3 and 1.4.11), level AA. */
+/** The pages' colours in both themes, against the contrasts of WCAG 2.1 (1.4.3 and 1.4.11), level AA. */
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 
-const STYLE = readFileSync(new URL("./page.css", import.meta.url), "utf8");
+const STYLE = readFileSync(new URL("./colors.css", import.meta.url), "utf8");
 
 type Colors = Readonly<Record<string, string>>;
 

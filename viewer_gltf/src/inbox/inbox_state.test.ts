@@ -1,0 +1,77 @@
+import { describe, expect, it } from "vitest";
+import { type InboxState, readInboxState } from "./inbox_state";
+import { readUnderstood } from "./understood";
+
+const ITEM = {
+  ...{ id: "a1", title: "Head", doing: "building", line: "", bytes: 10, total: 10, place: 0 },
+  ...{ share: 0.4, label: "units", tiles: 1, all_tiles: 4, left_s: 30, page: "items/a1/view/" },
+  ...{ has_upload: true, keep_upload: false, asks: "" },
+};
+const LIMITS = { bytes: 100, files: 5, piece: 8, free_bytes: 70, hours: 24 };
+const read = (items: unknown[], more = {}) =>
+  readInboxState(
+    JSON.stringify({ items, limits: LIMITS, may_upload: true, ...more }),
+  ) as InboxState;
+
+describe("a message of the server", () => {
+  it("is read by its names", () => {
+    expect(read([ITEM])).toEqual({
+      mayUpload: true,
+      limits: { bytes: 100, files: 5, piece: 8, freeBytes: 70, hours: 24 },
+      items: [
+        {
+          ...{ id: "a1", title: "Head", doing: "building", line: "", bytes: 10, total: 10 },
+          ...{ place: 0, share: 0.4, label: "units", tiles: 1, allTiles: 4, left_s: 30 },
+          ...{ page: "items/a1/view/", hasUpload: true, keepsUpload: false },
+          asksSpacing: false,
+        },
+      ],
+    });
+  });
+
+  it("is left out if it is none, and gives no right that it does not state", () => {
+    for (const text of ["", "null", "7", "[]", "{", '{"items": 3}']) {
+      expect(readInboxState(text), text).toBeNull();
+    }
+    expect(read([], { may_upload: "yes" }).mayUpload).toBe(false);
+    expect(read([{ ...ITEM, doing: "sleeping" }, null, { ...ITEM, id: "../a" }]).items).toEqual([]);
+  });
+
+  it("leads to no other page than one of its own", () => {
+    const elsewhere = ["//host/", "https://host/", "items/../x/", "items/a1/view", "javascript:1"];
+    for (const page of elsewhere) expect(read([{ ...ITEM, page }]).items[0].page, page).toBe("");
+  });
+});
+
+describe("what was understood", () => {
+  it("has its choices, each with the words that are shown", () => {
+    const found = readUnderstood({
+      format: "OME-TIFF",
+      size_voxels: [9, 8, 7],
+      slices: [
+        { axis: "z", name: "axial", image: "slices/z.png" },
+        { axis: "y", image: "../secret.png" },
+      ],
+      channels: [{ id: "0", name: "DNA", color: "url(x)", has_surface: true }],
+      choices: {
+        preset: { value: "mri", options: ["mri", "ct"] },
+        channels: { value: ["0"], options: [{ id: "0", name: "DNA" }] },
+        series: { value: "2", options: [{ id: "2", text: "T1, 180 slices" }] },
+        background: null,
+        spacing_um: { value: [0.5, 0.5, 2] },
+      },
+    });
+    expect(found.slices).toEqual([{ axis: "z", name: "axial", image: "slices/z.png" }]);
+    expect(found.channels).toEqual([{ id: "0", name: "DNA", color: "", hasSurface: true }]);
+    expect(found.preset?.options.map(({ text }) => text)).toEqual(["mri", "ct"]);
+    expect(found.series?.options).toEqual([{ id: "2", text: "T1, 180 slices" }]);
+    expect(found.chosenSpacing_um).toEqual([0.5, 0.5, 2]);
+    expect([found.background, found.channelOptions]).toEqual([null, [{ id: "0", text: "DNA" }]]);
+  });
+
+  it("is empty where the answer is none", () => {
+    for (const answer of [null, 7, [], "x"]) {
+      expect(readUnderstood(answer)).toMatchObject({ format: "", slices: [], preset: null });
+    }
+  });
+});

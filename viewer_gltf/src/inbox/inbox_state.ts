@@ -1,0 +1,123 @@
+/** What the server reports of the inbox: all items, and what this page may do. Pure. */
+
+const DOINGS = [
+  "uploading",
+  "unpacking",
+  "understanding",
+  "understood",
+  "failed",
+  "queued",
+  "building",
+  "paused",
+  "cancelled",
+  "built",
+] as const;
+
+export type Doing = (typeof DOINGS)[number];
+
+/** One specimen that was handed in: dropped files, or an address. */
+export type Item = Readonly<{
+  id: string;
+  title: string;
+  doing: Doing;
+  /** Why it has failed, or what is worth knowing; or empty. */
+  line: string;
+  /** Bytes of the upload that have arrived, and all. */
+  bytes: number;
+  total: number;
+  /** From 1 in the queue of builds; 0: it is not in the queue. */
+  place: number;
+  /** How much of the build is done, 0..1. */
+  share: number;
+  /** The running part of the build, as `units`; or empty. */
+  label: string;
+  /** Tiles that have their surfaces, and all tiles. */
+  tiles: number;
+  allTiles: number;
+  /** s until the end of the build; null: not known. */
+  left_s: number | null;
+  /** The folder below this page where it can be looked at; or empty. */
+  page: string;
+  /** Whether the files state no voxel spacing, so that a person has to. */
+  asksSpacing: boolean;
+  hasUpload: boolean;
+  keepsUpload: boolean;
+}>;
+
+/** Of one item: bytes and files. `piece`: most bytes of one request. `hours`: how long an upload is kept unfinished. */
+export type Limits = Readonly<{
+  bytes: number;
+  files: number;
+  piece: number;
+  freeBytes: number;
+  hours: number;
+}>;
+
+export type InboxState = Readonly<{
+  items: readonly Item[];
+  limits: Limits;
+  mayUpload: boolean;
+}>;
+
+type Found = Readonly<Record<string, unknown>>;
+
+/** Reads a message of the server; null: it is none that this page knows. */
+export function readInboxState(text: string): InboxState | null {
+  let found: Found;
+  try {
+    found = JSON.parse(text);
+  } catch {
+    return null;
+  }
+  if (!Array.isArray(found?.items)) return null;
+  const limits = (found.limits ?? {}) as Found;
+  return {
+    items: found.items.flatMap((each: Found) => readItem(each) ?? []),
+    limits: {
+      bytes: positive(limits.bytes, Number.POSITIVE_INFINITY),
+      files: positive(limits.files, Number.POSITIVE_INFINITY),
+      piece: positive(limits.piece, 2 ** 20),
+      freeBytes: positive(limits.free_bytes, Number.POSITIVE_INFINITY),
+      hours: positive(limits.hours, 0),
+    },
+    mayUpload: found.may_upload === true,
+  };
+}
+
+function readItem(found: Found): Item | null {
+  const doing = DOINGS.find((each) => each === found?.doing);
+  const id = textOf(found?.id);
+  if (doing === undefined || !/^[\w-]+$/.test(id)) return null;
+  return {
+    id,
+    doing,
+    title: textOf(found.title),
+    line: textOf(found.line),
+    bytes: positive(found.bytes, 0),
+    total: positive(found.total, 0),
+    place: positive(found.place, 0),
+    share: Math.min(1, positive(found.share, 0)),
+    label: textOf(found.label),
+    tiles: positive(found.tiles, 0),
+    allTiles: positive(found.all_tiles, 0),
+    left_s: typeof found.left_s === "number" ? found.left_s : null,
+    page: pageOf(found.page),
+    asksSpacing: found.asks === "spacing_um",
+    hasUpload: found.has_upload === true && found.total !== 0, // of an address there is none
+    keepsUpload: found.keep_upload === true,
+  };
+}
+
+/** A folder of an item's own; empty: the text leads elsewhere. */
+export function pageOf(found: unknown): string {
+  const page = textOf(found);
+  return /^items\/[\w-]+\/([\w-]+\/)*$/.test(page) ? page : "";
+}
+
+export function textOf(found: unknown): string {
+  return typeof found === "string" ? found : "";
+}
+
+export function positive(found: unknown, otherwise: number): number {
+  return typeof found === "number" && found >= 0 ? found : otherwise;
+}

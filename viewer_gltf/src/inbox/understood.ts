@@ -1,0 +1,105 @@
+/** What the server has understood of an item, before anything heavy runs. Pure. */
+import { positive, textOf } from "./inbox_state";
+
+export type Channel = Readonly<{
+  id: string;
+  name: string;
+  /** #rrggbb; empty: none. */
+  color: string;
+  hasSurface: boolean;
+}>;
+
+/** A setting with one value out of a few. */
+export type Choice = Readonly<{ value: string; options: readonly Option[] }>;
+export type Option = Readonly<{ id: string; text: string }>;
+
+export type Understood = Readonly<{
+  title: string;
+  format: string;
+  modality: string;
+  /** x, y, z */
+  voxels: readonly number[];
+  spacing_um: readonly number[];
+  sizeText: string;
+  tiles: number;
+  bytesEstimate: number;
+  notes: readonly string[];
+  channels: readonly Channel[];
+  /** The middle slices: across which axis, the plane's name, and the image below the item's folder. */
+  slices: readonly Readonly<{ axis: string; name: string; image: string }>[];
+  preset: Choice | null;
+  series: Choice | null;
+  background: Choice | null;
+  /** x, y, z; empty: it can't be changed. */
+  chosenSpacing_um: readonly number[];
+  /** Which channels are built. */
+  chosenChannels: readonly string[];
+  channelOptions: readonly Option[];
+}>;
+
+type Found = Readonly<Record<string, unknown>>;
+
+const listOf = (found: unknown): readonly unknown[] => (Array.isArray(found) ? found : []);
+const foundOf = (found: unknown): Found =>
+  typeof found === "object" && found !== null ? (found as Found) : {};
+const numbersOf = (found: unknown) => listOf(found).map((each) => positive(each, 0));
+const textsOf = (found: unknown) =>
+  listOf(found).flatMap((each) => (typeof each === "string" ? [each] : []));
+
+export function readUnderstood(answer: unknown): Understood {
+  const found = foundOf(answer);
+  const choices = foundOf(found.choices);
+  const channels = foundOf(choices.channels);
+  return {
+    title: textOf(found.title),
+    format: textOf(found.format),
+    modality: textOf(found.modality),
+    voxels: numbersOf(found.size_voxels),
+    spacing_um: numbersOf(found.spacing_um),
+    sizeText: textOf(found.size_text).replaceAll(" x ", " × "),
+    tiles: positive(found.tiles, 0),
+    bytesEstimate: positive(found.bytes_estimate, 0),
+    notes: textsOf(found.notes),
+    channels: listOf(found.channels).map(foundOf).map(readChannel),
+    slices: listOf(found.slices).map(foundOf).flatMap(readSlice),
+    preset: readChoice(choices.preset),
+    series: readChoice(choices.series),
+    background: readChoice(choices.background),
+    chosenSpacing_um: numbersOf(foundOf(choices.spacing_um).value),
+    chosenChannels: textsOf(channels.value),
+    channelOptions: optionsOf(channels.options),
+  };
+}
+
+function readChannel(found: Found): Channel {
+  const color = textOf(found.color);
+  return {
+    id: textOf(found.id),
+    name: textOf(found.name),
+    color: /^#[0-9a-f]{6}$/i.test(color) ? color : "",
+    hasSurface: found.has_surface === true,
+  };
+}
+
+function readSlice({ axis, name, image }: Found): Understood["slices"] {
+  const path = textOf(image);
+  return /^slices\/[\w-]+\.png$/.test(path)
+    ? [{ axis: textOf(axis), name: textOf(name) || textOf(axis), image: path }]
+    : [];
+}
+
+/** null: there is nothing to choose. */
+function readChoice(found: unknown): Choice | null {
+  const { value, options } = foundOf(found);
+  const read = optionsOf(options);
+  return read.length === 0 ? null : { value: textOf(value), options: read };
+}
+
+/** Options are texts, or texts with an id. */
+function optionsOf(found: unknown): readonly Option[] {
+  return listOf(found).map((each) => {
+    if (typeof each === "string") return { id: each, text: each };
+    const { id, text, name } = foundOf(each);
+    return { id: textOf(id), text: textOf(text) || textOf(name) || textOf(id) };
+  });
+}

@@ -1,0 +1,210 @@
+/**
+ * Sends the files of one item in pieces. After a lost connection the upload continues by itself where the server has
+ * got to, after longer and longer waits.
+ */
+import { findUnreadable, type PieceAnswer, type Server } from "./server";
+import type { UploadFiles } from "./upload_files";
+
+export type Progress = Readonly<{
+  /** `waiting`: another upload goes first. `lost`: the connection is, and will be tried again. `refused`: for good. */
+  doing: "waiting" | "sending" | "lost" | "refused" | "cancelled" | "complete";
+  sent: number;
+  total: number;
+  /** s until the end; null: not known. */
+  left_s: number | null;
+  /** Why it is lost or refused; or empty. */
+  line: string;
+}>;
+
+/** Time that a piece should take, s: so often does the progress change, and so little is sent twice. */
+const PIECE_S = 1.5;
+const FIRST_BYTES = 2 ** 20;
+const LEAST_BYTES = 2 ** 16;
+/** Time after which a lost connection is tried again, ms: first, and at most. */
+const FIRST_WAIT_MS = 500;
+const MOST_WAIT_MS = 30_000;
+/** How much the last piece counts in the mean rate, 0..1. */
+const NEWEST_SHARE = 0.2;
+
+/**
+ * Bytes of the stream from `start`, by reference. They are read once before they are sent, so that the files are open
+ * by then, and a file that can't be read is told from a lost connection. (What is in memory travels ten times slower
+ * in Chromium, as an array.)
+ */
+type Piece = Readonly<{ start: number; end: number; content: Blob; isReadable: Promise<boolean> }>;
+
+/** Statuses that pass: the server is busy, full or starts again. */
+const isPassing = (status: number) => status >= 500 || status === 408 || status === 429;
+
+export class Upload {
+  private pieceBytes = FIRST_BYTES;
+  /** Mean bytes a second; null: nothing was sent yet. */
+  private rate: number | null = null;
+  /** The piece after the one that is being sent: a folder's many files take time to open. */
+  private next: Piece | null = null;
+  private wait_ms = FIRST_WAIT_MS;
+  private readonly cancelled = new AbortController();
+  /** Ends the request or the wait that is under way; the upload goes on. */
+  private interruption = new AbortController();
+  private state: Progress;
+
+  /** @param offset bytes that the server has already */
+  constructor(
+    readonly id: string,
+    private readonly files: UploadFiles,
+    offset: number,
+    private readonly server: Server,
+    private readonly mostBytes: number,
+    private readonly onProgress: (progress: Progress) => void,
+  ) {
+    this.state = { doing: "waiting", sent: offset, total: files.bytes, left_s: null, line: "" };
+  }
+
+  get progress(): Progress {
+    return this.state;
+  }
+
+  get isOver(): boolean {
+    return ["refused", "cancelled", "complete"].includes(this.state.doing);
+  }
+
+  /** Stops sending. What has arrived stays on the server until the item is deleted. */
+  cancel(): void {
+    this.cancelled.abort();
+    this.tell({ doing: "cancelled", left_s: null });
+  }
+
+  /** Tries a lost connection at once. */
+  retryNow(): void {
+    if (this.state.doing === "lost") this.interruption.abort();
+  }
+
+  /** The browser has no network any more: what is under way can't end. */
+  loseConnection(): void {
+    if (this.state.doing === "sending") this.interruption.abort();
+  }
+
+  /** Resolves when all bytes have arrived, or when the upload has ended in another way. */
+  async run(): Promise<void> {
+    this.tell({ doing: "sending" });
+    while (!this.isOver) {
+      if (this.state.sent >= this.state.total) this.tell({ doing: "complete", left_s: null });
+      else if (this.state.doing === "lost") await this.recover();
+      else await this.sendNext();
+    }
+  }
+
+  private async sendNext(): Promise<void> {
+    const { sent } = this.state;
+    const piece = this.next?.start === sent ? this.next : this.read(sent);
+    const { end, content } = piece;
+    this.next = null;
+    const isReadable = await piece.isReadable;
+    if (this.isOver) return;
+    if (!isReadable) {
+      const name = await findUnreadable(this.files.filesIn(sent, end));
+      this.refuse(`${name ?? "A file"} has changed or is gone. Drop the files again.`);
+      return;
+    }
+    if (end < this.state.total) this.next = this.read(end);
+    const began_ms = performance.now();
+    const answer = await this.attempt((signal) =>
+      this.server.sendPiece(this.id, sent, content, signal),
+    );
+    if (this.isOver) return;
+    if (answer === null) {
+      this.lose("");
+      return;
+    }
+    const { status, offset } = answer;
+    if (status === 409 && offset !== null && offset !== sent) this.moveTo(offset);
+    else if (status === 409 || isPassing(status)) this.lose(answer.line);
+    else if (status >= 300) this.refuse(answer.line);
+    else {
+      this.measure(end - sent, (performance.now() - began_ms) / 1000);
+      this.moveTo(offset ?? end);
+    }
+  }
+
+  private read(start: number): Piece {
+    const end = Math.min(this.state.total, start + Math.min(this.pieceBytes, this.mostBytes));
+    const content = this.files.piece(start, end);
+    const isReadable = content.arrayBuffer().then(
+      () => true,
+      () => false,
+    );
+    return { start, end, content, isReadable };
+  }
+
+  /** Waits, and asks where the server has got to. */
+  private async recover(): Promise<void> {
+    await this.wait(this.wait_ms);
+    this.wait_ms = Math.min(MOST_WAIT_MS, 2 * this.wait_ms);
+    const answer = await this.attempt((signal) => this.server.askOffset(this.id, signal));
+    if (answer === null || this.isOver) return;
+    if (answer.offset !== null && answer.status < 300) {
+      this.tell({ doing: "sending", line: "" });
+      this.place(answer.offset);
+    } else if (!isPassing(answer.status)) this.refuse(answer.line || "The upload was deleted.");
+  }
+
+  /** The answer; null: the connection is lost. */
+  private async attempt(
+    request: (signal: AbortSignal) => Promise<PieceAnswer>,
+  ): Promise<PieceAnswer | null> {
+    this.interruption = new AbortController();
+    const either = AbortSignal.any([this.cancelled.signal, this.interruption.signal]);
+    try {
+      return await request(either);
+    } catch {
+      return null;
+    }
+  }
+
+  private async wait(time_ms: number): Promise<void> {
+    this.interruption = new AbortController();
+    const either = AbortSignal.any([this.cancelled.signal, this.interruption.signal]);
+    await new Promise<void>((resolve) => {
+      const timer = setTimeout(resolve, time_ms);
+      either.addEventListener("abort", () => {
+        clearTimeout(timer);
+        resolve();
+      });
+    });
+  }
+
+  private measure(bytes: number, took_s: number): void {
+    const rate = bytes / Math.max(took_s, 1e-3);
+    this.rate = this.rate === null ? rate : this.rate + NEWEST_SHARE * (rate - this.rate);
+    // it grows by at most twice: the first answer says little
+    const wanted = Math.min(rate * PIECE_S, 2 * this.pieceBytes);
+    this.pieceBytes = Math.max(LEAST_BYTES, Math.round(wanted));
+  }
+
+  /** The server has got to there: it answers again. */
+  private moveTo(offset: number): void {
+    this.wait_ms = FIRST_WAIT_MS;
+    this.place(offset);
+  }
+
+  private place(offset: number): void {
+    const sent = Math.min(offset, this.state.total);
+    const left_s = this.rate === null ? null : (this.state.total - sent) / this.rate;
+    this.tell({ sent, left_s });
+  }
+
+  private lose(line: string): void {
+    this.pieceBytes = Math.max(LEAST_BYTES, Math.round(this.pieceBytes / 2));
+    this.tell({ doing: "lost", left_s: null, line });
+  }
+
+  private refuse(line: string): void {
+    this.tell({ doing: "refused", left_s: null, line });
+  }
+
+  private tell(changes: Partial<Progress>): void {
+    if (this.isOver) return;
+    this.state = { ...this.state, ...changes };
+    this.onProgress(this.state);
+  }
+}

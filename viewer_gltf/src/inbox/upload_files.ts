@@ -1,0 +1,75 @@
+/** The files of one upload: one stream of bytes, in the order of their names, and pieces of it. Pure. */
+
+/** A file with its name in the upload: with folders, between slashes. */
+export type NamedFile = Readonly<{ name: string; file: Blob }>;
+
+/** Files that operating systems leave in folders, and that belong to no image. */
+const LEFT_BY_SYSTEM = /^(\.DS_Store|Thumbs\.db|desktop\.ini|\._.*)$/i;
+
+function belongsToImage(name: string): boolean {
+  const parts = name.split("/");
+  return !LEFT_BY_SYSTEM.test(parts[parts.length - 1]) && !parts.includes("__MACOSX");
+}
+
+export class UploadFiles {
+  readonly files: readonly NamedFile[];
+  /** Where each file begins in the stream, and where the last one ends. */
+  private readonly starts: readonly number[];
+
+  /** The order of `files` does not matter: browsers list a folder in any order. */
+  constructor(files: Iterable<NamedFile>) {
+    const kept = [...files].filter(({ name }) => belongsToImage(name));
+    this.files = kept.sort((a, b) => (a.name < b.name ? -1 : 1));
+    let at = 0;
+    this.starts = [0, ...this.files.map(({ file }) => (at += file.size))];
+  }
+
+  get bytes(): number {
+    return this.starts[this.files.length];
+  }
+
+  /** Names and bytes, as the server takes them. */
+  get list(): readonly (readonly [string, number])[] {
+    return this.files.map(({ name, file }) => [name, file.size]);
+  }
+
+  /**
+   * The files that the bytes from `start` to `end` lie in, from the first to before the last. An empty file has no
+   * bytes, so it lies in no piece.
+   */
+  filesIn(start: number, end: number): readonly NamedFile[] {
+    return this.partsIn(start, end).map(({ index }) => this.files[index]);
+  }
+
+  /** The bytes from `start` to `end`, by reference: nothing is read yet. */
+  piece(start: number, end: number): Blob {
+    const parts = this.partsIn(start, end).map(({ index, from, to }) => {
+      const { file } = this.files[index];
+      return from === 0 && to === file.size ? file : file.slice(from, to);
+    });
+    return new Blob(parts);
+  }
+
+  private partsIn(start: number, end: number) {
+    const parts: { index: number; from: number; to: number }[] = [];
+    for (let index = this.fileAt(start); index < this.files.length; index++) {
+      const begin = this.starts[index];
+      if (begin >= end) break;
+      const from = Math.max(0, start - begin);
+      const to = Math.min(this.starts[index + 1], end) - begin;
+      if (to > from) parts.push({ index, from, to });
+    }
+    return parts;
+  }
+
+  /** The last file that begins at or before a byte, by bisection: a folder of OME-Zarr has 100 000 files. */
+  private fileAt(byte: number): number {
+    let [low, high] = [0, this.files.length];
+    while (low + 1 < high) {
+      const middle = (low + high) >> 1;
+      if (this.starts[middle] <= byte) low = middle;
+      else high = middle;
+    }
+    return low;
+  }
+}

@@ -1,0 +1,158 @@
+import { describe, expect, it } from "vitest";
+import { type ActionName, actionsOf } from "./actions";
+import type { Item } from "./inbox_state";
+import type { Progress } from "./upload";
+import { bytesText, deletionWords, refusalOf, shareOf, stateName, wordsOf } from "./words";
+
+const item = (changes: Partial<Item>): Item => ({
+  ...{ id: "a1", title: "Head", doing: "understood", line: "", bytes: 0, total: 0, place: 0 },
+  ...{ share: 0, label: "", tiles: 0, allTiles: 0, left_s: null, page: "" },
+  ...{ hasUpload: true, keepsUpload: false, asksSpacing: false },
+  ...changes,
+});
+const upload = (changes: Partial<Progress>): Progress => ({
+  ...{ doing: "sending", sent: 312e6, total: 1.2e9, left_s: null, line: "" },
+  ...changes,
+});
+const LIMITS = { bytes: 2e9, files: 1000, piece: 8e6, freeBytes: 3e9, hours: 24 };
+const VIEW = "items/a1/view/";
+const UPLOADING = item({ doing: "uploading", bytes: 312e6, total: 1.2e9 });
+
+describe("bytes", () => {
+  it.each([
+    [0, "0 bytes"],
+    [999, "999 bytes"],
+    [1000, "1.0 kB"],
+    [312e6, "312 MB"],
+    [1.24e9, "1.2 GB"],
+    [5e15, "5000 TB"],
+  ])("%d are %s", (bytes, text) => expect(bytesText(bytes)).toBe(text));
+});
+
+describe("the words for an upload of this page", () => {
+  it.each([
+    [{}, "312 MB of 1.2 GB. Keep this page open."],
+    [{ left_s: 41 }, "312 MB of 1.2 GB, about 45 s left. Keep this page open."],
+    [{ doing: "waiting" }, "It waits for the upload before it. 312 MB of 1.2 GB have arrived."],
+    [
+      { doing: "lost" },
+      "The connection is lost. 312 MB of 1.2 GB are safe; the page goes on by itself as soon as it can.",
+    ],
+    [{ doing: "refused", line: "The disk is full." }, "The disk is full."],
+  ] as const)("%o", (changes, words) => {
+    expect(wordsOf(UPLOADING, upload(changes), false, LIMITS)).toBe(words);
+  });
+});
+
+describe("the words for an item", () => {
+  it.each([
+    [
+      UPLOADING,
+      "312 MB of 1.2 GB have arrived. Drop the same files again to go on. An unfinished upload is deleted after 24 hours.",
+    ],
+    [item({ doing: "queued", place: 1 }), "It is built next."],
+    [item({ doing: "queued", place: 2 }), "It is built after 1 other."],
+    [item({ doing: "queued", place: 4 }), "It is built after 3 others."],
+    [
+      item({ doing: "building", label: "units", tiles: 1, allTiles: 4, left_s: 400 }),
+      "Building surfaces: 1 of 4 tiles, about 7 min left.",
+    ],
+    [item({ doing: "building", allTiles: 4 }), "Reading the source."],
+    [item({ doing: "building", label: "stage", tiles: 4, allTiles: 4 }), "Writing the stage."],
+    [
+      item({ doing: "paused", tiles: 1, allTiles: 4 }),
+      "Paused: 1 of 4 tiles. What is finished is kept.",
+    ],
+    [item({ doing: "failed", line: "a.tif: cut off" }), "a.tif: cut off"],
+    [item({ doing: "failed" }), "This can't be read."],
+    [item({ doing: "built" }), "All surfaces are built. The upload is kept."],
+    [item({ doing: "built", hasUpload: false }), "All surfaces are built."],
+  ])("%o", (shown, words) => expect(wordsOf(shown, null, false, LIMITS)).toBe(words));
+
+  it("tell an upload of another page from one that was left", () => {
+    expect(wordsOf(UPLOADING, null, true, LIMITS)).toBe(
+      "312 MB of 1.2 GB have arrived from another page.",
+    );
+    expect(stateName(UPLOADING, null)).toBe("Unfinished");
+    expect(stateName(UPLOADING, upload({ doing: "lost" }))).toBe("No connection");
+  });
+
+  it("go with a share where something is measured", () => {
+    expect(shareOf(UPLOADING, null)).toBeCloseTo(0.26);
+    expect(shareOf(UPLOADING, upload({ sent: 600e6 }))).toBe(0.5);
+    expect(shareOf(item({ doing: "building", share: 0.4 }), null)).toBe(0.4);
+    expect(shareOf(item({}), null)).toBeNull();
+  });
+});
+
+describe("what a person can do", () => {
+  const can = (shown: Item, changes = {}): readonly ActionName[] =>
+    actionsOf(shown, {
+      ...{ upload: null, mayUpload: true, hasHandles: false, isMoving: false, isUnderstood: false },
+      ...changes,
+    }).map(({ name }) => name);
+
+  it.each([
+    [item({ doing: "unpacking" }), ["delete"]],
+    [item({}), ["look", "build", "delete"]],
+    [item({ doing: "queued" }), ["cancel", "delete"]],
+    [item({ doing: "building", page: VIEW }), ["open", "pause", "cancel", "delete"]],
+    [item({ doing: "paused" }), ["continue", "cancel", "delete"]],
+    [item({ doing: "cancelled" }), ["delete"]],
+    [item({ doing: "failed" }), ["delete"]],
+    [item({ doing: "built", page: VIEW }), ["open", "delete"]],
+  ] as const)("%o", (shown, names) => expect(can(shown)).toEqual(names));
+
+  it("depends on what this page and this browser know", () => {
+    expect(can(UPLOADING)).toEqual(["delete"]);
+    expect(can(UPLOADING, { hasHandles: true })).toEqual(["go-on", "delete"]);
+    expect(can(UPLOADING, { hasHandles: true, isMoving: true })).toEqual(["delete"]);
+    expect(can(UPLOADING, { upload: upload({ doing: "lost" }) })).toEqual(["retry", "delete"]);
+    for (const doing of ["failed", "cancelled"] as const) {
+      const names = ["look", "build", "delete"];
+      expect(can(item({ doing }), { isUnderstood: true })).toEqual(names);
+      const asking = item({ doing, asksSpacing: true });
+      expect(can(asking, { isUnderstood: true })).toEqual(["delete"]);
+    }
+  });
+
+  it("is to look, and no more, without the right to upload", () => {
+    for (const doing of ["understood", "building", "built"] as const) {
+      expect(can(item({ doing }), { mayUpload: false })).toEqual([]);
+      expect(can(item({ doing, page: VIEW }), { mayUpload: false })).toEqual(["open"]);
+    }
+  });
+});
+
+describe("before a deletion", () => {
+  it.each([
+    [UPLOADING, "what has arrived of the upload"],
+    [item({ total: 1.2e9 }), "the upload (1.2 GB)"],
+    [item({ total: 1.2e9, page: VIEW }), "the upload (1.2 GB) and the look"],
+    [item({ doing: "building", page: VIEW, hasUpload: false }), "the build, which is stopped"],
+    [
+      item({ doing: "built", total: 1.2e9, page: VIEW }),
+      "the upload (1.2 GB) and the built specimen, with its page",
+    ],
+    [item({ doing: "failed", hasUpload: false }), "the entry in this list"],
+  ])("%o", (shown, what) => {
+    expect(deletionWords(shown)).toBe(
+      `This deletes ${what} from the server. Your own files stay as they are. It can't be undone.`,
+    );
+  });
+});
+
+describe("files that can't be handed in", () => {
+  it.each([
+    [0, 0, /^There is no file in it/],
+    [1001, 10, /1001 files, and this server takes at most 1000/],
+    [3, 2.5e9, /2\.5 GB, and this server takes at most 2\.0 GB/],
+  ])("%d files, %d bytes", (files, bytes, words) => {
+    expect(refusalOf(files, bytes, LIMITS)).toMatch(words);
+  });
+
+  it("are refused before the disk is full, and others are not", () => {
+    expect(refusalOf(1, 1e9, { ...LIMITS, freeBytes: 5e8 })).toMatch(/has 500 MB left/);
+    expect(refusalOf(1000, 2e9, LIMITS)).toBeNull();
+  });
+});
