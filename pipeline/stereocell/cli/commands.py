@@ -139,7 +139,9 @@ def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make_plan(options.input, options.out, wanted, choice=choice, engine=engine)
+    made = phases.make_plan(
+        options.input, options.out, wanted, choice=choice, title=options.title or "", engine=engine
+    )
     return Answer(
         {
             "out": str(options.shown),
@@ -468,4 +470,4 @@ def _show_source(options: argparse.Namespace, run: "Callable[[Live], None]") -> 
     source = str(options.out)
     wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
     behind = None if options.no_build else Behind(build_behind(options, build), options.build_out)
-    show_source(source, wanted, choice, run, behind)
+    show_source(source, wanted, choice, run, behind, title=options.title or "")

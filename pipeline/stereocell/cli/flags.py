@@ -11,15 +11,34 @@ from urllib.parse import unquote
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag
+from stereocell.model.titles import MAX_TITLE
 from stereocell.storage.processes import cores
 
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
     """Declare what is read, and the OUT folder that is written."""
     declare_source(parser)
+    _declare_title(parser)
     parser.add_argument(
         "-o", "--out", type=_place, required=True, help="folder of the results, or s3:// address"
     )
+
+
+def _declare_title(parser: Any) -> None:
+    parser.add_argument(
+        "--title",
+        type=_title,
+        metavar="TEXT",
+        help="name of the specimen in stage and page (default: by the source)",
+    )
+
+
+def _title(text: str) -> str:
+    if not text.strip() or not text.isprintable() or len(text) > MAX_TITLE:
+        raise argparse.ArgumentTypeError(
+            f"{text!r:.40} is no title, expected 1 to {MAX_TITLE} printable characters"
+        )
+    return text.strip()
 
 
 def declare_slices(parser: argparse.ArgumentParser) -> None:
@@ -406,6 +425,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="folder of the build (default: NAME.stereocell here, by the specimen's name)",
     )
+    _declare_title(behind)
     declare_how_to_read(parser)
 
 

@@ -14,17 +14,14 @@ from pathlib import Path
 from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
-from stereocell.live.first_view import read_channels, write_first_view
+from stereocell.live.first_look import FirstLook
 from stereocell.model.errors import OutputError
-from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import print_notes
 from stereocell.planning.settings import Settings
-from stereocell.planning.settle import settle
 from stereocell.read.addresses.resolve import may_know
 from stereocell.read.image import printable
 from stereocell.read.known_formats import find_format
-from stereocell.steps.open_source import open_source
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.contents import contents_of
 from stereocell.storage.kinds import Kind
@@ -80,12 +77,15 @@ def show_source(
     choice: Sequence[str],
     serve: Callable[[Live], None],
     behind: Behind | None,
+    *,
+    title: str = "",
 ) -> None:
     """Serve a source: its first view, which is written meanwhile, and then what is built of it.
 
     choice  notes on how the settings were chosen; see `load_for`
     serve   serves until it is stopped, or until there can be no first view
     behind  how the source is built meanwhile; None: it is only looked at
+    title   the name of the specimen; empty: the one that the source gives it
 
     Raises StereoCellError where the source can't be read. The views are removed at the end.
     """
@@ -93,8 +93,8 @@ def show_source(
     page = viewer_dist()
     if page is None:
         raise OutputError("the viewer is not built: run `make setup`")
-    plan = settle(source, settings, choice)
-    dataset = open_source(as_asked(plan.source, plan.settings.plan))
+    look = FirstLook.at(source, settings, choice, title=title)
+    plan = look.plan
     build = None
     if behind is not None:
         out = default_out(plan) if behind.out is None else behind.out
@@ -108,8 +108,8 @@ def show_source(
 
         def write() -> None:
             try:
-                read = read_channels(plan, dataset)
-                write_first_view(plan, read, live.bundle)
+                read = look.read()
+                look.write(live.bundle)
             except BaseException as error:  # the command raises it
                 first.set_exception(error)
                 return
