@@ -395,6 +395,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "out",
         type=_place,
+        nargs="?",
         metavar="OUT|SOURCE",
         help="folder of a build, or its s3:// address; or a source: all that `build` takes",
     )
@@ -412,6 +413,20 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         metavar="ORIGIN",
         help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
         "given several times",
+    )
+    inbox = parser.add_argument_group("an inbox, without OUT|SOURCE")
+    inbox.add_argument(
+        "--inbox",
+        type=_file,
+        metavar="FOLDER",
+        help="a page on which people hand in files or an address, look, and build; FOLDER keeps "
+        "uploads and builds (docs/inbox.md)",
+    )
+    inbox.add_argument(
+        "--inbox-gb",
+        type=_positive,
+        metavar="GB",
+        help="largest upload, in GB, and what its archive unpacks to (default 50)",
     )
     behind = parser.add_argument_group("a source")
     behind.add_argument(
