@@ -11,6 +11,7 @@ from stereocell.planning.settings import NO_PRESET, preset_names
 DARK, BRIGHT = "dark", "bright"  # the background around structures
 _MAX_CHANNELS = 1000
 _MAX_SERIES = 100_000
+_MAX_UM = 1e7  # um between voxels
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +21,14 @@ class Choices:
     channels    indices of the source's channels, as texts
     series      the number of an image of several, from 1, as a text
     background  `bright` where structures are darker than their surroundings
+    spacing_um  voxel spacing (x, y, z), um, where the files state none or a wrong one
     """
 
     preset: str = ""
     channels: tuple[str, ...] = ()
     series: str = ""
     background: str = ""
+    spacing_um: tuple[float, ...] = ()
     title: str = ""
 
     def settings(self) -> dict[str, Any]:
@@ -37,16 +40,20 @@ class Choices:
             found["series"] = int(self.series)
         if self.background == BRIGHT:
             found["dark"] = True
+        if self.spacing_um:
+            found["spacing_um"] = list(self.spacing_um[::-1])
         return found
 
     def to_json(self) -> dict[str, Any]:
         """Return the choices as plain values."""
-        return {**asdict(self), "channels": list(self.channels)}
+        lists = {"channels": list(self.channels), "spacing_um": list(self.spacing_um)}
+        return {**asdict(self), **lists}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "Choices":
         """Return the choices that `to_json` was given."""
-        return cls(**{**content, "channels": tuple(content["channels"])})
+        lists = {name: tuple(content[name]) for name in ("channels", "spacing_um")}
+        return cls(**{**content, **lists})
 
 
 def parse_choices(content: Any, before: Choices) -> Choices:
@@ -58,6 +65,8 @@ def parse_choices(content: Any, before: Choices) -> Choices:
     for name, value in content.items():
         if name == "channels":
             news[name] = _channels_of(value)
+        elif name == "spacing_um":
+            news[name] = _spacing_of(value)
         elif not isinstance(value, str):
             raise RefusedError(400, f"{name}: expected a text")
     if news.get("preset", "") not in ("", NO_PRESET, *preset_names()):
@@ -84,6 +93,13 @@ def _channels_of(value: Any) -> tuple[str, ...]:
     if len(set(value)) < len(value):
         raise RefusedError(400, "channels: found one twice, expected each once")
     return tuple(value)
+
+
+def _spacing_of(value: Any) -> tuple[float, ...]:
+    is_list = isinstance(value, list) and len(value) in (0, 3)
+    if not is_list or not all(type(one) in (int, float) and 0 < one < _MAX_UM for one in value):
+        raise RefusedError(400, "spacing_um: expected three lengths x, y, z in um, each above 0")
+    return tuple(float(one) for one in value)
 
 
 def _require_number(name: str, text: str, within: range) -> None:

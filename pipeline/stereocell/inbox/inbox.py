@@ -25,6 +25,7 @@ from stereocell.inbox.upload import Announced, Upload, parse_announced
 
 _BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
 _WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
+_ASKS_SPACING = "--spacing-um"  # in the line of files that state no voxel size
 _FREE_STEP = 100_000_000  # bytes: free disk is told in steps, so that it is no news each time
 
 
@@ -124,6 +125,7 @@ class Inbox:
             self._items[item.id] = item
             self.save()
             self.changed.notify_all()
+        self.reader.warm()
         return item, True
 
     def _require_room(self, total: int) -> None:
@@ -145,27 +147,30 @@ class Inbox:
     def piece(self, item: Item, offset: int) -> Iterator[Callable[[bytes], None]]:
         """Yield a function that takes the bytes of one piece, as they come.
 
-        What has come stays, however the piece ends. Raises RefusedError.
+        What has come stays, however the piece ends. A later piece takes over from one whose
+        connection is lost. Raises RefusedError.
         """
         if item.doing != "uploading" or item.upload is None:
             raise RefusedError(409, "nothing more is to be uploaded")
-        if not item.writing.acquire(blocking=False):
-            raise RefusedError(409, "another piece is being uploaded: ask how far it has come")
-        try:
-            upload = item.upload
+        upload, writer = item.upload, object()
+        with item.writing:
             if offset != upload.offset:
                 raise RefusedError(409, f"Upload-Offset: found {offset}, expected {upload.offset}")
+            item.writer = writer
 
-            def write(data: bytes) -> None:
+        def write(data: bytes) -> None:
+            with item.writing:
                 if not self.is_here(item):
                     raise RefusedError(410, "the item was deleted")
+                if item.writer is not writer:
+                    raise RefusedError(409, "the upload goes on by another connection")
                 if len(data) > upload.announced.total - upload.offset:
                     raise RefusedError(413, "more bytes than were announced")
                 upload.write(data)
 
+        try:
             yield write
         finally:
-            item.writing.release()
             self._end_piece(item)
 
     def _end_piece(self, item: Item) -> None:
@@ -306,6 +311,7 @@ def _shown(item: Item, place: int, may_upload: bool) -> dict[str, Any]:
         "title": item.title or item.choices.title,
         "doing": item.doing,
         "line": item.line if may_upload else "",
+        "asks": "spacing_um" if item.doing == "failed" and _ASKS_SPACING in item.line else "",
         "bytes": upload.offset if upload else 0,
         "total": upload.announced.total if upload else 0,
         "place": place,

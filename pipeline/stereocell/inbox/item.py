@@ -52,7 +52,8 @@ class Item:
     queued    place among the builds that wait, smaller ones first; 0: it does not wait
     is_local  whether it was handed in at this machine
     round     counts the choices, so that an answer to older ones is not taken for one to newer
-    writing   held while a piece is written
+    writer    the piece that may write: a later one takes over
+    writing   held while bytes are written
     """
 
     id: str
@@ -70,6 +71,7 @@ class Item:
     live: Live | None = None
     build: BuildProcess | None = None
     round: int = 0
+    writer: object = None
     writing: threading.Lock = field(default_factory=threading.Lock)
 
     @property

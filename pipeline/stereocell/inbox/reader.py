@@ -54,16 +54,23 @@ class Source:
 class Reader:
     """Reads one item. It lives in a process of its own; see `storage.child_process`."""
 
-    def __init__(self, upload: str, is_stranger: bool) -> None:
-        """upload: the folder that alone may hold an identity; is_stranger: use no credentials."""
+    def __init__(self) -> None:
+        self._upload = Path()
+        self._look: FirstLook | None = None
+        self._series: dict[str, list[dict[str, str]]] = {}
+
+    def begin(self, upload: str, is_stranger: bool) -> None:
+        """Turn to an item, once.
+
+        upload       the folder that alone may hold an identity
+        is_stranger  use no credentials of this machine
+        """
         self._upload = Path(upload)
         fetched = self._upload / FETCHED
         fetched.mkdir(exist_ok=True)
         os.environ["TMPDIR"] = tempfile.tempdir = str(fetched)
         if is_stranger:
             forget_credentials()
-        self._look: FirstLook | None = None
-        self._series: dict[str, list[dict[str, str]]] = {}
 
     def arrange(self, limits: InboxLimits) -> str:
         """Return the file or folder to open; see `arrange`."""
@@ -131,6 +138,7 @@ class Reader:
                 }
                 if not dataset.modality
                 else None,
+                "spacing_um": {"value": list(plan.spacing_um[::-1])},
             },
         }
 
