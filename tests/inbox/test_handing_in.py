@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.cli.inbox_build import make_inbox_build
+from stereocell.serve.inbox_protocol import InboxHttp
 from support.dicom_series import grid, write_series
 from support.identity_search import find
 from support.nifti_files import write as write_nifti
@@ -26,7 +27,7 @@ from support.server.inbox_client import (
     files_below,
     serving_inbox,
 )
-from support.server.timeouts import PATIENCE_S
+from support.server.timeouts import PATIENCE_S, connect
 
 PATIENT = "Mustermann"
 
@@ -226,3 +227,21 @@ def test_the_limits_are_those_that_the_page_is_told(client: InboxClient) -> None
     assert client.ask("POST", "/items", {"files": [["a.nii", LIMITS.bytes + 1]]})[0] == 413
     many = [[f"{k}.dcm", 1] for k in range(LIMITS.files + 1)]
     assert client.ask("POST", "/items", {"files": many})[0] == 413
+
+
+def test_a_websocket_stays_open_without_news_and_a_silent_sender_is_cut_off(
+    client: InboxClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(InboxHttp, "body_stall_s", 0.3)
+    item = client.announce([("slow.nii", bytes(1000))])
+    with connect(f"ws://localhost:{client.port}/events") as events:
+        events.recv()
+        with socket.create_connection(("127.0.0.1", client.port), timeout=PATIENCE_S) as stream:
+            head = f"PATCH /items/{item}/bytes HTTP/1.1\r\nHost: localhost\r\nUpload-Offset: 0\r\n"
+            stream.sendall(f"{head}Content-Length: 1000\r\n\r\n".encode() + bytes(400))
+            assert stream.recv(100) == b""
+        assert client.ask("HEAD", f"/items/{item}/bytes")[2]["Upload-Offset"] == "400"
+        assert client.ask("DELETE", f"/items/{item}")[0] == 204
+        ids: list[str] = [item]
+        while item in ids:  # it is told, so that it is open
+            ids = [one["id"] for one in json.loads(events.recv(timeout=PATIENCE_S))["items"]]

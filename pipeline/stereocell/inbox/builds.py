@@ -52,22 +52,25 @@ class Builds:
         inbox.set(item, "building")
         try:
             _require_room(inbox, item)
-            coarse, found, bundle = write_first_look(inbox, item)
+            with item.viewing:
+                coarse, found, bundle = write_first_look(inbox, item)
             source = item.place().place
             build = BuildProcess(
                 self._make(source, found, titled(item), item.out, is_stranger=not item.is_local),
                 item.out,
             )
             with inbox.changed:
-                if item.doing != "building":  # cancelled or deleted meanwhile
-                    return
+                if item.doing not in ("building", "paused") or not inbox.is_here(item):
+                    return  # cancelled or deleted meanwhile
+                if item.doing == "paused":
+                    build.do("pause")
                 item.build = build
                 item.live = live_of(self._page, bundle, len(coarse.plan.tiles), build)
                 self._running = item
             build.start(coarse)
         except Exception as error:  # whatever a reader meets in a stranger's files
             with inbox.changed:
-                if item.doing == "building":
+                if item.doing in ("building", "paused"):
                     item.queued = 0
                     inbox.set(item, "failed", line_of(item, error))
 
@@ -78,6 +81,7 @@ class Builds:
             return
         state = build.state
         if state.doing == "complete":
+            build.close()
             if not item.keep_upload:
                 inbox.remove_upload(item)
             self._end(item)

@@ -54,6 +54,7 @@ class Item:
     round     counts the choices, so that an answer to older ones is not taken for one to newer
     writer    the piece that may write: a later one takes over
     writing   held while bytes are written
+    viewing   held while its first view is written
     """
 
     id: str
@@ -73,6 +74,7 @@ class Item:
     round: int = 0
     writer: object = None
     writing: threading.Lock = field(default_factory=threading.Lock)
+    viewing: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def upload_folder(self) -> Path:

@@ -71,7 +71,7 @@ def titled(item: Item) -> Choices:
 
 
 def write_first_look(inbox: Inbox, item: Item) -> tuple[Coarse, Resolved, Path]:
-    """Write the first view of an item.
+    """Write the first view of an item, whose `viewing` the caller holds.
 
     Returns the inputs of a build behind it, the place that the source was found at, and the folder
     of the view. Raises as the reader does.
@@ -103,16 +103,19 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
     """
     if item.page:
         return item.page
-    if item.doing not in ("understood", "cancelled", "failed", "queued") or not item.title:
+    if item.doing in ("uploading", "unpacking", "understanding") or not item.title:
         raise RefusedError(409, f"it can't be looked at while it is {item.doing}")
     if item.upload is None:
         raise RefusedError(409, "its upload is gone: hand it in again")
-    try:
-        coarse, _, bundle = write_first_look(inbox, item)
-    except StereoCellError as error:
-        raise RefusedError(422, line_of(item, error)) from None
-    with inbox.changed:
-        if inbox.is_here(item) and item.live is None:
-            item.live = live_of(page, bundle, len(coarse.plan.tiles), None)
-            inbox.changed.notify_all()
+    with item.viewing:
+        if item.page:  # another request was first
+            return item.page
+        try:
+            coarse, _, bundle = write_first_look(inbox, item)
+        except StereoCellError as error:
+            raise RefusedError(422, line_of(item, error)) from None
+        with inbox.changed:
+            if inbox.is_here(item):
+                item.live = live_of(page, bundle, len(coarse.plan.tiles), None)
+                inbox.changed.notify_all()
     return item.page

@@ -26,6 +26,7 @@ class InboxHttp(GuardedHttp):
 
     body_stall_s = BODY_STALL_S
     body_s = BODY_S
+    _is_websocket = False
     _body_end: asyncio.TimerHandle | None = None
     _body_last_s = _body_began_s = 0.0
 
@@ -42,6 +43,10 @@ class InboxHttp(GuardedHttp):
         self._end_body()
         super().on_response_complete()
 
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._is_websocket = True  # it has no body, though h11 has not read the end of one
+        super().handle_websocket_upgrade(event)
+
     def _most_bytes(self) -> int:
         method, path = self.scope["method"], self.scope["path"]
         found = (most for name, form, most in _MOST if name == method and form.fullmatch(path))
@@ -49,8 +54,8 @@ class InboxHttp(GuardedHttp):
 
     def _await_body(self) -> None:
         """Watch a body that has begun and not ended."""
-        is_awaited = self.conn.their_state is h11.SEND_BODY and not self.transport.is_closing()
-        if not is_awaited:
+        is_body = self.conn.their_state is h11.SEND_BODY and not self._is_websocket
+        if not is_body or self.transport.is_closing():
             self._end_body()
         elif self._body_end is None:
             self._body_began_s = self.loop.time()

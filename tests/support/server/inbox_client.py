@@ -4,22 +4,23 @@ import http.client
 import json
 import os
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from stereocell.inbox import readers
+from stereocell.inbox import builds, readers
 from stereocell.inbox.choices import Choices
 from stereocell.inbox.limits import InboxLimits
-from stereocell.live.build_process import Build
+from stereocell.live.build_process import Build, BuildProcess, Coarse
 from stereocell.read.addresses.resolved import Resolved
 from stereocell.serve import inbox_server
 from stereocell.serve.inbox_server import InboxServer
 from stereocell.serve.server import LOCALHOST
-from support import fake_build
 from support.server.running import running
 from support.server.timeouts import PATIENCE_S, connect
 from support.small_viewer import write_small_viewer
@@ -47,14 +48,52 @@ LIMITS = InboxLimits(bytes=50_000_000, files=300, items=40, piece=1 << 20, reser
 class FakeBuilds:
     """Makes builds that compute nothing, and records what they are asked for."""
 
-    def __init__(self, build: Any = fake_build.bundled) -> None:
-        self.build, self.asked = build, list[tuple[str, Choices, bool]]()
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Choices, bool]] = []
 
     def __call__(
         self, source: str, found: Resolved, choices: Choices, out: Path, *, is_stranger: bool
     ) -> Build:
         self.asked.append((source, choices, is_stranger))
-        return fake_build.Into(self.build, out)
+        return lambda _: ""
+
+
+class NearBuild(BuildProcess):
+    """A build without a process: it does what it is told, and ends when a test says so."""
+
+    def _start(self, coarse: Coarse | None) -> None:
+        self.out.mkdir(exist_ok=True)
+        with (self.out / "starts").open("a") as starts:
+            starts.write("*")
+        if self.state.doing == "pausing":
+            self._set(doing="paused")
+
+    def _send(self, command: str) -> None:
+        if command == "pause":
+            threading.Timer(0.05, partial(self._set, doing="paused")).start()
+
+    def end(self, line: str = "") -> None:
+        """Leave a bundle of two files, or fail with a line."""
+        if line:
+            self._set(doing="failed", line=line)
+            return
+        (self.out / "bundle").mkdir(exist_ok=True)
+        for name in ("manifest.json", "index.html"):
+            (self.out / "bundle" / name).write_text('"built"')
+        self._set(doing="complete", share=1.0, has_bundle=True)
+
+
+def end_build(server: InboxServer, item: str, line: str = "") -> None:
+    """End the running build of an item, once it runs."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        build = server.inbox.find(item).build
+        is_begun = build is not None and (build.out / "starts").exists()
+        if is_begun and isinstance(build, NearBuild) and build.state.doing == "building":
+            build.end(line)
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"{item} is not built")
 
 
 @contextmanager
@@ -68,7 +107,7 @@ def serving_inbox(
 ) -> Iterator[InboxServer]:
     """Serve an inbox until the block ends; `folder` gets one folder of it, and one of its page.
 
-    is_near  read in the process of the test
+    is_near  read and build in the process of the test
     """
     page = write_small_viewer(folder / "page")
     (page / "inbox.html").write_text("<!doctype html>inbox")
@@ -79,6 +118,7 @@ def serving_inbox(
     with ExitStack() as stack:
         if is_near:
             stack.enter_context(patch.object(readers, "Child", NearReader))
+            stack.enter_context(patch.object(builds, "BuildProcess", NearBuild))
         yield stack.enter_context(running(server))
 
 
