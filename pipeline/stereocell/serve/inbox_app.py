@@ -10,6 +10,7 @@ Each refusal is one line of JSON, {"line": "..."}. The session of a viewer may o
 
 import asyncio
 import json
+import re
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from ipaddress import ip_address
@@ -39,6 +40,7 @@ from stereocell.serve.static_files import BundleFiles
 
 _PAGE = "inbox.html"
 _OFFSET = "Upload-Offset"
+_SLICE = re.compile(r"slices/[xyz]\.png")
 _EACH_S = 0.25  # s between two states
 _MAX_VIEWS = 16  # views whose applications are kept
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
@@ -103,7 +105,7 @@ class InboxApp:
         if not path.startswith("/items"):
             return await self._answer_file(request)
         item = self._find(item_id, request.scope)
-        if is_read and rest.startswith("slices/"):
+        if is_read and _SLICE.fullmatch(rest):
             return await BundleFiles(item.folder, {}).answer(_at(request, f"/{rest}"))
         handler = self._handlers.get((method, rest))
         if handler is None:
