@@ -6,35 +6,32 @@ numbers of planes and channels, the keys of a Zarr group. That much is kept.
 
 import re
 from collections.abc import Sequence
+from functools import cache
 
 from stereocell.inbox.names import Parts, without_shared_folders
+from stereocell.read.foreign_files import FOREIGN
 from stereocell.read.formats.ome_zarr.archive import ZARR_FILES
 from stereocell.read.formats.planes.names import COUNTERS
 from stereocell.read.known_formats import known_formats
 
 NAME = "specimen"
-_IMAGES = re.compile(r".*\.(tiff?|png|jpe?g|bmp)", re.IGNORECASE)
-_OTHER_ENDING = re.compile(r"\.[A-Za-z0-9]{1,8}$")
-_TOKENS = re.compile(r"[A-Za-z]+|[0-9]+|[^A-Za-z0-9]+")
+_IMAGE_ENDINGS = (".ome.tif", ".ome.tiff", ".tif", ".tiff", ".png", ".jpg", ".jpeg", ".bmp")
+_VOXELS = (".raw", ".zraw", ".img", ".vol", ".bin", ".dat")  # data that a header names
+_TOKENS = re.compile(r"[^\W\d_]+|[0-9]+|[/._ -]+|.")
 _GROUP_ENDINGS = (".ome.zarr", ".zarr", ".n5")
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a name, as `.nii.gz`: of a known format, or a short one of any kind."""
+    """Return the ending of a name, as `.nii.gz`, if it is a format's; empty: it could be a name."""
     lower = name.lower()
-    known = sorted(
-        {
-            ending
-            for one in known_formats().values()
-            for ending in (*one.endings, *one.loose_endings)
-            if lower.endswith(ending)
-        },
-        key=len,
-    )
-    if known:
-        return known[-1]
-    found = _OTHER_ENDING.search(name)
-    return found[0].lower() if found else ""
+    return max((one for one in _endings() if lower.endswith(one)), key=len, default="")
+
+
+@cache
+def _endings() -> frozenset[str]:
+    rows = known_formats().values()
+    known = {one for row in rows for one in (*row.endings, *row.packed_endings, *row.loose_endings)}
+    return frozenset(known.union(_IMAGE_ENDINGS, _VOXELS, *(one.endings for one in FOREIGN)))
 
 
 def group_names(names: Sequence[Parts]) -> list[Parts] | None:
@@ -66,7 +63,10 @@ def _below_group(names: Sequence[Parts], own: Sequence[str]) -> list[Parts]:
 
 def are_planes(names: Sequence[Parts]) -> bool:
     """Return whether all files are images of planes that no file lists by their names."""
-    return all(_IMAGES.fullmatch(parts[-1]) and ".ome." not in parts[-1].lower() for parts in names)
+    return all(
+        parts[-1].lower().endswith(_IMAGE_ENDINGS) and ".ome." not in parts[-1].lower()
+        for parts in names
+    )
 
 
 def plane_names(names: Sequence[Parts]) -> list[Parts]:
@@ -90,13 +90,14 @@ def _safe_column(tokens: Sequence[str], index: int, count: int) -> Sequence[str]
     if len(set(tokens)) > 1 or is_ending:
         return tokens
     token = tokens[0]
-    if token.isalpha() and token.isascii() and token.lower() not in COUNTERS:
-        return ["x"] * len(tokens)
-    if token.isdecimal():
-        return ["0"] * len(tokens)
-    kept = "".join(c if c in "/._- " else "_" for c in token) if not token.isalnum() else token
+    if token.isalpha():
+        kept = token if token.lower() in COUNTERS else "x"
+    elif token.isdecimal():
+        kept = "0"
+    else:
+        kept = token if token[0] in "/._ -" else "_"
     return [kept] * len(tokens)
 
 
 def _kind(token: str) -> str:
-    return "n" if token[0].isdecimal() else "a" if token[0].isalnum() and token.isascii() else token
+    return "number" if token.isdecimal() else "word" if token.isalpha() else token
