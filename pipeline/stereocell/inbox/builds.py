@@ -49,8 +49,8 @@ class Builds:
 
     def _start(self, item: Item) -> None:
         inbox = self._inbox
-        inbox.set(item, "building")
         try:
+            inbox.set(item, "building")
             _require_room(inbox, item)
             with item.viewing:
                 coarse, found, bundle = write_first_look(inbox, item)

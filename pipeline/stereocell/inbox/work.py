@@ -2,11 +2,13 @@
 
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from stereocell.inbox.builds import Builds, MakeBuild
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.preparing import prepare
+from stereocell.model.errors import OutputError
 
 _LOOK_S = 0.25  # s between two looks at the running build
 _OLD_S = 60.0  # s between two looks for uploads that have broken off too long ago
@@ -49,7 +51,8 @@ class Work:
                 if not items:
                     inbox.changed.wait(_IDLE_S / 4)
             if items and not self._is_over.is_set():
-                prepare(inbox, items[0])
+                with suppress(OutputError):  # the queue file: it is written at the next change
+                    prepare(inbox, items[0])
                 used_s = time.monotonic()
             elif time.monotonic() - used_s > _IDLE_S:
                 inbox.reader.release()
@@ -57,7 +60,9 @@ class Work:
     def _build(self) -> None:
         next_s = 0.0
         while not self._is_over.wait(_LOOK_S):
-            self._builds.step()
+            with suppress(OutputError):  # likewise
+                self._builds.step()
             if time.monotonic() > next_s:
-                self._inbox.remove_old()
+                with suppress(OutputError):
+                    self._inbox.remove_old()
                 next_s = time.monotonic() + _OLD_S

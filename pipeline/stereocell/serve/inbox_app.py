@@ -305,9 +305,13 @@ async def _content_of(request: Request, default: Any = None) -> Any:
     if not body and default is not None:
         return default
     try:
-        return json.loads(body, parse_constant=_no_number)
+        return await anyio.to_thread.run_sync(_parse, body)
     except (ValueError, RecursionError):
         raise RefusedError(400, "body: expected JSON") from None
+
+
+def _parse(body: bytes) -> Any:
+    return json.loads(body, parse_constant=_no_number)
 
 
 def _no_number(_: str) -> None:

@@ -1,4 +1,4 @@
-"""Serve an inbox: `stereocell serve --inbox FOLDER`.
+"""Serve an inbox: `stereocell serve --inbox`.
 
 On this machine everybody may upload. With `--lan` there are two codes: the sessions of one may
 upload and look, those of the other may look alone.
