@@ -57,6 +57,7 @@ FORMATS: dict[str, tuple[str, str, str]] = {
         "`slices.json`, beside the PNG files that `stereocell slices` writes: "
         "[DICOM and NIfTI](../dicom.md).",
     ),
+    "inbox": ("Inbox", "inbox", "`FOLDER/inbox.json`. See [The inbox](../inbox.md)."),
 }
 _ANCHOR = re.compile(r"#/\$defs/(\w+)")
 _OTHER_SCHEMA = re.compile(r"urn:stereocell:schema:(\w+):1#/([$\w]+)/")

@@ -64,11 +64,13 @@ def make_plan(
     settings: Settings,
     *,
     choice: Sequence[str] = (),
+    title: str = "",
     engine: Engine | None = None,
 ) -> Plan:
     """Write OUT/plan.json and the settings used (TOML). The same plan again changes nothing.
 
     choice  notes on how the settings were chosen; see `load_for`
+    title   the name of the specimen; empty: the one that the source gives it
     engine  the workers of all other phases, where these follow at once: before anything is written,
             a cluster is joined, and the places of the phases are guarded; None: the plan alone
 
@@ -80,7 +82,7 @@ def make_plan(
     with phase_of(out_folder, "plan") as phase:
         if engine is not None:
             require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
-        plan = settle(source, settings, choice)
+        plan = settle(source, settings, choice, title=title)
         plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
         out_folder.require_writable()

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _main(words: Sequence[str]) -> int:
     options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
     try:
-        options = _parser(words).parse_args(prepared(words))
+        options = parse(words)
         with answering_sigterm():
             return _run(options)
     except (StereoCellError, MemoryError, RuntimeError, ImportError, OSError) as error:
@@ -84,6 +84,11 @@ def _line_of(options: argparse.Namespace, error: Exception) -> str:
     raise error
 
 
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """Return the arguments of a command. Raises UsageError."""
+    return _parser(words).parse_args(prepared(words))
+
+
 def run_to_line(options: argparse.Namespace) -> str:
     """Run a command behind another one, and return the line of its error; empty: it went well.
 
@@ -115,6 +120,8 @@ def _run(options: argparse.Namespace) -> int:
     """Run a command; one that writes into OUT locks it: storage/lock.py, workspace.py."""
     out, name = getattr(options, "out", None), options.command
     options.shown, options.is_source = out, False
+    if name in SHOWERS and commands.is_inbox(options):
+        return commands.answer(options, commands.serve_inbox(options))
     if name in SHOWERS:
         from stereocell.live.show_source import is_source
 

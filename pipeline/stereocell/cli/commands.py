@@ -139,7 +139,9 @@ def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
 
     flags = flags_of(options)
     wanted, choice = load_for(options.input, options.preset, options.config, flags=flags)
-    made = phases.make_plan(options.input, options.out, wanted, choice=choice, engine=engine)
+    made = phases.make_plan(
+        options.input, options.out, wanted, choice=choice, title=options.title or "", engine=engine
+    )
     return Answer(
         {
             "out": str(options.shown),
@@ -445,14 +447,64 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     return Answer()
 
 
-def _require_no_source_flags(options: argparse.Namespace) -> None:
-    """Raise UsageError for flags that say how a source is read, where a build is shown."""
+def is_inbox(options: argparse.Namespace) -> bool:
+    """Return whether an inbox is served. Raises UsageError where not one thing is named."""
+    if options.inbox is None:
+        if options.out is None:
+            raise UsageError(
+                f"`stereocell {options.command}` needs OUT, a source, or --inbox FOLDER"
+            )
+        if options.inbox_gb is not None:
+            raise UsageError("--inbox-gb is for an inbox: expected --inbox FOLDER with it")
+        return False
+    if options.out is not None:
+        raise UsageError(f"found --inbox and {options.out}, expected one of them")
+    given = _source_flags(options)
+    if given or options.allow_frame:
+        first = [*given, "--allow-frame"][0]
+        raise UsageError(f"{first} is not for an inbox: leave it out; people choose in the page")
+    return True
+
+
+def serve_inbox(options: argparse.Namespace) -> Answer:
+    """Serve an inbox."""
+    from stereocell.cli.inbox_build import make_inbox_build
+    from stereocell.inbox.limits import UPLOAD_BYTES, InboxLimits
+    from stereocell.serve.inbox_server import serve_inbox as run
+
+    gb = options.inbox_gb
+    limits = InboxLimits(bytes=UPLOAD_BYTES if gb is None else round(gb * 1e9))
+    may_open = options.command == "view" and not (options.no_browser or options.lan)
+    try:
+        run(
+            options.inbox,
+            limits,
+            make_inbox_build,
+            port=options.port,
+            lan=options.lan,
+            open_browser=may_open,
+            for_program=options.json,
+        )
+    except BrokenPipeError as error:  # the reader of the address has gone
+        raise StdoutLost(error) from error
+    return Answer()
+
+
+def _source_flags(options: argparse.Namespace) -> list[str]:
+    """Return the flags that were given and that say how a source is read and built."""
     given = given_flags(options)
     if options.no_build:
         given.append("--no-build")
     if options.build_out is not None:
         given.append("--out")
-    if given:
+    if options.title:
+        given.append("--title")
+    return given
+
+
+def _require_no_source_flags(options: argparse.Namespace) -> None:
+    """Raise UsageError for flags that say how a source is read, where a build is shown."""
+    if given := _source_flags(options):
         raise UsageError(
             f"{given[0]} says how a source is read, and {options.shown} is a build: leave it out, "
             "or name the source"
@@ -468,4 +520,4 @@ def _show_source(options: argparse.Namespace, run: "Callable[[Live], None]") -> 
     source = str(options.out)
     wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
     behind = None if options.no_build else Behind(build_behind(options, build), options.build_out)
-    show_source(source, wanted, choice, run, behind)
+    show_source(source, wanted, choice, run, behind, title=options.title or "")

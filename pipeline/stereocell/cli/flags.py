@@ -11,15 +11,34 @@ from urllib.parse import unquote
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import AUTO, Flag
+from stereocell.model.titles import MAX_TITLE
 from stereocell.storage.processes import cores
 
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
     """Declare what is read, and the OUT folder that is written."""
     declare_source(parser)
+    _declare_title(parser)
     parser.add_argument(
         "-o", "--out", type=_place, required=True, help="folder of the results, or s3:// address"
     )
+
+
+def _declare_title(parser: Any) -> None:
+    parser.add_argument(
+        "--title",
+        type=_title,
+        metavar="TEXT",
+        help="name of the specimen in stage and page (default: by the source)",
+    )
+
+
+def _title(text: str) -> str:
+    if not text.strip() or not text.isprintable() or len(text) > MAX_TITLE:
+        raise argparse.ArgumentTypeError(
+            f"{text!r:.40} is no title, expected 1 to {MAX_TITLE} printable characters"
+        )
+    return text.strip()
 
 
 def declare_slices(parser: argparse.ArgumentParser) -> None:
@@ -376,6 +395,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "out",
         type=_place,
+        nargs="?",
         metavar="OUT|SOURCE",
         help="folder of a build, or its s3:// address; or a source: all that `build` takes",
     )
@@ -394,6 +414,20 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
         "given several times",
     )
+    inbox = parser.add_argument_group("an inbox, without OUT|SOURCE")
+    inbox.add_argument(
+        "--inbox",
+        type=_file,
+        metavar="FOLDER",
+        help="a page on which people hand in files or an address, look, and build; FOLDER keeps "
+        "uploads and builds (docs/inbox.md)",
+    )
+    inbox.add_argument(
+        "--inbox-gb",
+        type=_positive,
+        metavar="GB",
+        help="largest upload, in GB, and what its archive unpacks to (default 50)",
+    )
     behind = parser.add_argument_group("a source")
     behind.add_argument(
         "--no-build", action="store_true", help="only look: don't build the source behind the page"
@@ -406,6 +440,7 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="folder of the build (default: NAME.stereocell here, by the specimen's name)",
     )
+    _declare_title(behind)
     declare_how_to_read(parser)
 
 

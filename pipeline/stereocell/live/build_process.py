@@ -188,6 +188,7 @@ class BuildProcess:
         with self._asked:
             self._is_closed = True
             self._stop()
+            self._coarse = None  # megabytes
 
     def _stop(self) -> None:
         process = self._process

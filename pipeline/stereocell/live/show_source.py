@@ -15,18 +15,15 @@ from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
 from stereocell.live.fine_tiles import FineTiles
-from stereocell.live.first_view import read_channels, write_first_view
+from stereocell.live.first_look import FirstLook
 from stereocell.live.reading import Reading
 from stereocell.model.errors import OutputError
-from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import print_notes
 from stereocell.planning.settings import Settings
-from stereocell.planning.settle import settle
 from stereocell.read.addresses.resolve import may_know
 from stereocell.read.image import printable
 from stereocell.read.known_formats import find_format
-from stereocell.steps.open_source import open_source
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.contents import contents_of
 from stereocell.storage.kinds import Kind
@@ -62,18 +59,20 @@ class Behind:
 class Live:
     """A source that is shown.
 
-    page    the folder of the viewer
-    bundle  the folder of the first view, once `first` has a result
-    first   done once the first view is written; its error is why that can't be
-    fine    the tiles that are looked at, read from the source
+    page     the folder of the viewer
+    bundle   the folder of the first view, once `first` has a result
+    first    done once the first view is written; its error is why that can't be
+    tiles    how many there are
+    fine     the tiles that are looked at, read from the source; None: the views stay coarse
+    build    the build behind the view; None: it is only looked at
     reading  how much has been read for the first view
-    build   the build behind the view; None: it is only looked at
     """
 
     page: Path
     bundle: Path
     first: Future[None]
-    fine: FineTiles
+    tiles: int
+    fine: FineTiles | None
     build: BuildProcess | None
     reading: Reading
 
@@ -84,12 +83,15 @@ def show_source(
     choice: Sequence[str],
     serve: Callable[[Live], None],
     behind: Behind | None,
+    *,
+    title: str = "",
 ) -> None:
     """Serve a source: its first view, which is written meanwhile, and then what is built of it.
 
     choice  notes on how the settings were chosen; see `load_for`
     serve   serves until it is stopped, or until there can be no first view
     behind  how the source is built meanwhile; None: it is only looked at
+    title   the name of the specimen; empty: the one that the source gives it
 
     Raises StereoCellError where the source can't be read. The views are removed at the end.
     """
@@ -99,8 +101,8 @@ def show_source(
         raise OutputError("the viewer is not built: run `make setup`")
     if not Location.of(source).is_local:
         _print(f"reading {printable(source)}")  # an answer may take a while
-    plan = settle(source, settings, choice)
-    dataset = open_source(as_asked(plan.source, plan.settings.plan))
+    look = FirstLook.at(source, settings, choice, title=title)
+    plan = look.plan
     build = None
     if behind is not None:
         out = default_out(plan) if behind.out is None else behind.out
@@ -110,14 +112,14 @@ def show_source(
         print_notes(plan)  # a build prints them itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
-        fine = FineTiles(plan, dataset)
-        live = Live(page, scratch / "bundle", first, fine, build, Reading(_print))
+        fine = FineTiles(plan, look.dataset)
+        live = Live(page, scratch / "bundle", first, len(plan.tiles), fine, build, Reading(_print))
 
         def write() -> None:
             try:
-                read = read_channels(plan, dataset, live.reading.add)
+                read = look.read(live.reading.add)
                 sizes = fine.sizes()
-                write_first_view(plan, read, live.bundle, sizes)
+                look.write(live.bundle, sizes)
             except BaseException as error:  # the command raises it
                 first.set_exception(error)
                 return

@@ -25,6 +25,7 @@ from stereocell.planning.plan_notes import (
 )
 from stereocell.planning.settings import INTENSITY, Settings
 from stereocell.read.addresses.resolve import resolve
+from stereocell.read.image import printable
 from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import CAST
 from stereocell.textures.map_packages import (
@@ -32,10 +33,11 @@ from stereocell.textures.map_packages import (
 )
 
 
-def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
+def settle(source: str, settings: Settings, choice: Sequence[str] = (), *, title: str = "") -> Plan:
     """Return the plan of a build, with its notes. Nothing is written or printed.
 
     choice  notes on how the settings were chosen; see `load_for`
+    title   the name of the specimen; empty: the one that the source gives it
 
     Raises StereoCellError where the source can't be read, or the settings don't fit it.
     """
@@ -80,7 +82,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = ()) -> Plan:
     origin = dataset.levels[level[0]].origin_um
     plan = make_plan(
         location,
-        dataset.name,
+        printable(title) or dataset.name,
         fingerprint=dataset.fingerprint,
         levels=dataset.levels,
         origin_um=origin,

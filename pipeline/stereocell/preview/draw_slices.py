@@ -40,7 +40,7 @@ _SHOWN_PX = 330  # pixels, width of display for which lines and text have weight
 class Slice:
     """One plane through a unit, as the picture has it: rows downwards, columns to the right.
 
-    grey        uint8 (rows, columns), windowed
+    grey        uint8 (rows, columns), windowed; or with colours, (rows, columns, 3)
     spacing_um  (row, column), um
     outline     float64 (n, 2, 2): n line segments between two points (row, column), in voxels
     above       float32 (rows, columns): field minus iso-value, or None without an iso-value
@@ -166,6 +166,20 @@ def paint_slices(
             _write_ends(draw, part.view.ends, corner, (columns, rows), weight)
     if min(down, right) >= 60 * weight:
         _scale_bar(draw, (right, down), scale, weight)
+    return picture
+
+
+def paint_slice(part: Slice, longest_px: int) -> Image.Image:
+    """Return a picture of one slice, whose longest side has `longest_px`, with a scale bar."""
+    scale = longest_px / max(_extent(part))
+    rows, columns = (max(2, round(um * scale)) for um in _extent(part))
+    weight = max(1.0, longest_px / _SHOWN_PX)
+    picture = _panel(part, (columns, rows), weight)
+    draw = ImageDraw.Draw(picture)
+    if min(rows, columns) >= 60 * weight:
+        _write(draw, (4, 2), part.view.name, weight)
+        _write_ends(draw, part.view.ends, (0, 0), (columns, rows), weight)
+        _scale_bar(draw, (columns, rows), scale, weight)
     return picture
 
 

@@ -30,6 +30,9 @@ COOKIE = "__Host-stereocell"
 _ATTRIBUTES = "Path=/; Secure; HttpOnly; SameSite=Lax"
 
 
+MAY_UPLOAD = "may_upload"  # in the state of a request: whether its client may hand things in
+
+
 class Gate:
     """Tokens and sessions of a server on the LAN. They end with the process."""
 
@@ -63,14 +66,21 @@ class Access:
     """
 
     def __init__(
-        self, app: ASGIApp, names: Collection[str], gate: Gate | None, frames: Collection[str] = ()
+        self,
+        app: ASGIApp,
+        names: Collection[str],
+        gate: Gate | None,
+        frames: Collection[str] = (),
+        uploaders: Gate | None = None,
     ) -> None:
         """Wrap an application.
 
-        names   hosts that this server answers to, in lower case
-        gate    None on localhost
-        frames  origins whose pages may hold the viewer in a frame
+        names      hosts that this server answers to, in lower case
+        gate       None on localhost
+        frames     origins whose pages may hold the viewer in a frame
+        uploaders  the gate whose sessions may upload, too; None: on localhost all clients may
         """
+        self._uploaders = uploaders
         self._app = app
         self._frames = tuple(frames)
         self._names = frozenset(names)
@@ -101,20 +111,34 @@ class Access:
         host = headers.get("host", "").lower()
         if _name(host) not in self._names:
             return PlainTextResponse("this server answers to its own names only", 403)
-        if not (_is_own_origin(headers, host) and _is_own_fetch(headers, bool(self._frames))):
+        is_read = scope["type"] == "websocket" or scope["method"] in ("GET", "HEAD")
+        is_own = _is_own_fetch(headers, bool(self._frames), is_read=is_read)
+        if not (_is_own_origin(headers, host) and is_own):
             return PlainTextResponse("pages of other origins may not ask this server", 403)
-        return None if self._gate is None else self._judge_session(scope, headers, self._gate)
+        rights = scope.setdefault("state", {})
+        rights[MAY_UPLOAD] = self._gate is None
+        if self._gate is None:
+            return None
+        uploader = self._uploaders is not None and self._uploaders.knows(_cookie(headers))
+        rights[MAY_UPLOAD] = uploader
+        return self._judge_session(scope, headers, self._gate, is_uploader=uploader)
 
-    def _judge_session(self, scope: Scope, headers: Headers, gate: Gate) -> Response | None:
+    def _judge_session(
+        self, scope: Scope, headers: Headers, gate: Gate, *, is_uploader: bool
+    ) -> Response | None:
         tokens = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
-        is_known = gate.knows(_cookie(headers))
+        is_known = gate.knows(_cookie(headers)) or is_uploader
         if not tokens:
             return None if is_known else _no_session()
         if scope["type"] != "http" or scope["method"] != "GET":  # a HEAD is a preview, not a visit
             return _no_session()
-        if is_known:
+        if is_uploader or (is_known and self._uploaders is None):
             return redirect(scope["path"])
-        session = gate.exchange(tokens[0])
+        session = None if self._uploaders is None else self._uploaders.exchange(tokens[0])
+        if session is None and is_known:
+            return redirect(scope["path"])
+        if session is None:
+            session = gate.exchange(tokens[0])
         if session is None:
             return _no_session()
         answer = redirect(scope["path"])
@@ -129,13 +153,16 @@ def _is_own_origin(headers: Headers, host: str) -> bool:
         return False
 
 
-def _is_own_fetch(headers: Headers, may_be_framed: bool) -> bool:
+def _is_own_fetch(headers: Headers, may_be_framed: bool, *, is_read: bool) -> bool:
     """Return whether the request comes from this server's page, a person or no browser.
 
     may_be_framed  a frame of another page may ask, too: the browser then asks the page's policy
+    is_read        it changes nothing: a form of another page may not send what does
     """
     if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
         return True
+    if not is_read:
+        return False
     goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
     a_link = ("navigate", "document")  # on a page or in a chat
     return goes == a_link or (may_be_framed and goes == ("navigate", "iframe"))

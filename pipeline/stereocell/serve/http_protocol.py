@@ -1,7 +1,8 @@
 """The subset of HTTP that a bundle needs; all other requests are refused before processing.
 
 uvicorn passes every request to the application, and closes those that it can't parse with 400. Here
-a request has no body (413; without one no second request can be smuggled in), one plain path, and a
+a request has no body (413; without one no second request can be smuggled in; an inbox alone takes
+bodies: inbox_protocol.py), one plain path, and a
 head of limited size; a client has a limited number of connections and requests. A refused client
 may continue to send for LINGER_S: if the socket closed at once, the client's system would discard
 the answer.
@@ -32,6 +33,7 @@ from stereocell.serve.limits import (
 
 _LINE_BYTES = 8 << 10  # bytes of a header; the websockets library accepts no longer one
 _VERSIONS = ("1.0", "1.1")
+_LENGTH_DIGITS = 18  # of a Content-Length
 
 
 class State(ServerState):
@@ -137,10 +139,23 @@ class GuardedHttp(HeadDeadline):
         if {b"content-length", b"transfer-encoding"} <= names:
             raise _RefusedError(400, "both Content-Length and Transfer-Encoding")
         length = next((value for name, value in headers if name == b"content-length"), b"0")
-        if b"transfer-encoding" in names or length.strip(b"0"):
+        if most := self._most_bytes():
+            self._judge_body(length, most, is_chunked=b"transfer-encoding" in names)
+        elif b"transfer-encoding" in names or length.strip(b"0"):
             raise _RefusedError(413, "this server takes no bodies")
         if b"upgrade" in names and scope["method"] != "GET":
             raise _RefusedError(405, "websockets begin with GET")
+
+    def _most_bytes(self) -> int:
+        """Return the largest body that the request may have; 0: none."""
+        return 0
+
+    def _judge_body(self, length: bytes, most: int, *, is_chunked: bool) -> None:
+        if is_chunked:
+            raise _RefusedError(411, "expected a Content-Length")
+        # h11 accepts digits alone
+        if len(length) > _LENGTH_DIGITS or int(length) > most:
+            raise _RefusedError(413, f"a body of more than {most} bytes")
 
     def send_400_response(self, msg: str) -> None:
         """Answer a request that can't be parsed; called where h11's error is handled.

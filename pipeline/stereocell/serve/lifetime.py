@@ -66,7 +66,9 @@ class Lifetime(uvicorn.Server):
             yield
 
     def _make_http(self) -> GuardedHttp:
-        return GuardedHttp(self.config, self.server_state, self.lifespan.state)
+        kind = self.config.http_protocol_class
+        assert issubclass(kind, GuardedHttp)
+        return kind(self.config, self.server_state, self.lifespan.state)
 
     def _shake(self, transport: asyncio.Transport) -> None:
         """Begin TLS on a new connection, which counts from now on."""

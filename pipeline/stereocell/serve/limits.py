@@ -32,6 +32,12 @@ HEAD_S = 10.0  # s for the head of an HTTP request, and before it for the TLS ha
 STALL_S = 60.0  # longest time in which no byte of an answer is sent
 LINGER_S = 1.0  # time in which a refused client may still send, so that it reads the answer
 
+# Bodies of requests to an inbox
+LIST_BYTES = 16 << 20  # bytes of the list of files that is announced
+SMALL_BYTES = 64 << 10  # bytes of any other body of JSON
+BODY_STALL_S = 30.0  # s without a byte of a body
+BODY_S = 300.0  # s for a whole body
+
 # A client, identified by its address: one for this machine, one for all behind the same router
 CONNECTIONS = 400  # sockets of all clients: each may open a file; 1024 descriptors are usual
 CLIENT_CONNECTIONS = 200  # connections of one client

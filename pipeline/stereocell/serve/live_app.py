@@ -57,7 +57,7 @@ class LiveApp:
         """built: returns the application that serves a whole bundle."""
         self._live, self._build, self._make_built = live, live.build, built
         self._built: ASGIApp | None = None
-        self._bricks = LiveBricks(live.fine, live.bundle.parent)
+        self._bricks = None if live.fine is None else LiveBricks(live.fine, live.bundle.parent)
         self._endpoint = BrickEndpoint()
         self._sockets = 0
 
@@ -90,13 +90,16 @@ class LiveApp:
         """Talk to one client that asks for the bricks of a view."""
         folder = self._folder_of(socket.scope)
         path = "/bricks" if folder is None else f"/{_first_of(socket.scope['path'])}/bricks"
-        if socket.scope["path"] != path or not self._live.first.done():
+        library = self._library(folder)
+        if socket.scope["path"] != path or not self._live.first.done() or library is None:
             await socket.close()
             return
-        await self._endpoint.talk(socket, self._library(folder))
+        await self._endpoint.talk(socket, library)
 
-    def _library(self, folder: Path | None) -> BrickLibrary:
-        """Return the bricks of a later view, or of the first one."""
+    def _library(self, folder: Path | None) -> BrickLibrary | None:
+        """Return the bricks of a later view, or of the first one; None: views stay coarse."""
+        if self._bricks is None:
+            return None
         if folder is None or self._build is None:
             return self._bricks.library(self._live.bundle, {})
         return self._bricks.library(folder, self._build.holders)
@@ -140,7 +143,8 @@ class LiveApp:
                 await asyncio.shield(asyncio.wrap_future(self._live.first))
             except StereoCellError:  # the command reports it, and ends
                 return PlainTextResponse("the source can't be shown: see the terminal", 503)
-        if path == MANIFEST and self._library(folder).has_finer():
+        library = self._library(folder) if path == MANIFEST else None
+        if library is not None and library.has_finer():
             headers = headers | bricks_header("" if folder is None else f"{folder.name}/")
         return await BundleFiles(folder or self._live.bundle, headers).answer(request)
 
@@ -160,7 +164,7 @@ class LiveApp:
         sent = ""
         try:
             while True:
-                about = {"all_tiles": len(self._live.fine.plan.tiles), "may_control": may_control}
+                about = {"all_tiles": self._live.tiles, "may_control": may_control}
                 text = json.dumps({**asdict(build.state), **about})
                 if text != sent:
                     await socket.send_text(text)

@@ -16,30 +16,25 @@ import socket
 import ssl
 import sys
 import webbrowser
-from collections.abc import AsyncIterator
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from contextlib import asynccontextmanager, suppress
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
 
 import uvicorn
-from starlette.applications import Starlette
-from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp
 
 from stereocell.bundle.manifest import MANIFEST, read_manifest
 from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
-from stereocell.serve.access import Access, Gate
+from stereocell.serve.access import Gate
 from stereocell.serve.brick_library import BrickLibrary
-from stereocell.serve.brick_session import BrickEndpoint
+from stereocell.serve.bundle_app import make_app
 from stereocell.serve.http_protocol import GuardedHttp
 from stereocell.serve.lan import draw_qr, explain, find_addresses, find_names, make_certificate
 from stereocell.serve.lifetime import Lifetime
 from stereocell.serve.limits import MESSAGE_BYTES, STOP_S
-from stereocell.serve.live_app import LiveApp
-from stereocell.serve.measured_values import VALUES_HEADER, MeasuredValues
-from stereocell.serve.static_files import BundleFiles, ShrunkError, bricks_header
+from stereocell.serve.static_files import ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
@@ -72,6 +67,16 @@ def serve(
     if (bundle / MANIFEST).is_file():
         read_manifest(bundle)  # raises where it was changed
     server = BundleServer(out, port, lan, for_program, frames, live)
+    if live is not None:
+        live.first.add_done_callback(lambda first: _stop_after(first, server))
+    run_until_stopped(server, open_browser=open_browser)
+
+
+def run_until_stopped(server: "Server", *, open_browser: bool) -> None:
+    """Introduce a server and run it until Ctrl+C or SIGTERM.
+
+    Raises KeyboardInterrupt at a second Ctrl+C.
+    """
     # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
@@ -79,68 +84,12 @@ def serve(
         server.invite()
         if open_browser:
             webbrowser.open(server.address)
-        if live is not None:
-            live.first.add_done_callback(lambda first: _stop_after(first, server))
         with suppress(KeyboardInterrupt):
             server.run()
     finally:
         signal.signal(signal.SIGTERM, before)
     if server.was_forced:
         raise KeyboardInterrupt
-
-
-def make_app(
-    bundle: Path,
-    library: BrickLibrary | None,
-    stage: Path | None,
-    *,
-    names: tuple[str, ...],
-    gate: Gate | None,
-    frames: tuple[str, ...] = (),
-    live: Live | None = None,
-) -> ASGIApp:
-    """Return the application: the bundle's files, `/bricks` and `/values`.
-
-    library  of the bundle; None: there is no `/bricks`
-    stage    the folder of the stage beside the bundle in OUT; None: there is no `/values`
-    names    the hosts that it answers to, in lower case
-    gate     tokens and sessions on the LAN; None: all clients of this machine have access
-    frames   origins whose pages may hold the viewer in a frame
-    live     see `serve`
-    """
-    if live is None:
-        return Access(_bundle_app(bundle, library, stage), names, gate, frames)
-
-    def built(bundle: Path) -> ASGIApp:
-        out = bundle.parent
-        return _bundle_app(bundle, BrickLibrary(bundle, out / "bricks"), out / "stage")
-
-    return Access(LiveApp(live, built), names, gate, frames)
-
-
-def _bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) -> ASGIApp:
-    """Return the application without its checks of access; see `make_app`."""
-    values = None if library is None or stage is None else MeasuredValues(library, stage)
-    endpoint = None if library is None else BrickEndpoint()
-    announced = ({} if endpoint is None else bricks_header()) | (
-        {} if values is None else VALUES_HEADER
-    )
-    files = BundleFiles(bundle, announced)
-
-    @asynccontextmanager
-    async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        yield
-        if endpoint is not None:
-            endpoint.close()
-
-    routes: list[BaseRoute] = [Route("/{path:path}", files.answer, methods=["GET"])]
-    if library is not None and endpoint is not None:
-        routes.insert(0, WebSocketRoute("/bricks", partial(endpoint.talk, library=library)))
-    if values is not None:
-        routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
-    app = Starlette(routes=routes, lifespan=lifespan)
-    app.router.redirect_slashes = False  # paths with a line break match no route
-    return app
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:
@@ -157,31 +106,26 @@ def _places(out: Path) -> tuple[Path, Path | None]:
     return out, None
 
 
-class BundleServer:
+MakeApp = Callable[[tuple[str, ...], Gate | None], ASGIApp]
+
+
+class Server:
     """A bound server: `address` is where it listens; run() until stop()."""
 
     def __init__(
         self,
-        out: Path,
         port: int,
         lan: bool,
+        make: MakeApp,
+        *,
         for_program: bool = False,
-        frames: tuple[str, ...] = (),
-        live: Live | None = None,
+        http: type[GuardedHttp] = GuardedHttp,
     ) -> None:
-        """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
-        bundle, bricks = _places(out) if live is None else (live.bundle, None)
-        library = stage = None
-        if bricks is not None:
-            library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
-        self.bundle, self.has_bricks = bundle, bricks is not None
-        self.for_program, self.is_live = for_program, live is not None
-        for name in (MANIFEST, "index.html"):
-            if live is None and not (bundle / name).is_file():
-                raise StereoCellError(
-                    f"{bundle / name}: expected a built bundle, found no such file; "
-                    "`stereocell bundle OUT` writes it"
-                )
+        """make: returns the application for the server's names and its gate on the LAN.
+
+        Raises StereoCellError where the port is taken, or there is no network.
+        """
+        self.for_program = for_program
         names: tuple[str, ...] = _OWN_NAMES
         self.gate: Gate | None = None
         self.fingerprint = ""
@@ -197,12 +141,12 @@ class BundleServer:
         self.port: int = self._socket.getsockname()[1]
         self.address = f"{scheme}://{host}:{self.port}/"
         config = uvicorn.Config(
-            make_app(bundle, library, stage, names=names, gate=self.gate, frames=frames, live=live),
+            make(names, self.gate),
             log_config=None,
             log_level="error",
             access_log=False,
             server_header=False,
-            http=GuardedHttp,
+            http=http,
             ws=GuardedSocket,
             ws_max_size=MESSAGE_BYTES,
             ws_per_message_deflate=False,  # bricks are compressed already
@@ -221,28 +165,29 @@ class BundleServer:
         return self._server.force_exit
 
     def introduce(self) -> None:
-        """Print the address, and the bundle's path."""
+        """Print the address, and what lies there."""
+        self.introduce_as("what is served", {})
+
+    def introduce_as(self, shown: str, about: Mapping[str, object]) -> None:
+        """Print the address with these words, or for a program with these values."""
         if self.for_program:
-            about = {"bundle": str(self.bundle), "bricks": self.has_bricks}
-            _print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
-            return
-        shown = str(self.bundle)
-        if self.is_live:
-            shown = "the first view, and what is built of it"
-        elif not self.has_bricks:
-            shown += " (a bundle by itself: its volumes come whole)"
-        print(f"{self.address} shows {shown}; Ctrl+C ends it", flush=True)
+            print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
+        else:
+            print(f"{self.address} shows {shown}; Ctrl+C ends it", flush=True)
 
     def invite(self) -> None:
         """Print the QR code for the next device on the LAN, and an explanation of its warning."""
-        if self.gate is None:
-            return
-        invitation = f"{self.address}?token={self.gate.token}"
+        if self.gate is not None:
+            self.invite_by(self.gate, "", {})
+
+    def invite_by(self, gate: Gate, title: str, about: Mapping[str, object]) -> None:
+        """Print the QR code of a gate under a title, or for a program with these values."""
+        invitation = f"{self.address}?token={gate.token}"
         if self.for_program:
-            _print_json({"invitation": invitation})
+            print_json({"invitation": invitation, **about})
             return
         code = draw_qr(invitation, encoding=sys.stdout.encoding or "utf-8")
-        print(explain(self.address, self.fingerprint, code), flush=True)
+        print(title + explain(self.address, self.fingerprint, code), flush=True)
 
     def _tell_wait(self, transfers: int) -> None:
         print(
@@ -264,13 +209,57 @@ class BundleServer:
         self._server.should_exit = True
 
 
+class BundleServer(Server):
+    """A server of a bundle, or of the views of a source while it is built."""
+
+    def __init__(
+        self,
+        out: Path,
+        port: int,
+        lan: bool,
+        for_program: bool = False,
+        frames: tuple[str, ...] = (),
+        live: Live | None = None,
+    ) -> None:
+        """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
+        bundle, bricks = _places(out) if live is None else (live.bundle, None)
+        library = stage = None
+        if bricks is not None:
+            library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
+        self.bundle, self.has_bricks = bundle, bricks is not None
+        self.is_live = live is not None
+        for name in (MANIFEST, "index.html"):
+            if live is None and not (bundle / name).is_file():
+                raise StereoCellError(
+                    f"{bundle / name}: expected a built bundle, found no such file; "
+                    "`stereocell bundle OUT` writes it"
+                )
+
+        def make(names: tuple[str, ...], gate: Gate | None) -> ASGIApp:
+            return make_app(
+                bundle, library, stage, names=names, gate=gate, frames=frames, live=live
+            )
+
+        super().__init__(port, lan, make, for_program=for_program)
+
+    def introduce(self) -> None:
+        """Print the address, and the bundle's path."""
+        shown = str(self.bundle)
+        if self.is_live:
+            shown = "the first view, and what is built of it"
+        elif not self.has_bricks:
+            shown += " (a bundle by itself: its volumes come whole)"
+        self.introduce_as(shown, {"bundle": str(self.bundle), "bricks": self.has_bricks})
+
+
 def _stop_after(first: "Future[None]", server: BundleServer) -> None:
     """Stop a server where there can be no first view."""
     if first.exception() is not None:
         server.stop()
 
 
-def _print_json(content: dict[str, object]) -> None:
+def print_json(content: Mapping[str, object]) -> None:
+    """Print a line of JSON for a program."""
     print(json.dumps(content), flush=True)
 
 

@@ -92,19 +92,19 @@ class Child:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def call(self, method: str, *arguments: Any) -> Any:
-        """Return what a method of the object returns."""
-        return self._ask(method, arguments)
+    def call(self, method: str, *arguments: Any, bounds: Bounds | None = None) -> Any:
+        """Return what a method of the object returns; `bounds` of this call replace the usual."""
+        return self._ask(method, arguments, bounds)
 
     def close(self) -> None:
         """End the process."""
         self._finish()
 
-    def _ask(self, what: Any, arguments: tuple[Any, ...]) -> Any:
+    def _ask(self, what: Any, arguments: tuple[Any, ...], bounds: Bounds | None = None) -> Any:
         pipes = self._process
         assert pipes.stdin is not None
         assert pipes.stdout is not None
-        with self._lock, _Watch(pipes, self._bounds) as watch:
+        with self._lock, _Watch(pipes, bounds or self._bounds) as watch:
             try:
                 _send(pipes.stdin, (what, arguments))
                 parts = _receive(pipes.stdout)

@@ -12,7 +12,8 @@ from urllib.parse import SplitResult, urljoin, urlsplit
 
 from stereocell.model.errors import SourceError
 
-_NAT64 = ipaddress.ip_network("64:ff9b::/96")  # addresses that a gateway translates to IPv4
+# addresses that hold one of IPv4: a gateway translates the former, and old systems the latter
+_OF_IPV4 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("::/96"))
 _PORTS = {"http": 80, "https": 443}
 
 
@@ -48,7 +49,7 @@ def is_public(number: str) -> bool:
         inner = address.ipv4_mapped or address.sixtofour
         if address.teredo is not None:
             inner = address.teredo[1]
-        elif address in _NAT64:
+        elif any(address in network for network in _OF_IPV4):
             inner = ipaddress.IPv4Address(int(address) & 0xFFFFFFFF)
         if inner is not None:
             return is_public(str(inner))

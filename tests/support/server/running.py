@@ -5,8 +5,11 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from threading import Thread
+from typing import TypeVar
 
-from stereocell.serve.server import BundleServer
+from stereocell.serve.server import BundleServer, Server
+
+S = TypeVar("S", bound=Server)
 
 
 def serving(out: Path, *, lan: bool = False) -> AbstractContextManager[BundleServer]:
@@ -15,7 +18,7 @@ def serving(out: Path, *, lan: bool = False) -> AbstractContextManager[BundleSer
 
 
 @contextmanager
-def running(server: BundleServer) -> Iterator[BundleServer]:
+def running(server: S) -> Iterator[S]:
     """Run a server until the block ends."""
     thread = Thread(target=server.run)
     thread.start()

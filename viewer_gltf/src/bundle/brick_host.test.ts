@@ -7,7 +7,7 @@ describe("the address of the bricks", () => {
 
   it("is the host's that has them, as safe as the page", () => {
     expect(of("version=1", "http://localhost:8000/")).toBe("ws://localhost:8000/bricks");
-    expect(of("version=1", "https://10.0.0.7:8000/x/")).toBe("wss://10.0.0.7:8000/bricks");
+    expect(of("version=1", "https://10.0.0.7:8000/x/")).toBe("wss://10.0.0.7:8000/x/bricks");
   });
 
   it("is that of a view of a source, where it has its own", () => {

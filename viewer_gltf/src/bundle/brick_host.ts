@@ -7,7 +7,8 @@ const HEADER = "Stereocell-Bricks";
 export function bricksAddress(headers: Headers, base: string): string | null {
   const found = /^version=1(?:; folder=(g\d+\/))?$/.exec(headers.get(HEADER)?.trim() ?? "");
   if (found === null) return null;
-  const url = new URL(`/${found[1] ?? ""}bricks`, base);
+  const [, folder = ""] = found;
+  const url = new URL(base.endsWith(`/${folder}`) ? "bricks" : `${folder}bricks`, base);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }

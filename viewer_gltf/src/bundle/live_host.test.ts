@@ -11,6 +11,13 @@ it("finds the build's websocket and the folder of the newest view", () => {
   expect(of("version=1; folder=g12/")).toEqual({ socket, folder: "g12/" });
 });
 
+it("finds the websocket beside a bundle in a folder", () => {
+  const headers = new Headers({ "Stereocell-Live": "version=1; folder=" });
+  expect(liveHost(headers, `${BASE}items/7/view/`)?.socket).toBe(
+    "wss://lab.example:8000/items/7/view/live",
+  );
+});
+
 it("takes no other word for one", () => {
   expect(of(null)).toBeNull();
   for (const value of [

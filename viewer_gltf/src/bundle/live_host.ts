@@ -10,7 +10,7 @@ export type LiveHost = Readonly<{ socket: string; folder: string }>;
 export function liveHost(headers: Headers, base: string): LiveHost | null {
   const found = /^version=1; folder=((?:g\d+\/)?)$/.exec(headers.get(HEADER)?.trim() ?? "");
   if (found === null) return null;
-  const url = new URL("/live", base);
+  const url = new URL("live", base);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return { socket: url.href, folder: found[1] };
 }

@@ -11,7 +11,7 @@ describe("the address of the values as measured", () => {
     );
 
   it("is the host's that has them", () => {
-    expect(of("version=1")).toBe("https://10.0.0.7:8000/values/");
+    expect(of("version=1")).toBe("https://10.0.0.7:8000/x/values/");
   });
 
   it("is none where the host has none, or newer ones", () => {

@@ -9,7 +9,7 @@ const MAX_KEPT = 4096;
 
 /** The address below which values are; null: the host has none. */
 export function valuesAddress(headers: Headers, base: string): string | null {
-  return headers.get(HEADER)?.trim() === "version=1" ? new URL("/values/", base).href : null;
+  return headers.get(HEADER)?.trim() === "version=1" ? new URL("values/", base).href : null;
 }
 
 export class ValuesHost {

@@ -20,6 +20,7 @@ _GROUPS = {
     *("s", "site", "p", "pos", "position", "xy", "f", "field", "fov", "series", "m", "tile"),
     *("well", "row", "col", "r", "scene", "stage", "v", "view", "region"),
 }
+COUNTERS = _Z | _C | _T | _GROUPS  # letters before a number that say what it counts
 _SEPARATORS = (re.compile(r"[/_\-\s.]+"), re.compile(r"[/_\s]+"))
 _WELL = re.compile(r"[A-P][0-9]{2}")
 _GUID = re.compile(r"[0-9A-Fa-f]{8}(-[0-9A-Fa-f]{4}){3}-[0-9A-Fa-f]{12}")

@@ -1,0 +1,55 @@
+"""Build an item of an inbox: `build` with a person's choices, in a process that prints nothing.
+
+What a build prints may hold texts from an upload, and the terminal is not the place for them.
+"""
+
+import argparse
+import os
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from stereocell.cli.build_behind import RunToLine
+from stereocell.engine.run import Watch
+from stereocell.inbox.address import forget_credentials
+from stereocell.inbox.choices import Choices
+from stereocell.live.build_process import Build
+from stereocell.read.addresses.resolve import remember
+from stereocell.read.addresses.resolved import Resolved
+from stereocell.storage.processes import cores
+
+
+def make_inbox_build(
+    source: str, found: Resolved, choices: Choices, out: Path, *, is_stranger: bool
+) -> Build:
+    """Return the build of an item; see `inbox.builds.MakeBuild`."""
+    return partial(_build, source, found, choices, out, is_stranger)
+
+
+def _build(
+    source: str, found: Resolved, choices: Choices, out: Path, is_stranger: bool, watch: Watch
+) -> str:
+    # by its name: where Python runs the command's module, that is called __main__, which names
+    # another module in this process
+    main = import_module("stereocell.cli.__main__")
+    run: RunToLine = main.run_to_line
+    if is_stranger:
+        forget_credentials()
+    _be_silent()
+    remember(source, found)
+    words = ["build", "--out", str(out), "--title", choices.title]
+    if choices.preset:
+        words += ["--preset", choices.preset]
+    options: argparse.Namespace = main.parse([*words, "--", source])
+    for name, value in choices.settings().items():
+        setattr(options, name, value)
+    options.workers, options.watch = cores(), watch
+    return run(options)
+
+
+def _be_silent() -> None:
+    """Let this process and its workers print nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
+    os.close(nowhere)

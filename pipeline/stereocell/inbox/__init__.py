@@ -1,0 +1,1 @@
+"""The inbox: specimens that people hand in by a browser, understood, shown and built."""

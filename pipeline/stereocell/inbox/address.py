@@ -1,0 +1,70 @@
+"""Addresses that people paste: http(s) and s3 alone, and public ones from other machines.
+
+A person at this machine may name what `build` takes. A person at another one acts through this
+machine, which may reach more than they do: hosts of its own network, and what its credentials open.
+"""
+
+import json
+import os
+import re
+
+from stereocell.inbox.refused import RefusedError
+from stereocell.model.errors import StereoCellError
+from stereocell.read.addresses.dicomweb import TOKEN
+from stereocell.storage.public_hosts import public_numbers_of, split_address
+
+_BUCKET = re.compile(r"[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]")
+_IP = re.compile(r"[0-9.]+")
+_EXPECTED = "expected https://, http:// or s3:// of an image"
+
+
+def check_address(address: str, *, is_local: bool) -> str:
+    """Return an address that may be read. Raises RefusedError.
+
+    is_local  whether the person is at this machine
+    """
+    text = address.strip()
+    if not text.isprintable() or not text.isascii() or " " in text or "\\" in text:
+        raise RefusedError(400, f"address: found spaces or special characters, {_EXPECTED}")
+    scheme, mark, rest = text.partition("://")
+    scheme = scheme.lower()
+    if not mark or scheme not in ("http", "https", "s3"):
+        raise RefusedError(400, f"address: found another kind, {_EXPECTED}")
+    text = f"{scheme}://{rest}"
+    if scheme == "s3":
+        _check_bucket(rest)
+        return text
+    try:
+        split_address(text)
+        if not is_local:
+            public_numbers_of(text)
+    except StereoCellError as error:
+        raise RefusedError(400, _line_of(error, is_local=is_local)) from None
+    return text
+
+
+def forget_credentials() -> None:
+    """Let this process, and those that it starts, read as a stranger does: without credentials."""
+    import fsspec
+
+    os.environ.pop(TOKEN, None)
+    for name in [name for name in os.environ if name.startswith(("AWS_", "FSSPEC_"))]:
+        del os.environ[name]
+    os.environ["FSSPEC_S3"] = json.dumps({"anon": True})
+    fsspec.config.conf.clear()
+    fsspec.config.conf["s3"] = {"anon": True}
+
+
+def _check_bucket(rest: str) -> None:
+    bucket, _, key = rest.partition("/")
+    is_name = _BUCKET.fullmatch(bucket) and ".." not in bucket and not _IP.fullmatch(bucket)
+    if not is_name or not key.strip("/"):
+        raise RefusedError(400, "address: found no bucket and key, expected s3://bucket/image")
+    if "?" in rest or "#" in rest or ".." in key.split("/"):
+        raise RefusedError(400, "address: found ?, # or .. in a key, expected s3://bucket/image")
+
+
+def _line_of(error: StereoCellError, *, is_local: bool) -> str:
+    if is_local or "private network" not in str(error):
+        return f"address: found none that can be asked, {_EXPECTED}"
+    return "address: leads into a private network, expected a public address"

@@ -1,0 +1,116 @@
+"""Build the items of the queue, one at a time, each in a process behind its page."""
+
+import shutil
+from pathlib import Path
+from typing import Protocol
+
+from stereocell.inbox.choices import Choices
+from stereocell.inbox.inbox import Inbox
+from stereocell.inbox.item import Doing, Item
+from stereocell.inbox.lines import line_of, without_identity
+from stereocell.inbox.preparing import live_of, titled, write_first_look
+from stereocell.inbox.refused import RefusedError
+from stereocell.live.build_process import Build, BuildProcess
+from stereocell.read.addresses.resolved import Resolved
+
+
+class MakeBuild(Protocol):
+    """Returns the build of a source into a folder, with the choices of a person.
+
+    It can be pickled. It prints nothing. `is_stranger`: it uses no credentials of this machine.
+    """
+
+    def __call__(
+        self, source: str, found: Resolved, choices: Choices, out: Path, *, is_stranger: bool
+    ) -> Build: ...
+
+
+class Builds:
+    """The builds of an inbox. Only one thread calls `step`."""
+
+    def __init__(self, inbox: Inbox, page: Path, make: MakeBuild) -> None:
+        self._inbox, self._page, self._make = inbox, page, make
+        self._running: Item | None = None
+
+    def step(self) -> None:
+        """Take over how far the running build is, or start the next one."""
+        item = self._running
+        if item is not None:
+            self._follow(item)
+        if self._running is None:
+            waiting = [one for one in self._inbox.waiting() if one.doing == "queued"]
+            if waiting:
+                self._start(waiting[0])
+
+    def close(self) -> None:
+        """End the running build, which goes on at the next start."""
+        if self._running is not None and self._running.build is not None:
+            self._running.build.close()
+
+    def _start(self, item: Item) -> None:
+        inbox = self._inbox
+        try:
+            inbox.set(item, "building")
+            _require_room(inbox, item)
+            with item.viewing:
+                coarse, found, bundle = write_first_look(inbox, item)
+            source = item.place().place
+            build = BuildProcess(
+                self._make(source, found, titled(item), item.out, is_stranger=not item.is_local),
+                item.out,
+            )
+            with inbox.changed:
+                if item.doing not in ("building", "paused") or not inbox.is_here(item):
+                    return  # cancelled or deleted meanwhile
+                if item.doing == "paused":
+                    build.do("pause")
+                item.build = build
+                item.live = live_of(self._page, bundle, len(coarse.plan.tiles), build)
+                self._running = item
+            build.start(coarse)
+        except Exception as error:  # whatever a reader meets in a stranger's files
+            with inbox.changed:
+                if item.doing in ("building", "paused"):
+                    item.queued = 0
+                    inbox.set(item, "failed", line_of(item, error))
+
+    def _follow(self, item: Item) -> None:
+        inbox, build = self._inbox, item.build
+        if build is None or not inbox.is_here(item):
+            self._running = None
+            return
+        state = build.state
+        if state.doing == "complete":
+            build.close()
+            if not item.keep_upload:
+                inbox.remove_upload(item)
+            self._end(item)
+            inbox.set(item, "built")
+        elif state.doing in ("failed", "cancelled") or item.doing == "cancelled":
+            line = without_identity(item, state.line)
+            build.close()
+            self._end(item)
+            if item.doing != "cancelled":
+                inbox.set(item, "failed" if state.doing == "failed" else "cancelled", line)
+        elif (doing := _doing_of(state.doing)) != item.doing:
+            inbox.set(item, doing)
+
+    def _end(self, item: Item) -> None:
+        item.queued = 0
+        self._running = None
+
+
+def _doing_of(doing: str) -> Doing:
+    return "paused" if doing in ("pausing", "paused") else "building"
+
+
+def _require_room(inbox: Inbox, item: Item) -> None:
+    """Raise RefusedError where the disk has no room for a build."""
+    needed = inbox.understood(item)["bytes_estimate"]
+    free = shutil.disk_usage(inbox.folder).free - inbox.limits.reserve
+    if needed > free:
+        raise RefusedError(
+            507,
+            f"the server's disk has room for {max(0, free):,} bytes more, a build of this needs "
+            f"about {needed:,}: delete some items, then build it again",
+        )

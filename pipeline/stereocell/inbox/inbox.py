@@ -1,0 +1,325 @@
+"""The inbox: what people hand in, from the first byte to the finished build.
+
+Requests come from many threads. What they change, they change under one lock, and write to the
+queue file before they answer. Reading and building run in threads of their own, and the work
+itself in other processes: see `preparing` and `builds`.
+"""
+
+import json
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from stereocell.inbox.address import check_address
+from stereocell.inbox.choices import parse_choices
+from stereocell.inbox.item import Doing, Item, new_id
+from stereocell.inbox.limits import InboxLimits
+from stereocell.inbox.queue_file import load_items, save_items
+from stereocell.inbox.readers import ReaderProcess
+from stereocell.inbox.refused import RefusedError
+from stereocell.inbox.upload import Announced, Upload, parse_announced
+
+_BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
+_WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
+_ASKS_SPACING = "--spacing-um"  # in the line of files that state no voxel size
+_FREE_STEP = 100_000_000  # bytes: free disk is told in steps, so that it is no news each time
+
+
+class Inbox:
+    """The items of a folder. All methods may be called from any thread."""
+
+    def __init__(self, folder: Path, limits: InboxLimits) -> None:
+        """Raises OutputError where the folder is no inbox and holds other files."""
+        self.folder, self.limits = folder, limits
+        self.reader = ReaderProcess()
+        self._is_closed = False
+        self.changed = threading.Condition(threading.RLock())
+        self._items = {item.id: item for item in load_items(folder)}
+        for item in self._items.values():
+            self._take_up(item)
+        with self.changed:
+            self.save()
+
+    def _take_up(self, item: Item) -> None:
+        """Bring an item to where it goes on after a restart."""
+        shutil.rmtree(item.view_folder, ignore_errors=True)
+        if item.doing == "built" and not (item.out / "bundle" / "manifest.json").exists():
+            self._fail(item, "its build is gone: hand it in again")
+        elif item.doing in ("building", "paused"):
+            item.doing = "queued"  # with its old place, which is the first
+        if item.doing in ("uploading", *_BUSY, "understood", "queued") and item.upload is None:
+            self._fail(item, "its upload is gone: hand it in again")
+
+    # --- items, by their state
+
+    def find(self, item_id: str) -> Item:
+        """Return an item. Raises RefusedError where there is none."""
+        with self.changed:
+            item = self._items.get(item_id)
+        if item is None:
+            raise RefusedError(404, "no such item: it was deleted, or its time was over")
+        return item
+
+    def items(self) -> list[Item]:
+        """Return all items, in the order in which they were handed in."""
+        with self.changed:
+            return list(self._items.values())
+
+    def is_here(self, item: Item) -> bool:
+        """Return whether an item has not been deleted meanwhile."""
+        return self._items.get(item.id) is item
+
+    def set(self, item: Item, doing: Doing, line: str = "") -> None:
+        """Change the state of an item, and write it down. It does nothing to a deleted one."""
+        with self.changed:
+            if self.is_here(item):
+                item.doing, item.line = doing, line
+                self.save()
+                self.changed.notify_all()
+
+    def save(self) -> None:
+        """Write the queue file; the lock must be held. Raises OutputError."""
+        if self._is_closed:  # the end of a server is no failure of its items
+            return
+        save_items(self.folder, list(self._items.values()))
+
+    def _fail(self, item: Item, line: str) -> None:
+        item.doing, item.line, item.queued = "failed", line, 0
+
+    def waiting(self) -> list[Item]:
+        """Return the items whose builds run or wait, the first one first."""
+        with self.changed:
+            found = [item for item in self._items.values() if item.doing in _WAITING]
+        return sorted(found, key=lambda item: item.queued)
+
+    # --- uploads
+
+    def announce(self, content: Any, *, is_local: bool) -> tuple[Item, bool]:
+        """Return the item of what a person hands in, and whether it is new. Raises RefusedError.
+
+        An upload of the same list that has broken off goes on.
+        """
+        announced = parse_announced(content, self.limits)
+        if announced.address:
+            address = check_address(announced.address, is_local=is_local)
+            announced = Announced(address=address)
+        with self.changed:
+            for item in self._items.values():
+                is_same = item.upload and item.upload.announced.digest == announced.digest
+                if item.doing == "uploading" and is_same:
+                    return item, False
+            if len(self._items) >= self.limits.items:
+                raise RefusedError(
+                    429, f"the inbox holds {len(self._items)} items, as many as it may: delete some"
+                )
+            self._require_room(announced.total)
+            item_id = new_id()
+            item = Item(item_id, self.folder / item_id, time.time(), is_local)
+            item.upload = Upload.create(item.upload_folder, announced)
+            if announced.address:
+                item.doing = "understanding"
+            self._items[item.id] = item
+            self.save()
+            self.changed.notify_all()
+        self.reader.warm()
+        return item, True
+
+    def _require_room(self, total: int) -> None:
+        """Raise RefusedError where the disk has no room for an upload and those that have begun."""
+        begun = sum(
+            item.upload.announced.total - item.upload.offset
+            for item in self._items.values()
+            if item.doing == "uploading" and item.upload is not None
+        )
+        free = shutil.disk_usage(self.folder).free - self.limits.reserve - begun
+        if total > free:
+            raise RefusedError(
+                507,
+                f"the server's disk has room for {max(0, free):,} bytes more, found {total:,}: "
+                "delete some items",
+            )
+
+    @contextmanager
+    def piece(self, item: Item, offset: int) -> Iterator[Callable[[bytes], None]]:
+        """Yield a function that takes the bytes of one piece, as they come.
+
+        What has come stays, however the piece ends. A later piece takes over from one whose
+        connection is lost. Raises RefusedError.
+        """
+        if item.doing != "uploading" or item.upload is None:
+            raise RefusedError(409, "nothing more is to be uploaded")
+        upload, writer = item.upload, object()
+        with item.writing:
+            if offset != upload.offset:
+                raise RefusedError(409, f"Upload-Offset: found {offset}, expected {upload.offset}")
+            item.writer = writer
+
+        def write(data: bytes) -> None:
+            with item.writing:
+                if not self.is_here(item):
+                    raise RefusedError(410, "the item was deleted")
+                if item.writer is not writer:
+                    raise RefusedError(409, "the upload goes on by another connection")
+                if len(data) > upload.announced.total - upload.offset:
+                    raise RefusedError(413, "more bytes than were announced")
+                upload.write(data)
+
+        try:
+            yield write
+        finally:
+            self._end_piece(item)
+
+    def _end_piece(self, item: Item) -> None:
+        upload = item.upload
+        with self.changed:
+            is_whole = upload is not None and upload.is_whole
+            if upload is not None and is_whole and item.doing == "uploading":
+                upload.finish()
+                self.set(item, "unpacking")
+
+    def remove_old(self) -> None:
+        """Remove uploads that have broken off too long ago."""
+        for item in self.items():
+            upload = item.upload
+            if item.doing == "uploading" and upload and upload.age_h > self.limits.hours:
+                self.delete(item)
+
+    def delete(self, item: Item) -> None:
+        """Delete all of an item; what runs for it is ended. Waits for its end."""
+        with self.changed:
+            if self._items.pop(item.id, None) is None:
+                return
+            self.save()
+            self.changed.notify_all()
+        self.reader.stop(item)
+        if item.build is not None:
+            item.build.close()
+        with item.writing:  # a piece ends at its next bytes
+            for _ in range(20):  # a process that was ended may write one more file
+                shutil.rmtree(item.folder, ignore_errors=True)
+                if not item.folder.exists():
+                    return
+                time.sleep(0.1)
+
+    def close(self) -> None:
+        """End what is read; what is changed from here on is not written down."""
+        with self.changed:
+            self._is_closed = True
+        self.reader.close()
+
+    def remove_upload(self, item: Item) -> None:
+        """Remove what was uploaded: from here on nothing holds an identity."""
+        with self.changed:
+            item.upload = None
+        shutil.rmtree(item.upload_folder, ignore_errors=True)
+
+    # --- what people ask for
+
+    def understood(self, item: Item) -> dict[str, Any]:
+        """Return what is known of an item. Raises RefusedError."""
+        try:
+            found: dict[str, Any] = json.loads(item.understood_file.read_bytes())
+        except (OSError, ValueError):
+            raise RefusedError(404, "it is not understood yet") from None
+        return found
+
+    def choose(self, item: Item, content: Any) -> None:
+        """Change the choices of an item, which is understood again. Raises RefusedError."""
+        with self.changed:
+            self._require(item, ("understood", "failed", "cancelled", "understanding"), "chosen")
+            if item.upload is None or (not item.source and not item.address):
+                raise RefusedError(409, "its upload is gone, or damaged: hand it in again")
+            item.choices = parse_choices(content, item.choices)
+            item.round += 1
+            self.set(item, "understanding")
+
+    def build(self, item: Item, content: Any) -> None:
+        """Put an item into the queue. Raises RefusedError."""
+        keep = content.get("keep_upload", False) if isinstance(content, dict) else None
+        if not isinstance(keep, bool) or not content.keys() <= {"keep_upload"}:
+            raise RefusedError(400, 'build: expected {"keep_upload": true or false}, or {}')
+        with self.changed:
+            self._require(item, ("understood", "failed", "cancelled"), "built")
+            if item.upload is None or not item.title:
+                raise RefusedError(409, "it is not understood, so that it can't be built")
+            item.keep_upload = keep
+            self._enqueue(item)
+
+    def command(self, item: Item, command: str) -> None:
+        """Pause, continue or cancel what runs for an item. Raises RefusedError."""
+        with self.changed:
+            build = item.build
+            if command == "pause":
+                self._require(item, ("building",), "paused")
+            elif command == "continue" and item.doing == "cancelled" and item.title:
+                self._enqueue(item)
+                return
+            elif command == "continue":
+                self._require(item, ("paused",), "continued")
+            else:
+                self._require(item, (*_BUSY, *_WAITING), "cancelled")
+                item.queued = 0
+                self.set(item, "cancelled")
+        if command == "cancel":
+            self.reader.stop(item)
+        if build is not None and command in ("pause", "continue", "cancel"):
+            build.do("pause" if command == "pause" else command)  # type: ignore[arg-type]
+        if command in ("pause", "continue"):
+            self.set(item, "paused" if command == "pause" else "building")
+
+    def _enqueue(self, item: Item) -> None:
+        if item.upload is None:
+            raise RefusedError(409, "its upload is gone: hand it in again")
+        item.queued = 1 + max((one.queued for one in self._items.values()), default=0)
+        self.set(item, "queued")
+
+    def _require(self, item: Item, doings: Iterable[Doing], verb: str) -> None:
+        if not self.is_here(item) or item.doing not in doings:
+            raise RefusedError(409, f"it can't be {verb} while it is {item.doing}")
+
+    # --- the state that pages show
+
+    def state(self, *, may_upload: bool) -> dict[str, Any]:
+        """Return the state of all items that a person may see, as the websocket sends it."""
+        places = {item.id: place for place, item in enumerate(self.waiting(), start=1)}
+        shown = [item for item in self.items() if may_upload or item.page]
+        limits = self.limits
+        with suppress(OSError):
+            free = max(0, shutil.disk_usage(self.folder).free - limits.reserve)
+        return {
+            "items": [_shown(item, places.get(item.id, 0), may_upload) for item in shown],
+            "limits": {
+                "bytes": limits.bytes,
+                "files": limits.files,
+                "piece": limits.piece,
+                "free_bytes": free // _FREE_STEP * _FREE_STEP,
+                "hours": limits.hours,
+            },
+            "may_upload": may_upload,
+        }
+
+
+def _shown(item: Item, place: int, may_upload: bool) -> dict[str, Any]:
+    upload, build = item.upload, item.build
+    state = build.state if build is not None and item.doing in ("building", "paused") else None
+    return {
+        "id": item.id,
+        "title": item.title or item.choices.title,
+        "doing": item.doing,
+        "line": item.line if may_upload else "",
+        "asks": "spacing_um" if item.doing == "failed" and _ASKS_SPACING in item.line else "",
+        "bytes": upload.offset if upload else 0,
+        "total": upload.announced.total if upload else 0,
+        "place": place,
+        "share": 1.0 if item.doing == "built" else round(state.share, 3) if state else 0.0,
+        "label": state.label if state else "",
+        "tiles": state.tiles if state else 0,
+        "left_s": None if state is None or state.left_s is None else round(state.left_s),
+        "page": item.page,
+        "has_upload": upload is not None,
+        "keep_upload": item.keep_upload,
+    }

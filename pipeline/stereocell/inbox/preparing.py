@@ -1,0 +1,122 @@
+"""Unpack and understand what has been handed in, and write first views: all by the reader."""
+
+import json
+import shutil
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from stereocell.inbox.choices import Choices
+from stereocell.inbox.inbox import Inbox
+from stereocell.inbox.item import Item
+from stereocell.inbox.limits import UNPACK_S
+from stereocell.inbox.lines import line_of, without_identity
+from stereocell.inbox.reader import Source
+from stereocell.inbox.refused import RefusedError
+from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.reading import Reading
+from stereocell.live.show_source import Live
+from stereocell.model.errors import StereoCellError
+from stereocell.read.addresses.resolved import Resolved
+from stereocell.storage.json_files import write_json
+
+_FOUND = "found.json"  # below the upload: the place that an address led to
+
+
+def prepare(inbox: Inbox, item: Item) -> None:
+    """Unpack and understand an item; what goes wrong becomes its line."""
+    try:
+        if item.doing == "unpacking":
+            source = inbox.reader.run(item, "arrange", inbox.limits, seconds=UNPACK_S)
+            with inbox.changed:
+                if item.doing != "unpacking":  # cancelled meanwhile
+                    return
+                item.source = source
+                inbox.set(item, "understanding")
+        round_, choices = item.round, item.choices
+        shutil.rmtree(item.folder / "slices", ignore_errors=True)
+        found = inbox.reader.run(
+            item, "understand", source_of(item), choices, str(item.folder / "slices")
+        )
+        _write_understood(item, found)
+    except Exception as error:  # whatever a reader meets in a stranger's files
+        with inbox.changed:
+            if item.doing in ("unpacking", "understanding"):
+                inbox.set(item, "failed", line_of(item, error))
+        return
+    with inbox.changed:
+        if item.round == round_ and item.doing == "understanding":
+            item.title = found["title"]
+            inbox.set(item, "understood")
+
+
+def _write_understood(item: Item, found: dict[str, Any]) -> None:
+    notes = [without_identity(item, note) for note in found["notes"]]
+    write_json(item.understood_file, {**found, "notes": notes})
+
+
+def source_of(item: Item) -> Source:
+    """Return the source of an item, with what an earlier process found at its address."""
+    source = item.place()
+    try:
+        content = json.loads((item.upload_folder / _FOUND).read_bytes())
+    except (OSError, ValueError):
+        return source
+    return replace(source, found=content["source"], found_notes=tuple(content["notes"]))
+
+
+def titled(item: Item) -> Choices:
+    """Return the choices of an item with the title that it is shown by."""
+    return replace(item.choices, title=item.title or item.choices.title)
+
+
+def write_first_look(inbox: Inbox, item: Item) -> tuple[Coarse, Resolved, Path]:
+    """Write the first view of an item, whose `viewing` the caller holds.
+
+    Returns the inputs of a build behind it, the place that the source was found at, and the folder
+    of the view. Raises as the reader does.
+    """
+    shutil.rmtree(item.view_folder, ignore_errors=True)
+    item.view_folder.mkdir(parents=True)
+    bundle = item.view_folder / "bundle"
+    plan, read, found = inbox.reader.run(
+        item, "first_view", source_of(item), titled(item), str(bundle)
+    )
+    if item.address:
+        write_json(item.upload_folder / _FOUND, {"source": found.source, "notes": found.notes})
+    return Coarse(plan, read, item.out, item.view_folder, {}), found, bundle
+
+
+def live_of(page: Path, bundle: Path, tiles: int, build: BuildProcess | None) -> Live:
+    """Return a view whose first picture is written."""
+    first: Future[None] = Future()
+    first.set_result(None)
+    return Live(page, bundle, first, tiles, None, build, Reading(lambda _: None))
+
+
+def look(inbox: Inbox, item: Item, page: Path) -> str:
+    """Write the first view of an item, unless there is one; return the address of its page.
+
+    page  the folder of the viewer
+
+    Raises RefusedError.
+    """
+    if item.page:
+        return item.page
+    if item.doing in ("uploading", "unpacking", "understanding") or not item.title:
+        raise RefusedError(409, f"it can't be looked at while it is {item.doing}")
+    if item.upload is None:
+        raise RefusedError(409, "its upload is gone: hand it in again")
+    with item.viewing:
+        if item.page:  # another request was first
+            return item.page
+        try:
+            coarse, _, bundle = write_first_look(inbox, item)
+        except StereoCellError as error:
+            raise RefusedError(422, line_of(item, error)) from None
+        with inbox.changed:
+            if inbox.is_here(item):
+                item.live = live_of(page, bundle, len(coarse.plan.tiles), None)
+                inbox.changed.notify_all()
+    return item.page

@@ -1,0 +1,202 @@
+"""Read a stranger's files in a process that may die, by the product's own readers.
+
+A reader that crashes, hangs or takes too much memory ends that process, and the item's line says
+so. The process stays for a while, so that another choice or a look need not read again.
+"""
+
+import os
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from stereocell import read
+from stereocell.inbox.address import forget_credentials
+from stereocell.inbox.arrange import arrange
+from stereocell.inbox.choices import BRIGHT, DARK, Choices
+from stereocell.inbox.limits import InboxLimits
+from stereocell.inbox.middle_slices import ShownChannel, hex_of, write_middle_slices
+from stereocell.live.coarse_channel import CoarseChannel
+from stereocell.live.first_appearance import first_appearance
+from stereocell.live.first_look import FirstLook
+from stereocell.planning.plan import Plan
+from stereocell.planning.preset_choice import load_for
+from stereocell.planning.settings import NO_PRESET, preset_names
+from stereocell.preview.views import views_of
+from stereocell.read.addresses.resolve import remember, resolve
+from stereocell.read.addresses.resolved import Resolved
+from stereocell.read.known_formats import format_of
+
+FETCHED = "fetched"  # the folder, in that of an upload, for files that an address leads to
+_MODALITIES = {"PT": "PET", "NM": "SPECT"}  # words for codes of DICOM
+_VOXEL_BYTES = 4  # bytes on the disk for each voxel of a channel, about, once all is built
+_PRESET = re.compile(r"preset ([\w-]+):")
+_SERIES = re.compile(r"--series (\d+)")
+_LISTED = re.compile(r"\s*(\d+)\s+(.*)")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A source as the inbox has it.
+
+    place        the file or folder of an upload, or an address
+    found        the place that a service led to, if an earlier process asked it; empty: none did
+    found_notes  how it was found
+    """
+
+    place: str
+    found: str = ""
+    found_notes: tuple[str, ...] = ()
+
+
+class Reader:
+    """Reads one item. It lives in a process of its own; see `storage.child_process`."""
+
+    def __init__(self) -> None:
+        self._upload = Path()
+        self._look: FirstLook | None = None
+        self._series: dict[str, list[dict[str, str]]] = {}
+
+    def begin(self, upload: str, is_stranger: bool) -> None:
+        """Turn to an item, once.
+
+        upload       the folder that alone may hold an identity
+        is_stranger  use no credentials of this machine
+        """
+        self._upload = Path(upload)
+        fetched = self._upload / FETCHED
+        fetched.mkdir(exist_ok=True)
+        os.environ["TMPDIR"] = tempfile.tempdir = str(fetched)
+        if is_stranger:
+            forget_credentials()
+
+    def arrange(self, limits: InboxLimits) -> str:
+        """Return the file or folder to open; see `arrange`."""
+        return arrange(str(self._upload), limits)
+
+    def understand(self, source: Source, choices: Choices, folder: str) -> dict[str, Any]:
+        """Return what is known of a source, and write its middle slices into a folder."""
+        choice = self._settle(source, choices)
+        assert self._look is not None
+        plan, dataset = self._look.plan, self._look.dataset
+        coarse = self._look.read()
+        shared = plan.shared_volumes
+        shown, channels = [], []
+        for channel in plan.channels:
+            appearance, _ = first_appearance(plan, channel, coarse[channel.voxels_id])
+            channels.append(
+                {
+                    "id": channel.id,
+                    "name": channel.name,
+                    "color": hex_of(appearance.color),
+                    "has_surface": appearance.level is not None,
+                    "level": _rounded(appearance.iso_value),
+                    "unit": "HU" if plan.modality == "CT" and plan.is_hounsfield else "",
+                }
+            )
+            if channel.id not in shared:
+                shown.append(ShownChannel(coarse[channel.voxels_id], appearance))
+        views = views_of(plan.placement, is_neurological=plan.settings.plan.neurological)
+        size_um = [n * step for n, step in zip(plan.region.shape, plan.spacing_um, strict=True)][
+            ::-1
+        ]
+        voxels = plan.region.shape[0] * plan.region.shape[1] * plan.region.shape[2]
+        chosen = list(dict.fromkeys(str(channel.index) for channel in plan.channels))
+        series = self._list_series(source)
+        return {
+            "format": format_of(plan.source).short_title,
+            "title": plan.name,
+            "modality": plan.modality,
+            "size_voxels": list(plan.region.shape[::-1]),
+            "spacing_um": list(plan.spacing_um[::-1]),
+            "size_um": size_um,
+            "size_text": words_of_size(size_um),
+            "tiles": len(plan.tiles),
+            "bytes_estimate": voxels * len(chosen) * _VOXEL_BYTES,
+            "notes": list(plan.notes),
+            "channels": channels,
+            "slices": write_middle_slices(shown, views, plan.spacing_um, Path(folder)),
+            "choices": {
+                "preset": {
+                    "value": choices.preset or _preset_in(choice),
+                    "options": [*preset_names(), NO_PRESET],
+                },
+                "channels": {
+                    "value": chosen,
+                    "options": [
+                        {"id": str(i), "name": one.name} for i, one in enumerate(dataset.channels)
+                    ],
+                },
+                "series": {"value": choices.series or _series_in(plan), "options": series}
+                if len(series) > 1
+                else None,
+                "background": {
+                    "value": BRIGHT if plan.settings.plan.dark else DARK,
+                    "options": [DARK, BRIGHT],
+                }
+                if not dataset.modality
+                else None,
+                "spacing_um": {"value": list(plan.spacing_um[::-1])},
+            },
+        }
+
+    def first_view(
+        self, source: Source, choices: Choices, bundle: str
+    ) -> tuple[Plan, Mapping[str, CoarseChannel], Resolved]:
+        """Write the first view of a source, and return what the build behind it starts with."""
+        if self._look is None:
+            self._settle(source, choices)
+        assert self._look is not None
+        self._look.write(Path(bundle))
+        return self._look.plan, self._look.read(), resolve(source.place)
+
+    def _settle(self, source: Source, choices: Choices) -> tuple[str, ...]:
+        """Settle the plan; return the notes on the choice of its preset."""
+        self._look = None
+        if source.found:
+            remember(source.place, Resolved(source.found, source.found_notes))
+        flags = {"plan": choices.settings()}
+        settings, choice = load_for(source.place, choices.preset or None, None, flags=flags)
+        look = FirstLook.at(source.place, settings, choice)
+        look.plan = replace(look.plan, name=choices.title or title_of(look.plan))
+        self._look = look
+        return choice
+
+    def _list_series(self, source: Source) -> list[dict[str, str]]:
+        place = resolve(source.place).source
+        if place not in self._series:
+            has_some = format_of(place).list_series is not None
+            lines = read.list_series(place) if has_some else ()
+            found = filter(None, map(_LISTED.fullmatch, lines))
+            self._series[place] = [{"id": one[1], "text": one[2]} for one in found]
+        return self._series[place]
+
+
+def title_of(plan: Plan) -> str:
+    """Return a title that holds nothing of names and tags: the modality, or the format."""
+    if plan.modality:
+        return f"{_MODALITIES.get(plan.modality, plan.modality)} volume"
+    return f"{format_of(plan.source).short_title} volume"
+
+
+def words_of_size(size_um: list[float]) -> str:
+    """Return the edges of a box, as `18.2 x 20.1 x 15.0 cm`."""
+    units = (("cm", 1e4, 5e4), ("mm", 1e3, 1e3), ("um", 1.0, 0.0))  # name, um, from which edge on
+    name, unit, _ = next(one for one in units if max(size_um) >= one[2])
+    return " x ".join(f"{edge / unit:.1f}" for edge in size_um) + f" {name}"
+
+
+def _preset_in(notes: tuple[str, ...]) -> str:
+    found = next(filter(None, map(_PRESET.match, notes)), None)
+    return found[1] if found else NO_PRESET
+
+
+def _series_in(plan: Plan) -> str:
+    found = next(filter(None, map(_SERIES.search, plan.notes)), None)
+    return found[1] if found else "1"
+
+
+def _rounded(level: float | None) -> float | None:
+    return None if level is None else float(f"{level:.6g}")

@@ -1,0 +1,80 @@
+"""The process that reads: one at a time, one item each, with bounds of time and memory."""
+
+import threading
+from typing import Any
+
+from stereocell.inbox.item import Item
+from stereocell.inbox.limits import MEMORY_SHARE, READ_S
+from stereocell.inbox.reader import Reader
+from stereocell.storage.child_process import Bounds, Child, ChildError
+from stereocell.storage.processes import available_bytes
+
+
+class ReaderProcess:
+    """Runs methods of `Reader`. All methods may be called from any thread."""
+
+    def __init__(self) -> None:
+        self._busy = threading.Lock()
+        self._child: Child | None = None
+        self._item: Item | None = None
+        self._is_closed = False
+
+    def run(self, item: Item, method: str, *arguments: Any, seconds: float = READ_S) -> Any:
+        """Return what a method of the reader of an item returns.
+
+        Raises as it does, and ChildError where its process dies or exceeds its bounds.
+        """
+        bounds = Bounds(seconds, int(MEMORY_SHARE * available_bytes()))
+        with self._busy:
+            if self._item is not item:
+                if self._item is not None:
+                    self._close()
+                child = self._child = self._child or Child(Reader)
+                self._item = item
+                child.call("begin", str(item.upload_folder), not item.is_local)
+            assert self._child is not None
+            try:
+                return self._child.call(method, *arguments, bounds=bounds)
+            except BaseException:
+                self._close()
+                raise
+
+    def warm(self) -> None:
+        """Start a process for the next item, while its upload comes: imports take seconds."""
+        threading.Thread(target=self._warm, daemon=True).start()
+
+    def _warm(self) -> None:
+        if self._busy.acquire(blocking=False):
+            try:
+                if self._child is None and not self._is_closed:
+                    self._child = Child(Reader)
+            except ChildError:  # the next item starts one, and has its error
+                pass
+            finally:
+                self._busy.release()
+
+    def stop(self, item: Item) -> None:
+        """End what runs for an item: its caller gets ChildError."""
+        child = self._child if self._item is item else None
+        if child is not None:
+            child.close()
+
+    def release(self) -> None:
+        """End the process where it is idle."""
+        if self._busy.acquire(blocking=False):
+            try:
+                self._close()
+            finally:
+                self._busy.release()
+
+    def close(self) -> None:
+        """End the process for good, whatever it does."""
+        self._is_closed = True
+        child = self._child
+        if child is not None:
+            child.close()
+
+    def _close(self) -> None:
+        if self._child is not None:
+            self._child.close()
+        self._child = self._item = None

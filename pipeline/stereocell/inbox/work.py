@@ -1,0 +1,68 @@
+"""The threads of an inbox: one prepares what is handed in, one builds."""
+
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from stereocell.inbox.builds import Builds, MakeBuild
+from stereocell.inbox.inbox import Inbox
+from stereocell.inbox.preparing import prepare
+from stereocell.model.errors import OutputError
+
+_LOOK_S = 0.25  # s between two looks at the running build
+_OLD_S = 60.0  # s between two looks for uploads that have broken off too long ago
+_IDLE_S = 120.0  # s after which a reader without work ends
+
+
+class Work:
+    """Runs until it is closed."""
+
+    def __init__(self, inbox: Inbox, page: Path, make: MakeBuild) -> None:
+        """page: the folder of the viewer; make: how sources are built."""
+        self._inbox = inbox
+        self._builds = Builds(inbox, page, make)
+        self._is_over = threading.Event()
+        self._threads = [
+            threading.Thread(target=run, name=name, daemon=True)
+            for name, run in {"inbox-prepare": self._prepare, "inbox-build": self._build}.items()
+        ]
+
+    def start(self) -> None:
+        """Begin."""
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """End, and wait for it. What is not finished goes on at the next start."""
+        self._is_over.set()
+        with self._inbox.changed:
+            self._inbox.changed.notify_all()
+        self._inbox.close()
+        for thread in self._threads:
+            thread.join()
+        self._builds.close()
+
+    def _prepare(self) -> None:
+        inbox, used_s = self._inbox, 0.0
+        while not self._is_over.is_set():
+            with inbox.changed:
+                items = [i for i in inbox.items() if i.doing in ("unpacking", "understanding")]
+                if not items:
+                    inbox.changed.wait(_IDLE_S / 4)
+            if items and not self._is_over.is_set():
+                with suppress(OutputError):  # the queue file: it is written at the next change
+                    prepare(inbox, items[0])
+                used_s = time.monotonic()
+            elif time.monotonic() - used_s > _IDLE_S:
+                inbox.reader.release()
+
+    def _build(self) -> None:
+        next_s = 0.0
+        while not self._is_over.wait(_LOOK_S):
+            with suppress(OutputError):  # likewise
+                self._builds.step()
+            if time.monotonic() > next_s:
+                with suppress(OutputError):
+                    self._inbox.remove_old()
+                next_s = time.monotonic() + _OLD_S
