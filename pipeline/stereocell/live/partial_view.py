@@ -18,7 +18,13 @@ from stereocell.bundle.write import Composed
 from stereocell.bundle.write_tile import write_tile
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import NOT_BUILT, Sizes, write_coarse_tiles, write_view
+from stereocell.live.first_view import (
+    NOT_BUILT,
+    Sizes,
+    as_surface,
+    write_coarse_tiles,
+    write_view,
+)
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -172,10 +178,14 @@ class PartialView:
             for ref in (ref for channel in tile.channels for ref in channel.files):
                 own = self._scratch / "parts" / tile.id / ref.path
                 _link(own if own.exists() else self._scratch / "coarse" / ref.path, root / ref.path)
+        is_whole = len(self._finished) == len(tiles)
         write_view(
             survey.plan,
             root,
-            [_as_far_as_built(one, i, tiles) for i, one in enumerate(survey.appearances)],
+            [
+                _as_far_as_built(one, i, tiles, is_whole=is_whole)
+                for i, one in enumerate(survey.appearances)
+            ],
             tiles,
             is_cut=survey.is_cut,
             finished=self._finished,
@@ -188,9 +198,11 @@ def _units_of(survey: _Survey, tile: Tile) -> list[Path]:
 
 
 def _as_far_as_built(
-    appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile]
+    appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile], *, is_whole: bool
 ) -> ComposedAppearance:
     """Return a channel's appearance in a view: without a surface as long as no tile has one."""
+    if not is_whole:
+        appearance = as_surface(appearance)
     if appearance.surface == "none" or any(tile.channels[channel].lods for tile in tiles):
         return appearance
     return replace(appearance, surface="none", surface_reason=NOT_BUILT)
