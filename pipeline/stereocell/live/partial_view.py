@@ -178,14 +178,14 @@ class PartialView:
             for ref in (ref for channel in tile.channels for ref in channel.files):
                 own = self._scratch / "parts" / tile.id / ref.path
                 _link(own if own.exists() else self._scratch / "coarse" / ref.path, root / ref.path)
-        is_whole = len(self._finished) == len(tiles)
+        appearances = survey.appearances
+        if len(self._finished) < len(tiles):
+            coarse = [self._read[channel.voxels_id] for channel in survey.plan.channels]
+            appearances = tuple(map(as_surface, appearances, coarse))
         write_view(
             survey.plan,
             root,
-            [
-                _as_far_as_built(one, i, tiles, is_whole=is_whole)
-                for i, one in enumerate(survey.appearances)
-            ],
+            [_as_far_as_built(one, i, tiles) for i, one in enumerate(appearances)],
             tiles,
             is_cut=survey.is_cut,
             finished=self._finished,
@@ -198,11 +198,9 @@ def _units_of(survey: _Survey, tile: Tile) -> list[Path]:
 
 
 def _as_far_as_built(
-    appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile], *, is_whole: bool
+    appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile]
 ) -> ComposedAppearance:
     """Return a channel's appearance in a view: without a surface as long as no tile has one."""
-    if not is_whole:
-        appearance = as_surface(appearance)
     if appearance.surface == "none" or any(tile.channels[channel].lods for tile in tiles):
         return appearance
     return replace(appearance, surface="none", surface_reason=NOT_BUILT)
