@@ -72,8 +72,6 @@ export class TileMarch {
   private readonly occupancy: Data3DTexture;
   readonly tables: MarchTables;
   private readonly low: Vector3;
-  /** Shortest edge of a texel of the finest level. */
-  private readonly texel_um: number;
   private readonly toTile: Matrix4;
   /** Between the world and the box from its low corner. */
   private readonly fromBox: Matrix4;
@@ -88,13 +86,8 @@ export class TileMarch {
     this.low = new Vector3(...min);
     const size = new Vector3(...max).sub(this.low);
     const { low, high } = textureCorners(volume);
-    const shortest = (texels: readonly number[]) =>
-      Math.min(
-        ...size.toArray().map((edge, i) => edge / Math.max(1, texels[i] - 1 - 2 * volume.apron)),
-      );
-    // coarse volumes absorb as much as the finer ones that take their place
-    const voxel = shortest(volume.finer_size ?? volume.size);
-    this.texel_um = shortest(volume.size);
+    const intervals = volume.size.map((n) => n - 1 - 2 * volume.apron);
+    const voxel = Math.min(...size.toArray().map((edge, i) => edge / Math.max(1, intervals[i])));
     this.tables = new MarchTables(channelCount);
     const bricks = brickCounts(volume.size);
     this.skips = new Uint8Array(bricks[0] * bricks[1] * bricks[2]);
@@ -117,7 +110,7 @@ export class TileMarch {
         uTexHigh: { value: high },
         uTexels: { value: new Vector3(...volume.size) },
         uVoxel: { value: voxel },
-        uMinStep: { value: this.texel_um },
+        uMinStep: { value: voxel },
         uBrickSlack: { value: 0 },
         uToShading: { value: new Matrix4() },
         uShadingCell: { value: 0 },
@@ -242,7 +235,7 @@ export class TileMarch {
     // ranges of bricks hold for what is drawn, however coarse
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
-    uniforms.uMinStep.value = STEP_VOXELS * this.texel_um * 2 ** shown.level;
+    uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
   /** March what lies in the disc's cone alone, whatever the channels. */
