@@ -310,8 +310,9 @@ careless: setup browser ## Ten minutes of scripted, careless use of a built bund
 bench: setup ## Ratios of two things in one run, medians
 	$(BIN)/python tests/bench/bench.py
 
-bench-live: setup ## How soon `stereocell view SOURCE` shows a source, and how it answers beside a build
+bench-live: setup ## How soon `stereocell view SOURCE` shows a source, in which colours, and how it answers beside a build
 	$(BIN)/python tests/bench/live_view.py
+	$(BIN)/python tests/bench/live_color.py
 
 bench-start: setup ## How long `import stereocell` and `stereocell --help` take
 	$(BIN)/python tests/bench/start.py

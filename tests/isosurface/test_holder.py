@@ -230,3 +230,14 @@ def test_a_thin_ear_in_a_foam_rest_stays() -> None:
     out = _left_out(given)
     assert (out & cradle).sum() > 0.7 * cradle.sum()
     assert not (out & body).any()
+
+
+def test_voxels_on_a_coarser_grid_are_left_out_at_their_places() -> None:
+    mask = np.zeros((2, 2, 2), bool)
+    mask[1, :, 0] = True
+    holder = Holder(Box((0, 0, 0), (8, 8, 8)), mask, ())
+    fine = np.full((8, 8, 8), 40.0, np.float32)
+    coarse = np.full((4, 4, 4), 40.0, np.float32)
+    places = [np.arange(0.5, 8, 2)] * 3  # each between two voxels
+    whole = holder.left_out_of(fine, Box((0, 0, 0), (8, 8, 8)))
+    np.testing.assert_array_equal(holder.left_out_at(coarse, places), whole[::2, ::2, ::2])

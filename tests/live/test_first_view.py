@@ -202,3 +202,15 @@ def test_numbers_of_a_label_map_are_never_averaged(
     assert coarse.voxels.size <= 10_000 < labels.size
     assert coarse.voxels.max() == 1
     assert coarse.voxels[0].max() == 0
+
+
+def test_a_translucent_channel_looks_like_its_surface_where_voxels_are_those_of_the_build(
+    f_tiff: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = []
+    for voxels in (4_000_000, 10_000):
+        monkeypatch.setattr(first_view, "VOXELS", voxels)
+        root = tmp_path / f"view-{voxels}"
+        write_view_of(f_tiff, root)
+        opened.append(manifest_of(root)["channels"][0]["transfer_function"])
+    assert opened == ["surface", "soft"]

@@ -44,5 +44,7 @@ def first_appearance(
     small = replace(plan, spacing_um=(z, y, x), region=whole.box, tiles=(whole,))
     level = find_level(small, channel, window, {whole.id: found.evidence})
     iso = {whole.id: level_of_tile(small, whole, level, 0, {})}
-    appearance = appearance_of(small, channel, Chosen(level, 0, {}, iso))
+    # Functions are those of the planned voxels, which take the place of the coarse ones.
+    fine = replace(plan, tiles=(Tile(whole.id, plan.region),))
+    appearance = appearance_of(fine, channel, Chosen(level, 0, {}, iso))
     return appearance, is_body(appearance, statistics)

@@ -35,6 +35,7 @@ from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
 from stereocell.storage.processes import cores
 from stereocell.transfer.joint_histogram import to_eight_bits
+from stereocell.transfer.opacity import SOFT, SURFACE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
@@ -101,7 +102,10 @@ def write_first_view(
         found = list(
             pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
         )
-    appearances = [composed(appearance) for appearance, _ in found] or [
+    appearances = [
+        as_surface(composed(appearance), read[channel.voxels_id])
+        for channel, (appearance, _) in zip(plan.channels, found, strict=True)
+    ] or [
         composed(replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT))
         for one in plan.labels
     ]
@@ -190,6 +194,19 @@ def write_view(
         unfinished={tile.id for tile in tiles} - set(finished),
     )
     write_file(root, MANIFEST, manifest)
+
+
+def as_surface(appearance: ComposedAppearance, coarse: CoarseChannel) -> ComposedAppearance:
+    """Return how a channel is drawn until its surface is there.
+
+    A channel that opens translucent beside its surface looks like that surface as long as there is
+    none: the picture would be much darker than that of the build. Coarse voxels stay translucent:
+    their edges are wider than those of a surface, and too bright for one.
+    """
+    is_coarse = max(coarse.grid.step) > 1
+    if is_coarse or appearance.chosen != SOFT or SURFACE not in appearance.transfer_functions:
+        return appearance
+    return replace(appearance, chosen=SURFACE)
 
 
 def composed(appearance: Appearance) -> ComposedAppearance:

@@ -18,7 +18,13 @@ from stereocell.bundle.write import Composed
 from stereocell.bundle.write_tile import write_tile
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import NOT_BUILT, Sizes, write_coarse_tiles, write_view
+from stereocell.live.first_view import (
+    NOT_BUILT,
+    Sizes,
+    as_surface,
+    write_coarse_tiles,
+    write_view,
+)
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -172,10 +178,14 @@ class PartialView:
             for ref in (ref for channel in tile.channels for ref in channel.files):
                 own = self._scratch / "parts" / tile.id / ref.path
                 _link(own if own.exists() else self._scratch / "coarse" / ref.path, root / ref.path)
+        appearances = survey.appearances
+        if len(self._finished) < len(tiles):
+            coarse = [self._read[channel.voxels_id] for channel in survey.plan.channels]
+            appearances = tuple(map(as_surface, appearances, coarse))
         write_view(
             survey.plan,
             root,
-            [_as_far_as_built(one, i, tiles) for i, one in enumerate(survey.appearances)],
+            [_as_far_as_built(one, i, tiles) for i, one in enumerate(appearances)],
             tiles,
             is_cut=survey.is_cut,
             finished=self._finished,
