@@ -22,6 +22,7 @@ from stereocell.inbox.queue_file import load_items, save_items
 from stereocell.inbox.readers import ReaderProcess
 from stereocell.inbox.refused import RefusedError
 from stereocell.inbox.upload import Announced, Upload, parse_announced
+from stereocell.live.build_process import COMMANDS
 
 _BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
 _WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
@@ -255,21 +256,21 @@ class Inbox:
             build = item.build
             if command == "pause":
                 self._require(item, ("building",), "paused")
+                self.set(item, "paused")
             elif command == "continue" and item.doing == "cancelled" and item.title:
                 self._enqueue(item)
                 return
             elif command == "continue":
                 self._require(item, ("paused",), "continued")
+                self.set(item, "building")
             else:
                 self._require(item, (*_BUSY, *_WAITING), "cancelled")
                 item.queued = 0
                 self.set(item, "cancelled")
         if command == "cancel":
             self.reader.stop(item)
-        if build is not None and command in ("pause", "continue", "cancel"):
-            build.do("pause" if command == "pause" else command)  # type: ignore[arg-type]
-        if command in ("pause", "continue"):
-            self.set(item, "paused" if command == "pause" else "building")
+        if build is not None:
+            build.do(next(one for one in COMMANDS if one == command))
 
     def _enqueue(self, item: Item) -> None:
         if item.upload is None:

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -70,7 +69,11 @@ class NearBuild(BuildProcess):
 
     def _send(self, command: str) -> None:
         if command == "pause":
-            threading.Timer(0.05, partial(self._set, doing="paused")).start()
+            threading.Timer(0.05, self._pause).start()
+
+    def _pause(self) -> None:
+        if self.state.doing == "pausing":
+            self._set(doing="paused")
 
     def end(self, line: str = "") -> None:
         """Leave a bundle of two files, or fail with a line."""
