@@ -4,8 +4,8 @@ import json
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -51,10 +51,9 @@ def live(tmp_path: Path) -> Live:
             (tmp_path / folder / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / folder / name).write_text(text)
     (tmp_path / "secret").write_text("secret")
-    fine: Any = SimpleNamespace(plan=SimpleNamespace(tiles=range(10)))  # of which none is read
     build = FakeBuild(tmp_path / "out")
     return Live(
-        tmp_path / "page", tmp_path / "first", Future(), fine, build, Reading(lambda _: None)
+        tmp_path / "page", tmp_path / "first", Future(), 10, None, build, Reading(lambda _: None)
     )
 
 
@@ -192,7 +191,7 @@ def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_here:
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:
     live.first.set_result(None)
-    only = Live(live.page, live.bundle, live.first, live.fine, None, live.reading)
+    only = replace(live, build=None)
     with serving(only) as port:
         assert "Stereocell-Live" not in ask(port, "/manifest.json")[0].headers
         refused = pytest.raises((ConnectionClosed, InvalidStatus))
