@@ -165,6 +165,21 @@ def test_an_upload_that_breaks_off_twice_goes_on_where_it_was(
     understood(client, item)
 
 
+def test_files_of_another_patient_by_the_same_names_are_an_upload_of_their_own(
+    client: InboxClient,
+) -> None:
+    def announce(mark: str) -> tuple[int, str]:
+        body = {"files": [["scan/01.dcm", 4], ["scan/02.dcm", 4]], "mark": mark}
+        status, content, _ = client.ask("POST", "/items", body)
+        return status, str(content.get("id", content.get("line")))
+
+    (first, one), (second, other) = announce("a" * 64), announce("b" * 64)
+    assert (first, second) == (201, 201)
+    assert one != other
+    assert announce("a" * 64) == (200, one)
+    assert announce("A" * 64) == (400, "mark: expected 64 hexadecimal digits in lower case")
+
+
 def test_choices_are_understood_anew_and_a_wrong_one_is_a_line(
     client: InboxClient, tmp_path: Path
 ) -> None:

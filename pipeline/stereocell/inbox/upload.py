@@ -11,6 +11,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import time
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ from stereocell.storage.json_files import compact_json
 
 _NAMES, _PARTS = "names.json", "parts"
 _LIST = "files"
+_MARK = re.compile(r"([0-9a-f]{64})?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +35,14 @@ class Announced:
 
     names, sizes  of the files, in the order of the stream
     address       empty: files
+    mark          a hash of samples of their bytes, so that files of the same names and sizes, as of
+                  two patients, are not taken for one another; empty: the client names none
     """
 
     names: tuple[str, ...] = ()
     sizes: tuple[int, ...] = ()
     address: str = ""
+    mark: str = ""
 
     @property
     def total(self) -> int:
@@ -47,7 +52,7 @@ class Announced:
     @property
     def digest(self) -> str:
         """A hash by which an upload is found again."""
-        content = [self.address, list(zip(self.names, self.sizes, strict=True))]
+        content = [self.address, self.mark, list(zip(self.names, self.sizes, strict=True))]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     @property
@@ -58,7 +63,11 @@ class Announced:
 
 def parse_announced(content: Any, limits: InboxLimits) -> Announced:
     """Return what the body of a request announces. Raises RefusedError."""
-    if not isinstance(content, dict) or len(content) != 1:
+    is_object = isinstance(content, dict)
+    mark = content.pop("mark", "") if is_object and "files" in content else ""
+    if not isinstance(mark, str) or not _MARK.fullmatch(mark):
+        raise RefusedError(400, "mark: expected 64 hexadecimal digits in lower case")
+    if not is_object or len(content) != 1:
         raise RefusedError(400, 'items: expected {"files": [[name, bytes], ...]} or {"address": A}')
     if isinstance(address := content.get("address"), str):
         if not 0 < len(address) <= ADDRESS_CHARS:
@@ -85,7 +94,7 @@ def parse_announced(content: Any, limits: InboxLimits) -> Announced:
         raise RefusedError(
             413, f"files: found {sum(sizes):,} bytes, expected at most {limits.bytes:,}"
         )
-    return Announced(tuple(names), tuple(sizes))
+    return Announced(tuple(names), tuple(sizes), mark=mark)
 
 
 class Upload:
@@ -103,7 +112,7 @@ class Upload:
             folder.mkdir(parents=True, mode=0o700)
             (folder / _PARTS).mkdir()
             files = list(zip(announced.names, announced.sizes, strict=True))
-            content = {_LIST: files, "address": announced.address}
+            content = {_LIST: files, "address": announced.address, "mark": announced.mark}
             (folder / _NAMES).write_bytes(compact_json(content))
         except OSError as error:
             raise not_written(error) from None
@@ -117,7 +126,8 @@ class Upload:
             names, sizes = zip(*content[_LIST], strict=True) if content[_LIST] else ((), ())
         except (OSError, ValueError, KeyError):
             return None
-        return cls(folder, Announced(tuple(names), tuple(sizes), content["address"]))
+        address, mark = content["address"], content.get("mark", "")
+        return cls(folder, Announced(tuple(names), tuple(sizes), address, mark))
 
     @property
     def is_whole(self) -> bool:

@@ -49,8 +49,9 @@ export class Server {
   ) {}
 
   /** Begins an upload, or finds the unfinished one of the same files. */
-  async begin({ list }: UploadFiles): Promise<Begun> {
-    return begunOf(await this.json("POST", "items", { files: list }));
+  async begin(files: UploadFiles): Promise<Begun> {
+    const content = { files: files.list, mark: await files.mark() };
+    return begunOf(await this.json("POST", "items", content));
   }
 
   async addAddress(address: string): Promise<Begun> {

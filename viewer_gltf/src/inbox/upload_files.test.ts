@@ -43,6 +43,23 @@ describe("the files of an upload", () => {
     }
   });
 
+  it("have a mark that differs where bytes differ that the list does not tell", async () => {
+    const mark = (...values: number[]) =>
+      new UploadFiles([
+        { name: "01.dcm", file: bytesOf(...values) },
+        { name: "02.dcm", file: bytesOf(9) },
+      ]).mark();
+    expect(await mark(1, 2)).toMatch(/^[0-9a-f]{64}$/);
+    expect(await mark(1, 2)).toBe(await mark(1, 2));
+    expect(await mark(1, 2)).not.toBe(await mark(1, 3));
+    const long = (last: number) => {
+      const bytes = new Uint8Array(100_000);
+      bytes[bytes.length - 1] = last;
+      return new UploadFiles([{ name: "a.nii", file: new Blob([bytes]) }]).mark();
+    };
+    expect(await long(1)).not.toBe(await long(2));
+  });
+
   it("names the files that a piece lies in", () => {
     const files = new UploadFiles(FILES);
     const namesIn = (start: number, end: number) =>

@@ -11,6 +11,10 @@ function belongsToImage(name: string): boolean {
   return !LEFT_BY_SYSTEM.test(parts[parts.length - 1]) && !parts.includes("__MACOSX");
 }
 
+/** Files of which bytes are sampled for the mark, at most, and the bytes at each of their ends. */
+const MARKED_FILES = 64;
+const MARKED_BYTES = 4096;
+
 export class UploadFiles {
   readonly files: readonly NamedFile[];
   /** Where each file begins in the stream, and where the last one ends. */
@@ -31,6 +35,21 @@ export class UploadFiles {
   /** Names and bytes, as the server takes them. */
   get list(): readonly (readonly [string, number])[] {
     return this.files.map(({ name, file }) => [name, file.size]);
+  }
+
+  /**
+   * A hash of samples of the bytes, hexadecimal: files of the same names and sizes, as of two patients, must not be
+   * taken for one another when an upload goes on.
+   */
+  async mark(): Promise<string> {
+    const count = Math.min(MARKED_FILES, this.files.length);
+    const samples = Array.from({ length: count }, (_, i) => {
+      const { file } = this.files[Math.floor((i * this.files.length) / count)];
+      return [file.slice(0, MARKED_BYTES), file.slice(Math.max(0, file.size - MARKED_BYTES))];
+    });
+    const bytes = await new Blob(samples.flat()).arrayBuffer();
+    const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+    return [...digest].map((byte) => byte.toString(16).padStart(2, "0")).join("");
   }
 
   /**
