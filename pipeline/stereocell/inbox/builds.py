@@ -52,7 +52,9 @@ class Builds:
         try:
             inbox.set(item, "building")
             _require_room(inbox, item)
-            with item.viewing:
+            with item.reading:
+                if item.is_deleted:
+                    return
                 coarse, found, bundle = write_first_look(inbox, item)
             source = item.place().place
             build = BuildProcess(

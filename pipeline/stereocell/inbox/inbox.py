@@ -194,12 +194,13 @@ class Inbox:
         with self.changed:
             if self._items.pop(item.id, None) is None:
                 return
+            item.is_deleted = True
             self.save()
             self.changed.notify_all()
         self.reader.stop(item)
         if item.build is not None:
             item.build.close()
-        with item.writing:  # a piece ends at its next bytes
+        with item.writing, item.reading:  # a piece ends at its next bytes, a reader has been ended
             for _ in range(20):  # a process that was ended may write one more file
                 shutil.rmtree(item.folder, ignore_errors=True)
                 if not item.folder.exists():

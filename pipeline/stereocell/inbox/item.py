@@ -54,7 +54,8 @@ class Item:
     round     counts the choices, so that an answer to older ones is not taken for one to newer
     writer    the piece that may write: a later one takes over
     writing   held while bytes are written
-    viewing   held while its first view is written
+    reading   held while its upload is read and what is found in it is written
+    is_deleted  whether its folder goes: nothing is read any more
     """
 
     id: str
@@ -74,7 +75,8 @@ class Item:
     round: int = 0
     writer: object = None
     writing: threading.Lock = field(default_factory=threading.Lock)
-    viewing: threading.Lock = field(default_factory=threading.Lock)
+    reading: threading.Lock = field(default_factory=threading.Lock)
+    is_deleted: bool = False
 
     @property
     def upload_folder(self) -> Path:

@@ -26,6 +26,12 @@ _FOUND = "found.json"  # below the upload: the place that an address led to
 
 def prepare(inbox: Inbox, item: Item) -> None:
     """Unpack and understand an item; what goes wrong becomes its line."""
+    with item.reading:
+        if not item.is_deleted:
+            _prepare(inbox, item)
+
+
+def _prepare(inbox: Inbox, item: Item) -> None:
     try:
         if item.doing == "unpacking":
             source = inbox.reader.run(item, "arrange", inbox.limits, seconds=UNPACK_S)
@@ -72,7 +78,7 @@ def titled(item: Item) -> Choices:
 
 
 def write_first_look(inbox: Inbox, item: Item) -> tuple[Coarse, Resolved, Path]:
-    """Write the first view of an item, whose `viewing` the caller holds.
+    """Write the first view of an item, whose `reading` the caller holds.
 
     Returns the inputs of a build behind it, the place that the source was found at, and the folder
     of the view. Raises as the reader does.
@@ -108,9 +114,11 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
         raise RefusedError(409, f"it can't be looked at while it is {item.doing}")
     if item.upload is None:
         raise RefusedError(409, "its upload is gone: hand it in again")
-    with item.viewing:
+    with item.reading:
         if item.page:  # another request was first
             return item.page
+        if item.is_deleted:
+            raise RefusedError(410, "it has been deleted")
         try:
             coarse, _, bundle = write_first_look(inbox, item)
         except StereoCellError as error:

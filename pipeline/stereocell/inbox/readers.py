@@ -6,6 +6,7 @@ from typing import Any
 from stereocell.inbox.item import Item
 from stereocell.inbox.limits import MEMORY_SHARE, READ_S
 from stereocell.inbox.reader import Reader
+from stereocell.inbox.refused import RefusedError
 from stereocell.storage.child_process import Bounds, Child, ChildError
 from stereocell.storage.processes import available_bytes
 
@@ -22,10 +23,13 @@ class ReaderProcess:
     def run(self, item: Item, method: str, *arguments: Any, seconds: float = READ_S) -> Any:
         """Return what a method of the reader of an item returns.
 
-        Raises as it does, and ChildError where its process dies or exceeds its bounds.
+        Raises as it does, ChildError where its process dies or exceeds its bounds, and RefusedError
+        where the item has been deleted.
         """
         bounds = Bounds(seconds, int(MEMORY_SHARE * available_bytes()))
         with self._busy:
+            if item.is_deleted:
+                raise RefusedError(410, "it has been deleted")
             if self._item is not item:
                 if self._item is not None:
                     self._close()

@@ -181,10 +181,10 @@ class InboxClient:
 
     def wait(self, item: str, *doings: str) -> dict[str, Any]:
         """Return the state of an item once it does one of these."""
-        end_s = time.monotonic() + 2 * PATIENCE_S
+        end_s = time.monotonic() + 5 * PATIENCE_S  # a build goes behind all else
         with connect(f"ws://localhost:{self.port}/events") as socket:
-            while time.monotonic() < end_s:
-                items = json.loads(socket.recv(timeout=PATIENCE_S))["items"]
+            while (left_s := end_s - time.monotonic()) > 0:
+                items = json.loads(socket.recv(timeout=left_s))["items"]
                 found: dict[str, Any] = next(one for one in items if one["id"] == item)
                 if found["doing"] in doings:
                     return found
