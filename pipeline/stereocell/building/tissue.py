@@ -20,13 +20,6 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
 from stereocell.building.replaced_plan import replace_plan
 from stereocell.building.sealed_documents import require_documents
-from stereocell.building.tissue_files import (
-    FOLDER,
-    RECORD,
-    VOXELS,
-    digests_of,
-    read_whole,
-)
 from stereocell.engine.run import console
 from stereocell.engine.step_record import libraries_of
 from stereocell.formats.ome_zarr_write import write_probabilities
@@ -38,6 +31,13 @@ from stereocell.planning.plan_source import voxels_of
 from stereocell.planning.provenance import provenance_record
 from stereocell.steps.learn_tissue import LearnTissue
 from stereocell.steps.open_source import SourceRef, open_source
+from stereocell.steps.tissue_files import (
+    FOLDER,
+    RECORD,
+    VOXELS,
+    digests_of,
+    read_whole,
+)
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.json_files import write_json, write_sealed
 from stereocell.storage.shell_commands import fill_in

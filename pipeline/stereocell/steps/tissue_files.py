@@ -7,10 +7,10 @@ only: Zarr reads a lost chunk as zeros, and zstd decodes some damage to other vo
 from pathlib import Path
 from typing import Any
 
-from stereocell.building.out_folder import OutFolder
 from stereocell.model.errors import OutputError
 from stereocell.storage.file_list import measure
 from stereocell.storage.json_files import read_json
+from stereocell.storage.workspace import fetch
 
 FOLDER, VOXELS, RECORD = "tissue", "classes.ome.zarr", "tissue.json"
 _SCHEMA = "tissue.schema.json"
@@ -37,7 +37,7 @@ def read_whole(folder: Path) -> dict[str, Any]:
     Raises OutputError for the first file that isn't.
     """
     record = read_record(folder)
-    OutFolder(folder.parent).fetch(folder)
+    fetch(folder)
     found, written = digests_of(folder), record["files"]
     for name in sorted(written.keys() | found.keys()):
         if found.get(name) != written.get(name):
