@@ -22,11 +22,10 @@ from stereocell.formats.gltf_decode import read_glb
 from stereocell.formats.vdb import write_vdb
 from stereocell.model.identifiers import to_identifier
 from stereocell.samples.cells import table_beside, write_cells
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.blender_session import NEEDS_BLENDER, run
-from support.bundles import load
+from support.bundles import load, write_bundle
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
 
 pytestmark = NEEDS_BLENDER

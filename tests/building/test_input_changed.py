@@ -5,7 +5,6 @@ import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +20,9 @@ from stereocell.planning import input_files
 from stereocell.read import fingerprint
 from stereocell.read import tables as tables_module
 from stereocell.steps.find_extents import FindExtents
-from stereocell.steps.learn_tissue import Learned, LearnTissue
+from stereocell.steps.learn_tissue import LearnTissue
 from stereocell.steps.open_source import SourceRef, open_afresh
+from stereocell.steps.tissue_files import TissueClasses
 from stereocell.steps.unit_files import UnitFolder
 from stereocell.storage import file_states
 from stereocell.storage.file_states import FileStates
@@ -336,14 +336,14 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_reported(
 
         monkeypatch.setattr(Path, "read_bytes", read_bytes)
     else:
-        learn = LearnTissue.learn
+        learn = LearnTissue.run
 
-        def learn_and_change(*given: Any) -> Learned:
-            found = learn(*given)
+        def learn_and_change(step: LearnTissue) -> TissueClasses:
+            found = learn(step)
             write_tiff(tmp_path, OTHER)
             return found
 
-        monkeypatch.setattr(LearnTissue, "learn", learn_and_change)
+        monkeypatch.setattr(LearnTissue, "run", learn_and_change)
     assert main(["tissue", str(out), "--model", str(model)]) == 1
     line = last_line(capsys)
     assert "changed while it was read" in line

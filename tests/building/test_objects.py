@@ -19,7 +19,7 @@ from stereocell.planning import label_numbers
 from stereocell.planning.located_objects import CUT
 from stereocell.samples.cells import SPACING_UM, make_tissue, table_beside
 from stereocell.steps.unit_files import load_objects
-from stereocell.steps.write_bundle import write_bundle
+from support.bundles import write_bundle
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid
 from support.dicom_series import sample as scene_on

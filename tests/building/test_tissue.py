@@ -23,6 +23,7 @@ from stereocell.storage.assets import find_asset
 from stereocell.storage.json_files import read_json
 from stereocell.tissue.classify import TissueOptions
 from stereocell.verify.formats import check
+from support import phantoms
 from support.bundles import channel, load
 from support.onnx_models import write_model
 from support.sealed_files import seal
@@ -153,6 +154,25 @@ def test_the_same_again_learns_nothing_anew(
     capsys.readouterr()
     add(planned, "--classes", "3")
     assert "up to date" in capsys.readouterr().err
+
+
+def test_the_same_plan_has_the_same_classes_whatever_was_planned_before(tmp_path: Path) -> None:
+    body = phantoms.f_phantom(1)
+    source = phantoms.write_ome_tiff(
+        tmp_path / "f.ome.tif", np.stack([body, body[:, ::-1]]), "CZYX", names=["first", "second"]
+    )
+    found = {}
+    for name, earlier in (("detour", ["--channels", "0"]), ("straight", None)):
+        out = tmp_path / name
+        for flags in filter(lambda one: one is not None, (earlier, [])):
+            assert main(["plan", str(source), "-o", str(out), *flags]) == 0
+            plan = add(out, "--classes", "2").plan()
+        assert len({channel.color for channel in plan.channels}) == 4
+        files = sorted(file for file in (out / "tissue").rglob("*") if file.is_file())
+        found[name] = {file.relative_to(out).as_posix(): file.read_bytes() for file in files}
+        colors = [channel.color for channel in plan.channels]
+        found[name]["colors"] = json.dumps(colors).encode()
+    assert found["detour"] == found["straight"]
 
 
 def test_wrong_use_is_said_in_a_line(planned: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,10 +11,9 @@ from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError
 from stereocell.notebook.bundle_files import NotebookBundle
 from stereocell.serve.brick_library import BrickLibrary
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.layer_units import LINES
 from support import plain_bundle
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 
 FIRST, SECOND = "ab" * 32, "cd" * 32
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd
 
 from stereocell.engine.run import Engine
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import files
+from support.bundles import files, write_bundle
 from support.phantoms import f_phantom, write_ome_tiff
 from support.validators import make_assets
 

@@ -17,11 +17,10 @@ from stereocell.formats.gltf import AMBIENT_SHARE
 from stereocell.formats.tiles3d import content_hash
 from stereocell.model.errors import OutputError, StageError, StereoCellError
 from stereocell.model.mesh import Baked
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import schema_path
 from stereocell.usd.written_files import write_list
 from support import spheres
-from support.bundles import TILES, channel, files, load, volumes, write, write_tiles
+from support.bundles import TILES, channel, files, load, volumes, write, write_bundle, write_tiles
 from support.glbs import decoded_colors, decoded_positions_m, read
 
 

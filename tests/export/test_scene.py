@@ -17,8 +17,7 @@ from stereocell.export.scene import write_scene
 from stereocell.formats.tiles3d import TileLod, make_tilesets
 from stereocell.formats.tiles3d_levels import inlined, surfaces, without_finer
 from stereocell.model.errors import OutputError, UsageError
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import load, write_tiles
+from support.bundles import load, write_bundle, write_tiles
 from support.small_viewer import use_small_viewer
 
 LINK = "https://host.example/page/?quality=low#v=1&c=CD31&eye=0,0,1.8,0,0,0"

@@ -9,10 +9,10 @@ from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
 from stereocell.formats.tiles3d import content_hash
 from stereocell.formats.tiles3d_walk import walk
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.verify.bundle_against_stage import BundleTask, compare_tile
 from stereocell.verify.formats import check
 from support import spheres
+from support.bundles import write_bundle
 
 CHANNEL = "channels/CD31"
 FINER = f"{CHANNEL}/r0_c0/finer.json"

@@ -8,8 +8,7 @@ import pytest
 from stereocell.bundle import blob_page
 from stereocell.engine.run import Engine
 from stereocell.notebook import page
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 
 
 @pytest.fixture(scope="session")

@@ -15,8 +15,7 @@ import pytest
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.publish.targets import AGAIN, FOREVER, FolderTarget
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 from support.object_store import ObjectStore, serving_bucket
 from support.plain_bundle import FILES, below, write
 

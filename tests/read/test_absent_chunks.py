@@ -51,6 +51,7 @@ def write_hdf5(path: Path, count: int) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_share_of_chunks_that_are_not_stored_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -78,6 +79,7 @@ def test_the_share_of_chunks_that_are_not_stored_is_reported(
     assert "2 of 8 chunks of level 0 " + told.format("25.00%", 9) in said
 
 
+@pytest.mark.slow
 def test_chunks_of_other_channels_and_regions_are_not_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -125,6 +125,7 @@ def test_any_address_that_fsspec_knows_works(fixture: str, request: pytest.Fixtu
 
 
 @pytest.mark.parametrize("fixture", FORMATS)
+@pytest.mark.slow
 def test_a_public_host_does_not_redirect_into_a_private_network(
     fixture: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -370,6 +370,7 @@ def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
     np.testing.assert_array_equal(whole(read.open(path)), BODY)
 
 
+@pytest.mark.slow
 def test_lost_blocks_of_a_view_are_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

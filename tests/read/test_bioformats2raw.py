@@ -64,6 +64,7 @@ def test_positions_of_planes_give_the_spacing_where_the_scale_differs(tmp_path: 
     assert read.open(container(tmp_path / "same.zarr", [BODY], [places(0.5)])).notes == ()
 
 
+@pytest.mark.slow
 def test_angles_along_z_are_images_of_their_own(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

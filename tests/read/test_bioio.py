@@ -59,6 +59,7 @@ def _bioio(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_bioio")
+@pytest.mark.slow
 def test_a_plugin_s_format_is_read_with_its_scenes(tmp_path: Path) -> None:
     (tmp_path / "a b.dv").write_bytes(b"DV")
     dataset = read.open(tmp_path / "a b.dv")

@@ -84,6 +84,7 @@ def test_a_stated_colour_counts_more_than_the_light(tmp_path: Path) -> None:
     assert found == linear_color((255, 0, 255))
 
 
+@pytest.mark.slow
 def test_channels_without_light_take_colours_that_all_eyes_tell_apart(tmp_path: Path) -> None:
     """Each of the palette, where the file states none, and never one that a dye has already."""
     lights: list[dict[str, Any]] = [{}, {"emission_wavelength": 461.0}, {}, {}]
@@ -128,6 +129,7 @@ def test_wavelengths_and_dyes_of_czi_color_the_channels(tmp_path: Path) -> None:
     assert found == [color_of_wavelength(519), color_of_wavelength(610)]
 
 
+@pytest.mark.slow
 def test_emission_spectra_of_nd2_color_channels_that_state_none(tmp_path: Path) -> None:
     path = tmp_path / "a.nd2"
     lights = {0: 667.0, 1: 519.0}

@@ -54,6 +54,7 @@ def test_a_key_chooses_among_datasets(tmp_path: Path, key: str) -> None:
     assert "expected one of label, raw" in refusal(f"{path}:/none")
 
 
+@pytest.mark.slow
 def test_axes_come_from_tags_labels_and_the_user(tmp_path: Path) -> None:
     body = f_phantom()
     stored = np.stack([body, body + 1], axis=-1)  # z, y, x, c
@@ -117,6 +118,7 @@ def test_links_in_the_folder_are_followed_and_others_refused(tmp_path: Path) -> 
         assert "voxels lie in other files" in refusal(f"{path}:/{key}")
 
 
+@pytest.mark.slow
 def test_a_filter_of_hdf5plugin_is_read(tmp_path: Path) -> None:
     import hdf5plugin
 
@@ -320,6 +322,7 @@ def test_an_index_of_chunks_that_contradicts_itself_is_refused(
     assert told in line
 
 
+@pytest.mark.slow
 def test_an_index_of_many_chunks_is_compared_where_a_window_reads(tmp_path: Path) -> None:
     body = np.random.default_rng(0).integers(0, 256, (40, 100, 100), np.uint8)
     path = tmp_path / "a.h5"
@@ -355,6 +358,7 @@ def test_an_index_of_any_kind_is_read_with_chunks_that_are_not_stored(
 
 
 @pytest.mark.parametrize("name", ["axistags", "unit", "label", "scale"])
+@pytest.mark.slow
 def test_a_heap_of_texts_that_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

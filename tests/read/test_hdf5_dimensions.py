@@ -229,6 +229,7 @@ def test_a_volume_of_minc_is_refused_with_the_way_out(tmp_path: Path) -> None:
         read.open(tmp_path / "a.mnc")
 
 
+@pytest.mark.slow
 def test_factors_of_nexus_beside_a_field_are_applied(tmp_path: Path) -> None:
     path = write_nexus(tmp_path / "a.h5", "zyx", is_old=False)
     with h5py.File(path, "a") as file:

@@ -40,6 +40,7 @@ def test_no_ending_belongs_to_two_formats() -> None:
     assert not [a & b for a, b in combinations(endings, 2) if a & b]
 
 
+@pytest.mark.slow
 def test_rows_import_no_library_of_a_format() -> None:
     code = "import sys, stereocell.read.known_formats as k; k.known_formats(); print(*sys.modules)"
     loaded = subprocess.run(

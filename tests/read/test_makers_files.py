@@ -37,6 +37,7 @@ def five(body: NDArray[Any]) -> NDArray[Any]:
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.slow
 def test_czi_has_channels_times_spacing_and_its_tiles_composed(tmp_path: Path, dtype: Any) -> None:
     body = (f_phantom() // 8).astype(dtype)
     path = write_czi(tmp_path / "it's µ.CZI", {None: five(body)})
@@ -51,6 +52,7 @@ def test_czi_has_channels_times_spacing_and_its_tiles_composed(tmp_path: Path, d
     assert (dataset.dtype, dataset.name) == (dtype, "it's µ")
 
 
+@pytest.mark.slow
 def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small, large = f_phantom()[:, :40], f_phantom() + 1
     path = write_czi(tmp_path / "a.czi", {0: small[None, None], 1: large[None, None]})
@@ -98,6 +100,7 @@ def test_a_czi_whose_directory_leads_to_no_tile_is_refused(tmp_path: Path) -> No
     assert "a.czi" in refusal(path)
 
 
+@pytest.mark.slow
 def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> None:
     path = tmp_path / "a.czi"
     body = five(f_phantom())
@@ -117,6 +120,7 @@ def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> Non
     assert note.startswith("7 of 32 tiles (21.88%) are not stored: read as 0")
 
 
+@pytest.mark.slow
 def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path) -> None:
     path = tmp_path / "a.czi"
     with czi.create_czi(str(path)) as file:
@@ -128,6 +132,7 @@ def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path)
     assert "time point 1: found no tile" in refusal(path, time=1, spacing_um=SIZE_UM)
 
 
+@pytest.mark.slow
 def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = path.read_bytes()
@@ -137,6 +142,7 @@ def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) 
     assert note.startswith("the metadata state 24 along Z, and tiles are there for 16")
 
 
+@pytest.mark.slow
 def test_a_czi_whose_metadata_state_phases_that_are_not_there_is_told(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = path.read_bytes()
@@ -157,6 +163,7 @@ def with_metadata(path: Path, old: bytes, new: bytes) -> None:
     path.write_bytes(content[:start] + xml.ljust(end - start) + content[end:])
 
 
+@pytest.mark.slow
 def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_told(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     interval = b"<Dimensions><Z><Positions><Interval><Increment>9<"
@@ -168,6 +175,7 @@ def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_told(tmp_path: Pat
     assert "the interval of the planes states 9 um: Scaling is used" in note
 
 
+@pytest.mark.slow
 def test_a_distance_of_a_czi_that_is_stated_twice_is_told(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     twice = b'</Distance><Distance Id="X"><Value>0.5</Value></Distance></Items>'
@@ -177,6 +185,7 @@ def test_a_distance_of_a_czi_that_is_stated_twice_is_told(tmp_path: Path) -> Non
     assert sum("element Distance in Items" in note for note in dataset.notes) == 1
 
 
+@pytest.mark.slow
 def test_a_czi_of_rgb_or_of_one_plane_is_refused(tmp_path: Path) -> None:
     with czi.create_czi(str(tmp_path / "a.czi")) as file:
         file.write(data=np.zeros((9, 9, 3), np.uint8), plane={"C": 0, "Z": 0, "T": 0})

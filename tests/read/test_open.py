@@ -249,6 +249,7 @@ def test_further_images_are_noted(tmp_path: Path, suffix: str) -> None:
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, body)
 
 
+@pytest.mark.slow
 def test_a_format_is_told_by_the_first_bytes_where_the_name_says_nothing(tmp_path: Path) -> None:
     body = f_phantom()
     tifffile.imwrite(tmp_path / "a.dat", body, photometric="minisblack")

@@ -248,6 +248,7 @@ def test_damage_in_another_time_point_is_refused(tmp_path: Path) -> None:
     assert "damaged" in refusal(stream.source)
 
 
+@pytest.mark.slow
 def test_damage_in_a_page_of_parquet_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     columns: dict[str, Any] = {"label": range(1, 5001), "area": np.arange(5000) * 0.37}

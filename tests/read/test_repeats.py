@@ -63,6 +63,7 @@ def test_a_key_that_is_stated_twice_with_one_value_needs_no_note(tmp_path: Path)
     assert not any("multiscales" in one for one in read.open(tmp_path / "a.zarr").notes)
 
 
+@pytest.mark.slow
 def test_keys_of_n5_and_of_vigra_are_looked_at(tmp_path: Path) -> None:
     folder = tmp_path / "a.n5" / "s0"
     (folder / "0" / "0").mkdir(parents=True)

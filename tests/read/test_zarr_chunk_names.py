@@ -54,6 +54,7 @@ def voxels_of(path: Path | str) -> tuple[Any, tuple[str, ...]]:
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.slow
 def test_chunks_are_read_by_whichever_name_their_files_have(tmp_path: Path, version: int) -> None:
     forms = NAMED[version]
     for number, (lies, says) in enumerate((a, b) for a in forms for b in forms if a != b):
@@ -66,6 +67,7 @@ def test_chunks_are_read_by_whichever_name_their_files_have(tmp_path: Path, vers
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.slow
 def test_chunks_in_a_zip_file_are_read_by_whichever_name_they_have(
     tmp_path: Path, version: int
 ) -> None:
@@ -126,6 +128,7 @@ def test_lost_chunks_are_counted_by_the_names_of_the_files(
 
 
 @pytest.mark.parametrize("place", ["start", "end"])
+@pytest.mark.slow
 def test_chunks_that_a_shard_lacks_are_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], place: Any
 ) -> None:

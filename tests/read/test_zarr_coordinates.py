@@ -80,6 +80,7 @@ def test_positions_go_before_attributes_that_disagree(tmp_path: Path) -> None:
     assert "list of positions z states 0.5 um, resolution of the array states 1 um" in note
 
 
+@pytest.mark.slow
 def test_uneven_positions_and_those_without_order_are_told(tmp_path: Path) -> None:
     uneven = positions("z")
     uneven[8:] += 5

@@ -47,6 +47,7 @@ def write_tiff(folder: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize("write", [write_zarr, write_tiff])
+@pytest.mark.slow
 def test_a_damaged_chunk_among_many_prints_nothing_as_python_ends(
     tmp_path: Path, write: Callable[[Path], tuple[Path, Path]]
 ) -> None:

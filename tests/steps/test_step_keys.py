@@ -13,7 +13,10 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.step import Keyed
 from stereocell.model.object_table import ObjectTable, SharedWalls
 from stereocell.steps.learn_tissue import LearnTissue
+from stereocell.tissue.classify import TissueOptions
+from stereocell.tissue.onnx_classifier import Network
 from support import phantoms
+from support.onnx_models import write_model
 from support.step_record import find_steps
 
 SHAPE = (16, 24, 48)
@@ -44,7 +47,13 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Keyed]:
         patch.setattr(Keyed, "key", property(key))
         assert main(["build", str(image), "-o", str(folder / "out"), *flags]) == 0
     window = found["FindWindow"]
-    found["LearnTissue"] = LearnTissue(window.voxels, window.region, "MR", {"classes": 3})  # type: ignore[attr-defined]
+    found["LearnTissue"] = LearnTissue(
+        window.voxels,  # type: ignore[attr-defined]
+        window.region,  # type: ignore[attr-defined]
+        "MR",
+        TissueOptions(classes=3),
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+    )
     return found
 
 
@@ -64,6 +73,20 @@ def test_every_field_changes_the_key_and_no_place_does(steps: dict[str, Keyed], 
             changed += 1
     counted = [one for one in fields(step) if one.compare]  # type: ignore[arg-type]
     assert changed >= len(counted)
+
+
+def test_a_network_counts_by_its_file_and_classes_and_never_by_its_name(
+    steps: dict[str, Keyed], tmp_path: Path
+) -> None:
+    def key(name: str, names: list[str], slope: float = 1.0) -> str:
+        path = write_model(tmp_path / name, slopes=(0.0, slope), names=names)
+        network = Network.load(path, path.read_bytes())
+        return replace(steps["LearnTissue"], method=network).key  # type: ignore[call-arg]
+
+    first = key("a.onnx", ["bone", "marrow"])
+    assert key("b.onnx", ["bone", "marrow"]) == first
+    keys = {key("a.onnx", ["bone", "marrow"], 2.0), key("a.onnx", ["bone", ""])}
+    assert len({first, steps["LearnTissue"].key, *keys}) == 4
 
 
 Path_ = tuple[tuple[str, str], ...]  # of class and field, from the step inwards

@@ -1,9 +1,13 @@
 """A bundle of two tiles, and how tests read one."""
 
 import json
+import tempfile
+from contextlib import nullcontext
+from pathlib import Path
 
 from stereocell.engine.run import Engine
-from stereocell.steps.write_bundle import write_bundle
+from stereocell.engine.run_steps import run_missing
+from stereocell.steps import write_bundle as steps
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support import spheres
 from support.glbs import read
@@ -45,6 +49,22 @@ def factor(bundle, tile="r0_c0"):
 
 def files(folder):
     return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def write_bundle(stage, folder, viewer, *, engine, parts=None, report_line=lambda _: None):
+    """Write the bundle of a stage outside of a build, in the order of building/phases.py.
+
+    parts  a folder for finished tiles, which are taken and left there; None: none are kept
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    kept = nullcontext(parts) if parts else tempfile.TemporaryDirectory(dir=folder.parent)
+    with kept as place, steps.opened_stage(stage) as composed:
+        for note in composed.notes():
+            report_line(note)
+        tiles = steps.bundle_tile_tasks(composed, Path(place))
+        run_missing(engine, "bundle", tiles)
+        for note in steps.write_bundle(composed, [tile.place for tile in tiles], folder, viewer):
+            report_line(note)
 
 
 def write(stage, folder):

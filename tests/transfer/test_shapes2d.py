@@ -19,7 +19,6 @@ from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.model.channel import Shape, Shapes, TransferFunctions2d
 from stereocell.model.errors import StageError
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import find_asset, schema_path
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS, count_joint, log_scaled
 from stereocell.transfer.opacity import evaluate
@@ -37,7 +36,7 @@ from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.verify.check_line import CheckLine
 from stereocell.verify.formats import check
 from support import spheres
-from support.bundles import channel, load
+from support.bundles import channel, load, write_bundle
 from support.phantoms import as_counts, blurred_ball, write_ome_tiff
 
 RECTANGLE = Shape("rectangle", (0.25, 1.0), (0.25, 1.0), 0.625, (1.0, 0.5, 0.0), 0.5, 1.0)

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from stereocell.engine.run import Engine
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 from support.unity_meta import PACKAGE
 
 HERE = Path(__file__).parent

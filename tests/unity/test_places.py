@@ -16,8 +16,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from stereocell.engine.run import Engine
 from stereocell.formats import tiles3d
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import load
+from support.bundles import load, write_bundle
 from support.unity_import import UM, boxes, child, texels_of, volume_of, world_of
 
 Run = Callable[..., subprocess.CompletedProcess[bytes]]

@@ -8,9 +8,8 @@ from pxr import Usd, UsdGeom
 from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.validate import validate_stage
-from support.bundles import load
+from support.bundles import load, write_bundle
 from support.deactivated import PARTS, deactivate
 from support.stages import BALL_ID, F_ID, NAMES, TILES, write_whole
 

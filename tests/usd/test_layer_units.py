@@ -9,10 +9,10 @@ from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StageError
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.read_levels import read_lods
 from stereocell.usd.read_stage import loaded, open_stage
+from support.bundles import write_bundle
 from support.stages import F_ID, HEAD, leaf, write_whole
 
 

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from stereocell.engine.run import Engine
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd.validate import validate_stage
-from support.bundles import load
+from support.bundles import load, write_bundle
 from support.printed_layers import find_layers, write_layer
 from support.stages import F_ID, write_whole
 

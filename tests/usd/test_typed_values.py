@@ -11,11 +11,11 @@ from stereocell.engine.run import Engine
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import StereoCellError
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.usd import read_stage, typed_values
 from stereocell.usd.read_attributes import color_of
 from stereocell.usd.typed_values import read_as
 from stereocell.usd.validate import validate_stage
+from support.bundles import write_bundle
 from support.stages import F_ID, HEAD, leaf, write_whole
 
 CHANNEL = f"/Specimen/Channels/{F_ID}"

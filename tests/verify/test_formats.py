@@ -15,13 +15,13 @@ from stereocell.planning import settings as settings_module
 from stereocell.planning.channels import Channel
 from stereocell.planning.plan import make_plan
 from stereocell.read import Level
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.storage.assets import find_asset
 from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from stereocell.usd.written_files import write_list
 from stereocell.verify import node_validators
 from stereocell.verify.formats import check
 from support import object_bundle, spheres
+from support.bundles import write_bundle
 from support.sealed_files import edit_sealed
 
 GLB = "channels/CD31/r0_c0/lod0.glb"

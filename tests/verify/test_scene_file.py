@@ -14,8 +14,7 @@ from stereocell.bundle.scene_blocks import FILE, block
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
 from stereocell.export.scene import write_scene
-from stereocell.steps.write_bundle import write_bundle
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 from support.small_viewer import use_small_viewer
 
 LUT = "luts/CD31.ktx2"

@@ -7,7 +7,6 @@ therefore compared, too: a file written while tasks ran may differ in voxels out
 from collections.abc import Iterator
 from pathlib import Path
 
-from stereocell.building.tissue_files import read_whole
 from stereocell.model.errors import SourceError
 from stereocell.planning.input_files import first_states, forget, open_watched
 from stereocell.planning.plan import Plan
@@ -16,6 +15,7 @@ from stereocell.read.fingerprint import covers_all
 from stereocell.read.known_formats import format_of
 from stereocell.read.remarks import LEFT_OUT
 from stereocell.steps.open_source import SourceRef, open_afresh
+from stereocell.steps.tissue_files import read_whole
 from stereocell.storage.file_states import FileStates
 
 _SHOWN = 100  # characters of a path in a message

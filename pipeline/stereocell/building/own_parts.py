@@ -7,9 +7,9 @@ wrote, and layers of the stage that were edited in place, end the phase before i
 from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
-from stereocell.building.tissue_files import FOLDER, RECORD
 from stereocell.bundle.manifest import MANIFEST, find_others, require_bundle
 from stereocell.model.errors import OutputError
+from stereocell.steps.tissue_files import FOLDER, RECORD
 from stereocell.storage.contents import contents_of, is_ignored, words_for
 from stereocell.storage.file_list import sizes_of
 from stereocell.storage.kinds import Kind

@@ -50,7 +50,7 @@ from stereocell.planning.survey import Survey
 from stereocell.planning.unit_steps import choose_units, unit_steps
 from stereocell.read.image import printable
 from stereocell.read.source_place import require_apart
-from stereocell.steps.write_bundle import write_bundle
+from stereocell.steps.write_bundle import bundle_tile_tasks, opened_stage, write_bundle
 from stereocell.storage.assets import viewer_dist
 from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
@@ -227,14 +227,13 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         if not phase.is_done(step):
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key
-            write_bundle(
-                path,
-                out_folder.bundle_dir,
-                viewer,
-                engine=engine,
-                parts=parts,
-                report_line=phase.print,
-            )
+            with opened_stage(path) as composed:
+                phase.print(*composed.notes())
+                tiles = bundle_tile_tasks(composed, parts)
+                run_missing(engine, "bundle", tiles)
+                written = [tile.place for tile in tiles]
+                for note in write_bundle(composed, written, out_folder.bundle_dir, viewer):
+                    phase.print(note)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
     out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:

@@ -5,14 +5,11 @@ the plan. Its window is 0..255; its surface lies at probability 1/2.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from stereocell.building.input_unchanged import require_input, require_still
 from stereocell.building.model_process import ModelBounds, opened_network
@@ -20,38 +17,22 @@ from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import require_own_places, require_own_tissue
 from stereocell.building.replaced_plan import replace_plan
 from stereocell.building.sealed_documents import require_documents
-from stereocell.building.tissue_files import (
-    FOLDER,
-    RECORD,
-    VOXELS,
-    digests_of,
-    read_whole,
-)
 from stereocell.engine.run import console
-from stereocell.engine.step_record import libraries_of
-from stereocell.formats.ome_zarr_write import write_probabilities
-from stereocell.model.errors import OutputError, SourceError, UsageError
-from stereocell.model.version import GENERATOR
-from stereocell.planning.channels import GREY_MATTER, PALETTE, WHITE_MATTER, Channel
+from stereocell.model.errors import SourceError, UsageError
+from stereocell.planning.channels import PALETTE, Channel
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_source import voxels_of
 from stereocell.planning.provenance import provenance_record
 from stereocell.steps.learn_tissue import LearnTissue
 from stereocell.steps.open_source import SourceRef, open_source
-from stereocell.storage.atomic_write import replacing_folder
-from stereocell.storage.json_files import write_json, write_sealed
+from stereocell.steps.tissue_files import FOLDER, VOXELS, find_fault, read_record
+from stereocell.storage.json_files import write_sealed
 from stereocell.storage.shell_commands import fill_in
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions
 from stereocell.tissue.onnx_classifier import Network
 
 LEVEL = 127.5  # iso-value, 0..255: probability 1/2
 MAX_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
-# names and colours (linear RGB) of three classes in a head, by rising T1 intensity
-HEAD = (
-    ("CSF", (0.03, 0.3, 1.0)),
-    (GREY_MATTER, (1.0, 0.22, 0.1)),
-    (WHITE_MATTER, (0.95, 0.85, 0.45)),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +51,6 @@ class TissueRequest:
     model: Path | None = None
     everywhere: bool = False
     bounds: ModelBounds = ModelBounds()  # noqa: RUF009  (frozen)
-
-
-@dataclass(frozen=True, slots=True)
-class _Class:
-    name: str
-    color: tuple[float, float, float]
-    intensity: float | None  # mean, bias removed; None: not known of a network
-    probabilities: NDArray[np.uint8]
 
 
 def parse_classes(text: str) -> int | Literal["auto"]:
@@ -132,13 +105,17 @@ def _add(
             f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
             "same, or no --classes"
         )
-    is_brain = plan.modality == "MR" and not request.everywhere
-    options = TissueOptions(classes=request.classes or "auto", brain=is_brain)
-    settings = asdict(options) if network is None else network.settings()
-    step = LearnTissue(voxels_of(plan, channel), plan.region, channel.name, settings)
-    record = _find_learned(out / FOLDER, step.key)
-    if record is None:
-        record = _learn(out_folder, plan, step, options, network)
+    method: TissueOptions | Network
+    if network is None:
+        is_brain = plan.modality == "MR" and not request.everywhere
+        method = TissueOptions(classes=request.classes or "auto", brain=is_brain)
+    else:
+        method = network
+    step = LearnTissue(
+        voxels_of(plan, channel), plan.region, channel.name, method, _free_colors(plan)
+    )
+    _keep(out_folder, plan, step)
+    record = read_record(out / FOLDER)
     plan = with_tissue(plan, out, record)
     require_own_places(out_folder, is_same_plan=out_folder.plan() == plan)
     replace_plan(out_folder, plan)
@@ -154,7 +131,7 @@ def without_tissue(plan: Plan) -> Plan:
     return replace(plan, channels=own, settings=replace(plan.settings, iso_values=values))
 
 
-def with_tissue(plan: Plan, out: Path, record: dict[str, Any]) -> Plan:
+def with_tissue(plan: Plan, out: Path, record: Mapping[str, Any]) -> Plan:
     """Return the plan with a channel for each class of OUT/tissue."""
     fingerprint = open_source(SourceRef(_source_in(out), 0, ())).fingerprint
     _require_free([one["name"] for one in record["classes"]], plan)
@@ -165,7 +142,7 @@ def _source_in(out: Path) -> str:
     return str((out / FOLDER / VOXELS).resolve())
 
 
-def _with_classes(plan: Plan, source: str, fingerprint: str, record: dict[str, Any]) -> Plan:
+def _with_classes(plan: Plan, source: str, fingerprint: str, record: Mapping[str, Any]) -> Plan:
     added = []
     for index, one in enumerate(record["classes"]):
         red, green, blue = one["color"]
@@ -175,77 +152,29 @@ def _with_classes(plan: Plan, source: str, fingerprint: str, record: dict[str, A
     return replace(plan, channels=(*plan.channels, *added), settings=settings)
 
 
-def _find_learned(folder: Path, key: str) -> dict[str, Any] | None:
-    """Return the record of OUT/tissue if it has this key and is whole; print which."""
-    if not folder.exists():
-        return None
-    try:
-        record = read_whole(folder)
-    except OutputError as fault:
-        line = fill_in(str(fault), {"OUT": str(folder.parent)})
+def _keep(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
+    """Learn the classes unless OUT/tissue holds them, whole; print which."""
+    folder = out_folder.out / FOLDER
+    if step.is_whole(folder):
+        console.print("tissue: up to date")
+        return
+    if folder.exists() and (fault := find_fault(folder)) is not None:
+        line = fill_in(fault, {"OUT": str(out_folder.out)})
         console.print(f"tissue: {line}", markup=False, soft_wrap=True)
-        return None
-    if record["key"] != key:
-        return None
-    console.print("tissue: up to date")
-    return record
+    _learn(out_folder, plan, step)
 
 
-def _learn(
-    out_folder: OutFolder,
-    plan: Plan,
-    step: LearnTissue,
-    options: TissueOptions,
-    network: Network | None,
-) -> dict[str, Any]:
+def _learn(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
+    """Write OUT/tissue. The input and the plan are checked before anything is written."""
     require_input(plan)
-    learned = step.learn(options, network)
+    found = step.run()
     require_still(plan, again="stereocell tissue OUT")
-    names = learned.names or _names(plan, len(learned.intensities), options.brain)
-    classes = [
-        _Class(name, color, intensity, np.rint(255 * part).astype(np.uint8))
-        for (name, color), intensity, part in zip(
-            _colored(names, plan), learned.intensities, learned.probabilities, strict=True
-        )
-    ]
-    _require_free([one.name for one in classes], plan)
-    voxel_mm3 = math.prod(length / 1000 for length in plan.spacing_um)
-    record: dict[str, Any] = {
-        "format": "stereocell-tissue",
-        "version": 1,
-        "generator": GENERATOR,
-        "key": step.key,
-        "fingerprint": plan.fingerprint,
-        "channel": step.channel,
-        "settings": dict(step.settings),
-        "bic": dict(learned.bic),
-        "classes": [
-            {
-                "name": one.name,
-                "color": list(one.color),
-                "intensity": one.intensity,
-                "volume_mm3": float(one.probabilities.sum(dtype=np.float64) / 255 * voxel_mm3),
-            }
-            for one in classes
-        ],
-        "libraries": libraries_of(LearnTissue.__name__),
-    }
-    shape = open_source(step.voxels.ref).levels[plan.level].shape
-    # Checks the plan before anything is written. Its fingerprint is a placeholder of equal length.
-    out_folder.require_readable(_with_classes(plan, _source_in(out_folder.out), "0" * 64, record))
-    with replacing_folder(out_folder.out / FOLDER) as folder:
-        write_probabilities(
-            folder / VOXELS,
-            [one.probabilities for one in classes],
-            channels=[(one.name, one.color) for one in classes],
-            start=plan.region.start,
-            shape=shape,
-            spacing_um=plan.spacing_um,
-            origin_um=plan.origin_um,
-        )
-        write_json(folder / RECORD, {**record, "files": digests_of(folder)})
+    _require_free([one.name for one in found.classes], plan)
+    # The fingerprint is a placeholder of equal length.
+    planned = _with_classes(plan, _source_in(out_folder.out), "0" * 64, found.record)
+    out_folder.require_readable(planned)
+    step.FORM.write(out_folder.out / FOLDER, found)
     open_source.cache_clear()  # the same address holds another volume now
-    return record
 
 
 def _find_channel(plan: Plan, wanted: str) -> Channel:
@@ -273,15 +202,7 @@ def _require_free(names: Sequence[str], plan: Plan) -> None:
             )
 
 
-def _names(plan: Plan, count: int, is_brain: bool) -> list[str]:
-    if is_brain and count == len(HEAD):
-        return [name for name, _ in HEAD]
-    return [f"tissue {k + 1}" for k in range(count)]
-
-
-def _colored(names: Sequence[str], plan: Plan) -> list[tuple[str, tuple[float, float, float]]]:
-    """Return each name with a colour (linear RGB) of its own, not a channel's of the input."""
-    known = dict(HEAD)
+def _free_colors(plan: Plan) -> tuple[tuple[float, float, float], ...]:
+    """Return the colours (linear RGB) of the palette that no channel of the input has."""
     taken = {channel.color for channel in plan.channels}
-    free = [color for color in PALETTE if color not in taken] or list(PALETTE)
-    return [(name, known.get(name, free[k % len(free)])) for k, name in enumerate(names)]
+    return tuple(color for color in PALETTE if color not in taken) or PALETTE

@@ -136,6 +136,17 @@ def fill_bundle(
         files += copy_viewer(viewer_dist, root)
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
+    ar = {"usdz": usdz, "usdz_reason": usdz_reason}
+    manifest = describe_bundle(_specimen_of(stage), tiles, channels=channels, index=index, ar=ar)
+    write_file(root, MANIFEST, manifest)
+    for tile in tiles:
+        for channel in tile.channels:
+            if channel.edit:
+                yield f"{tile.id}/{channel.channel_id}: {channel.edit}"
+
+
+def _specimen_of(stage: Usd.Stage) -> dict[str, Any]:
+    """Return the specimen as the manifest describes it."""
     specimen: dict[str, Any] = {"name": specimen_name(stage), "modality": modality_of(stage)}
     if fingerprint := fingerprint_of(stage):
         specimen["fingerprint"] = fingerprint
@@ -143,10 +154,4 @@ def fill_bundle(
         specimen["sides"] = sides
     if (cut := opening_cut_of(stage)) is not None:
         specimen["cut"] = {"normal": list(cut[0]), "offset_um": cut[1]}
-    ar = {"usdz": usdz, "usdz_reason": usdz_reason}
-    manifest = describe_bundle(specimen, tiles, channels=channels, index=index, ar=ar)
-    write_file(root, MANIFEST, manifest)
-    for tile in tiles:
-        for channel in tile.channels:
-            if channel.edit:
-                yield f"{tile.id}/{channel.channel_id}: {channel.edit}"
+    return specimen

@@ -10,6 +10,7 @@ from stereocell.model.color import linear_color
 from stereocell.model.errors import UsageError
 from stereocell.model.identifiers import to_identifier
 from stereocell.planning.settings import Settings
+from stereocell.tissue.head_classes import GREY_MATTER, WHITE_MATTER
 from stereocell.transfer.windows import NAMED
 
 T = TypeVar("T")
@@ -34,7 +35,6 @@ SKIN = (0.72, 0.5, 0.37)
 MR_GREY = (0.92, 0.88, 0.82)
 BODY_MODALITIES = ("MR", "CT")
 # Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
-GREY_MATTER, WHITE_MATTER = "grey matter", "white matter"
 BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.input_unchanged import require_added
-from stereocell.building.tissue_files import FOLDER, read_record
 from stereocell.model.color import to_srgb8
 from stereocell.model.tiling import Box
 from stereocell.planning.plan import Plan
@@ -18,6 +17,7 @@ from stereocell.planning.plan_source import source_of
 from stereocell.preview.draw_slices import encode
 from stereocell.preview.views import views_of
 from stereocell.steps.open_source import open_source
+from stereocell.steps.tissue_files import FOLDER, read_record
 
 SHOWN_PX = 330  # pixels, longest side of a plane
 _GAP_PX = 6  # pixels between planes

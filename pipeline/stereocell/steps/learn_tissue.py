@@ -1,16 +1,29 @@
 """The step that learns the tissue classes of a channel, or applies a network to it."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stereocell.engine.step import Keyed
+from stereocell.engine.step import Step
+from stereocell.engine.step_record import libraries_of
+from stereocell.model.errors import OutputError
 from stereocell.model.tiling import Box
-from stereocell.steps.open_source import Voxels
+from stereocell.model.version import GENERATOR
+from stereocell.steps.open_source import Voxels, open_source
+from stereocell.steps.tissue_files import (
+    TISSUE_FOLDER,
+    TissueClass,
+    TissueClasses,
+    TissueFolder,
+    read_record,
+)
 from stereocell.tissue.classify import TissueOptions, learn_tissue
+from stereocell.tissue.head_classes import HEAD
 from stereocell.tissue.onnx_classifier import Network, apply_network
 
 
@@ -20,7 +33,7 @@ class Learned:
 
     probabilities  float32 (n, z, y, x), 0..1
     intensities    mean of each class, bias removed; None: a network does not know it
-    names          of a network's classes; empty: the classes were learned
+    names          of the classes
     bic            Bayesian information criterion by number of classes; empty for a network
     """
 
@@ -31,37 +44,95 @@ class Learned:
 
 
 @dataclass(frozen=True, slots=True)
-class LearnTissue(Keyed):
+class LearnTissue(Step[TissueClasses]):
     """Learn the classes of a channel in the planned region.
 
-    The command runs this step itself (building/tissue.py): its network lives in a child process of
-    the command, its errors are the command's, and the plan names and colours the classes that are
-    written.
+    OUT/tissue is a place that users know, so no key names it, and the record holds the key. The
+    command runs this step in its own process (building/tissue.py): its network has a child process
+    there, and the classes are compared with the plan before they replace earlier ones.
 
-    channel   its name, which the record states
-    settings  of the method, as the record states them: a network counts by its digest
+    channel  its name, which the record states
+    method   how the classes are learned, or the network that knows them, which counts by its digest
+    palette  colours (linear RGB) of classes without a colour of their own, in this order
     """
 
     VERSION: ClassVar[int] = 1
+    FORM: ClassVar[TissueFolder] = TISSUE_FOLDER
 
     voxels: Voxels
     region: Box
     channel: str
-    settings: Mapping[str, Any]
+    method: TissueOptions | Network
+    palette: tuple[tuple[float, float, float], ...]
 
-    def learn(self, options: TissueOptions, network: Network | None) -> Learned:
-        """Return the classes. Raises SourceError, ModelError.
+    def is_whole(self, place: Path) -> bool:
+        """Return whether the folder is of this step, and all its files are as written."""
+        try:
+            is_own = read_record(place)["key"] == self.key
+        except OutputError:
+            return False
+        return is_own and self.FORM.is_whole(place)
 
-        options  those of `settings`, without a network
-        network  the one whose settings are `settings`; None: the classes are learned
-        """
+    def run(self) -> TissueClasses:
+        """Return the classes. Raises SourceError."""
+        method = self.method
+        if isinstance(method, Network):
+            settings, learned = method.settings(), self._apply(method)
+        else:
+            settings, learned = asdict(method), self._learn(method)
+        colors = dict(HEAD)
+        classes = tuple(
+            TissueClass(
+                name,
+                colors.get(name, self.palette[k % len(self.palette)]),
+                learned.intensities[k],
+                np.rint(255 * learned.probabilities[k]).astype(np.uint8),
+            )
+            for k, name in enumerate(learned.names)
+        )
+        record = {
+            "format": "stereocell-tissue",
+            "version": 1,
+            "generator": GENERATOR,
+            "key": self.key,
+            "fingerprint": self.voxels.ref.fingerprint,
+            "channel": self.channel,
+            "settings": settings,
+            "bic": dict(learned.bic),
+            "classes": [self._described(one) for one in classes],
+            "libraries": libraries_of(type(self).__name__),
+        }
+        return TissueClasses(
+            classes,
+            record,
+            self.region.start,
+            open_source(self.voxels.ref).levels[self.voxels.level].shape,
+            self.voxels.spacing_um,
+            self.voxels.origin_um,
+        )
+
+    def _learn(self, options: TissueOptions) -> Learned:
         volume = self.voxels.read(self.region)
-        if network is None:
-            learned = learn_tissue(volume.voxels, self.voxels.spacing_um, options=options)
-            means = tuple(float(mean) for mean in learned.means[:, 0])
-            bic = {str(count): value for count, value in learned.bic.items()}
-            return Learned(learned.probabilities, means, (), bic)
-        found = apply_network(network, volume.voxels)
+        found = learn_tissue(volume.voxels, self.voxels.spacing_um, options=options)
+        means = tuple(float(mean) for mean in found.means[:, 0])
+        bic = {str(count): value for count, value in found.bic.items()}
+        names = tuple(f"tissue {k + 1}" for k in range(len(means)))
+        if options.brain and len(means) == len(HEAD):
+            names = tuple(name for name, _ in HEAD)
+        return Learned(found.probabilities, means, names, bic)
+
+    def _apply(self, network: Network) -> Learned:
+        found = apply_network(network, self.voxels.read(self.region).voxels)
         kept = [k for k, name in enumerate(network.classes) if name]
         names = tuple(network.classes[k] for k in kept)
         return Learned(found[kept], (None,) * len(kept), names, {})
+
+    def _described(self, one: TissueClass) -> dict[str, Any]:
+        """Return a class as the record describes it."""
+        voxel_mm3 = math.prod(length / 1000 for length in self.voxels.spacing_um)
+        return {
+            "name": one.name,
+            "color": list(one.color),
+            "intensity": one.intensity,
+            "volume_mm3": float(one.probabilities.sum(dtype=np.float64) / 255 * voxel_mm3),
+        }

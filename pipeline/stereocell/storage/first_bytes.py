@@ -1,7 +1,9 @@
 """Words for a file by its first bytes, for messages about files of another kind than expected.
 
 This module knows containers and formats that are not read. A caller adds the marks of those that
-are.
+are. The tables lie below the readers because two modules of `storage` use them for the files of all
+commands: contents.py names a foreign file that a command would replace, or that was given in place
+of a build, and library_errors.py names a file that a library can't read.
 """
 
 import re

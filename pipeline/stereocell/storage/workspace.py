@@ -10,10 +10,11 @@ machine:
 
 For any other folder these functions do nothing. Few modules call them: the functions that read and
 write all documents (seals.py, atomic_write.py, file_list.py), the runner of steps for the inputs of
-each task, and `OutFolder` for phases and checks. Three more know which one of many large files they
+each task, and `OutFolder` for phases and checks. Four more know which one of many large files they
 need, so that the disk never holds all: `usd` for a layer or a tile of a stage,
 `steps/unit_files.py` for a file of a unit, `steps/open_source.py` for the voxels of an added
-channel. `bundle/write.py` moves the files of finished tiles.
+channel, `steps/tissue_files.py` for those of all classes. `bundle/write.py` moves the files of
+finished tiles.
 """
 
 import os

@@ -66,6 +66,10 @@ class Network:
             "onnxruntime": version("onnxruntime"),
         }
 
+    def key_content(self) -> dict[str, Any]:
+        """Return what counts in a key."""
+        return self.settings()
+
     @classmethod
     def load(
         cls,

@@ -5,7 +5,7 @@ DCC tool are converted: polygons, values per face corner, left-handed orientatio
 mirrored tiles.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -63,16 +63,7 @@ def read_mesh(
     if len(counts) == 0:
         return None
     path = mesh.GetPath()
-    if counts.min() < 3 or counts.sum() != len(indices):
-        raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
-    if (most := int(counts.max())) > MAX_CORNERS:
-        raise LargeFaceError(
-            f"{path}: faceVertexCounts[{counts.argmax()}]: found a face of {most} corners, "
-            f"expected at most {MAX_CORNERS}: triangulate it in the program that edited it"
-        )
-    if indices.min() < 0 or indices.max() >= len(points):
-        raise StageError(f"{path}: faceVertexIndices outside its {len(points)} points")
-
+    _require_faces(path, counts, indices, len(points))
     corners = _triangulate(counts)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corners = corners[:, ::-1]
@@ -92,12 +83,7 @@ def read_mesh(
         objects = _of_vertices(np.repeat(objects, counts), indices, len(points))
     if is_edited:
         sizes = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
-        for name in sorted(values.keys() - {"normals"}):
-            array, kind = values[name]
-            if len(array) != sizes.get(kind, len(points)):
-                del values[name]
-        if "st" not in values:
-            values.pop("tangents", None)
+        values = _fitting(values, sizes, len(points))
     if all(kind in ("vertex", "varying") for _, kind in values.values()):
         triangles = indices[corners]
         arrays = {name: array for name, (array, _) in values.items()}
@@ -124,6 +110,38 @@ def read_mesh(
         ),
         to_world,
     )
+
+
+def _require_faces(
+    path: Sdf.Path, counts: NDArray[np.int64], indices: NDArray[np.int64], points: int
+) -> None:
+    """Raise StageError where the faces of a mesh contradict its other arrays, or are too large."""
+    if counts.min() < 3 or counts.sum() != len(indices):
+        raise StageError(f"{path}: faceVertexCounts don't fit {len(indices)} faceVertexIndices")
+    if (most := int(counts.max())) > MAX_CORNERS:
+        raise LargeFaceError(
+            f"{path}: faceVertexCounts[{counts.argmax()}]: found a face of {most} corners, "
+            f"expected at most {MAX_CORNERS}: triangulate it in the program that edited it"
+        )
+    if indices.min() < 0 or indices.max() >= points:
+        raise StageError(f"{path}: faceVertexIndices outside its {points} points")
+
+
+def _fitting(
+    values: Mapping[str, _Values], sizes: Mapping[str, int], points: int
+) -> dict[str, _Values]:
+    """Return the primvars that fit the faces of an edited mesh; normals are always kept.
+
+    sizes  the number of values by interpolation; one for each point where it is not named
+    """
+    kept = {
+        name: (array, kind)
+        for name, (array, kind) in values.items()
+        if name == "normals" or len(array) == sizes.get(kind, points)
+    }
+    if "st" not in kept:
+        kept.pop("tangents", None)
+    return kept
 
 
 def _values(attribute: Usd.Attribute, expected: Sdf.ValueTypeName, dtype: type) -> NDArray[Any]:

@@ -9,12 +9,12 @@ from stereocell.building.sealed_documents import (
     checks_of,
     find_document_faults,
 )
-from stereocell.building.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.formats.exr import check_exr
 from stereocell.formats.stl import check_stl
 from stereocell.formats.vdb import check_vdb
 from stereocell.model.errors import CheckError, StereoCellError
 from stereocell.steps import unit_files
+from stereocell.steps.tissue_files import FOLDER, RECORD, read_whole
 from stereocell.storage.documents import schema_of
 from stereocell.storage.file_list import DAMAGED, MISSING, sizes_of
 from stereocell.storage.json_files import find_sealed, read_json

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.sealed_documents import has_report, has_units
-from stereocell.building.tissue_files import FOLDER
 from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, SCHEMA
 from stereocell.model.errors import OutputError, StereoCellError
+from stereocell.steps.tissue_files import FOLDER
 from stereocell.storage.contents import require_kind
 from stereocell.storage.kinds import Kind
 from stereocell.usd.write_usdz import USDZ_NAME

@@ -72,6 +72,7 @@ def test_each_form_leads_to_the_zarr(archive: Service, address: str) -> None:
     assert found.notes == (f"DANDI asset {ASSET} is read from {found.source}",)
 
 
+@pytest.mark.slow
 def test_the_zarr_is_read(archive: Service, tiny_zarr_04: Path) -> None:
     """Its address has no ending that tells the format."""
     for file in tiny_zarr_04.rglob("*"):

@@ -110,6 +110,7 @@ def test_a_series_is_fetched_once(pacs: Service) -> None:
     assert len(pacs.asked) == 2
 
 
+@pytest.mark.slow
 def test_the_folder_is_removed_at_the_end(pacs: Service) -> None:
     code = (
         "import sys; from stereocell.read.addresses.resolve import resolve;"

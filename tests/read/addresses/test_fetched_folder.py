@@ -34,12 +34,14 @@ def test_a_folder_is_its_owner_s_alone_and_can_be_removed_at_once(scratch: Path)
 
 
 @pytest.mark.parametrize("end", ["", "raise SystemExit(1)", "raise KeyboardInterrupt"])
+@pytest.mark.slow
 def test_a_folder_is_removed_when_its_process_ends(scratch: Path, end: str) -> None:
     done = subprocess.run([sys.executable, "-c", MAKE + end], capture_output=True, text=True)
     assert Path(done.stdout.strip()).name == "dicom"
     assert os.listdir(scratch) == []
 
 
+@pytest.mark.slow
 def test_a_child_that_is_forked_leaves_the_folder(scratch: Path) -> None:
     fork = "import os; p = os.fork(); p or sys.exit(0); os.waitpid(p, 0); print(folder.exists())"
     done = subprocess.run(
@@ -49,6 +51,7 @@ def test_a_child_that_is_forked_leaves_the_folder(scratch: Path) -> None:
     assert os.listdir(scratch) == []
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_killed_process_is_removed_by_the_next_one(scratch: Path) -> None:
     sleep = "import time; time.sleep(60)"
     with subprocess.Popen(

@@ -387,6 +387,7 @@ def test_a_zarr_group_without_a_table(tmp_path: Path) -> None:
     assert "found no group `obs`" in refusal(str(tmp_path / "s.zarr"))
 
 
+@pytest.mark.slow
 def test_a_file_of_an_older_anndata(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5ad", "w") as file:
         obs = file.create_group("obs")
@@ -396,6 +397,7 @@ def test_a_file_of_an_older_anndata(tmp_path: Path) -> None:
     assert "as AnnData before 0.8 wrote them" in refusal(str(tmp_path / "a.h5ad"))
 
 
+@pytest.mark.slow
 def test_only_the_genes_that_are_asked_for(tmp_path: Path) -> None:
     path = str(anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr"))
     (only,) = read_table(path, "", ("CD3",), "cells").columns
@@ -411,6 +413,7 @@ def test_only_the_genes_that_are_asked_for(tmp_path: Path) -> None:
         ("obs/id", lambda a: a.__setitem__(0, 2), "id: found 2 more than once"),
     ],
 )
+@pytest.mark.slow
 def test_an_h5ad_that_contradicts_itself(tmp_path: Path, name: str, change: Any, told: str) -> None:
     path = anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr")
     with h5py.File(path, "a") as file:
@@ -424,6 +427,7 @@ def parquet(tmp_path: Path, **columns: Any) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_a_table_of_parquet(tmp_path: Path) -> None:
     place = parquet(
         tmp_path,
@@ -464,6 +468,7 @@ def test_a_table_of_parquet(tmp_path: Path) -> None:
     assert (len(empty.labels), empty.columns[0].texts) == (0, ())
 
 
+@pytest.mark.slow
 def test_numbers_that_parquet_stores_as_texts_are_read_as_numbers_and_noted(tmp_path: Path) -> None:
     place = parquet(
         tmp_path,
@@ -484,6 +489,7 @@ def test_numbers_that_parquet_stores_as_texts_are_read_as_numbers_and_noted(tmp_
     assert "area: '#DIV/0!' (1), empty (1)" in told
 
 
+@pytest.mark.slow
 def test_numbers_that_anndata_stores_as_texts_are_read_as_numbers_and_noted(tmp_path: Path) -> None:
     place = anndata(tmp_path / "a" / "t.h5ad", "h5ad", "dense")
     with h5py.File(place, "r+") as file:
@@ -503,6 +509,7 @@ def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert refusal(place).endswith('expected: pip install "stereocell[tables]"')
 
 
+@pytest.mark.slow
 def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> None:
     """Decoded to a text a row it would be 2 GB."""
     rows = 20_000
@@ -513,6 +520,7 @@ def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> No
     assert found.texts == ("x" * 200,) * rows
 
 
+@pytest.mark.slow
 def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path) -> None:
     """The repetition type of a column is 33 instead of 0 to 2. pyarrow 26 aborts on it."""
     place = tmp_path / "a.parquet"
@@ -524,6 +532,7 @@ def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path
     assert "expected a Parquet file that is whole" in refusal(place)
 
 
+@pytest.mark.slow
 def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_path: Path) -> None:
     place = tmp_path / "a.h5ad"
     with h5py.File(place, "w") as file:
@@ -535,6 +544,7 @@ def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_pa
     assert "expected an IEEE float" in refusal(str(place))
 
 
+@pytest.mark.slow
 def test_an_h5ad_whose_heap_makes_hdf5_loop_without_end_is_refused_at_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -550,6 +560,7 @@ def test_an_h5ad_whose_heap_makes_hdf5_loop_without_end_is_refused_at_a_time_lim
     assert "expected a table of AnnData" in refusal(str(place))
 
 
+@pytest.mark.slow
 def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parquet_tables, "_MAX_BYTES", 50_000)
     place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])

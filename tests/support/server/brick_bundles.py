@@ -9,9 +9,8 @@ import numpy as np
 from stereocell.engine.run import Engine
 from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.ktx2 import encode_2d, encode_3d
-from stereocell.steps.write_bundle import write_bundle
 from stereocell.transfer.opacity import evaluate, make_transfer_functions
-from support.bundles import write_tiles
+from support.bundles import write_bundle, write_tiles
 from support.sealed_files import seal
 
 

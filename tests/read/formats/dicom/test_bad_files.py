@@ -238,6 +238,7 @@ def test_too_few_slices_for_their_gaps_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.slow
 def test_garbled_headers_raise_nothing_else(tmp_path: Path, seed: int) -> None:
     """Bytes are changed at random; a series opens all the same, or is refused in one line."""
     random = np.random.default_rng(seed)

@@ -29,6 +29,7 @@ DUAL_ECHOES: dict[str, tuple[float, float, dict[str, Any]]] = {
         kept=[*product(DUAL_ECHOES, [True]), (next(iter(DUAL_ECHOES)), False)],
     ),
 )
+@pytest.mark.slow
 def test_the_echo_in_phase_is_built_and_both_are_named(
     tmp_path: Path, name: str, is_one_series: bool
 ) -> None:
@@ -69,6 +70,7 @@ def test_other_echoes_have_no_phase_and_the_first_is_built(
 
 
 @pytest.mark.parametrize("order", ["slices first", "times first"])
+@pytest.mark.slow
 def test_trigger_times_that_change_with_the_heart_rate_are_points_in_time(
     tmp_path: Path, order: str
 ) -> None:
@@ -97,6 +99,7 @@ def test_directions_of_diffusion_are_named_as_such(tmp_path: Path) -> None:
     assert any(note in one for one in dataset.notes)
 
 
+@pytest.mark.slow
 def test_repetition_times_are_named_and_in_rising_order(tmp_path: Path) -> None:
     for add, ms in ((200, 500), (300, 2000), (100, 100)):
         write_kind(tmp_path, add, setting(RepetitionTime=ms), first_number=add)

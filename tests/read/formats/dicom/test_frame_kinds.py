@@ -229,6 +229,7 @@ PHASES: dict[str, Callable[[int], Change]] = {
         kept=[*product(PHASES, [range(8)]), ("TriggerTime", range(3, 10))],
     ),
 )
+@pytest.mark.slow
 def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
     tmp_path: Path, name: str, rest: range
 ) -> None:

@@ -42,6 +42,7 @@ CORRECTIONS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 @pytest.mark.parametrize("name", CORRECTIONS)
 @pytest.mark.parametrize("series", ["1.2.3", "1.2.9"])
+@pytest.mark.slow
 def test_a_corrected_image_is_built_before_an_uncorrected_one(
     tmp_path: Path, name: str, series: str
 ) -> None:
@@ -69,6 +70,7 @@ TIMES: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", TIMES)
+@pytest.mark.slow
 def test_frames_of_dynamic_pet_are_points_in_time(tmp_path: Path, name: str) -> None:
     for time in (2, 0, 1):
         values: dict[str, Any] = {"FrameReferenceTime": 5000.0 * time, **TIMES[name]}
@@ -98,6 +100,7 @@ def test_points_in_time_that_are_stated_and_absent_are_said(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("told", ["FrameReferenceTime", "AcquisitionNumber", "InstanceNumber"])
+@pytest.mark.slow
 def test_beds_that_overlap_are_one_volume_of_their_inner_slices(tmp_path: Path, told: str) -> None:
     for bed in range(3):
         values = {"FrameReferenceTime": None} if told == "InstanceNumber" else {told: bed + 1}

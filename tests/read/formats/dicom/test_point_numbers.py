@@ -39,6 +39,7 @@ def write_points(folder: Path, change: Callable[[int], Change], lacking: int | N
 
 
 @pytest.mark.parametrize("attribute", SECOND)
+@pytest.mark.slow
 def test_an_incomplete_point_has_the_name_of_its_own_place_and_time_tells_the_others(
     tmp_path: Path, attribute: str
 ) -> None:

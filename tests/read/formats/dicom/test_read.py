@@ -47,6 +47,7 @@ def test_every_voxel_lies_where_the_scene_has_it(
     assert (np.diag(turned) > 0.5).all()  # near the identity: flips and permutations did the rest
 
 
+@pytest.mark.slow
 def test_the_letter_f_is_the_same_from_dicom_and_nifti(tmp_path: Path) -> None:
     """Its axes are canonical, so that nothing is left for the placement."""
     write_f_dicom(tmp_path / "dicom", f_phantom(), (0.5, 0.2, 0.3))

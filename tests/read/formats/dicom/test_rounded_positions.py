@@ -51,6 +51,7 @@ STATED = {
 
 @pytest.mark.parametrize("step_mm", [1.0, 0.1])
 @pytest.mark.parametrize("name", STATED)
+@pytest.mark.slow
 def test_no_slice_is_lost_and_the_note_names_the_rounding(
     tmp_path: Path, name: str, step_mm: float
 ) -> None:
@@ -67,6 +68,7 @@ def test_no_slice_is_lost_and_the_note_names_the_rounding(
 
 
 @pytest.mark.parametrize("falls", [False, True])
+@pytest.mark.slow
 def test_oblique_slices_that_were_rounded_are_regular(tmp_path: Path, falls: bool) -> None:
     affine = grid(shape=SHAPE, spacing=SPACING, rotation=turn((1, 2, 0), 20))
 

@@ -76,6 +76,7 @@ def test_a_segmentation_ends_the_plan_by_a_line_without_its_texts(
 
 
 @pytest.mark.parametrize("kind", ["BINARY", "FRACTIONAL"])
+@pytest.mark.slow
 def test_each_segment_is_a_mask_of_its_own(tmp_path: Path, kind: str) -> None:
     path = write_segmentation(tmp_path, kind, masks())
     lines = read.list_series(path)

@@ -17,6 +17,7 @@ DIXON = {
 
 
 @pytest.mark.parametrize("maker", DIXON)
+@pytest.mark.slow
 def test_dixon_images_are_in_phase_then_water_then_opposed_phase_then_fat(
     tmp_path: Path, maker: str
 ) -> None:
@@ -40,6 +41,7 @@ def test_derived_water_comes_before_an_original_opposed_phase(tmp_path: Path) ->
     assert (added(tmp_path), added(tmp_path, 2)) == (100, 200)
 
 
+@pytest.mark.slow
 def test_dixon_images_in_series_of_their_own_have_the_same_order(tmp_path: Path) -> None:
     for name, word, intercept in (("a", "FAT", 2), ("b", "OPP_PHASE", 3), ("c", "IN_PHASE", 1)):
         change = image_type("M", word)
@@ -56,6 +58,7 @@ def test_a_fat_fraction_map_comes_after_the_images(tmp_path: Path) -> None:
     assert "parametric map" in read.list_series(tmp_path)[1]
 
 
+@pytest.mark.slow
 def test_the_uniform_image_comes_before_both_inversions(tmp_path: Path) -> None:
     for add, word, time in ((300, "INV1", 700), (200, "INV2", 2500), (100, "UNI", 5000)):
         change = setting(ImageType=["ORIGINAL", "PRIMARY", "M", word], InversionTime=time)
