@@ -1,8 +1,8 @@
-import { readdirSync, readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { KEYS, layOut } from "../../test/support/panel/whole_panel";
+import { PRESET_TITLES } from "../bundle/generated/preset_titles";
 import { STAYS } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
@@ -23,27 +23,6 @@ const CONTROLS: readonly Control[] = STATES.flatMap((state) =>
     .sections.flatMap(({ items }) => items)
     .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item])),
 );
-
-/** Functions that the pipeline writes, by its sources. */
-function functionsOfPipeline(): readonly string[] {
-  const folder = new URL("../../../pipeline/stereocell/transfer/", import.meta.url);
-  const sources = readdirSync(folder).filter(
-    (name) => name.endsWith(".py") && name !== "windows.py",
-  );
-  return sources.flatMap((name) => {
-    const text = readFileSync(new URL(name, folder), "utf8");
-    const names = [...text.matchAll(/^(?:NAME|SOFT|THRESHOLD) = (.+)$/gm)].map(
-      ([, value]) => value,
-    );
-    const plain = /^ {4}functions = \{\n([^}]*)^ {4}\}/m.exec(text)?.[1] ?? "";
-    const tissues = /^TISSUES[^{]*\{([^}]*)\}/m.exec(text)?.[1] ?? "";
-    const keys = [...`${plain}${tissues}`.matchAll(/"(\w+)":/g)].map(([, key]) => key);
-    return [
-      ...names.flatMap((value) => [...value.matchAll(/"(\w+)"/g)].map(([, each]) => each)),
-      ...keys,
-    ];
-  });
-}
 
 describe("the explanations", () => {
   it("are there for each control that has a question mark, in whole sentences", () => {
@@ -70,7 +49,7 @@ describe("the explanations", () => {
         expect(explanationOfChoice(control.id, value), value).toMatch(/^[A-Z].*\.$/);
       }
     }
-    const names = functionsOfPipeline();
+    const names = Object.keys(PRESET_TITLES);
     expect(names.length).toBeGreaterThan(10);
     for (const name of names) {
       expect(Object.keys(CHOICES["transfer-function"])).toContain(name);

@@ -2,6 +2,7 @@
  * What each setting does, and what one will see of each choice, in plain words. A part of the code by itself, loaded
  * when somebody first asks. Pure.
  */
+import { PRESET_SENTENCES } from "../bundle/generated/preset_sentences";
 import { OWN } from "../state/transfer_functions_2d";
 
 /** By the last part of a control's ID. */
@@ -46,21 +47,8 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     sum: "The light of all places adds up, as in an X-ray, and nothing veils.",
   },
   "transfer-function": {
-    default: "The background is clear, the material translucent, its bright parts denser.",
-    soft: "A thin veil: faint material shows too, and the inside stays visible.",
-    sharp: "A solid body with a crisp edge, almost opaque.",
-    surface: "A thin shell where the surface lies. Inside and outside are clear.",
-    threshold: "All that is brighter than the channel's threshold, and nothing below it.",
-    arcs: "Boundaries between materials, found by how steeply the values rise there.",
-    heat: "Little is dark red, much is bright, as PET and SPECT are read.",
-    grey: "Tissues in shades of grey, as on a slice.",
-    tissues: "Skin, muscle and bone in colours of their own.",
-    air: "Only what is as thin as air, such as lungs and sinuses.",
-    fat: "Only what has the density of fat.",
-    soft_tissue: "Only what has the density of muscles and organs.",
-    blood: "Only what has the density of blood.",
-    bone: "Only what is as dense as bone.",
-    own: "The shapes that you drew in the plane of value and gradient.",
+    ...PRESET_SENTENCES,
+    [OWN]: "The shapes that you drew in the plane of value and gradient.",
   },
   tool: {
     select: "A card names what lies there, and hides, recolours or isolates it.",
