@@ -3,7 +3,6 @@ import { Object3D } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { FrameView, Hit, Part, PartDefinition, PartHost, PartScene } from "../host/part";
 import type { ClipPlane } from "../math/clip";
-import { meetSlices } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { PartSection } from "../panel/controls";
 import { tileAt, unitRay } from "../probe/probe";
@@ -11,6 +10,7 @@ import { isSliced } from "../state/parameters/slices";
 import type { ViewerState } from "../state/viewer_state";
 import { SLICE_KEYS } from "./keys";
 import { sliceSections } from "./section";
+import { meetSlices } from "./slice_frame";
 import type { Slices } from "./slices";
 
 const NOT_LOADED =
