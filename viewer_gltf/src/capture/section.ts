@@ -21,16 +21,18 @@ function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   ];
 }
 
+export const SAVE_COMMANDS = [
+  /** Saves the view as large as is chosen; once more: cancels it. */
+  "save-picture",
+  /** Saves a video: once round, or through the kept views; once more: cancels it. */
+  "save-video",
+  "keep-view",
+  "next-view",
+  "forget-views",
+] as const;
+
 declare module "../state/commands" {
-  interface CommandNames {
-    /** Saves the view as large as is chosen; once more: cancels it. */
-    "save-picture": true;
-    /** Saves a video: once round, or through the kept views; once more: cancels it. */
-    "save-video": true;
-    "keep-view": true;
-    "next-view": true;
-    "forget-views": true;
-  }
+  interface CommandNames extends Record<(typeof SAVE_COMMANDS)[number], true> {}
 }
 
 export function saveSections(state: ViewerState, isFilming: boolean): readonly PartSection[] {

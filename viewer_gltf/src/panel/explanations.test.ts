@@ -1,12 +1,13 @@
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { KEYS, layOut } from "../../test/support/panel/whole_panel";
+import { KEYS } from "../../test/support/panel/all_keys";
+import { layOut } from "../../test/support/panel/whole_panel";
 import { PRESET_TITLES } from "../bundle/generated/preset_titles";
 import { STAYS } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
-import { PARAMETERS } from "../state/parameters/table";
+import { allParameters } from "../state/parameters/table";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import { type Control, START_VIEW } from "./controls";
@@ -36,7 +37,7 @@ describe("the explanations", () => {
     // The effect of these settings is plain from their names; all others need an entry in the table.
     const plain =
       /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
-    const silent = [...PARAMETERS, ...CHANNEL].filter(
+    const silent = [...allParameters(), ...CHANNEL].filter(
       ({ id, about }) => !about && !isExplained(id),
     );
     expect(silent.map(({ id }) => id).filter((id) => !plain.test(id))).toEqual([]);
