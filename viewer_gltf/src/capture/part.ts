@@ -6,6 +6,7 @@ import type { PartSection } from "../panel/controls";
 import { REFUSED } from "../state/refusals";
 import type { Scene } from "./save_picture";
 import { SAVE_COMMANDS, SAVE_KEYS, saveSections } from "./section";
+import { CAPTURE_SETTINGS } from "./settings";
 
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 const NEXT_KEPT = "“Next kept view” goes through them.";
@@ -168,6 +169,7 @@ export const capture: PartDefinition = {
   id: "capture",
   keys: SAVE_KEYS,
   commands: SAVE_COMMANDS,
+  settings: CAPTURE_SETTINGS,
   waysOn: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
   create: (host) => new CapturePart(host),
 };

@@ -6,7 +6,6 @@ import { type Parameter, type SetAction, type Value, withValue } from "./kinds";
 import { LAMPS_SHOWN, LIGHT } from "./light";
 import {
   MEASURE_PARAMETERS,
-  PICTURE_PARAMETERS,
   QUALITY,
   QUALITY_PARAMETERS,
   SCREEN_STEREO,
@@ -21,7 +20,6 @@ const OWN: readonly Parameter<ViewerState>[] = [
   SCREEN_STEREO,
   ...STEREO_PARAMETERS,
   ...QUALITY_PARAMETERS,
-  ...PICTURE_PARAMETERS,
   ...LIGHT,
   LAMPS_SHOWN,
 ];

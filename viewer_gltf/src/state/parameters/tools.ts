@@ -17,9 +17,6 @@ const MEASURES = ["distance", "angle", "line"] as const;
 /** Between two points, at the second of three, through several. */
 export type MeasureKind = (typeof MEASURES)[number];
 
-const PICTURE_SIZES = ["1", "2", "4"] as const;
-export type PictureSize = (typeof PICTURE_SIZES)[number];
-
 const SCREEN_STEREO_KINDS = ["off", "anaglyph", "side-by-side"] as const;
 /** Stereo on the page's own screen: in red and cyan for glasses, or both eyes' pictures side by side. */
 export type ScreenStereo = (typeof SCREEN_STEREO_KINDS)[number];
@@ -33,8 +30,6 @@ export const START_TOOLS = {
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
-  /** How many times as large as the screen a saved picture is. */
-  pictureSize: "2" as PictureSize,
   /** Between the user's pupils, mm: adults have 54 to 74. */
   eyeDistance_mm: 63,
   /** Factor to it: 0 shows both eyes the same. */
@@ -93,17 +88,6 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   names: { auto: "Auto", low: "Low", high: "High" },
   key: ["q", "Next quality"],
   spoken: ({ quality }) => `Quality: ${quality}`,
-};
-
-const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
-  kind: "choice",
-  id: "picture-size",
-  label: "Picture",
-  ...lens("pictureSize"),
-  values: PICTURE_SIZES,
-  names: { "1": "1 x", "2": "2 x", "4": "4 x" },
-  key: ["0", "Next size of saved pictures: 1, 2 or 4 times the screen"],
-  spoken: ({ pictureSize }) => `Pictures: ${pictureSize} times the screen`,
 };
 
 export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
@@ -170,5 +154,4 @@ export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
 /** By the panel's section that lists them. */
 export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
 export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
-export const PICTURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [PICTURE_SIZE];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

@@ -4,6 +4,7 @@
  */
 import { measureSections } from "../../../src/annotations/section";
 import { saveSections } from "../../../src/capture/section";
+import { CAPTURE_SETTINGS } from "../../../src/capture/settings";
 import {
   PAGE as CHANNELS_OF_A_PAGE,
   type ChannelFacts,
@@ -23,6 +24,7 @@ import { volumeSections } from "../../../src/volumes/section";
 
 export { CHANNELS_OF_A_PAGE };
 
+addSettings("capture", CAPTURE_SETTINGS);
 addSettings("slices", SLICE_SETTINGS);
 
 /** What is known beside the state, by the panel and by the parts. */
