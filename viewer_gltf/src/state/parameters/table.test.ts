@@ -88,6 +88,8 @@ describe("the parameters", () => {
 
   it("are a bug where nobody knows them", () => {
     expect(() => reduce(START, { type: "set", id: "size", value: 1 })).toThrow("no parameter size");
+    const action = JSON.parse('{"type": "wind-clock"}');
+    expect(() => reduce(START, action)).toThrow('no part has the action {"type":"wind-clock"}');
   });
 });
 
