@@ -188,6 +188,7 @@ export default defineConfig({
           name: "unit",
           include: ["{src,scripts}/**/*.test.ts"],
           environment: "node",
+          setupFiles: "test/support/all_parts.ts",
           isolate: false, // modules are read once for all files, which is most of what they take
           testTimeout: 30_000, // on a busy machine the longest takes ten times its second
         },

@@ -1,6 +1,6 @@
 /**
- * TypeScript types of the bundle's JSON files, from the schemas that the pipeline checks too, and the
- * pipeline's constants that the formats depend on. Writes src/bundle/generated/*.ts, which git ignores.
+ * Writes src/bundle/generated/*.ts, which git ignores: types of the bundle's JSON files, from the schemas that the
+ * pipeline checks too, and numbers and tables of the pipeline that the viewer needs.
  */
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { compile } from "json-schema-to-typescript";
@@ -26,28 +26,68 @@ function toOlderDraft(node: Json): Json {
   return items === undefined ? mapped : { ...mapped, items: toOlderDraft(items) };
 }
 
-/** Integers at the top of a Python module: module, name, meaning. */
-const CONSTANTS = [
-  [
-    "filters/min_max_bricks.py",
-    "SKIP_BRICK",
-    "Texels along the edge of a brick of empty-space skipping.",
-  ],
-  [
-    "formats/voxel_bvh.py",
-    "STREAM_BRICK",
-    "Texels along the edge of a brick of /bricks, without apron.",
-  ],
-] as const;
+/** Names of numbers at the top of Python modules. */
+type Names = Readonly<Record<string, readonly string[]>>;
 
-async function readConstants(): Promise<string> {
-  const lines = CONSTANTS.map(async ([module, name, meaning]) => {
-    const text = await readFile(new URL(module, PIPELINE), "utf8");
-    const value = new RegExp(`^${name} = (\\d+)\\b`, "m").exec(text)?.[1];
-    if (value === undefined) throw new Error(`${module}: found no integer ${name}`);
-    return `/** ${meaning} From ${module}. */\nexport const ${name} = ${value};\n`;
+/** The names that each generated file has, by the module that states the numbers. */
+const CONSTANTS: Readonly<Record<string, Names>> = {
+  "constants.ts": {
+    "filters/min_max_bricks.py": ["SKIP_BRICK"],
+    "formats/voxel_bvh.py": ["STREAM_BRICK"],
+  },
+  "opacity.ts": {
+    "transfer/opacity.py": [
+      ...["SOFT_DEPTH", "LEAST_SHARE", "FOOT", "NEAR_SURFACE", "AT_SURFACE", "IN_BODY", "BRIGHT"],
+      ...["AT_SURFACE_OF_MAGNITUDES", "BRIGHT_OF_MAGNITUDES", "BELOW_BODY", "SOLID_BODY"],
+      ...["NOISE_REACH", "FAINT", "MAX_SHIFT"],
+    ],
+  },
+  "grey_shapes.ts": {
+    "transfer/channel_statistics.py": ["BRIGHT_SHARE"],
+    "transfer/mr_grey.py": [
+      ...["BANDS", "DARKEST", "LEAST_RANGE", "STEEP", "STEEPEST", "EDGE_FROM", "EDGE_SOFTNESS"],
+    ],
+  },
+};
+
+const readModule = (module: string) => readFile(new URL(module, PIPELINE), "utf8");
+
+/** Reads the numbers of one generated file. An underscore before a name in Python is left out. */
+async function readConstants(numbers: Names): Promise<string> {
+  const modules = Object.entries(numbers).map(async ([module, names]) => {
+    const text = await readModule(module);
+    const lines = names.map((name) => {
+      const line = new RegExp(`^_?${name} = ([\\d.]+(?:e-?\\d+)?) *(?:#.*)?$`, "m").exec(text);
+      if (line === null) throw new Error(`${module}: found no number ${name}`);
+      return `export const ${name} = ${line[1]};\n`;
+    });
+    return `// From ${module}, where the meanings stand.\n${lines.join("")}`;
   });
-  return (await Promise.all(lines)).join("\n");
+  return (await Promise.all(modules)).join("\n");
+}
+
+const PRESETS = "transfer/presets.py";
+const ROW = /^ {4}"(\w+)": Preset\(\s*"([^"\\]+)",\s*"([^"\\]+)",\s*\),$/gm;
+
+/** Reads titles and sentences of the transfer functions that a build makes: two files, since sentences load later. */
+async function readPresets(): Promise<Readonly<Record<string, string>>> {
+  const text = await readModule(PRESETS);
+  const rows = [...text.matchAll(ROW)];
+  const found = text.match(/\bPreset\(/g)?.length ?? 0;
+  if (rows.length === 0 || rows.length !== found) {
+    throw new Error(
+      `${PRESETS}: read ${rows.length} of ${found} rows, expected '"name": Preset("title", "sentence"),'`,
+    );
+  }
+  const table = (name: string, column: number) => {
+    const cells = Object.fromEntries(rows.map((row) => [row[1], row[column]]));
+    const type = "Readonly<Record<string, string>>";
+    return `/** From ${PRESETS}. */\nexport const ${name}: ${type} = ${JSON.stringify(cells, null, 2)};\n`;
+  };
+  return {
+    "preset_titles.ts": table("PRESET_TITLES", 2),
+    "preset_sentences.ts": table("PRESET_SENTENCES", 3),
+  };
 }
 
 /** make goes by dates: what is the same stays as old as it is. */
@@ -58,7 +98,10 @@ async function writeChanged(name: string, text: string): Promise<void> {
 }
 
 await mkdir(OUT, { recursive: true });
-await writeChanged("constants.ts", await readConstants());
+for (const [file, numbers] of Object.entries(CONSTANTS)) {
+  await writeChanged(file, await readConstants(numbers));
+}
+for (const [name, text] of Object.entries(await readPresets())) await writeChanged(name, text);
 for (const name of ["bundle", "volumes", "transfer2d", "objects"]) {
   const text = await readFile(new URL(`${name}.schema.json`, SCHEMAS), "utf8");
   const schema = toOlderDraft(JSON.parse(text)) as { [key: string]: Json };

@@ -29,7 +29,8 @@ IN_BODY = 0.45  # ... and where the body is bright
 BRIGHT = 0.3  # share of the window above the level over which a body becomes bright
 # The same two numbers for magnitudes, as MR has them. A cut through such a volume shows tissues by
 # their opacity, so the opacity has to rise over all of their values.
-AT_SURFACE_OF_MAGNITUDES, BRIGHT_OF_MAGNITUDES = 0.12, 0.5
+AT_SURFACE_OF_MAGNITUDES = 0.12
+BRIGHT_OF_MAGNITUDES = 0.5
 # Share of the window between the start of a body's opacity and its surface. The presets for CT
 # make it 36 HU. The values at an edge rise by more than that within a voxel. A step of the opacity
 # would look jagged.

@@ -20,7 +20,7 @@ import type { ViewerState } from "../state/viewer_state";
 import "./annotations.css";
 import { Marks } from "./annotations";
 import { listenForHandles } from "./handle_pointer";
-import { MEASURE_KEYS, measureSections } from "./section";
+import { MEASURE_COMMANDS, MEASURE_KEYS, measureSections } from "./section";
 
 class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
   readonly id = "annotations";
@@ -122,5 +122,6 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
 export const annotations: PartDefinition = {
   id: "annotations",
   keys: MEASURE_KEYS,
+  commands: MEASURE_COMMANDS,
   create: (host) => new AnnotationsPart(host),
 };

@@ -11,11 +11,13 @@ import { MEASURE_PARAMETERS } from "../state/parameters/tools";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 
+export const MEASURE_COMMANDS = [
+  /** The measurements as a file. */
+  "save-csv",
+] as const;
+
 declare module "../state/commands" {
-  interface CommandNames {
-    /** The measurements as a file. */
-    "save-csv": true;
-  }
+  interface CommandNames extends Record<(typeof MEASURE_COMMANDS)[number], true> {}
 }
 
 const POINT_NAMES = ["First point", "Second point", "Third point"] as const;

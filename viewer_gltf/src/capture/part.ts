@@ -5,7 +5,8 @@ import type { PosterMaker } from "../host/services";
 import type { PartSection } from "../panel/controls";
 import { REFUSED } from "../state/refusals";
 import type { Scene } from "./save_picture";
-import { SAVE_KEYS, saveSections } from "./section";
+import { SAVE_COMMANDS, SAVE_KEYS, saveSections } from "./section";
+import { CAPTURE_SETTINGS } from "./settings";
 
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 const NEXT_KEPT = "“Next kept view” goes through them.";
@@ -167,6 +168,8 @@ class CapturePart implements Part, PosterMaker {
 export const capture: PartDefinition = {
   id: "capture",
   keys: SAVE_KEYS,
+  commands: SAVE_COMMANDS,
+  settings: CAPTURE_SETTINGS,
   waysOn: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
   create: (host) => new CapturePart(host),
 };

@@ -3,16 +3,16 @@
 import { command, controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
 import { type Key, type KeyGroup, key, keysOf, no } from "../panel/key";
-import { PICTURE_PARAMETERS } from "../state/parameters/tools";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
+import { PICTURE_SIZE } from "./settings";
 
 function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   const { length } = state.keptViews;
   const path = length > 1 ? `through ${length} views` : "once round";
   const none = length === 0 ? REFUSED.views : "";
   return [
-    ...controlsOf(PICTURE_PARAMETERS, state),
+    ...controlsOf([PICTURE_SIZE], state),
     command("save-picture", isFilming ? "Cancel" : "Save the picture"),
     command("save-video", isFilming ? "Cancel" : `Save a video, ${path}`),
     command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
@@ -21,16 +21,18 @@ function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
   ];
 }
 
+export const SAVE_COMMANDS = [
+  /** Saves the view as large as is chosen; once more: cancels it. */
+  "save-picture",
+  /** Saves a video: once round, or through the kept views; once more: cancels it. */
+  "save-video",
+  "keep-view",
+  "next-view",
+  "forget-views",
+] as const;
+
 declare module "../state/commands" {
-  interface CommandNames {
-    /** Saves the view as large as is chosen; once more: cancels it. */
-    "save-picture": true;
-    /** Saves a video: once round, or through the kept views; once more: cancels it. */
-    "save-video": true;
-    "keep-view": true;
-    "next-view": true;
-    "forget-views": true;
-  }
+  interface CommandNames extends Record<(typeof SAVE_COMMANDS)[number], true> {}
 }
 
 export function saveSections(state: ViewerState, isFilming: boolean): readonly PartSection[] {
@@ -41,7 +43,7 @@ export function saveSections(state: ViewerState, isFilming: boolean): readonly P
 const NO_VIEW = no(REFUSED.views);
 
 const KEYS: readonly Key[] = [
-  ...PICTURE_PARAMETERS.flatMap(keysOf),
+  ...keysOf(PICTURE_SIZE),
   key('"', "Save the picture; again: cancel", "save-picture"),
   key(")", "Save a video: once round, or through the kept views; again: cancel", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),

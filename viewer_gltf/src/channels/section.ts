@@ -99,6 +99,7 @@ function cardOf(
         id: `${id}/transfer-function`,
         label: "Transfer function",
         name: `Transfer function of ${name}`,
+        about: "Which values of the volume are visible, and how dense they look.",
         value: channel.transferFunction,
         options: channel.transferFunctions.map((each) => ({
           value: each,
@@ -116,6 +117,7 @@ function cardOf(
         id: `${id}/window`,
         label: "Window",
         name: `Window of ${name}`,
+        about: "The values that are darkest and brightest. A narrower window has more contrast.",
         value: channel.window,
         steps: WINDOW_STEPS,
         texts: windowTexts(channel.window, range),

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
-import { KEYS } from "../../test/support/panel/whole_panel";
+import { KEYS } from "../../test/support/panel/all_keys";
 import { MAX_SHAPES } from "../bundle/transfer_2d";
 import { blocksOf } from "../panel/canvas/controls";
 import {

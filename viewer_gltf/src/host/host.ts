@@ -12,6 +12,7 @@ import type { Action } from "../state/actions";
 import { announcementOf } from "../state/announce_change";
 import type { Command } from "../state/commands";
 import { initialState } from "../state/initial_state";
+import { addSettings } from "../state/part_settings";
 import { newNotice, reduce } from "../state/reduce";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
@@ -57,6 +58,9 @@ export class Host implements PartHost {
     const { signal } = this.disposed;
     const renderer = makeRenderer(stage);
     const gl = renderer.getContext();
+    for (const { id, settings } of definitions) {
+      if (settings !== undefined) addSettings(id, settings);
+    }
     this.state = initialState(
       manifest,
       definitions.some(({ canTrace }) => canTrace?.(gl) ?? false),

@@ -15,6 +15,7 @@ import type { Reading } from "../probe/probe_reader";
 import type { FrameRenderer } from "../render/frame_renderer";
 import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
+import type { PartSettings } from "../state/part_settings";
 import type { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
 import type { Stereo } from "../xr/stereo";
@@ -138,6 +139,10 @@ export type PartDefinition = Readonly<{
   rank?: number;
   /** Whether the part traces paths of light on a device. */
   canTrace?: (gl: WebGLRenderingContext | WebGL2RenderingContext) => boolean;
+  /** Names of commands that no other part has. Each has a key. */
+  commands?: readonly Command[];
+  /** What the part adds to the state. */
+  settings?: PartSettings;
   /** Buttons that lead on from the part's refusals. */
   waysOn?: WaysOn;
   create: (host: PartHost) => Part;

@@ -4,11 +4,13 @@ import { type KeyGroup, key } from "../panel/key";
 import { labelMapsOf, objectsSection } from "../panel/layout";
 import type { ViewerState } from "../state/viewer_state";
 
+export const OBJECT_COMMANDS = [
+  /** The objects of a label map that are selected, or that show, as a file. */
+  "save-objects",
+] as const;
+
 declare module "../state/commands" {
-  interface CommandNames {
-    /** The objects of a label map that are selected, or that show, as a file. */
-    "save-objects": true;
-  }
+  interface CommandNames extends Record<(typeof OBJECT_COMMANDS)[number], true> {}
 }
 
 /** A label map that is shown has its section from the start, so that no row moves when its table has come. */

@@ -7,7 +7,7 @@ import { along, type Ray } from "../math/vec3";
 import type { PartSection, Section } from "../panel/controls";
 import type { ObjectView } from "../state/objects";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import { labelMapSections, OBJECT_KEYS } from "./label_maps";
+import { labelMapSections, OBJECT_COMMANDS, OBJECT_KEYS } from "./label_maps";
 import type { Objects } from "./objects";
 
 const NOT_LOADED =
@@ -193,5 +193,6 @@ class ObjectsPart implements Part, ObjectMaps {
 export const objects: PartDefinition = {
   id: "objects",
   keys: OBJECT_KEYS,
+  commands: OBJECT_COMMANDS,
   create: (host) => new ObjectsPart(host),
 };

@@ -1,12 +1,11 @@
 /** What lies over the picture in the page: progress, notices, the first hint, and the ways into stereo and back. */
 import { hasFullScreen } from "../dom/full_screen";
+import { isTouch } from "../dom/is_touch";
 import type { PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
 import { FirstHint, Notices, ProgressBar, Said, WayBack } from "../panel/html/overlays";
 import { arAddress, WaysIn } from "../panel/html/ways_in";
 import { wayToStereo } from "../xr/support";
-
-const IS_TOUCH = matchMedia("(pointer: coarse)").matches;
 
 /** Whether someone has taken the page in hand, which another view of the specimen may have taken over since. */
 let wasTouched = false;
@@ -27,7 +26,7 @@ export class Overlays {
       (texts) => host.dispatch({ type: "dismiss", texts }),
       () => host.run("retry"),
     );
-    const hint = new FirstHint(IS_TOUCH, window.parent !== window);
+    const hint = new FirstHint(isTouch(), window.parent !== window);
     const wayBack = new WayBack(() => host.run("back"));
     this.hint = hint;
     host.view.append(
@@ -61,7 +60,7 @@ export class Overlays {
     const { host, page, waysIn } = this;
     const support = await host.service("stereoSupport")?.found;
     if (support !== undefined) {
-      const way = wayToStereo(support.stereo, IS_TOUCH);
+      const way = wayToStereo(support.stereo, isTouch());
       waysIn.offerStereo(way, () => way && page.perform(way));
     }
     if (hasFullScreen()) waysIn.offerFullScreen(() => page.perform("full-screen"));

@@ -1,17 +1,17 @@
-import { readdirSync, readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { KEYS, layOut } from "../../test/support/panel/whole_panel";
+import { KEYS } from "../../test/support/panel/all_keys";
+import { layOut } from "../../test/support/panel/whole_panel";
+import { PRESET_TITLES } from "../bundle/generated/preset_titles";
 import { STAYS } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
-import { PARAMETERS } from "../state/parameters/table";
+import { allParameters } from "../state/parameters/table";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import { type Control, START_VIEW } from "./controls";
-import { EXPLAINED, isExplained } from "./explained";
-import { CHOICES, EXPLANATIONS, explanationOf, explanationOfChoice } from "./explanations";
+import { CHOICES, explanationOfChoice } from "./explanations";
 import { titleOf } from "./transfer_titles";
 
 const start = initialState(sampleManifest(3));
@@ -24,42 +24,24 @@ const CONTROLS: readonly Control[] = STATES.flatMap((state) =>
     .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item])),
 );
 
-/** Functions that the pipeline writes, by its sources. */
-function functionsOfPipeline(): readonly string[] {
-  const folder = new URL("../../../pipeline/stereocell/transfer/", import.meta.url);
-  const sources = readdirSync(folder).filter(
-    (name) => name.endsWith(".py") && name !== "windows.py",
-  );
-  return sources.flatMap((name) => {
-    const text = readFileSync(new URL(name, folder), "utf8");
-    const names = [...text.matchAll(/^(?:NAME|SOFT|THRESHOLD) = (.+)$/gm)].map(
-      ([, value]) => value,
-    );
-    const plain = /^ {4}functions = \{\n([^}]*)^ {4}\}/m.exec(text)?.[1] ?? "";
-    const tissues = /^TISSUES[^{]*\{([^}]*)\}/m.exec(text)?.[1] ?? "";
-    const keys = [...`${plain}${tissues}`.matchAll(/"(\w+)":/g)].map(([, key]) => key);
-    return [
-      ...names.flatMap((value) => [...value.matchAll(/"(\w+)"/g)].map(([, each]) => each)),
-      ...keys,
-    ];
-  });
-}
-
 describe("the explanations", () => {
-  it("are there for each control that has a question mark, in whole sentences", () => {
-    expect(Object.keys(EXPLANATIONS).toSorted()).toEqual(EXPLAINED.toSorted());
-    const asked = new Set(CONTROLS.map(({ id }) => id).filter(isExplained));
-    expect(asked.size).toBeGreaterThan(12);
-    for (const id of asked) expect(explanationOf(id), id).toMatch(/^[A-Z0-9].*\.$/);
+  it("are whole sentences", () => {
+    const sentences = CONTROLS.flatMap(({ about }) => about ?? []);
+    expect(new Set(sentences).size).toBeGreaterThan(20);
+    for (const text of sentences) expect(text).toMatch(/^[A-Z0-9].*\.$/);
+  });
+
+  it("of choices belong to controls that are explained", () => {
+    const explained = CONTROLS.filter(({ about }) => about !== undefined);
+    const ids = new Set(explained.map(({ id }) => id.slice(id.lastIndexOf("/") + 1)));
+    for (const id of Object.keys(CHOICES)) expect(ids, id).toContain(id);
   });
 
   it("are there for each setting whose name can't say it all", () => {
-    // The effect of these settings is plain from their names; all others need an entry in the table.
+    // The effect of these settings is plain from their names; all others need an `about`.
     const plain =
       /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
-    const silent = [...PARAMETERS, ...CHANNEL].filter(
-      ({ id, about }) => !about && !isExplained(id),
-    );
+    const silent = [...allParameters(), ...CHANNEL].filter(({ about }) => !about);
     expect(silent.map(({ id }) => id).filter((id) => !plain.test(id))).toEqual([]);
   });
 
@@ -70,7 +52,7 @@ describe("the explanations", () => {
         expect(explanationOfChoice(control.id, value), value).toMatch(/^[A-Z].*\.$/);
       }
     }
-    const names = functionsOfPipeline();
+    const names = Object.keys(PRESET_TITLES);
     expect(names.length).toBeGreaterThan(10);
     for (const name of names) {
       expect(Object.keys(CHOICES["transfer-function"])).toContain(name);
@@ -100,7 +82,7 @@ describe("the words of the panel", () => {
       name,
       ...keys.map(({ label }) => label),
     ]);
-    const others = [EXPLANATIONS, ...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
+    const others = [...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
       Object.values(table),
     );
     const found = [...ofControls, ...ofKeys, ...others].filter((text) => PRIVATE.test(text));

@@ -1,33 +1,9 @@
 /**
- * What each setting does, and what one will see of each choice, in plain words. A part of the code by itself, loaded
- * when somebody first asks. Pure.
+ * Explanations of choices: what one will see of each. The sentence on a setting as a whole is in its row. This is a part
+ * of the code by itself, which is loaded when somebody first asks. Pure.
  */
+import { PRESET_SENTENCES } from "../bundle/generated/preset_sentences";
 import { OWN } from "../state/transfer_functions_2d";
-
-/** By the last part of a control's ID. */
-export const EXPLANATIONS: Readonly<Record<string, string>> = {
-  mode: "Where the specimen shows its surfaces, and where its volumes.",
-  "switch-distance":
-    "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
-  "disc-radius":
-    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. At most twelve tiles show as volumes in it.",
-  compositing: "How things that lie behind one another appear.",
-  "depth-shading":
-    "Enclosed places are darker, and things that lie before others throw shadows on them.",
-  volume: "A channel whose volume is off stays a surface in every mode.",
-  "transfer-function": "Which values of the volume are visible, and how dense they look.",
-  opacity: "How dense the channel looks, as a surface and as a volume.",
-  window: "The values that are darkest and brightest. A narrower window has more contrast.",
-  tool: "The effect of a click, a tap or a resting gaze on the specimen.",
-  "measure-kind": "The kind of the next measurement.",
-  quality: "How finely volumes are drawn while the view moves.",
-  dwell: "In stereo, looking at something for 1.5 s is the same as pressing a button.",
-  "eye-distance":
-    "The distance between your pupils, for the split screen. A headset knows its own.",
-  "stereo-strength": "100 % is as your eyes see it. At 0 % both eyes see the same.",
-  "specimen-size": "The length of the specimen's longest edge in stereo.",
-  letters: "If this is off, only ?, the arrows, Escape and keys with Ctrl work.",
-};
 
 /** Explanations of each choice, by the last part of the control's ID and the choice. */
 export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>> = {
@@ -46,21 +22,8 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     sum: "The light of all places adds up, as in an X-ray, and nothing veils.",
   },
   "transfer-function": {
-    default: "The background is clear, the material translucent, its bright parts denser.",
-    soft: "A thin veil: faint material shows too, and the inside stays visible.",
-    sharp: "A solid body with a crisp edge, almost opaque.",
-    surface: "A thin shell where the surface lies. Inside and outside are clear.",
-    threshold: "All that is brighter than the channel's threshold, and nothing below it.",
-    arcs: "Boundaries between materials, found by how steeply the values rise there.",
-    heat: "Little is dark red, much is bright, as PET and SPECT are read.",
-    grey: "Tissues in shades of grey, as on a slice.",
-    tissues: "Skin, muscle and bone in colours of their own.",
-    air: "Only what is as thin as air, such as lungs and sinuses.",
-    fat: "Only what has the density of fat.",
-    soft_tissue: "Only what has the density of muscles and organs.",
-    blood: "Only what has the density of blood.",
-    bone: "Only what is as dense as bone.",
-    own: "The shapes that you drew in the plane of value and gradient.",
+    ...PRESET_SENTENCES,
+    [OWN]: "The shapes that you drew in the plane of value and gradient.",
   },
   tool: {
     select: "A card names what lies there, and hides, recolours or isolates it.",
@@ -82,10 +45,6 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
 const OF_THE_BUNDLE = "A transfer function that came with this bundle.";
 
 const lastPart = (id: string) => id.slice(id.lastIndexOf("/") + 1);
-
-export function explanationOf(id: string): string {
-  return EXPLANATIONS[lastPart(id)] ?? "";
-}
 
 /** Returns the explanation of a choice; "" if it needs none. */
 export function explanationOfChoice(id: string, value: string): string {

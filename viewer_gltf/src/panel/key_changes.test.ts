@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { KEYS } from "../../test/support/panel/whole_panel";
+import { KEYS } from "../../test/support/panel/all_keys";
 import { changeKey, keyNow } from "./key_changes";
 import { type KeyChanges, withKeys } from "./keys";
 

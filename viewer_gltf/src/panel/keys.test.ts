@@ -1,20 +1,26 @@
 import { describe, expect, it } from "vitest";
+import { PARTS } from "../../test/support/all_parts";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
-import { KEYS } from "../../test/support/panel/whole_panel";
-import type { Action } from "../state/actions";
-import type { Command } from "../state/commands";
+import { KEYS, NO_SLICES } from "../../test/support/panel/all_keys";
+import type { Action, PartAction } from "../state/actions";
+import { OWN_COMMANDS } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
+import type { Parameter } from "../state/parameters/kinds";
 import { LIGHT_NUMBERS } from "../state/parameters/light";
-import { SLICE_NUMBERS } from "../state/parameters/slices";
-import { PARAMETERS } from "../state/parameters/table";
+import { allParameters } from "../state/parameters/table";
 import { STEREO_NUMBERS } from "../state/parameters/tools";
+import { rowsOfParts } from "../state/part_settings";
 import { reduce } from "../state/reduce";
 import { REFUSED as REASONS } from "../state/refusals";
 import { makeShape } from "../state/transfer_shapes";
+import type { ViewerState } from "../state/viewer_state";
 import { type PanelChange, START_VIEW } from "./controls";
 import { isRefusal, type KeyContext } from "./key";
 import { spokenFeedback } from "./spoken_feedback";
+
+/** A number without keys of its own: one key chooses among several of them, two turn the chosen one. */
+const isTurned = (row: Parameter<ViewerState>) => row.kind === "number" && row.keys === undefined;
 
 const ALL = KEYS.groups.flatMap(({ keys }) => keys);
 const CONTEXT: KeyContext = {
@@ -86,7 +92,7 @@ describe("the keys", () => {
         wish !== null && typeof wish !== "string" && "type" in wish ? [wish.type] : [],
       ),
     );
-    const wanted: Readonly<Record<Action["type"], boolean>> = {
+    const wanted: Readonly<Record<Exclude<Action, PartAction>["type"], boolean>> = {
       set: true,
       objects: false, // the panel's, and a tap
       show: true,
@@ -102,7 +108,6 @@ describe("the keys", () => {
       "finish-measuring": true,
       "set-measurements": false, // the panel's list
       "move-lamp": false, // a drag
-      "move-slices": true,
       dismiss: true,
       "keep-views": false, // by the commands
       restore: false, // by the commands undo and redo
@@ -111,45 +116,11 @@ describe("the keys", () => {
     for (const [type, isWanted] of Object.entries(wanted)) {
       expect(actions.has(type as Action["type"]), type).toBe(isWanted);
     }
-    const commands: Readonly<Record<Command, true>> = {
-      reset: true,
-      back: true,
-      stereo: true,
-      room: true,
-      undo: true,
-      redo: true,
-      "full-screen": true,
-      split: true,
-      scan: true,
-      share: true,
-      "save-csv": true,
-      "save-objects": true,
-      "save-picture": true,
-      "save-video": true,
-      "keep-view": true,
-      "next-view": true,
-      "forget-views": true,
-      retry: true,
-      press: true,
-      front: true,
-      side: true,
-      top: true,
-      "zoom-in": true,
-      "zoom-out": true,
-      "turn-left": true,
-      "turn-right": true,
-      "turn-up": true,
-      "turn-down": true,
-      "pan-left": true,
-      "pan-right": true,
-      "pan-up": true,
-      "pan-down": true,
-      find: true,
-      "own-light": true,
-      "measure-screen": true,
-    };
+    const ofParts = PARTS.flatMap(({ settings }) => Object.keys(settings?.actions ?? {}));
+    expect([...actions]).toEqual(expect.arrayContaining(ofParts));
+    const commands = [...OWN_COMMANDS, ...PARTS.flatMap(({ commands: ofPart = [] }) => ofPart)];
     const asked = wishes.filter((wish) => typeof wish === "string");
-    expect(new Set(asked)).toEqual(new Set(Object.keys(commands)));
+    expect(new Set(asked)).toEqual(new Set(commands));
   });
 
   it("reach every parameter, the light's and stereo's numbers by three keys", () => {
@@ -160,10 +131,10 @@ describe("the keys", () => {
       ),
     );
     const turned = new Set<string>(
-      [...LIGHT_NUMBERS, ...SLICE_NUMBERS, ...STEREO_NUMBERS].map(({ id }) => id),
+      [...LIGHT_NUMBERS, ...STEREO_NUMBERS, ...rowsOfParts().filter(isTurned)].map(({ id }) => id),
     );
     // the choice of a tone map and lamps' colours are the panel's alone
-    const others = PARAMETERS.filter(
+    const others = allParameters().filter(
       ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",
     );
     for (const { id } of [...others, ...CHANNEL]) expect(set, id).toContain(id);
@@ -258,7 +229,7 @@ describe("the keys", () => {
 
   it("change the state, or say why they don't", () => {
     const start = initialState(sampleManifest(1));
-    const view = { ...START_VIEW, parameter: SLICE_NUMBERS[0].id };
+    const view = { ...START_VIEW, parameter: "slice-x" };
     const bare: KeyContext = { state: start, view, shown: SPECIMEN_BOX, focusTile: null };
     const dark = reduce(start, { type: "show", channel: "c0", shown: false });
     const atEnd = [
@@ -297,7 +268,7 @@ describe("the keys", () => {
       }
     }
     expect(silent).toEqual([]);
-    expect(KEYS.wishOf("}", contexts.bare)).toEqual({ refusal: REASONS.slices });
+    expect(KEYS.wishOf("}", contexts.bare)).toEqual({ refusal: NO_SLICES });
     const said = (name: string) => {
       const wish = KEYS.wishOf(name, contexts.atEnd);
       if (wish === null || isRefusal(wish)) throw new Error(name);

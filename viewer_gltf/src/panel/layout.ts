@@ -138,6 +138,7 @@ function lettersToggle({ hasLetters: value }: PanelView): Control {
     kind: "toggle",
     id: "letters",
     label: "Keys of one character",
+    about: "If this is off, only ?, the arrows, Escape and keys with Ctrl work.",
     value,
     to: (areOn) => ({ panel: "letters", areOn }),
   };

@@ -5,6 +5,7 @@ import type { Action } from "../state/actions";
 import type { SetAction } from "../state/parameters/kinds";
 import { channelParameterOf, parameterOf } from "../state/parameters/table";
 import { TOOL } from "../state/parameters/tools";
+import { rulesOf } from "../state/part_settings";
 import { tileName } from "../state/tile_name";
 import { shapesOf } from "../state/transfer_functions_2d";
 import type { ViewerState } from "../state/viewer_state";
@@ -100,12 +101,10 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
     }
     case "set-measurements":
       return `${state.measurements.length} measurements`;
-    case "move-slices":
-      return "Slices: in the middle, not turned";
     case "move-lamp":
       return `Lamp ${action.lamp + 1}: moved`;
     default:
-      return "";
+      return rulesOf(action)?.spoken(state) ?? "";
   }
 }
 

@@ -1,23 +1,8 @@
-/** Titles of the transfer functions that a build makes: each says what one will see. Pure. */
+/** Titles of transfer functions: those that a build makes, and the user's own. Pure. */
+import { PRESET_TITLES } from "../bundle/generated/preset_titles";
 import { type Functions, isTwoD, OWN } from "../state/transfer_functions_2d";
 
-const TITLES: Readonly<Record<string, string>> = {
-  default: "Translucent bodies",
-  soft: "Thin veil",
-  sharp: "Solid bodies",
-  surface: "Thin shell",
-  threshold: "All above the threshold",
-  arcs: "Boundaries of materials",
-  heat: "Heat colours",
-  grey: "Shades of grey",
-  tissues: "Tissues in colour",
-  air: "Air",
-  fat: "Fat",
-  soft_tissue: "Soft tissue",
-  blood: "Blood",
-  bone: "Bone",
-  [OWN]: "Your own shapes",
-};
+const TITLES: Readonly<Record<string, string>> = { ...PRESET_TITLES, [OWN]: "Your own shapes" };
 
 /** The title of a function; the name itself where an artist has given the function a name. */
 export function titleOf(name: string): string {

@@ -1,13 +1,15 @@
 import { describe, expect, it } from "vitest";
+import { PARTS } from "../../test/support/all_parts";
 import { SPECIMEN_BOX, sampleManifest } from "../../test/support/fixture/manifest";
 import { initialState } from "../state/initial_state";
-import { PARAMETERS } from "../state/parameters/table";
+import { allParameters } from "../state/parameters/table";
 import { reduce } from "../state/reduce";
 import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import { controlsOf } from "./control_templates";
-import { offerFor } from "./ways_on";
+import { offerFor, type WaysOn } from "./ways_on";
 
+const OF_PARTS: WaysOn = Object.assign({}, ...PARTS.map(({ waysOn }) => waysOn));
 const start = initialState(sampleManifest(3));
 const NOW = { state: start, shown: SPECIMEN_BOX, objects: new Map([["c0", [1, 2]]]) };
 
@@ -17,7 +19,7 @@ const STATES: readonly ViewerState[] = (["disc", "tile", "all", "traced", "off"]
 
 /** The state that a refusal's button leads to. */
 function led(state: ViewerState, refusal: string): ViewerState {
-  const to = offerFor(refusal, { ...NOW, state })?.to ?? [];
+  const to = offerFor(refusal, { ...NOW, state }, OF_PARTS)?.to ?? [];
   return to.reduce<ViewerState>(
     (now, each) => (typeof each === "string" ? now : reduce(now, each)),
     state,
@@ -26,12 +28,14 @@ function led(state: ViewerState, refusal: string): ViewerState {
 
 describe("a refusal", () => {
   it("is a sentence that a person can act on", () => {
-    for (const text of Object.values(REFUSED)) expect(text).toMatch(/^[A-Z].{10,}\.$/);
+    const ofParts = Object.keys(OF_PARTS);
+    for (const text of [...Object.values(REFUSED), ...ofParts])
+      expect(text).toMatch(/^[A-Z].{10,}\.$/);
   });
 
   it("of a setting has a button, which after a few presses makes the setting work", () => {
     const refused = STATES.flatMap((state) =>
-      controlsOf(PARAMETERS, state).flatMap(({ id, refusal }) =>
+      controlsOf(allParameters(), state).flatMap(({ id, refusal }) =>
         refusal ? [{ state, id, refusal }] : [],
       ),
     );
@@ -42,7 +46,7 @@ describe("a refusal", () => {
       let reason: string | undefined = refusal;
       for (let i = 0; i < 3 && reason; i++) {
         now = led(now, reason);
-        reason = controlsOf(PARAMETERS, now).find((each) => each.id === id)?.refusal;
+        reason = controlsOf(allParameters(), now).find((each) => each.id === id)?.refusal;
       }
       expect(reason ?? "", `${id}: ${refusal}`).toBe("");
     }

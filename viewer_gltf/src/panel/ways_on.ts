@@ -2,7 +2,6 @@
 import type { Box } from "../math/box";
 import { setTo } from "../state/parameters/kinds";
 import { TRACED_ALONE } from "../state/parameters/light";
-import { SLICE_PICTURES } from "../state/parameters/slices";
 import { TOOL } from "../state/parameters/tools";
 import { COMPOSITING, MODE, type Mode } from "../state/parameters/volumes";
 import { REFUSED } from "../state/refusals";
@@ -37,7 +36,6 @@ const WAYS: WaysOn = {
   [REFUSED.shaded]: EVERYWHERE,
   [REFUSED.opacity]: () => ({ label: "Choose Opacity", to: [setTo(COMPOSITING, "over")] }),
   [TRACED_ALONE]: mode("Show natural light", "traced"),
-  [REFUSED.slices]: () => ({ label: "Show slices", to: [setTo(SLICE_PICTURES, true)] }),
   [REFUSED.measuring]: measure,
   [REFUSED.measured]: measure,
   [REFUSED.cut]: ({ state: { clip }, shown }) => ({

@@ -6,12 +6,12 @@
 import { STANDS, type Stand } from "../interaction/named_views";
 import type { Action } from "../state/actions";
 import { type Parameter, setTo, type Value } from "../state/parameters/kinds";
-import { IN_ADDRESS } from "../state/parameters/table";
+import { parametersInAddress } from "../state/parameters/table";
 import type { ViewerState } from "../state/viewer_state";
 
 /** Their names: a link to a view leaves them out, it has them itself. */
-export const SETTINGS: readonly string[] = [
-  ...IN_ADDRESS.flatMap(({ link }) => link ?? []),
+export const settingNames = (): readonly string[] => [
+  ...parametersInAddress().flatMap(({ link }) => link ?? []),
   "view",
 ];
 
@@ -47,7 +47,7 @@ function valueIn(row: Parameter<ViewerState>, text: string): Value | null {
 /** The actions that bring a state there; one more reports unreadable settings. */
 export function settingsOf(search: string): readonly Action[] {
   const asked = new URLSearchParams(search);
-  return IN_ADDRESS.flatMap((row): readonly Action[] => {
+  return parametersInAddress().flatMap((row): readonly Action[] => {
     const name = row.link ?? row.id;
     const text = asked.get(name);
     if (text === null) return [];

@@ -7,7 +7,7 @@ import type { LinkCode, Links } from "../host/services";
 import { initialState } from "../state/initial_state";
 import { isPassingStep, writeAddress } from "./address";
 import type { AddressBar, Opened } from "./address_bar";
-import { SETTINGS } from "./page_parameters";
+import { settingNames } from "./page_parameters";
 
 type LinkWriter = typeof import("./link_of");
 
@@ -65,7 +65,7 @@ class SharePart implements Part, Links {
   private async shareBy({ leftOutOfLink, linkOf }: LinkWriter): Promise<void> {
     const { host } = this;
     const address = new URL(pageAddress());
-    for (const name of SETTINGS) address.searchParams.delete(name);
+    for (const name of settingNames()) address.searchParams.delete(name);
     address.hash = linkOf(host, initialState(host.bundle.manifest));
     // the address follows the view once the split screen is left
     if (hasAddress() && !isPassingStep()) writeAddress(address);

@@ -24,7 +24,7 @@ import type { ObjectView } from "../state/objects";
 import { CHANNEL, START_CHANNEL } from "../state/parameters/channel";
 import type { Parameter } from "../state/parameters/kinds";
 import { LIGHT } from "../state/parameters/light";
-import { PARAMETERS } from "../state/parameters/table";
+import { allParameters } from "../state/parameters/table";
 import { VOLUMES } from "../state/parameters/volumes";
 import { OWN } from "../state/transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "../state/viewer_state";
@@ -44,7 +44,7 @@ const WORDS: SwitchWords = ["off", "on"];
 const CHANNEL_WORDS: SwitchWords = ["", "on"];
 const NAMED_APART: ReadonlySet<Parameter<ViewerState>> = new Set([...VOLUMES, ...LIGHT]);
 /** Besides where volumes show, and the light, which has a part of its own. */
-const OTHERS = PARAMETERS.filter((row) => !NAMED_APART.has(row));
+const otherParameters = () => allParameters().filter((row) => !NAMED_APART.has(row));
 
 export type Shared = Readonly<{ actions: readonly Action[]; camera: CameraView | null }>;
 
@@ -110,7 +110,7 @@ function linkOf(
   const views = state.keptViews.flatMap(({ position, target }) => [...position, ...target]);
   if (views.length > 0) parts.views = written(views);
   if (newest.length > 0) parts.points = written(newest.flat());
-  Object.assign(parts, Object.fromEntries(writeWords(OTHERS, state, start, WORDS)));
+  Object.assign(parts, Object.fromEntries(writeWords(otherParameters(), state, start, WORDS)));
   const light = writeLight(state, start);
   if (light !== "") parts.light = light;
   Object.assign(parts, camera === null ? {} : writeLook(camera));
@@ -204,7 +204,7 @@ class LinkReader {
     this.tile("tile", "select");
     this.tile("only", "isolate");
     this.readClip();
-    this.readParameters(OTHERS);
+    this.readParameters(otherParameters());
     this.readPoints();
     this.readMeasurements();
     this.readViews();

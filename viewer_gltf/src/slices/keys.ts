@@ -2,9 +2,8 @@
 
 import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
 import { setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
-import { isSliced, SLICE_NUMBERS, SLICES } from "../state/parameters/slices";
-import { REFUSED } from "../state/refusals";
 import { STRAIGHT } from "./section";
+import { isSliced, NO_SLICES, SLICE_NUMBERS, SLICES } from "./settings";
 
 /** Steps of a number's slider by one press. */
 const STEPS = 2;
@@ -29,7 +28,7 @@ const KEYS: readonly Key[] = [
   key("{", "Less of that setting", turn(-STEPS)),
   key("}", "More of that setting", turn(STEPS)),
   key("~", "Slices back to the middle, not turned", ({ state }) =>
-    isSliced(state) ? STRAIGHT : no(REFUSED.slices),
+    isSliced(state) ? STRAIGHT : no(NO_SLICES),
   ),
 ];
 

@@ -2,9 +2,9 @@
 import { Matrix4 } from "three";
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { sliceFrames } from "../math/slice_frame";
 import { AXES, dot, type Vec3 } from "../math/vec3";
 import { compose, GREY, reslice, sizeOf, type TexelBlock } from "./reslice";
+import { sliceFrames } from "./slice_frame";
 
 const FILE = { path: "x", bytes: 0, sha256: "" };
 const SIZE = [17, 15, 13] as const;

@@ -3,14 +3,14 @@ import { Object3D } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { FrameView, Hit, Part, PartDefinition, PartHost, PartScene } from "../host/part";
 import type { ClipPlane } from "../math/clip";
-import { meetSlices } from "../math/slice_frame";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { PartSection } from "../panel/controls";
 import { tileAt, unitRay } from "../probe/probe";
-import { isSliced } from "../state/parameters/slices";
 import type { ViewerState } from "../state/viewer_state";
 import { SLICE_KEYS } from "./keys";
 import { sliceSections } from "./section";
+import { isSliced, SLICE_SETTINGS, SLICE_WAYS } from "./settings";
+import { meetSlices } from "./slice_frame";
 import type { Slices } from "./slices";
 
 const NOT_LOADED =
@@ -122,5 +122,7 @@ class SlicesPart implements Part {
 export const slices: PartDefinition = {
   id: "slices",
   keys: SLICE_KEYS,
+  settings: SLICE_SETTINGS,
+  waysOn: SLICE_WAYS,
   create: (host) => new SlicesPart(host),
 };

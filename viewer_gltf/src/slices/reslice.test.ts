@@ -1,9 +1,9 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
-import { pointIn, sliceFrames } from "../math/slice_frame";
 import { AXES, type Vec3 } from "../math/vec3";
 import { compose, reslice, sizeOf, type TexelBlock } from "./reslice";
+import { pointIn, sliceFrames } from "./slice_frame";
 
 const FILE = { path: "x", bytes: 0, sha256: "" };
 const SIZE = [14, 12, 10] as const;

@@ -5,9 +5,9 @@
 import { Matrix4, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Rgb } from "../math/color";
-import type { SliceFrame } from "../math/slice_frame";
 import type { VolumeLevel } from "../probe/measure";
 import { textureCorners } from "../voxels/texture_space";
+import type { SliceFrame } from "./slice_frame";
 
 /** One tile's texels of a channel. */
 export type TexelBlock = Readonly<{ volume: TileVolume; level: VolumeLevel }>;

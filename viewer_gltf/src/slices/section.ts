@@ -2,8 +2,8 @@
 
 import { controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
-import { SLICES } from "../state/parameters/slices";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
+import { SLICES } from "./settings";
 
 /** Back to the middle, along the axes. */
 export const STRAIGHT = {

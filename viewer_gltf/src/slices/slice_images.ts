@@ -7,15 +7,15 @@ import type { Manifest } from "../bundle/generated/bundle";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Box } from "../math/box";
 import { shownBox, shownTiles } from "../math/pick";
-import { outlineOf, pointAt, type SliceFrame, sliceFrames } from "../math/slice_frame";
 import { AXES, type Vec3 } from "../math/vec3";
 import { measuredText, unitOf, valueAt, valueText, voxelAt } from "../probe/measure";
 import { TexelCache } from "../probe/texel_cache";
 import type { LevelSource } from "../state/on_screen";
-import { isSliced } from "../state/parameters/slices";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { VolumeSource } from "../voxels/volume_source";
 import { compose, GREY, reslice, type Size, sizeOf, type TexelBlock } from "./reslice";
+import { isSliced } from "./settings";
+import { outlineOf, pointAt, type SliceFrame, sliceFrames } from "./slice_frame";
 
 /** Pixels of a picture's longer edge. */
 const LONGEST_PX = 384;

@@ -19,9 +19,9 @@ import type { Sight } from "../marks/style";
 import { AHEAD, type Box, boxSpan } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { MAX_CORNERS } from "../math/plane_box_section";
-import { cornerTowards } from "../math/slice_corner";
-import { outlineOf, placeIn, type SliceFrame } from "../math/slice_frame";
 import type { Vec3 } from "../math/vec3";
+import { cornerTowards } from "./slice_corner";
+import { outlineOf, placeIn, type SliceFrame } from "./slice_frame";
 import type { SliceImages } from "./slice_images";
 
 const LINE = 0xffd24a;

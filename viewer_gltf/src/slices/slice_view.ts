@@ -5,8 +5,8 @@
  * and Page Down, Shift with the arrows.
  */
 import { element, setText } from "../dom/element";
-import { placeIn, pointIn, type SliceFrame } from "../math/slice_frame";
 import type { Vec3 } from "../math/vec3";
+import { placeIn, pointIn, type SliceFrame } from "./slice_frame";
 import type { SliceImages } from "./slice_images";
 
 export type SliceChanges = Readonly<{

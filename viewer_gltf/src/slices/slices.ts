@@ -1,9 +1,9 @@
 /** All of the slices: their pictures, in the page and as planes in the scene. A part of the code by itself. */
 import "./slices.css";
 import type { Sight } from "../marks/style";
-import { sharesOf, turnedBy } from "../math/slice_frame";
 import type { Action } from "../state/actions";
 import type { ViewerState } from "../state/viewer_state";
+import { sharesOf, turnedBy } from "./slice_frame";
 import { type SlicesOptions as ImagesOptions, SliceImages } from "./slice_images";
 import { SlicePlanes } from "./slice_planes";
 import { SliceView } from "./slice_view";

@@ -1,23 +1,23 @@
 /**
  * The grey values of an MR on its cut faces, as a slice shows them: a two-dimensional function of bands of values.
  *
- * Follows pipeline/stereocell/transfer/mr_grey.py, where the reasons stand.
+ * Follows pipeline/stereocell/transfer/mr_grey.py, where the reasons stand, and takes the numbers from there.
  */
+import {
+  BANDS,
+  BRIGHT_SHARE,
+  DARKEST,
+  EDGE_FROM,
+  EDGE_SOFTNESS,
+  LEAST_RANGE,
+  STEEP,
+  STEEPEST,
+} from "../bundle/generated/grey_shapes";
 import type { Shape } from "../bundle/generated/transfer2d";
 import { BINS } from "./find_window";
 import type { OpacityPoints } from "./opacity";
 
 export const GREY = "grey";
-
-const BANDS = 10;
-const DARKEST = 0.14;
-const LEAST_RANGE = 0.01;
-const STEEP = 1.1;
-const STEEPEST = 0.8;
-const EDGE_FROM = 0.6;
-const EDGE_SOFTNESS = 0.3;
-/** Share of the tissue that is darker than its lightest grey. */
-const BRIGHT_SHARE = 0.95;
 
 /**
  * @param level where the body begins, 0..1 in the window

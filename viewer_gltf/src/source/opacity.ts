@@ -1,29 +1,31 @@
 /**
  * Transfer functions from intensity to opacity.
  *
- * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, where the reasons stand. What differs is
- * the level: a build looks for that of a surface, and here it is that of find_level.ts, or the skin's of a CT. There
+ * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, where the reasons stand, and takes
+ * the numbers from there. What differs is the level: a build looks for that of a surface, and here it is that of find_level.ts, or the skin's of a CT. There
  * are no functions at the adaptive threshold, by tissue of a CT, or of two dimensions but for that of grey_shapes.ts.
  */
+import {
+  AT_SURFACE,
+  AT_SURFACE_OF_MAGNITUDES,
+  BELOW_BODY,
+  BRIGHT,
+  BRIGHT_OF_MAGNITUDES,
+  FAINT,
+  FOOT,
+  IN_BODY,
+  LEAST_SHARE,
+  MAX_SHIFT,
+  NEAR_SURFACE,
+  NOISE_REACH,
+  SOFT_DEPTH,
+  SOLID_BODY,
+} from "../bundle/generated/opacity";
 import { BINS } from "./find_window";
 
 /** Intensity and opacity, 0..1 each. */
 export type OpacityPoints = readonly (readonly [number, number])[];
 
-const SOFT_DEPTH = 0.6;
-const LEAST_SHARE = 0.2;
-const FOOT = 0.95;
-const NEAR_SURFACE = 0.8;
-const AT_SURFACE = 0.18;
-const IN_BODY = 0.45;
-const BRIGHT = 0.3;
-const AT_SURFACE_OF_MAGNITUDES = 0.12;
-const BRIGHT_OF_MAGNITUDES = 0.5;
-const BELOW_BODY = 0.012;
-const SOLID_BODY = 0.06;
-const NOISE_REACH = 2.5;
-const FAINT = 1e-2;
-const MAX_SHIFT = 1.5;
 /** Percent of the voxels that are fainter than the volume of a channel without a level shows. */
 const LEVEL_PERCENTILE = 99;
 

@@ -9,7 +9,13 @@ import type { ObjectChange } from "./objects";
 import type { SetAction } from "./parameters/kinds";
 import type { ViewerState } from "./viewer_state";
 
+/** Actions of parts, by their types. A part adds its own by `declare module`, and their rules in its definition. */
+// biome-ignore lint/suspicious/noEmptyInterface: a type could not be extended by parts
+export interface PartActions {}
+export type PartAction = PartActions[keyof PartActions];
+
 export type Action =
+  | PartAction
   | ObjectChange
   /** The user sets a number, a switch, a choice or a colour: see parameters/. */
   | SetAction
@@ -31,8 +37,6 @@ export type Action =
   | Readonly<{ type: "finish-measuring" }>
   /** Those that are done: named otherwise, fewer, or another's. */
   | Readonly<{ type: "set-measurements"; measurements: readonly Measurement[] }>
-  /** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
-  | Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>
   /** Where a lamp is dragged to. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
   /** Back to a state of before, but for what is no user's: see history.ts. */

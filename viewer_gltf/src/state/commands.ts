@@ -1,50 +1,53 @@
 /**
- * The names of the requests of a panel or a key that are no change of the state. A part adds its own names by
- * `declare module`.
+ * The requests of a panel or a key that are no change of the state. A part has a list of its own in its definition, and
+ * adds the names by `declare module`.
  */
-export interface CommandNames {
+export const OWN_COMMANDS = [
   /** The whole specimen from the front again, and no tile isolated. */
-  reset: true;
+  "reset",
   /** One step out: from an isolated tile to all, from a selected one to none. */
-  back: true;
+  "back",
   /** One step of the history back, or on again. */
-  undo: true;
-  redo: true;
+  "undo",
+  "redo",
   /** Asks again for all that has failed. */
-  retry: true;
+  "retry",
   /** A tap in the middle of the view: for hands that have only keys. */
-  press: true;
+  "press",
   /** Stereo in a headset, or back to the page. */
-  stereo: true;
+  "stereo",
   /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
-  room: true;
+  "room",
   /** Split screen for a phone in a viewer without WebXR. */
-  split: true;
+  "split",
   /** Reads the phone viewer's code by the camera. */
-  scan: true;
+  "scan",
   /** Measures how large the screen is, by a card that is held to it. */
-  "measure-screen": true;
+  "measure-screen",
   /** The page on the full screen, or back in its window. */
-  "full-screen": true;
-  share: true;
+  "full-screen",
+  "share",
   /** To the panel's search among the channels that are not shown. */
-  find: true;
+  "find",
   /** Lights the traced picture by a .hdr or .exr file. */
-  "own-light": true;
-  front: true;
-  side: true;
-  top: true;
-  "zoom-in": true;
-  "zoom-out": true;
-  "turn-left": true;
-  "turn-right": true;
-  "turn-up": true;
-  "turn-down": true;
-  "pan-left": true;
-  "pan-right": true;
-  "pan-up": true;
-  "pan-down": true;
-}
+  "own-light",
+  "front",
+  "side",
+  "top",
+  "zoom-in",
+  "zoom-out",
+  "turn-left",
+  "turn-right",
+  "turn-up",
+  "turn-down",
+  "pan-left",
+  "pan-right",
+  "pan-up",
+  "pan-down",
+] as const;
+
+/** Names of commands: those above and those of the parts. */
+export interface CommandNames extends Record<(typeof OWN_COMMANDS)[number], true> {}
 
 export type Command = keyof CommandNames;
 

@@ -6,6 +6,7 @@
  */
 import type { Action } from "./actions";
 import { channelParameterOf, parameterOf } from "./parameters/table";
+import { rulesOf } from "./part_settings";
 import type { ChannelState, ViewerState } from "./viewer_state";
 
 /** Most steps back: so many states share all that they have in common. */
@@ -116,10 +117,9 @@ export function keyOfChange(action: Action): string | null {
       return `${action.type} ${action.lamp}`;
     case "set-clip":
     case "set-measurements":
-    case "move-slices":
       return action.type;
     default:
-      return null;
+      return rulesOf(action)?.isGradual ? action.type : null;
   }
 }
 
@@ -147,8 +147,6 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
       return "only tile";
     case "set-clip":
       return "cut";
-    case "move-slices":
-      return "slices";
     case "measure":
     case "add-point":
     case "finish-measuring":
@@ -159,6 +157,6 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
     case "keep-views":
       return "kept views";
     default:
-      return "";
+      return rulesOf(action)?.name ?? "";
   }
 }

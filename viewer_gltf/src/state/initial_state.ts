@@ -4,6 +4,7 @@ import type { ClipPlane } from "../math/clip";
 import { START_CHANNEL } from "./parameters/channel";
 import { START_SETTINGS } from "./parameters/settings";
 import type { Mode } from "./parameters/volumes";
+import { startOfParts } from "./part_settings";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** Most tiles that open as volumes; of a larger specimen the chosen tile does. */
@@ -39,6 +40,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const shown = new Set(opened.map(({ id }) => id));
   return {
     ...START_SETTINGS,
+    ...startOfParts(),
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,

@@ -6,8 +6,8 @@ import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withObjects } from "./objects";
 import { withValue } from "./parameters/kinds";
 import { LAMP } from "./parameters/light";
-import { SLICE_AT, SLICE_TURN } from "./parameters/slices";
 import { faultOfValue, withParameter } from "./parameters/table";
+import { withPartAction } from "./part_settings";
 import { withShapes } from "./transfer_functions_2d";
 import { type ChannelState, MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
@@ -59,11 +59,6 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
         (moved, axis, i) => withValue(axis, moved, action.place[i]),
         state,
       );
-    case "move-slices": {
-      const { at = [], turn_deg = [] } = action;
-      const moved = at.reduce((on, share, i) => withValue(SLICE_AT[i], on, share), state);
-      return turn_deg.reduce((on, angle, i) => withValue(SLICE_TURN[i], on, angle), moved);
-    }
     case "objects": {
       const objects = withObjects(state.objects, action);
       return objects === state.objects ? state : { ...state, objects };
@@ -123,6 +118,8 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
       if (notices.length === state.notices.length) return state;
       return { ...state, notices, mendable: state.mendable.filter(isLeft) };
     }
+    default:
+      return withPartAction(state, action);
   }
 }
 

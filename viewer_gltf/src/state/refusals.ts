@@ -17,7 +17,6 @@ export const REFUSED = {
   tracing: `Path tracing is on: choose another form ${MODES} to end it.`,
   transfer: "This channel is drawn as a surface: switch its volume on for transfer functions.",
   transferless: "This channel has no transfer function.",
-  slices: "No slices are shown: switch pictures or planes on under Slices.",
   measuring: "A tap selects now: choose Measure first.",
   measured: "Nothing is measured yet: choose Measure (p), then two points.",
   points: "The measurement needs more points: choose them first.",

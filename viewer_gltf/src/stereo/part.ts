@@ -1,5 +1,7 @@
 /** The ways into stereo as a part of the viewer: headset, the user's own room, and the split screen of a phone. */
+
 import { BundleError } from "../bundle/errors";
+import { isTouch } from "../dom/is_touch";
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { StereoFinder } from "../host/services";
@@ -33,7 +35,6 @@ import { stereoSections } from "./section";
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
 /** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
 const AFTER_PICTURE_MS = 2000;
-const IS_TOUCH = matchMedia("(pointer: coarse)").matches;
 const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
 
 async function findSupport(): StereoFinder["found"] {
@@ -73,7 +74,7 @@ class StereoPart implements Part, StereoFinder {
   /** Loads the code of stereo where it may be wanted, once the page has nothing else to do. */
   async afterOverview(): Promise<void> {
     const { stereo, hasRoom } = await this.found;
-    if (wayToStereo(stereo, IS_TOUCH) === null && !hasRoom) return;
+    if (wayToStereo(stereo, isTouch()) === null && !hasRoom) return;
     const prepare = () => void this.host.stereo.prepare().catch(() => undefined); // a start reports it
     if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
     else setTimeout(prepare, AFTER_PICTURE_MS);

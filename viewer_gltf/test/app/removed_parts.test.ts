@@ -10,17 +10,21 @@ import { Host } from "../support/browser/host";
 import { ViewerPage } from "../support/browser/page";
 import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
-import { buildPage, copyWithout } from "../support/without_parts";
+import { buildPage, copyWithout, registeredParts } from "../support/without_parts";
 
-/** Parts of the viewer, by folder, and the section of the panel that each has. */
-const PARTS: Readonly<Record<string, string>> = {
+/** The parts whose copies are built and opened, by folder, and the section of the panel that each has. */
+const OPENED: Readonly<Record<string, string>> = {
   annotations: "measure",
   capture: "save",
   objects: "objects",
   pathtrace: "light",
   slices: "slices",
 };
-const FOLDERS = Object.keys(PARTS);
+const FOLDERS = Object.keys(OPENED);
+/** The page's entry reads its address with files of this folder, which stays without the part's line. */
+const READS_ADDRESS = "share";
+
+const PARTS = await registeredParts();
 
 const copies = new Map<string, Promise<string>>();
 let folder = "";
@@ -33,7 +37,8 @@ afterAll(() => rm(folder, { recursive: true }));
 
 /** The copy of the viewer without a part, made when it is first asked for. */
 function without(part: string): Promise<string> {
-  const copy = copies.get(part) ?? copyWithout([part], join(folder, part));
+  const kept = part === READS_ADDRESS ? [part] : [];
+  const copy = copies.get(part) ?? copyWithout([part], join(folder, part), kept);
   copies.set(part, copy);
   return copy;
 }
@@ -48,7 +53,11 @@ async function faultsOf(copy: string): Promise<string> {
 }
 
 describe("the viewer", () => {
-  it.each(FOLDERS)("type-checks without the folder and the line of %s", async (part) => {
+  it("is opened without parts that are registered", () => {
+    expect(PARTS).toEqual(expect.arrayContaining(FOLDERS));
+  });
+
+  it.each(PARTS)("type-checks without the folder and the line of %s", async (part) => {
     expect(await faultsOf(await without(part))).toBe("");
   });
 });
@@ -80,7 +89,7 @@ describeInChromium("the page", () => {
         const openers = await page
           .locator("h2 [data-opener]")
           .evaluateAll((each) => each.map((opener) => (opener as HTMLElement).dataset.opener));
-        const ofParts = FOLDERS.filter((part) => openers.includes(PARTS[part]));
+        const ofParts = FOLDERS.filter((part) => openers.includes(OPENED[part]));
         // the fixture has no label map, so no page has a section of objects
         const isThere = (part: string) => part !== "objects" && part !== removed;
         expect(ofParts).toEqual(FOLDERS.filter(isThere));

@@ -3,7 +3,7 @@ import { expect, it } from "vitest";
 import { isWritten } from "../../src/panel/key_events";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
-import { KEYS } from "../support/panel/whole_panel";
+import { KEYS } from "../support/panel/all_keys";
 
 /** They open a dialog, a file chooser or stereo, write a file or the clipboard: each is its own answer. */
 const OWN_ANSWER = ["?", "V", "P", "K", ":", "U", "l", "(", ")", '"', "R"];

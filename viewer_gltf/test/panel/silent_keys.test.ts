@@ -5,7 +5,7 @@ import { REFUSED } from "../../src/state/refusals";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { sweep } from "../support/exhaustive";
-import { KEYS } from "../support/panel/whole_panel";
+import { KEYS, NO_SLICES } from "../support/panel/all_keys";
 
 const SCREEN = { viewport: { width: 320, height: 240 }, isBlind: true };
 /** They open a dialog of the browser's own, fill the screen, save a file or take long: tests of their own have them. */
@@ -81,7 +81,7 @@ describeInChromium("every key", () => {
     await page.evaluate(() => dispatchEvent(new KeyboardEvent("keydown", { key: "§" })));
     expect(await said()).toBe("No key §: ? lists the keys.");
     await page.keyboard.press("}");
-    expect(await said()).toBe(REFUSED.slices);
+    expect(await said()).toBe(NO_SLICES);
     await page.keyboard.press("]");
     expect(await said()).toBe("Only path tracing has this setting: switch path tracing on first.");
     await page.keyboard.press("u");

@@ -7,8 +7,26 @@ import { build } from "vite";
 const VIEWER = fileURLToPath(new URL("../..", import.meta.url));
 const COPIED = ["src", "index.html", "public", "package.json", "tsconfig.json"];
 
-/** Writes the copy to a folder, beside a link to the schemas. Returns the path of the copied viewer. */
-export async function copyWithout(parts: readonly string[], folder: string): Promise<string> {
+/** A line of src/app/parts.ts, and in it the folder of the part. */
+const REGISTERED = /^export .* from "\.\.\/(\w+)\/part";$/gm;
+const REGISTRATION = "src/app/parts.ts";
+
+/** The folders of all parts that are registered, in the order of their lines. */
+export async function registeredParts(): Promise<readonly string[]> {
+  const text = await readFile(join(VIEWER, REGISTRATION), "utf8");
+  return [...text.matchAll(REGISTERED)].map(([, part]) => part);
+}
+
+/**
+ * Writes the copy to a folder, beside a link to the schemas. Returns the path of the copied viewer.
+ *
+ * @param kept those of the parts whose folders stay, without their lines
+ */
+export async function copyWithout(
+  parts: readonly string[],
+  folder: string,
+  kept: readonly string[] = [],
+): Promise<string> {
   const copy = join(folder, "viewer_gltf");
   await mkdir(copy, { recursive: true });
   const isSource = (path: string) => !path.endsWith(".test.ts");
@@ -17,15 +35,17 @@ export async function copyWithout(parts: readonly string[], folder: string): Pro
   }
   await symlink(join(VIEWER, "node_modules"), join(copy, "node_modules"));
   await symlink(join(VIEWER, "..", "schemas"), join(folder, "schemas"));
-  const registration = join(copy, "src/app/parts.ts");
+  const registration = join(copy, REGISTRATION);
   const lines = (await readFile(registration, "utf8")).split("\n");
   const isGone = (line: string) => parts.some((part) => line.includes(`"../${part}/part"`));
-  const kept = lines.filter((line) => !isGone(line));
-  if (lines.length - kept.length !== parts.length) {
-    throw new Error(`src/app/parts.ts: expected a line for each of ${parts.join(", ")}`);
+  const left = lines.filter((line) => !isGone(line));
+  if (lines.length - left.length !== parts.length) {
+    throw new Error(`${REGISTRATION}: expected a line for each of ${parts.join(", ")}`);
   }
-  await writeFile(registration, kept.join("\n"));
-  for (const part of parts) await rm(join(copy, "src", part), { recursive: true });
+  await writeFile(registration, left.join("\n"));
+  for (const part of parts.filter((each) => !kept.includes(each))) {
+    await rm(join(copy, "src", part), { recursive: true });
+  }
   const config = { extends: "./tsconfig.json", include: ["src/app/main.ts", "src/vite-env.d.ts"] };
   await writeFile(join(copy, "tsconfig.page.json"), JSON.stringify(config));
   return copy;

@@ -1,7 +1,6 @@
 /** A question mark beside a control's label, which opens the explanation below it. */
 import { element } from "../../dom/element";
 import type { Control } from "../controls";
-import { isExplained } from "../explained";
 
 const load = () => import("../explanations");
 
@@ -10,7 +9,7 @@ export type Explainer = Readonly<{ button: HTMLElement; note: HTMLElement }>;
 /** null: the control needs no explanation. */
 export function explainerOf(control: Control): Explainer | null {
   const { id, label, name = label, about } = control;
-  if (about === undefined && !isExplained(id)) return null;
+  if (about === undefined) return null;
   const note = element("div", { className: "explanation", role: "note", hidden: true });
   const button = element(
     "button",
@@ -22,19 +21,18 @@ export function explainerOf(control: Control): Explainer | null {
     event.preventDefault(); // the label around it would work the control
     const isOpen = button.ariaExpanded === "true";
     button.ariaExpanded = String(!isOpen);
-    if (note.childElementCount === 0) note.replaceChildren(...(await linesOf(control)));
+    if (note.childElementCount === 0) note.replaceChildren(...(await linesOf(control, about)));
     note.hidden = isOpen;
   });
   return { button, note };
 }
 
-async function linesOf(control: Control): Promise<readonly HTMLElement[]> {
-  const { id, about } = control;
-  const { explanationOf, explanationOfChoice } = await load();
-  const lines = [element("p", { textContent: about ?? explanationOf(id) })];
+async function linesOf(control: Control, about: string): Promise<readonly HTMLElement[]> {
+  const lines = [element("p", { textContent: about })];
   if (control.kind !== "choice") return lines;
+  const { explanationOfChoice } = await load();
   for (const { value, label } of control.options) {
-    const text = explanationOfChoice(id, value);
+    const text = explanationOfChoice(control.id, value);
     if (text === "") continue;
     lines.push(element("p", {}, {}, element("b", { textContent: label }), ` ${text}`));
   }
@@ -42,8 +40,8 @@ async function linesOf(control: Control): Promise<readonly HTMLElement[]> {
 }
 
 /** Give each option of a list a tooltip, as soon as somebody comes near the list. */
-export function explainOptions(select: HTMLSelectElement, { id }: Control): void {
-  if (!isExplained(id)) return;
+export function explainOptions(select: HTMLSelectElement, { id, about }: Control): void {
+  if (about === undefined) return;
   const explain = async () => {
     const { explanationOfChoice } = await load();
     for (const option of select.options) option.title = explanationOfChoice(id, option.value);

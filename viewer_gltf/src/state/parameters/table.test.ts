@@ -5,9 +5,10 @@ import { reduce } from "../reduce";
 import { CHANNEL } from "./channel";
 import { type NumberParameter, setTo, shareOf, valueAtShare } from "./kinds";
 import { LIGHT_NUMBERS } from "./light";
-import { IN_ADDRESS, PARAMETERS } from "./table";
+import { allParameters, parametersInAddress } from "./table";
 import { MODE } from "./volumes";
 
+const PARAMETERS = allParameters();
 const START = initialState(sampleManifest(2));
 const NUMBERS = PARAMETERS.filter((row) => row.kind === "number");
 
@@ -21,7 +22,7 @@ describe("the parameters", () => {
     expect(isUnique(PARAMETERS.map(({ id }) => id))).toBe(true);
     expect(isUnique(PARAMETERS.map(({ link }) => link))).toBe(true);
     expect(isUnique(CHANNEL.map(({ link }) => link))).toBe(true);
-    expect(IN_ADDRESS.every(({ link }) => link !== undefined)).toBe(true);
+    expect(parametersInAddress().every(({ link }) => link !== undefined)).toBe(true);
     // of a channel's look, a letter names the part
     expect(CHANNEL.every(({ link }) => link?.length === 1 && !"wst".includes(link))).toBe(true);
   });
@@ -87,6 +88,8 @@ describe("the parameters", () => {
 
   it("are a bug where nobody knows them", () => {
     expect(() => reduce(START, { type: "set", id: "size", value: 1 })).toThrow("no parameter size");
+    const action = JSON.parse('{"type": "wind-clock"}');
+    expect(() => reduce(START, action)).toThrow('no part has the action {"type":"wind-clock"}');
   });
 });
 

@@ -1,12 +1,11 @@
 /** All parameters, and the action that sets one. Pure. */
+import { addressRowsOfParts, rowsOfParts } from "../part_settings";
 import type { ChannelState, ViewerState } from "../viewer_state";
 import { CHANNEL } from "./channel";
 import { type Parameter, type SetAction, type Value, withValue } from "./kinds";
 import { LAMPS_SHOWN, LIGHT } from "./light";
-import { SLICES } from "./slices";
 import {
   MEASURE_PARAMETERS,
-  PICTURE_PARAMETERS,
   QUALITY,
   QUALITY_PARAMETERS,
   SCREEN_STEREO,
@@ -14,21 +13,21 @@ import {
 } from "./tools";
 import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
 
-/** Besides those of the channels. */
-export const PARAMETERS: readonly Parameter<ViewerState>[] = [
+/** Besides those of the channels and of parts. */
+const OWN: readonly Parameter<ViewerState>[] = [
   ...VOLUMES,
-  ...SLICES,
   ...MEASURE_PARAMETERS,
   SCREEN_STEREO,
   ...STEREO_PARAMETERS,
   ...QUALITY_PARAMETERS,
-  ...PICTURE_PARAMETERS,
   ...LIGHT,
   LAMPS_SHOWN,
 ];
 
-/** The parameters that the page's address may set, by the names that links have. */
-export const IN_ADDRESS: readonly Parameter<ViewerState>[] = [
+/** Besides those of the channels. */
+export const allParameters = (): readonly Parameter<ViewerState>[] => [...OWN, ...rowsOfParts()];
+
+const OWN_IN_ADDRESS: readonly Parameter<ViewerState>[] = [
   MODE,
   QUALITY,
   SWITCH_DISTANCE,
@@ -36,12 +35,18 @@ export const IN_ADDRESS: readonly Parameter<ViewerState>[] = [
   SCREEN_STEREO,
 ];
 
-const byId = new Map(PARAMETERS.map((row) => [row.id, row]));
+/** The parameters that the page's address may set, by the names that links have. */
+export const parametersInAddress = (): readonly Parameter<ViewerState>[] => [
+  ...OWN_IN_ADDRESS,
+  ...addressRowsOfParts(),
+];
+
+const byId = new Map(OWN.map((row) => [row.id, row]));
 const channelById = new Map(CHANNEL.map((row) => [row.id, row]));
 
 /** The parameter of an id. Throws Error where there is none: ids come from tables. */
 export function parameterOf(id: string): Parameter<ViewerState> {
-  const row = byId.get(id);
+  const row = byId.get(id) ?? rowsOfParts().find((each) => each.id === id);
   if (row === undefined) throw new Error(`no parameter ${id}`);
   return row;
 }

@@ -17,9 +17,6 @@ const MEASURES = ["distance", "angle", "line"] as const;
 /** Between two points, at the second of three, through several. */
 export type MeasureKind = (typeof MEASURES)[number];
 
-const PICTURE_SIZES = ["1", "2", "4"] as const;
-export type PictureSize = (typeof PICTURE_SIZES)[number];
-
 const SCREEN_STEREO_KINDS = ["off", "anaglyph", "side-by-side"] as const;
 /** Stereo on the page's own screen: in red and cyan for glasses, or both eyes' pictures side by side. */
 export type ScreenStereo = (typeof SCREEN_STEREO_KINDS)[number];
@@ -33,8 +30,6 @@ export const START_TOOLS = {
   /** Whether looking at something for long is as good as pressing the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
-  /** How many times as large as the screen a saved picture is. */
-  pictureSize: "2" as PictureSize,
   /** Between the user's pupils, mm: adults have 54 to 74. */
   eyeDistance_mm: 63,
   /** Factor to it: 0 shows both eyes the same. */
@@ -52,6 +47,7 @@ export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
   kind: "choice",
   id: "tool",
   label: "A tap",
+  about: "The effect of a click, a tap or a resting gaze on the specimen.",
   link: "tool",
   ...lens("tool"),
   values: TOOLS,
@@ -64,6 +60,7 @@ export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
   kind: "choice",
   id: "measure-kind",
   label: "Measure",
+  about: "The kind of the next measurement.",
   link: "measure",
   ...lens("measureKind"),
   values: MEASURES,
@@ -77,6 +74,7 @@ export const DWELL: SwitchParameter<ToolSettings> = {
   kind: "switch",
   id: "dwell",
   label: "Gaze for 1.5 s chooses",
+  about: "In stereo, looking at something for 1.5 s is the same as pressing a button.",
   link: "dwell",
   ...lens("isDwellOn"),
   key: ["j", "Choosing by gaze on or off"],
@@ -87,6 +85,7 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   kind: "choice",
   id: "quality",
   label: "Quality",
+  about: "How finely volumes are drawn while the view moves.",
   link: "quality",
   ...lens("quality"),
   values: QUALITY_LEVELS,
@@ -95,21 +94,11 @@ export const QUALITY: ChoiceParameter<ToolSettings, QualityLevel> = {
   spoken: ({ quality }) => `Quality: ${quality}`,
 };
 
-const PICTURE_SIZE: ChoiceParameter<ToolSettings, PictureSize> = {
-  kind: "choice",
-  id: "picture-size",
-  label: "Picture",
-  ...lens("pictureSize"),
-  values: PICTURE_SIZES,
-  names: { "1": "1 x", "2": "2 x", "4": "4 x" },
-  key: ["0", "Next size of saved pictures: 1, 2 or 4 times the screen"],
-  spoken: ({ pictureSize }) => `Pictures: ${pictureSize} times the screen`,
-};
-
 export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "eye-distance",
   label: "Eye distance",
+  about: "The distance between your pupils, for the split screen. A headset knows its own.",
   ...lens("eyeDistance_mm"),
   limits: [50, 76],
   steps: 52,
@@ -122,6 +111,7 @@ export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "stereo-strength",
   label: "Strength of stereo",
+  about: "100 % is as your eyes see it. At 0 % both eyes see the same.",
   ...lens("stereoStrength"),
   limits: [0, 2],
   steps: 40,
@@ -137,6 +127,7 @@ const SPECIMEN_SIZE: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "specimen-size",
   label: "Size in stereo",
+  about: "The length of the specimen's longest edge in stereo.",
   ...lens("specimenSize_m"),
   limits: [0.2, 6],
   steps: 60,
@@ -170,5 +161,4 @@ export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
 /** By the panel's section that lists them. */
 export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
 export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
-export const PICTURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [PICTURE_SIZE];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

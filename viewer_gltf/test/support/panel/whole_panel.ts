@@ -1,35 +1,31 @@
-/** The panel and the keys with those of all parts, as the whole viewer has them. */
-import { MEASURE_KEYS, measureSections } from "../../../src/annotations/section";
-import { SAVE_KEYS, saveSections } from "../../../src/capture/section";
-import { CHANNEL_KEYS } from "../../../src/channels/keys";
+/**
+ * The panel with the sections of all parts, as the whole viewer has it. It takes no part as a whole: pages of tests have
+ * it, too.
+ */
+import { measureSections } from "../../../src/annotations/section";
+import { saveSections } from "../../../src/capture/section";
+import { CAPTURE_SETTINGS } from "../../../src/capture/settings";
 import {
   PAGE as CHANNELS_OF_A_PAGE,
   type ChannelFacts,
   channelSections,
 } from "../../../src/channels/section";
-import { labelMapSections, OBJECT_KEYS } from "../../../src/objects/label_maps";
+import { labelMapSections } from "../../../src/objects/label_maps";
 import type { Layout, PanelView, Section } from "../../../src/panel/controls";
-import { KeyTable, OWN_KEYS } from "../../../src/panel/keys";
 import { layOut as layOutOwn, type Facts as OwnFacts } from "../../../src/panel/layout";
-import { LIGHT_KEYS } from "../../../src/pathtrace/keys";
 import { lightSections } from "../../../src/pathtrace/section";
-import { SLICE_KEYS } from "../../../src/slices/keys";
 import { sliceSections } from "../../../src/slices/section";
+import { SLICE_SETTINGS } from "../../../src/slices/settings";
+import { addSettings } from "../../../src/state/part_settings";
 import type { ViewerState } from "../../../src/state/viewer_state";
-import { STEREO_KEYS } from "../../../src/stereo/keys";
 import { type StereoFacts, stereoSections } from "../../../src/stereo/section";
-import { TILE_KEYS } from "../../../src/tiles/keys";
 import { tileSections } from "../../../src/tiles/section";
-import { VOLUME_KEYS } from "../../../src/volumes/keys";
 import { volumeSections } from "../../../src/volumes/section";
 
 export { CHANNELS_OF_A_PAGE };
 
-export const KEYS = new KeyTable([
-  ...OWN_KEYS,
-  ...[...MEASURE_KEYS, ...OBJECT_KEYS, ...SLICE_KEYS, ...SAVE_KEYS],
-  ...[...CHANNEL_KEYS, ...LIGHT_KEYS, ...STEREO_KEYS, ...TILE_KEYS, ...VOLUME_KEYS],
-]);
+addSettings("capture", CAPTURE_SETTINGS);
+addSettings("slices", SLICE_SETTINGS);
 
 /** What is known beside the state, by the panel and by the parts. */
 export type Facts = OwnFacts &

@@ -1,7 +1,16 @@
-/** The parameters of the three slice planes: whether they show, where they meet, how they are turned. Pure. */
+/** The settings of the three slice planes: whether they show, where they meet, how they are turned. Pure. */
 
-import { REFUSED } from "../refusals";
-import { lensesOf, type NumberParameter, type Parameter, type SwitchParameter } from "./kinds";
+import type { Vec3 } from "../math/vec3";
+import type { WaysOn } from "../panel/ways_on";
+import {
+  lensesOf,
+  type NumberParameter,
+  type Parameter,
+  type SwitchParameter,
+  setTo,
+  withValue,
+} from "../state/parameters/kinds";
+import type { PartSettings } from "../state/part_settings";
 
 /** The slices of a bundle that has just opened. */
 export const START_SLICES = {
@@ -20,6 +29,20 @@ export const START_SLICES = {
 };
 
 export type SliceSettings = Readonly<typeof START_SLICES>;
+
+/** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
+export type MoveSlices = Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>;
+
+declare module "../state/parameters/settings" {
+  interface Settings extends SliceSettings {}
+}
+declare module "../state/actions" {
+  interface PartActions {
+    "move-slices": MoveSlices;
+  }
+}
+
+export const NO_SLICES = "No slices are shown: switch pictures or planes on under Slices.";
 
 const lens = lensesOf<SliceSettings>();
 
@@ -68,7 +91,7 @@ export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
   steps: 200,
   rounded: (share) => Number(share.toFixed(4)),
   text: percent,
-  refusal: (on) => (isSliced(on) ? "" : REFUSED.slices),
+  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
   spoken: (on) => `Slices: ${axis} ${percent(on[field])}`,
 }));
 
@@ -90,7 +113,7 @@ export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
   steps: 144,
   rounded: (angle) => Number(angle.toFixed(2)),
   text: degrees,
-  refusal: (on) => (isSliced(on) ? "" : REFUSED.slices),
+  refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
   spoken: (on) => `Slices: turned about ${axis} by ${degrees(on[field])}`,
 }));
 
@@ -105,3 +128,23 @@ export const SLICES: readonly Parameter<SliceSettings>[] = [
   SLICE_PLANES,
   ...SLICE_NUMBERS,
 ];
+
+export const SLICE_SETTINGS: PartSettings = {
+  start: START_SLICES,
+  rows: SLICES,
+  actions: {
+    "move-slices": {
+      reduce: (state, { at = [], turn_deg = [] }) => {
+        const moved = at.reduce((on, share, i) => withValue(SLICE_AT[i], on, share), state);
+        return turn_deg.reduce((on, angle, i) => withValue(SLICE_TURN[i], on, angle), moved);
+      },
+      name: "slices",
+      isGradual: true,
+      spoken: () => "Slices: in the middle, not turned",
+    },
+  },
+};
+
+export const SLICE_WAYS: WaysOn = {
+  [NO_SLICES]: () => ({ label: "Show slices", to: [setTo(SLICE_PICTURES, true)] }),
+};

@@ -1,7 +1,7 @@
 /** The corner before three slices, which would hide them. um, world. Pure. */
-import type { ClipPlane } from "./clip";
+import type { ClipPlane } from "../math/clip";
+import { dot, type Vec3 } from "../math/vec3";
 import { negated, type SliceFrame } from "./slice_frame";
-import { dot, type Vec3 } from "./vec3";
 
 /** Distance from the planes to the corner's end, by half a picture's longer edge: rounding stays outside. */
 const BEFORE = 1e-5;

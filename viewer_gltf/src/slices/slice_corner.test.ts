@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
-import { isKept } from "./clip";
+import { isKept } from "../math/clip";
+import type { Vec3 } from "../math/vec3";
 import { cornerTowards } from "./slice_corner";
 import { sliceFrames } from "./slice_frame";
-import type { Vec3 } from "./vec3";
 
 const BOX = { min: [0, -20, 10], max: [40, 0, 20] } as const;
 const STRAIGHT: Vec3 = [0, 0, 0];

@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { dot, type Vec3 } from "../math/vec3";
 import {
   meetSlices,
   outlineOf,
@@ -9,7 +10,6 @@ import {
   sliceFrames,
   turnedBy,
 } from "./slice_frame";
-import { dot, type Vec3 } from "./vec3";
 
 const BOX = { min: [0, -20, 10], max: [40, 0, 20] } as const;
 const STRAIGHT: Vec3 = [0, 0, 0];

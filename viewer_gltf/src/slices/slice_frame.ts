@@ -5,9 +5,9 @@
  * picture (as `stereocell slices` has it). um, world. Pure.
  */
 import { Euler, Quaternion, Vector3 } from "three";
-import type { Box } from "./box";
-import { planeSection } from "./plane_box_section";
-import { AXES, dot, type Ray, type Vec3 } from "./vec3";
+import type { Box } from "../math/box";
+import { planeSection } from "../math/plane_box_section";
+import { AXES, dot, type Ray, type Vec3 } from "../math/vec3";
 
 /** Of the patient, as unit vectors; null: there is none, or nobody knows. */
 export type PatientSides = Readonly<{ left: Vec3; posterior: Vec3; superior: Vec3 }> | null;
