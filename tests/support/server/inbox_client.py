@@ -20,6 +20,7 @@ from stereocell.read.addresses.resolved import Resolved
 from stereocell.serve import inbox_server
 from stereocell.serve.inbox_server import InboxServer
 from stereocell.serve.server import LOCALHOST
+from stereocell.storage.child_process import Child
 from support.server.running import running
 from support.server.timeouts import PATIENCE_S, connect
 from support.small_viewer import write_small_viewer
@@ -119,9 +120,10 @@ def serving_inbox(
     with patch.object(inbox_server, "viewer_dist", lambda: page):
         server = InboxServer(box, limits, make or FakeBuilds(), port=0, lan=lan)
     with ExitStack() as stack:
-        if is_near:
-            stack.enter_context(patch.object(readers, "Child", NearReader))
-            stack.enter_context(patch.object(builds, "BuildProcess", NearBuild))
+        # of two inboxes, one around the other, each has its own
+        child, process = (NearReader, NearBuild) if is_near else (Child, BuildProcess)
+        stack.enter_context(patch.object(readers, "Child", child))
+        stack.enter_context(patch.object(builds, "BuildProcess", process))
         yield stack.enter_context(running(server))
 
 
