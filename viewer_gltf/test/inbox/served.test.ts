@@ -1,5 +1,4 @@
 /** The inbox with its server: a real MRI is uploaded over faults, looked at, and built. */
-import { execFileSync } from "node:child_process";
 import { existsSync } from "node:fs";
 import { mkdtemp, readdir, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -13,17 +12,12 @@ import { describeInChromium } from "../support/browser/skip";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { drop } from "../support/inbox/drop";
 
-/** The real volumes, where they are available. */
-const MRI = join(process.env.STEREOCELL_DATA ?? "", "mri_t1_7t/dicoms");
+/** A real volume, where it is available. */
+const DATA = process.env.STEREOCELL_DATA;
+const MRI = join(DATA ?? "", "mri_t1_7t/dicoms");
+const IS_AVAILABLE = DATA !== undefined && existsSync(MRI) && existsSync(STEREOCELL);
 
-function hasInbox(): boolean {
-  if (process.env.STEREOCELL_DATA === undefined || !existsSync(MRI)) return false;
-  return (
-    existsSync(STEREOCELL) && execFileSync(STEREOCELL, ["serve", "--help"]).includes("--inbox")
-  );
-}
-
-describe.skipIf(!hasInbox())("with its server", () => {
+describe.skipIf(!IS_AVAILABLE)("with its server", () => {
   describeInChromium("the inbox", () => {
     let folder: string;
     let server: Awaited<ReturnType<typeof serve>>;
