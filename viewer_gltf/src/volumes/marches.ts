@@ -116,8 +116,10 @@ export class Marches implements DrawnMarches {
     const { march: before } = resident;
     const { channels } = packed;
     const volume = volumeOf(packed, resident);
-    const isSameGrid = before?.volume.size.join() === volume.size.join();
+    // a channel that has just been hidden is still among the packed ones, but its source is gone
+    const isSameGrid = volume === null || before?.volume.size.join() === volume.size.join();
     if (before?.channelCount === channels.length && isSameGrid) return before;
+    if (volume === null) throw new Error(`channel ${channels[0]} has come without a source`);
     before?.dispose();
     const march = new TileMarch(volume, channels.length, this.frame);
     resident.march = march;
@@ -189,9 +191,12 @@ export class Marches implements DrawnMarches {
   }
 }
 
-function volumeOf({ channels: [channel], index }: Packed, { texture }: Resident): TileVolume {
+function volumeOf(
+  { channels: [channel], index }: Packed,
+  { texture }: Resident,
+): TileVolume | null {
   const source = texture.kept.get(channel);
-  if (source === undefined) throw new Error(`channel ${channel} has come without a source`);
+  if (source === undefined) return null;
   return index === null ? source.volume : volumeOfBricks(source.volume);
 }
 
