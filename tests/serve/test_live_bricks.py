@@ -85,7 +85,7 @@ def test_bricks_of_a_first_view_are_the_sources_voxels_in_its_window(
         found = voxels_of(file)
         assert list(found.shape[::-1]) == file.volume.entry["finer_size"]
         assert found.size > 4 * np.prod(file.volume.entry["size"])
-        # what is left out as invisible is the mean of its box
+        # an invisible brick is left out, and its parent shows the mean of its box
         shown = expected > file.table.threshold
         assert shown.any()
         np.testing.assert_array_equal(found[shown], expected[shown])

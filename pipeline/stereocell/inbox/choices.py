@@ -16,7 +16,7 @@ _MAX_UM = 1e7  # um between voxels
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What a person has chosen; empty: as the product chooses.
+    """The choices of a person. The product chooses where one is empty.
 
     channels    indices of the source's channels, as texts
     series      the number of an image of several, from 1, as a text

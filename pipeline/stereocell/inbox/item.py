@@ -95,7 +95,7 @@ class Item:
 
     @property
     def understood_file(self) -> Path:
-        """What was understood, as JSON."""
+        """The JSON file of the facts that the reader found."""
         return self.folder / "understood.json"
 
     @property

@@ -31,7 +31,7 @@ _MARK = re.compile(r"([0-9a-f]{64})?")
 
 @dataclass(frozen=True, slots=True)
 class Announced:
-    """What a person says that they hand in: files, or an address.
+    """The files or the address that a person announces before handing them in.
 
     names, sizes  of the files, in the order of the stream
     address       empty: files

@@ -120,7 +120,7 @@ def serving_inbox(
     with patch.object(inbox_server, "viewer_dist", lambda: page):
         server = InboxServer(box, limits, make or FakeBuilds(), port=0, lan=lan)
     with ExitStack() as stack:
-        # of two inboxes, one around the other, each has its own
+        # a test may serve a second inbox within the first one: each sets its own classes
         child, process = (NearReader, NearBuild) if is_near else (Child, BuildProcess)
         stack.enter_context(patch.object(readers, "Child", child))
         stack.enter_context(patch.object(builds, "BuildProcess", process))

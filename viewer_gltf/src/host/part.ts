@@ -141,7 +141,7 @@ export type PartDefinition = Readonly<{
   canTrace?: (gl: WebGLRenderingContext | WebGL2RenderingContext) => boolean;
   /** Names of commands that no other part has. Each has a key. */
   commands?: readonly Command[];
-  /** What the part adds to the state. */
+  /** The settings and actions that the part adds to the state. */
   settings?: PartSettings;
   /** Buttons that lead on from the part's refusals. */
   waysOn?: WaysOn;

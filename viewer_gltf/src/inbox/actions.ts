@@ -1,4 +1,4 @@
-/** What a person can do with an item in its state. Pure. */
+/** The actions that a person may take on an item, by its state. Pure. */
 import type { Item } from "./inbox_state";
 import type { Progress } from "./upload";
 

@@ -200,7 +200,7 @@ export function titleOf({ title, doing }: Item, ownName: string): string {
   return title || ownName || (doing === "uploading" ? "An upload" : "A new image");
 }
 
-/** What tells a control from the others of its form. */
+/** A key that no other control of the same form has. */
 function settingOf(control: Element | null): string | null {
   if (!(control instanceof HTMLElement)) return null;
   const { setting } = control.dataset;

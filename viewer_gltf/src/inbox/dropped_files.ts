@@ -7,7 +7,7 @@ type OnFound = (count: number) => void;
 /** Files that are asked for at a time: each answer takes a moment, and a folder has thousands. */
 const AT_A_TIME = 64;
 
-/** What was dropped: the files, and handles that a later visit can read again, where the browser has those. */
+/** Dropped files, and handles by which a later visit reads them again. Some browsers have no handles. */
 export type Dropped = Readonly<{
   handles: Promise<readonly FileSystemHandle[]>;
   files: (onFound: OnFound) => Promise<readonly NamedFile[]>;

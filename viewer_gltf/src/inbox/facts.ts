@@ -1,4 +1,4 @@
-/** What was understood of an image: middle slices with their contours, facts, notes. */
+/** The part of a card that shows an image: its middle slices with contours, its facts, its notes. */
 import { element } from "../dom/element";
 import { sizeText } from "../math/length_text";
 import type { Understood } from "./understood";

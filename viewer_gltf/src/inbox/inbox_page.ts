@@ -16,7 +16,7 @@ import { deletionWords, refusalOf, stateName, wordsOf } from "./words";
 /** Time after which bytes that arrived count as an upload of another page no longer, ms. */
 const MOVING_MS = 4000;
 
-/** What the page knows of an item beside the server's state. */
+/** The facts on an item that the page keeps itself, since the server does not send them. */
 type Memory = {
   card: Card;
   understood: Understood | null;
@@ -103,7 +103,7 @@ export class InboxPage {
     for (const upload of this.uploads.values()) act(upload);
   }
 
-  // What is handed in
+  // Files and addresses that people hand in
 
   private async take(dropped: Dropped): Promise<void> {
     try {
