@@ -38,7 +38,7 @@ describe.skipIf(!IS_AVAILABLE)("with its server", () => {
 
     afterAll(async () => {
       await browser?.close();
-      server?.stop("SIGTERM");
+      await server?.stop("SIGTERM");
       await rm(folder, { recursive: true, force: true, maxRetries: 5 });
     });
 

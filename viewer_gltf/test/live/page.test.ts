@@ -17,16 +17,16 @@ describeInChromium("a source that is built behind the page", () => {
     return;
   }
   const folder = mkdtempSync(join(tmpdir(), "stereocell-live-"));
+  const source = join(folder, "f.ome.tif");
+  const flags = ["--out", join(folder, "out"), "--tile-size", "32,48,72"];
   let server: Awaited<ReturnType<typeof serve>>;
   let browser: Awaited<ReturnType<typeof openBrowser>>;
   let page: Page;
   let viewer: ViewerPage;
 
   beforeAll(async () => {
-    const source = join(folder, "f.ome.tif");
     await askPython("live_source", [source], "");
-    const out = join(folder, "out");
-    server = await serve(source, ["--out", out, "--tile-size", "32,48,72"]);
+    server = await serve(source, flags);
     const viewport = { width: 700, height: 420 };
     browser = await openBrowser({ viewport, serviceWorkers: "block" });
     page = await browser.context.newPage();
@@ -46,7 +46,7 @@ describeInChromium("a source that is built behind the page", () => {
 
   afterAll(async () => {
     await browser?.close();
-    server?.stop("SIGTERM");
+    await server?.stop("SIGTERM");
     rmSync(folder, { recursive: true, force: true });
   });
 
@@ -56,6 +56,8 @@ describeInChromium("a source that is built behind the page", () => {
     const { position, target } = (await viewer.snapshot()).look;
     return [...position, ...target];
   };
+
+  const hasSurface = async () => (await viewer.snapshot()).state.channels[0].hasSurface;
 
   it("shows its coarse volumes at once, and its surfaces at the end, as the user has set the view", async () => {
     const faults: string[] = [];
@@ -86,9 +88,7 @@ describeInChromium("a source that is built behind the page", () => {
     await press("continue");
     await expect.poll(words).not.toMatch(/^Paus/);
     await expect.poll(words).toMatch(/^Complete/);
-    await expect
-      .poll(async () => (await viewer.snapshot()).state.channels[0].hasSurface)
-      .toBe(true);
+    await expect.poll(hasSurface).toBe(true);
     await viewer.settled();
     const after = await viewer.snapshot();
     expect(after.state.tiles.some(({ isUnfinished }) => isUnfinished)).toBe(false);
@@ -105,17 +105,25 @@ describeInChromium("a source that is built behind the page", () => {
     expect(await page.locator(".build").count()).toBe(0);
   });
 
-  it("opens as a bundle afterwards, and its picture outlives the server", async () => {
+  it("opens as a bundle afterwards", async () => {
     await viewer.open(server.address);
     expect(await page.locator(".build").count()).toBe(0);
-    expect((await viewer.snapshot()).state.channels[0].hasSurface).toBe(true);
-    server.stop("SIGTERM");
-    const isGone = /^The host does not answer/;
-    const notices = async () => (await viewer.snapshot()).state.notices.join();
-    await expect.poll(notices, { timeout: 3000 }).toMatch(isGone);
-    const began_ms = performance.now();
+    expect(await hasSurface()).toBe(true);
+  });
+
+  it("finds its build finished when it is served again, and its picture outlives the server", async () => {
+    await server.stop("SIGTERM");
+    server = await serve(source, flags);
+    await viewer.open(server.address);
+    await expect.poll(hasSurface).toBe(true);
     await viewer.settled();
-    expect(performance.now() - began_ms, "ms until nothing is awaited").toBeLessThan(3000);
+    await server.stop("SIGTERM");
+    const began_ms = performance.now();
+    const notices = async () => (await viewer.snapshot()).state.notices.join();
+    await expect.poll(notices).toMatch(/^The host does not answer/);
+    await viewer.settled();
+    // half a second on a machine that is free; the connection is given up after 18.5 s
+    expect(performance.now() - began_ms, "ms until nothing is awaited").toBeLessThan(15_000);
     const picture = await takePicture(page);
     expect(isBackground(picture.at(picture.width / 2, picture.height / 2))).toBe(false);
   });
@@ -140,7 +148,7 @@ describeInChromium("a source of more voxels than a first view has", () => {
 
   afterAll(async () => {
     await browser?.close();
-    server?.stop("SIGTERM");
+    await server?.stop("SIGTERM");
     rmSync(folder, { recursive: true, force: true });
   });
 

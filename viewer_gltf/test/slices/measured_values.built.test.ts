@@ -50,7 +50,7 @@ describe.skipIf(!existsSync(STEREOCELL) || !existsSync(stage))("values as measur
     afterAll(async () => {
       await browser?.close();
       await host?.stop();
-      server?.stop();
+      await server?.stop();
       await rm(out, { recursive: true, force: true });
     });
 

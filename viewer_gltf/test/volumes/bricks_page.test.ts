@@ -82,7 +82,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
     afterAll(async () => {
       await browser?.close();
       await host?.stop();
-      server?.stop();
+      await server?.stop();
       await rm(out, { recursive: true, force: true });
     });
 
