@@ -60,7 +60,9 @@ def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_a_source_is_built_behind_the_page_and_a_stopped_command_goes_on(tmp_path: Path) -> None:
+def test_a_stopped_build_goes_on_behind_the_page_and_a_finished_one_is_shown(
+    tmp_path: Path,
+) -> None:
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
     command = [sys.executable, "-m", "stereocell.cli", "serve", str(source), "--json"]
     command += ["--port", "0", "--out", "out", "--tile-size", "32,48,72"]
@@ -78,6 +80,19 @@ def test_a_source_is_built_behind_the_page_and_a_stopped_command_goes_on(tmp_pat
             finally:
                 server.send_signal(signal.SIGTERM)
                 server.communicate(timeout=120)
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as server:
+        assert server.stdout is not None
+        try:
+            address = json.loads(server.stdout.readline())["address"]
+            with urllib.request.urlopen(f"{address}manifest.json") as answer:
+                assert json.load(answer)["channels"][0]["tileset"] is not None
+                assert "Stereocell-Live" not in answer.headers
+        finally:
+            server.send_signal(signal.SIGTERM)
+            _, told = server.communicate(timeout=60)
+    assert "built earlier into out, which is shown" in told
     assert main(["build", str(source), "-o", str(tmp_path / "plain"), *command[-2:]]) == 0
     # in this process the viewer is a small one, so that the page differs
     for part in ("stage", "bundle/channels", "bundle/volumes", "bundle/luts"):

@@ -8,11 +8,12 @@ import hashlib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from stereocell.building.made_of import FIELD, made_of
+from stereocell.building.made_of import FIELD, find_stale, made_of
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import (
     require_own_bundle,
@@ -24,6 +25,7 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
 from stereocell.engine.step import Keyed
 from stereocell.model.errors import OutputError
+from stereocell.planning.plan import Plan
 from stereocell.storage.file_list import find_faults, list_files, read_list, sizes_of
 from stereocell.usd import written_files
 
@@ -160,3 +162,26 @@ _RESULTS = {
         lambda out_folder: _digest_of_file(out_folder.report_file), require_own_report
     ),
 }
+
+
+def finished_bundle(out: Path, plan: Plan) -> Path | None:
+    """Return OUT/bundle where a build of this plan has finished and its results are whole, or None.
+
+    The notes of the two plans may differ: they are no input of a build.
+    """
+    out_folder = OutFolder(out)
+    try:
+        there = out_folder.plan()
+    except OutputError:
+        return None
+    phases = out_folder.phases()
+    is_same = replace(there, notes=()) == replace(plan, notes=())
+    is_whole = (
+        is_same
+        and find_stale(out_folder) is None
+        and all(
+            name in phases and phases[name]["results"] == results.digest(out_folder)
+            for name, results in _RESULTS.items()
+        )
+    )
+    return out_folder.bundle_dir if is_whole else None

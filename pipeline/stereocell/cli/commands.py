@@ -438,7 +438,7 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
             options.input = str(options.out)
             if listed := _series(options):
                 return listed
-            _show_source(options, lambda live: run(live.bundle, live))
+            _show_source(options, run)
         else:
             _require_no_source_flags(options)
             run(options.out)
@@ -511,7 +511,7 @@ def _require_no_source_flags(options: argparse.Namespace) -> None:
         )
 
 
-def _show_source(options: argparse.Namespace, run: "Callable[[Live], None]") -> None:
+def _show_source(options: argparse.Namespace, run: "Callable[[Path, Live | None], None]") -> None:
     """Serve the first view of a source that is not built, and build it behind the page."""
     from stereocell.cli.build_behind import build_behind
     from stereocell.live.show_source import Behind, show_source
@@ -519,5 +519,13 @@ def _show_source(options: argparse.Namespace, run: "Callable[[Live], None]") -> 
 
     source = str(options.out)
     wanted, choice = load_for(source, options.preset, options.config, flags=flags_of(options))
-    behind = None if options.no_build else Behind(build_behind(options, build), options.build_out)
-    show_source(source, wanted, choice, run, behind, title=options.title or "")
+
+    def serve_live(live: "Live") -> None:
+        run(live.bundle, live)
+
+    behind = None
+    if not options.no_build:
+        behind = Behind(
+            build_behind(options, build), options.build_out, lambda bundle: run(bundle, None)
+        )
+    show_source(source, wanted, choice, serve_live, behind, title=options.title or "")

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from stereocell.building.out_folder import require_build_or_nothing
+from stereocell.building.phase import finished_bundle
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
 from stereocell.live.fine_tiles import FineTiles
@@ -47,12 +48,14 @@ def is_source(place: Path | str) -> bool:
 class Behind:
     """The build behind the first view of a source.
 
-    build  builds into a folder; see `build_process.Build`
-    out    the folder; None: one in the working folder that is named after the source
+    build         builds into a folder; see `build_process.Build`
+    out           the folder; None: one in the working folder that is named after the source
+    serve_bundle  serves the bundle of a build that has finished earlier, until it is stopped
     """
 
     build: Callable[[Path, Watch], str]
     out: Path | None
+    serve_bundle: Callable[[Path], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +91,8 @@ def show_source(
 ) -> None:
     """Serve a source: its first view, which is written meanwhile, and then what is built of it.
 
+    A source whose build has finished earlier is shown by its bundle.
+
     choice  notes on how the settings were chosen; see `load_for`
     serve   serves until it is stopped, or until there can be no first view
     behind  how the source is built meanwhile; None: it is only looked at
@@ -107,6 +112,13 @@ def show_source(
     if behind is not None:
         out = default_out(plan) if behind.out is None else behind.out
         require_build_or_nothing(out, source)
+        if (bundle := finished_bundle(out, plan)) is not None:
+            _print(
+                f"built earlier into {printable(str(out))}, which is shown; "
+                f"`stereocell build {shlex.quote(source)} -o {shlex.quote(str(out))}` checks it"
+            )
+            behind.serve_bundle(bundle)
+            return
         build = BuildProcess(partial(behind.build, out), out)
     else:
         print_notes(plan)  # a build prints them itself
