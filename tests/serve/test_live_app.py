@@ -34,6 +34,9 @@ class FakeBuild(BuildProcess):
         self.asked.append(command)
         self.set(doing="pausing")
 
+    def rest(self) -> None:
+        self.asked.append("rest")
+
     def set(self, **news: Any) -> None:
         self._set(**news)
 
@@ -165,6 +168,16 @@ def test_an_unknown_command_ends_the_connection(live: Live, sent: str | bytes) -
         with pytest.raises(ConnectionClosed):
             socket.recv()
     assert build_of(live).asked == []
+
+
+def test_a_page_whose_frames_are_late_lets_the_build_rest(live: Live) -> None:
+    with serving(live) as port, connect(f"ws://localhost:{port}/live") as socket:
+        socket.recv()
+        socket.send("late")
+        socket.send("pause")
+        while json.loads(socket.recv())["doing"] != "pausing":
+            pass
+    assert build_of(live).asked == ["rest", "pause"]
 
 
 def test_a_phone_that_looks_on_can_not_stop_the_build(

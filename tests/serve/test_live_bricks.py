@@ -60,7 +60,7 @@ def write_first_view(fine: FineTiles, root: Path) -> BrickLibrary:
     """Write a first view into a folder, and return its library."""
     read = first_view.read_channels(fine.plan, fine.dataset)
     first_view.write_first_view(fine.plan, read, root, fine.sizes())
-    return LiveBricks(fine, root.parent).library(root, {})
+    return LiveBricks(fine, root.parent, None).library(root, {})
 
 
 def voxels_of(file: BrickFile) -> NDArray[np.float32]:
@@ -91,6 +91,29 @@ def test_bricks_of_a_first_view_are_the_sources_voxels_in_its_window(
         np.testing.assert_array_equal(found[shown], expected[shown])
 
 
+def test_a_build_rests_while_bricks_are_made_that_someone_waits_for(
+    source: Path, tmp_path: Path
+) -> None:
+    class Build(BuildProcess):
+        def __init__(self) -> None:
+            super().__init__(lambda _: "", tmp_path / "out")
+            self.rests: list[str] = []
+
+        @contextmanager
+        def while_someone_waits(self) -> Iterator[None]:
+            self.rests.append("begun")
+            yield
+            self.rests.append("ended")
+
+    build, fine = Build(), fine_tiles_of(source)
+    write_first_view(fine, tmp_path / "view")
+    library = LiveBricks(fine, tmp_path, build).library(tmp_path / "view", {})
+    tile, channel = fine.plan.tiles[0].id, fine.plan.channels[0].id
+    for _ in range(2):  # it is made once
+        library.open(tile, channel)
+        assert build.rests == ["begun", "ended"]
+
+
 @pytest.mark.slow
 def test_bricks_of_a_view_of_a_build_are_those_of_its_bundle(source: Path, tmp_path: Path) -> None:
     out, scratch = tmp_path / "out", tmp_path / "scratch"
@@ -101,7 +124,7 @@ def test_bricks_of_a_view_of_a_build_are_those_of_its_bundle(source: Path, tmp_p
     view = PartialView(fine.plan, read, out, scratch, sizes=fine.sizes(), rest=0)
     folder = view.add(None)
     assert folder is not None
-    live = LiveBricks(fine, scratch).library(folder, view.holders)
+    live = LiveBricks(fine, scratch, None).library(folder, view.holders)
     built = BrickLibrary(out / "bundle", out / "bricks")
     assert live.volumes().keys() == built.volumes().keys()
     for name, volume in live.volumes().items():

@@ -21,7 +21,7 @@ def serve(pipe: "Connection[Any, Any]") -> None:
     A request is the pickled (function, task). The answer is (result, None) or (None, error).
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     try:
         pipe.send(READY)
         while True:
@@ -50,7 +50,7 @@ def _pickled_error(error: Exception) -> bytes:
     return answer
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """End this process as soon as the command's process has ended, also in the middle of a task.
 
     A killed command can't stop its workers, and their results would appear after its end.

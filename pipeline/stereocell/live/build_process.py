@@ -1,7 +1,8 @@
 """Build a source in a process of its own, of lower priority, behind the page that shows it.
 
 The two processes talk over a pipe: the build reports its tasks and the views that it writes; it is
-asked to pause, to continue and to end. A pause begins when the running tasks have ended.
+asked to pause, to continue and to end. A pause begins when the running tasks have ended. Between
+pauses the build rests for moments, while someone waits for a picture; see `rests`.
 """
 
 import multiprocessing
@@ -10,16 +11,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from stereocell.engine.run import Watch, console
+from stereocell.engine.worker_process import end_with_parent
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.first_view import Sizes
+from stereocell.live.rests import Rests, lead_group
 from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan
 
@@ -117,6 +120,7 @@ class BuildProcess:
         self._views: dict[str, Path] = {}
         self.holders: Mapping[str, Holder] = {}  # what the views leave out; see `PartialView`
         self._process: Any = None
+        self._rests: Rests | None = None
         self._pipe: Connection[Any, Any] | None = None
         self._began_s = self._paused_s = 0.0
 
@@ -154,10 +158,11 @@ class BuildProcess:
         ours, theirs = context.Pipe()
         process = context.Process(target=_run, args=(theirs,))
         process.start()
+        assert process.pid is not None  # it has been started
         theirs.close()
         with suppress(OSError):  # it has ended already, and its end is heard
             ours.send((self._build, self._coarse))
-        self._process, self._pipe = process, ours
+        self._process, self._pipe, self._rests = process, ours, Rests(process.pid)
         self._began_s, self._paused_s = time.monotonic(), 0.0
         self._set(doing=doing, line="", left_s=None)
         if doing == "pausing":
@@ -183,6 +188,15 @@ class BuildProcess:
             self._set(doing="cancelled", left_s=None)
             self._stop()
 
+    def rest(self) -> None:
+        """Let the build rest for a moment: frames are late on this machine."""
+        if self._rests is not None:
+            self._rests.ask()
+
+    def while_someone_waits(self) -> AbstractContextManager[None]:
+        """Let the build rest while bricks are made that someone waits for."""
+        return nullcontext() if self._rests is None else self._rests.while_someone_waits()
+
     def close(self) -> None:
         """End the process for good, and wait for it; what is finished stays."""
         with self._asked:
@@ -192,6 +206,8 @@ class BuildProcess:
 
     def _stop(self) -> None:
         process = self._process
+        if self._rests is not None:
+            self._rests.end()
         if process is None or not process.is_alive():
             return
         process.terminate()
@@ -263,6 +279,8 @@ def _run(pipe: "Connection[Any, Any]") -> None:
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
         from stereocell.live.partial_view import PartialView  # it imports USD, and the page waits
 
+        lead_group()
+        threading.Thread(target=end_with_parent, daemon=True).start()
         _lower_priority()
         build, coarse = pipe.recv()
         view = PartialView(coarse.plan, coarse.read, coarse.out, coarse.scratch, sizes=coarse.sizes)

@@ -12,6 +12,7 @@ shows more fetches the volume's KTX2 file instead.
 
 import hashlib
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -37,15 +38,22 @@ class UnknownVolumeError(OutputError):
 class BrickLibrary:
     """The trees of one bundle. Its methods are thread-safe and may take seconds."""
 
-    def __init__(self, bundle: Path, trees: Path | TreeFiles, read: Texels | None = None) -> None:
+    def __init__(
+        self,
+        bundle: Path,
+        trees: Path | TreeFiles,
+        read: Texels | None = None,
+        while_made: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
         """Describe a library; nothing is read yet.
 
-        bundle  the folder of manifest.json
-        trees   the folder of the trees, or those that several bundles share
-        read    where the texels of volumes with finer trees than files come from; None: the bundle
-                has no such volumes
+        bundle      the folder of manifest.json
+        trees       the folder of the trees, or those that several bundles share
+        read        where the texels of volumes with finer trees than files come from; None: the
+                    bundle has no such volumes
+        while_made  what holds while a tree is made
         """
-        self._bundle, self._read = bundle, read
+        self._bundle, self._read, self._while_made = bundle, read, while_made
         self._trees = trees if isinstance(trees, TreeFiles) else TreeFiles(trees)
         self._stamp: tuple[int, int] | None = None
         self._volumes: dict[tuple[str, str], Volume] = {}
@@ -119,12 +127,13 @@ class BrickLibrary:
         return volume
 
     def _build(self, volume: Volume) -> bytes:
-        if self._read is not None and "finer_size" in volume.entry:
-            texels = self._read(volume)
-        else:
-            texels = _read_file(self._bundle, volume)
         source = bytes.fromhex(volume.source)[:HASH_BYTES]
-        return encode_tree(build(texels, volume.threshold), source)
+        with self._while_made():
+            if self._read is not None and "finer_size" in volume.entry:
+                texels = self._read(volume)
+            else:
+                texels = _read_file(self._bundle, volume)
+            return encode_tree(build(texels, volume.threshold), source)
 
 
 def _read_file(bundle: Path, volume: Volume) -> NDArray[np.uint8]:

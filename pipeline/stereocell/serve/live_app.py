@@ -16,8 +16,9 @@ The server sends the state whenever it changes, at most four times a second: see
      "left_s": 38.5, "folder": "g1/", "has_bundle": false, "line": "", "all_tiles": 10,
      "may_control": true}
 
-A client may send `pause`, `continue` or `cancel` as text. Only clients of this machine may: on the
-LAN a phone that looks on can't stop the build.
+A client may send `pause`, `continue` or `cancel` as text, and `late`: its frames are late, and the
+build rests for a moment. Only clients of this machine may: on the LAN a phone that looks on can't
+stop the build.
 """
 
 import asyncio
@@ -25,6 +26,7 @@ import json
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 
@@ -45,6 +47,7 @@ from stereocell.serve.live_bricks import LiveBricks
 from stereocell.serve.static_files import BundleFiles, bricks_header
 
 LIVE_HEADER = "Stereocell-Live"
+LATE = "late"
 READING = "stereocell-reading"  # on the page: `/reading` tells how far the first view is
 _NOW = {"Cache-Control": "no-store", **policy("application/json")}
 _EACH_S = 0.25  # s between two states
@@ -57,7 +60,9 @@ class LiveApp:
         """built: returns the application that serves a whole bundle."""
         self._live, self._build, self._make_built = live, live.build, built
         self._built: ASGIApp | None = None
-        self._bricks = None if live.fine is None else LiveBricks(live.fine, live.bundle.parent)
+        self._bricks = (
+            None if live.fine is None else LiveBricks(live.fine, live.bundle.parent, live.build)
+        )
         self._endpoint = BrickEndpoint()
         self._sockets = 0
 
@@ -174,10 +179,12 @@ class LiveApp:
                     continue
                 command = heard.result()
                 known = next((one for one in COMMANDS if one == command), None)
-                if known is None or not may_control:
-                    await socket.close(1008, "expected pause, continue or cancel, of this machine")
+                if (known is None and command != LATE) or not may_control:
+                    await socket.close(
+                        1008, "expected pause, continue, cancel or late, of this machine"
+                    )
                     return
-                await asyncio.to_thread(build.do, known)
+                await asyncio.to_thread(build.rest if known is None else partial(build.do, known))
                 heard = asyncio.ensure_future(socket.receive_text())
         except (WebSocketDisconnect, KeyError, RuntimeError):  # it has left, or has sent bytes
             pass

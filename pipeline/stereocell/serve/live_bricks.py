@@ -4,12 +4,14 @@ All views share one folder of trees beside them, which is bounded.
 """
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.isosurface.holder import Holder
+from stereocell.live.build_process import BuildProcess
 from stereocell.live.fine_tiles import FineTiles
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.tree_files import TreeFiles, Volume
@@ -21,9 +23,13 @@ _FOLDER = "bricks"
 class LiveBricks:
     """The libraries of a source's views."""
 
-    def __init__(self, fine: FineTiles, scratch: Path) -> None:
-        """scratch: the folder of the views, in which the trees get a folder of their own."""
-        self._fine = fine
+    def __init__(self, fine: FineTiles, scratch: Path, build: BuildProcess | None) -> None:
+        """Describe the libraries; nothing is read yet.
+
+        scratch  the folder of the views, in which the trees get a folder of their own
+        build    rests while a tree is made; None: there is none
+        """
+        self._fine, self._build = fine, build
         self._trees = TreeFiles(scratch / _FOLDER, MOST_BYTES)
         self._libraries: dict[Path, BrickLibrary] = {}
 
@@ -37,4 +43,5 @@ class LiveBricks:
             holder = holders.get(volume.channel)
             return self._fine.read(volume.tile, volume.channel, volume.window, holder)
 
-        return self._libraries.setdefault(view, BrickLibrary(view, self._trees, read))
+        rest = nullcontext if self._build is None else self._build.while_someone_waits
+        return self._libraries.setdefault(view, BrickLibrary(view, self._trees, read, rest))

@@ -144,7 +144,10 @@ function followBuild({ base }: Bundle, live: LiveHost): void {
     await host.noteOverview();
   };
   const shown = live.folder === "" ? "" : base;
-  void import("../live/watch_build").then(({ watchBuild }) => watchBuild(live, root, shown, show));
+  const isLate = () => host?.display.isLate ?? false;
+  void import("../live/watch_build").then(({ watchBuild }) =>
+    watchBuild({ live, root, shown, show, isLate }),
+  );
 }
 
 /** Makes the page of a bundle in an element. `place` brings it to the view with which it opens. */

@@ -99,6 +99,11 @@ export class FrameLoop {
     return this.pace.frame_ms;
   }
 
+  /** Whether the picture moves now, and its frames are late. */
+  get isLate(): boolean {
+    return this.pace.isLate;
+  }
+
   /** The settings of the last frame. */
   get settings(): QualitySettings {
     return this.pace.settings;

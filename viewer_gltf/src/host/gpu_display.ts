@@ -119,6 +119,10 @@ export class GpuDisplay implements Display {
     return this.loop.frames;
   }
 
+  get isLate(): boolean {
+    return this.loop.isLate;
+  }
+
   nextFrame(): Promise<void> {
     return this.loop.nextFrame();
   }

@@ -165,6 +165,8 @@ export interface Display {
   limitEdge(edge: number): void;
   /** Frames drawn so far. */
   readonly frames: number;
+  /** Whether the picture moves now, and its frames are late. */
+  readonly isLate: boolean;
   /** Resolves when the next frame has been drawn. */
   nextFrame(): Promise<void>;
   /** Resolves when nothing loads any more and the picture shows all of it. */

@@ -3,6 +3,8 @@ import { LastingSocket } from "../dom/lasting_socket";
 import { type BuildState, readBuildState } from "./build_state";
 
 export type Command = "pause" | "continue" | "cancel";
+/** Frames are late: the build shall rest for a moment. */
+const LATE = "late";
 
 export class BuildFeed {
   private readonly socket: LastingSocket;
@@ -19,6 +21,10 @@ export class BuildFeed {
 
   send(command: Command): void {
     this.socket.send(command);
+  }
+
+  rest(): void {
+    this.socket.send(LATE);
   }
 
   dispose(): void {

@@ -19,6 +19,8 @@ const LATE = 1.3;
 export class Pace {
   /** Between the last two frames, smoothed. */
   frame_ms = 0;
+  /** Whether the frames of a picture that moves now come later than the display could show them. */
+  isLate = false;
   /** The settings of the last frame. */
   settings: QualitySettings;
   private readonly timer: GpuTimer | null;
@@ -42,14 +44,15 @@ export class Pace {
    * @param rate_hz of the display, where it is known
    */
   begin(isMoving: boolean, interval_ms: number, rate_hz = RATE_HZ): QualitySettings {
+    this.isLate = false;
     if (isMoving && this.wasMoving) {
       this.frame_ms += (interval_ms - this.frame_ms) / 8;
       const { timing } = this.quality;
       const budget_ms = frameBudget_ms(rate_hz, timing);
       const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
       // where frames are late, or no answer comes, the GPU's own time means nothing
-      const isLate = this.frame_ms > LATE * (1000 / rate_hz);
-      const spent_ms = isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
+      this.isLate = this.frame_ms > LATE * (1000 / rate_hz);
+      const spent_ms = this.isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
       if (spent_ms !== null) this.quality = advanceQuality(this.quality, spent_ms, budget_ms);
     }
     this.wasMoving = isMoving;

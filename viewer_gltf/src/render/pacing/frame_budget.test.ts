@@ -1,0 +1,21 @@
+import { expect, it } from "vitest";
+import { Pace } from "./frame_budget";
+
+/** A context without a clock for the GPU's work. */
+const gl = { getExtension: () => null } as unknown as WebGL2RenderingContext;
+
+it("calls frames late while a picture moves more slowly than the display, and no longer", () => {
+  const pace = new Pace(gl);
+  const draw = (isMoving: boolean, interval_ms: number, frames: number) => {
+    for (let i = 0; i < frames; i++) {
+      pace.begin(isMoving, interval_ms, 60);
+      pace.end();
+    }
+    return pace.isLate;
+  };
+  expect(draw(true, 16, 60)).toBe(false);
+  expect(draw(true, 60, 60)).toBe(true);
+  expect(draw(false, 5000, 1), "at rest").toBe(false);
+  expect(draw(true, 5000, 1), "the first frame after a rest").toBe(false);
+  expect(draw(true, 16, 120)).toBe(false);
+});
