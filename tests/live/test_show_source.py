@@ -99,6 +99,24 @@ def test_a_stopped_build_goes_on_behind_the_page_and_a_finished_one_is_shown(
         assert digests_of(tmp_path / "out" / part) == digests_of(tmp_path / "plain" / part)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> None:
+    source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
+    command = [sys.executable, "-m", "stereocell.cli", "serve", str(source), "--port", "0"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as server:
+        assert server.stderr is not None
+        for line in server.stderr:
+            if line.startswith("built behind the page into"):
+                break
+        os.killpg(server.pid, signal.SIGINT)  # as a terminal does
+        told = server.stderr.read()
+    assert server.returncode == 0
+    assert "Traceback" not in told
+
+
 def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
     build, bundle, planes = (tmp_path / name for name in ("out", "sent", "planes"))

@@ -8,7 +8,6 @@ import hashlib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +24,6 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.engine.run import console
 from stereocell.engine.step import Keyed
 from stereocell.model.errors import OutputError
-from stereocell.planning.plan import Plan
 from stereocell.storage.file_list import find_faults, list_files, read_list, sizes_of
 from stereocell.usd import written_files
 
@@ -164,24 +162,10 @@ _RESULTS = {
 }
 
 
-def finished_bundle(out: Path, plan: Plan) -> Path | None:
-    """Return OUT/bundle where a build of this plan has finished and its results are whole, or None.
-
-    The notes of the two plans may differ: they are no input of a build.
-    """
-    out_folder = OutFolder(out)
-    try:
-        there = out_folder.plan()
-    except OutputError:
-        return None
+def is_finished(out_folder: OutFolder) -> bool:
+    """Return whether all phases of OUT's plan have finished, and their results are whole."""
     phases = out_folder.phases()
-    is_same = replace(there, notes=()) == replace(plan, notes=())
-    is_whole = (
-        is_same
-        and find_stale(out_folder) is None
-        and all(
-            name in phases and phases[name]["results"] == results.digest(out_folder)
-            for name, results in _RESULTS.items()
-        )
+    return find_stale(out_folder) is None and all(
+        name in phases and phases[name]["results"] == results.digest(out_folder)
+        for name, results in _RESULTS.items()
     )
-    return out_folder.bundle_dir if is_whole else None

@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from stereocell.engine.interrupts import children_ignore_interrupts
 from stereocell.engine.run import Watch, console
 from stereocell.engine.worker_process import end_with_parent
 from stereocell.isosurface.holder import Holder
@@ -157,7 +158,8 @@ class BuildProcess:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_run, args=(theirs,))
-        process.start()
+        with children_ignore_interrupts():  # Ctrl+C is the server's, which ends the build
+            process.start()
         assert process.pid is not None  # it has been started
         theirs.close()
         with suppress(OSError):  # it has ended already, and its end is heard
@@ -232,7 +234,7 @@ class BuildProcess:
                 told = pipe.recv()
             except (EOFError, OSError):
                 if self.state.doing not in ("cancelled", "failed", "complete"):
-                    self._set(doing="failed", line=_KILLED, left_s=None)
+                    self._fail(_KILLED)
                 return
             if isinstance(told, _Task):
                 self._take(told)
@@ -242,13 +244,17 @@ class BuildProcess:
                 self._set(folder=f"{told.folder.name}/")
             elif isinstance(told, _End) and self.state.doing != "cancelled":
                 if told.line:
-                    self._set(doing="failed", line=told.line, left_s=None)
+                    self._fail(told.line)
                 else:
                     self._set(doing="complete", share=1.0, left_s=0.0, has_bundle=True)
             elif told == "paused" and self.state.doing == "pausing":
                 self._set(doing="paused")
             elif isinstance(told, float):
                 self._paused_s += told
+
+    def _fail(self, line: str) -> None:
+        self._set(doing="failed", line=line, left_s=None)
+        console.print(f"the build has stopped: {line}", markup=False, soft_wrap=True)
 
     def _take(self, task: _Task) -> None:
         share = _share_of(task)

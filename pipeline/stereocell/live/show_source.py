@@ -1,25 +1,23 @@
 """Show a source that is not built: `stereocell view INPUT`."""
 
-import re
 import shlex
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from stereocell.building.out_folder import require_build_or_nothing
-from stereocell.building.phase import finished_bundle
 from stereocell.engine.run import Watch, console
+from stereocell.live.build_place import finished_bundle, free_place, require_place
 from stereocell.live.build_process import BuildProcess, Coarse
 from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_look import FirstLook
 from stereocell.live.reading import Reading
 from stereocell.model.errors import OutputError
-from stereocell.planning.plan import Plan
 from stereocell.planning.plan_notes import print_notes
 from stereocell.planning.settings import Settings
 from stereocell.read.addresses.resolve import may_know
@@ -108,10 +106,11 @@ def show_source(
         _print(f"reading {printable(source)}")  # an answer may take a while
     look = FirstLook.at(source, settings, choice, title=title)
     plan = look.plan
-    build = None
+    build, is_new = None, False
     if behind is not None:
-        out = default_out(plan) if behind.out is None else behind.out
-        require_build_or_nothing(out, source)
+        out = free_place(plan) if behind.out is None else behind.out
+        is_new = not out.exists()
+        require_place(source, out, plan)
         if (bundle := finished_bundle(out, plan)) is not None:
             _print(
                 f"built earlier into {printable(str(out))}, which is shown; "
@@ -152,15 +151,12 @@ def show_source(
         finally:
             if build is not None:
                 build.close()
+                if is_new:
+                    with suppress(OSError):  # it holds something by now
+                        build.out.rmdir()
         if first.done():
             first.result()
 
 
 def _print(line: str) -> None:
     console.print(line, markup=False, soft_wrap=True)
-
-
-def default_out(plan: Plan) -> Path:
-    """Return the folder in the working folder into which a specimen is built without `--out`."""
-    name = re.sub(r"[^\w.+-]+", "_", plan.name).strip("._") or "specimen"
-    return Path(f"{name}.stereocell")

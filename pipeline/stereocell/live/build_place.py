@@ -1,0 +1,68 @@
+"""The folder into which a source is built behind its page.
+
+What needs USD is imported only where the folder holds a build: that takes seconds.
+"""
+
+import re
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+from stereocell.building.out_folder import OutFolder, require_build_or_nothing
+from stereocell.building.replaced_plan import replaced_plan, require_own_settings
+from stereocell.planning.plan import Plan
+from stereocell.read.source_place import require_apart
+from stereocell.storage.contents import contents_of
+from stereocell.storage.kinds import Kind
+
+
+def free_place(plan: Plan) -> Path:
+    """Return a folder in the working folder that is named after a specimen.
+
+    A number follows the name where folders of other specimens, or other files, have it already.
+    """
+    name = re.sub(r"[^\w.+-]+", "_", plan.name).strip("._-") or "specimen"
+    for number in count(1):
+        place = Path(f"{name}.stereocell" if number == 1 else f"{name}-{number}.stereocell")
+        found = contents_of(place)
+        is_ours = found.kind is Kind.BUILD and found.fingerprint in ("", plan.fingerprint)
+        if is_ours or found.kind is Kind.NOTHING:
+            return place
+    raise AssertionError("numbers do not end")
+
+
+def require_place(source: str, out: Path, plan: Plan) -> None:
+    """Create OUT, into which a plan will be built.
+
+    Raises StereoCellError where the build would refuse it: OUT lies in the source, can't be
+    written, or holds something else.
+    """
+    require_apart(source, out)
+    require_build_or_nothing(out, source)
+    out_folder = OutFolder(out)
+    out_folder.require_name()
+    there = replaced_plan(out_folder, plan)
+    require_own_settings(out_folder, plan, there)
+    if there is not None:
+        from stereocell.building.own_parts import require_own_places
+
+        require_own_places(out_folder, is_same_plan=_is_same(there, plan))
+    out_folder.require_writable()
+
+
+def finished_bundle(out: Path, plan: Plan) -> Path | None:
+    """Return OUT/bundle where a build of this plan has finished and its results are whole, or None.
+
+    Raises OutputError where OUT's plan was changed by hand.
+    """
+    there = replaced_plan(OutFolder(out), plan)
+    if there is None or not _is_same(there, plan):
+        return None
+    from stereocell.building.phase import is_finished
+
+    return out / "bundle" if is_finished(OutFolder(out)) else None
+
+
+def _is_same(there: Plan, plan: Plan) -> bool:
+    """Return whether two plans differ in their notes alone, which are no input of a build."""
+    return replace(there, notes=()) == replace(plan, notes=())
