@@ -227,7 +227,12 @@ class BundleServer(Server):
         if bricks is not None:
             library, stage = BrickLibrary(bundle, bricks), bricks.parent / "stage"
         self.bundle, self.has_bricks = bundle, bricks is not None
-        self.is_live = live is not None
+        self._live = live
+        if live is None and not out.exists():
+            raise StereoCellError(
+                f"{out}: not found, expected a build, a bundle, or a source: a file, a folder, or "
+                "an address that begins with https:// or s3://"
+            )
         for name in (MANIFEST, "index.html"):
             if live is None and not (bundle / name).is_file():
                 raise StereoCellError(
@@ -243,13 +248,22 @@ class BundleServer(Server):
         super().__init__(port, lan, make, for_program=for_program)
 
     def introduce(self) -> None:
-        """Print the address, and the bundle's path."""
+        """Print the address, and the path of the bundle, or of OUT where a source is built."""
+        if self._live is not None:
+            self._introduce_source(self._live)
+            return
         shown = str(self.bundle)
-        if self.is_live:
-            shown = "the first view, and what is built of it"
-        elif not self.has_bricks:
+        if not self.has_bricks:
             shown += " (a bundle by itself: its volumes come whole)"
         self.introduce_as(shown, {"bundle": str(self.bundle), "bricks": self.has_bricks})
+
+    def _introduce_source(self, live: Live) -> None:
+        about: dict[str, object] = {"bricks": live.fine is not None}
+        if live.build is None:
+            self.introduce_as("the source, which is not built", about)
+        else:
+            about |= {"out": str(live.build.out)}
+            self.introduce_as("the source, and what is built of it", about)
 
 
 def _stop_after(first: "Future[None]", server: BundleServer) -> None:

@@ -188,7 +188,9 @@ opened.catch((error: unknown) => {
     showFatal(app, "The viewer failed", String(error));
     throw error;
   }
-  const kind = error.name === "SourceError" ? "source" : "bundle";
+  const isSource =
+    error.name === "SourceError" || new URL(pageAddress()).searchParams.has("source");
+  const kind = isSource ? "source" : "bundle";
   showFatal(app, `This ${kind} can't be shown`, error.message);
 });
 let host: Host | null = null;

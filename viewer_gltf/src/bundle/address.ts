@@ -43,7 +43,10 @@ export function sourceAddress(page: string): string | null {
   }
   const url = URL.canParse(named, page) ? new URL(named, page) : null;
   if (url === null || !/^https?:$/.test(url.protocol)) {
-    throw new BundleError(`?source=: expected an image's address on the web, found "${named}"`);
+    throw new BundleError(
+      `?source=: expected an image's address on the web, https://, found "${named}": ` +
+        "for other places, use stereocell view",
+    );
   }
   url.hash = "";
   return url.href;

@@ -57,7 +57,7 @@ describe("the words for an item", () => {
       item({ doing: "building", label: "units", tiles: 1, allTiles: 4, left_s: 400 }),
       "Building surfaces: 1 of 4 tiles, about 7 min left.",
     ],
-    [item({ doing: "building", allTiles: 4 }), "Reading the source."],
+    [item({ doing: "building", allTiles: 4 }), "Planning the build."],
     [item({ doing: "building", label: "stage", tiles: 4, allTiles: 4 }), "Writing the stage."],
     [
       item({ doing: "paused", tiles: 1, allTiles: 4 }),

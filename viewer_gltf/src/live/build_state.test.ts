@@ -45,7 +45,7 @@ describe("the words for a build", () => {
   it.each([
     [{}, "Building surfaces: 1 of 10 tiles, about 40 s left"],
     [{ all_tiles: 1, tiles: 0, left_s: null }, "Building surfaces: 0 of 1 tile"],
-    [{ label: "", total: 0, left_s: null }, "Reading the source"],
+    [{ label: "", total: 0, left_s: null }, "Planning the build"],
     [{ label: "stage", left_s: 400 }, "Writing the stage: 3 of 20, about 7 min left"],
     [{ label: "report", done: 0, total: 1, left_s: 2 }, "Writing the report, about 5 s left"],
     [{ left_s: 9000 }, "Building surfaces: 1 of 10 tiles, about 3 h left"],
@@ -58,6 +58,10 @@ describe("the words for a build", () => {
     ],
     [{ doing: "complete" }, "Complete: all surfaces are built."],
   ])("%o are %s", (changes, words) => {
-    expect(wordsOf(read(changes))).toBe(words);
+    expect(wordsOf(read(changes), true)).toBe(words);
+  });
+
+  it("calls a build complete once the page shows it", () => {
+    expect(wordsOf(read({ doing: "complete" }), false)).toBe("Built. Opening the surfaces.");
   });
 });

@@ -64,15 +64,19 @@ const PARTS: Readonly<Record<string, string>> = {
   report: "Writing the report",
 };
 
-/** The state in one line, as `Building surfaces: 3 of 10 tiles, about 40 s left`. */
-export function wordsOf(state: BuildState): string {
+/**
+ * The state in one line, as `Building surfaces: 3 of 10 tiles, about 40 s left`.
+ *
+ * @param isShown whether the page shows the newest view of the build
+ */
+export function wordsOf(state: BuildState, isShown: boolean): string {
   switch (state.doing) {
     case "failed":
       return `The build has stopped: ${state.line}. The picture stays.`;
     case "cancelled":
       return "The build was cancelled. What is finished is kept.";
     case "complete":
-      return "Complete: all surfaces are built.";
+      return isShown ? "Complete: all surfaces are built." : "Built. Opening the surfaces.";
     case "paused":
       return `Paused${tilesOf(state)}.`;
     case "pausing":
@@ -82,9 +86,9 @@ export function wordsOf(state: BuildState): string {
   }
 }
 
-/** The running part of a build, as `units`; the source is read before the first one. */
+/** The running part of a build, as `units`; the plan is made before the first one. */
 export function partWords(label: string): string {
-  return PARTS[label] ?? "Reading the source";
+  return PARTS[label] ?? "Planning the build";
 }
 
 function tilesOf({ tiles, allTiles, label, done, total }: BuildState): string {

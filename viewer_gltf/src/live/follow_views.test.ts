@@ -53,16 +53,19 @@ it("leaves out views that have become old while another one was being shown", as
 
 it("shows the bundle last, at the page's own address, though the first view had it, too", async () => {
   const { show, shown, goOn } = page();
-  const views = new ViewFollower(ROOT, "", show);
+  const told: boolean[] = [];
+  const views = new ViewFollower(ROOT, "", show, () => told.push(views.isNewestShown));
   views.take(BUNDLE);
+  expect(views.isNewestShown).toBe(false);
   await goOn();
   views.take(BUNDLE);
   expect(shown).toEqual([ROOT]);
+  expect(told).toEqual([true]);
 });
 
 it("tries a view again that could not be shown", async () => {
   const { show, shown, goOn, failNext } = page();
-  const views = new ViewFollower(ROOT, `${ROOT}g1/`, show, 1);
+  const views = new ViewFollower(ROOT, `${ROOT}g1/`, show, undefined, 1);
   failNext();
   views.take(view("g2/"));
   await expect.poll(() => shown).toEqual([`${ROOT}g2/`, `${ROOT}g2/`]);

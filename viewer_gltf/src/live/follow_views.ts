@@ -12,14 +12,21 @@ export class ViewFollower {
    * @param root the page's own folder
    * @param shown the address of the view that the page shows; empty: the first one, which the root leads to
    * @param show puts another view in its place; it may wait until nobody would notice
+   * @param onShown another view has been put in its place
    */
   constructor(
     private readonly root: string,
     private shown: string,
     private readonly show: (base: string) => Promise<void>,
+    private readonly onShown: () => void = () => undefined,
     private readonly again_ms = AGAIN_MS,
   ) {
     this.newest = shown;
+  }
+
+  /** Whether the page shows the newest view. */
+  get isNewestShown(): boolean {
+    return this.newest === this.shown;
   }
 
   take({ hasBundle, folder }: Pick<BuildState, "hasBundle" | "folder">): void {
@@ -36,6 +43,7 @@ export class ViewFollower {
       try {
         await this.show(next);
         this.shown = next;
+        this.onShown();
       } catch {
         await new Promise((resolve) => setTimeout(resolve, this.again_ms)); // the server may be back by then
       }

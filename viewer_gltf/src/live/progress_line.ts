@@ -40,10 +40,13 @@ export class ProgressLine {
     );
   }
 
-  /** @param state null: the server does not answer */
-  update(state: BuildState | null): void {
+  /**
+   * @param state null: the server does not answer
+   * @param isShown whether the page shows the newest view of the build
+   */
+  update(state: BuildState | null, isShown: boolean): void {
     const doing = state?.doing ?? null;
-    const words = state === null ? GONE : wordsOf(state);
+    const words = state === null ? GONE : wordsOf(state, isShown);
     setText(this.words, words);
     this.words.title = words; // a narrow window cuts them
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
@@ -53,6 +56,6 @@ export class ProgressLine {
     this.buttons.continue.hidden =
       !may || !["paused", "pausing", "cancelled", "failed"].includes(doing ?? "");
     this.buttons.cancel.hidden = !may || !["building", "pausing", "paused"].includes(doing ?? "");
-    this.close.hidden = doing !== "complete" && doing !== "cancelled";
+    this.close.hidden = !(doing === "complete" && isShown) && doing !== "cancelled";
   }
 }

@@ -19,14 +19,14 @@ export type BuildWatch = Readonly<{
 }>;
 
 export function watchBuild({ live, root, shown, show, isLate }: BuildWatch): void {
-  const views = new ViewFollower(root, shown, show);
+  const views = new ViewFollower(root, shown, show, () => line.update(now, views.isNewestShown));
   const line = new ProgressLine((command) => feed.send(command));
   document.body.append(line.root);
   let now: BuildState | null = null;
   const feed = new BuildFeed(live.socket, (state) => {
     now = state;
-    line.update(state);
     if (state !== null) views.take(state);
+    line.update(state, views.isNewestShown);
     if (state?.doing !== "complete") return;
     clearInterval(looks);
     feed.dispose();

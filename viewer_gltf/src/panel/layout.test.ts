@@ -94,6 +94,11 @@ describe("the panel's layout", () => {
     expect(status(start(), { isLoading: true })).toBe("Surfaces, volumes from near · loading …");
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     expect(status(off)).toBe("Surfaces · complete");
+    const [tile, ...others] = off.tiles;
+    const unfinished = { ...off, tiles: [{ ...tile, isUnfinished: true as const }, ...others] };
+    expect(status(unfinished)).toBe("Volumes, as not all surfaces are built");
+    const all = reduce(unfinished, { type: "set", id: "mode", value: "all" });
+    expect(status(all)).toBe("Volumes");
     const none = { ...off, channels: off.channels.map((each) => ({ ...each, shown: false })) };
     expect(status(none)).toBe("All channels are hidden");
   });

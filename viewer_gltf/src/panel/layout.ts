@@ -255,15 +255,21 @@ function volumesText(level: number): string {
 }
 
 /** Names the forms that are shown, and whether they are complete. */
-function statusOf({ channels, mode, isolated }: ViewerState, facts: Facts): string {
+function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
+  const isUnfinished = tiles.some((tile) => tile.isUnfinished);
   if (channels.every(({ shown }) => !shown)) return "All channels are hidden";
   const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
-  const parts = [channels.some(({ hasObjects }) => !hasObjects) ? STATUS[mode] : "Objects", alone];
+  const form = isUnfinished && mode !== "all" && mode !== "traced" ? UNFINISHED : STATUS[mode];
+  const parts = [channels.some(({ hasObjects }) => !hasObjects) ? form : "Objects", alone];
   if (isLoading) parts.push("loading …");
-  else parts.push(samples === null ? "complete" : samplesText(samples));
+  else if (samples !== null) parts.push(samplesText(samples));
+  else if (!isUnfinished) parts.push("complete");
   return parts.filter((part) => part !== "").join(" · ");
 }
+
+/** A tile without surfaces is shown as a volume, also by the modes that show surfaces. */
+const UNFINISHED = "Volumes, as not all surfaces are built";
 
 const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
   disc: "Surfaces, volumes from near",

@@ -7,6 +7,7 @@ import { openNifti } from "./read_nifti";
 import { openZarr } from "./read_zarr";
 import { RemoteFile, RemoteFolder } from "./remote_file";
 import { SourceError } from "./source_error";
+import { isNothingFound } from "./zarr_faults";
 import { ZipStore } from "./zip_store";
 
 /** A source as the viewer shows it, and sentences that appear as notices do. */
@@ -14,6 +15,8 @@ export type ShownSource = Readonly<{ bundle: Bundle; notes: readonly string[] }>
 
 const NIFTI = /\.nii(\.gz)?$/i;
 const ARCHIVE = /\.(ozx|zip)$/i;
+/** An address whose end looks like that of a file's name. */
+const FILE = /\.[a-z][a-z0-9]{1,4}$/i;
 const ENDINGS = /(\.ome)?\.(zarr(\.zip)?|ozx|zip)$|\.nii(\.gz)?$/i;
 
 /** Opens the image at an address of the web. Throws SourceError. */
@@ -24,7 +27,12 @@ export async function openAddress(address: string, report: Report): Promise<Show
   if (NIFTI.test(path) || ARCHIVE.test(path))
     return shown(await openFile(new RemoteFile(url), report), report);
   const name = nameOf(path) || url.host;
-  return shown(await openZarr(new RemoteFolder(url), name), report);
+  try {
+    return await shown(await openZarr(new RemoteFolder(url), name), report);
+  } catch (error) {
+    const isFile = isNothingFound(error) && FILE.test(path) && !path.endsWith(".zarr");
+    throw isFile ? otherFormat(name, url.href) : error;
+  }
 }
 
 /** A file or a folder of this machine, as a person has dropped or chosen it. */
@@ -44,9 +52,13 @@ async function openFile(file: ByteSource, report: Report): Promise<OpenedImage> 
   const { name } = file;
   if (NIFTI.test(name)) return openNifti(file, report);
   if (ARCHIVE.test(name)) return openZarr(await ZipStore.open(file), nameOf(name));
-  throw new SourceError(
+  throw otherFormat(name);
+}
+
+function otherFormat(name: string, address = ""): SourceError {
+  return new SourceError(
     `${name}: expected a NIfTI file (.nii, .nii.gz), an OME-Zarr folder or a zipped one (.ozx): for other formats, and ` +
-      "DICOM, use stereocell view.",
+      `DICOM, use stereocell view ${address}`.trimEnd(),
   );
 }
 

@@ -14,6 +14,11 @@ export async function explained<T>(where: string, job: () => Promise<T>): Promis
   }
 }
 
+/** Whether there is no Zarr at an address. */
+export function isNothingFound(error: unknown): boolean {
+  return error instanceof SourceError && zarr.isZarritaError(error.cause, "NotFoundError");
+}
+
 function faultOf(error: unknown): string | null {
   if (zarr.isZarritaError(error, "NotFoundError")) {
     return (

@@ -188,6 +188,8 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(level).toContain("found a Zarr array, expected the group of an OME-Zarr image");
         const nothing = await faultOf(`${other.address}/nothing.zarr`);
         expect(nothing).toMatch(/found neither zarr.json|does not let other pages/);
+        const file = await faultOf(`${other.address}/cells.ome.tif`);
+        expect(file).toMatch(/use stereocell view http:.*cells\.ome\.tif|let other pages/);
         expect(await faultOf(`${other.address}/nothing.ozx`)).toMatch(/not found|let other pages/);
       });
 
@@ -195,9 +197,9 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         expect(await faultOf("http://127.0.0.1:9/x.zarr")).toContain("can't be reached");
         const { page } = stand.viewer;
         await page.goto(`${stand.host.address}/app/?source=file%3A%2F%2F%2Fetc%2Fpasswd`);
-        expect(await page.locator("[data-fatal]").textContent()).toContain(
-          "expected an image's address on the web",
-        );
+        const fatal = (await page.locator("[data-fatal]").textContent()) ?? "";
+        expect(fatal).toContain("expected an image's address on the web");
+        expect(fatal).toContain("This source can't be shown");
         await page.goto(`${stand.host.address}/app/?source=x.zarr&bundle=../bundle/`);
         expect(await page.locator("[data-fatal]").textContent()).toContain("found both");
       });

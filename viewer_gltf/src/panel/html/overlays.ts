@@ -95,8 +95,9 @@ export class FirstHint {
     this.root = element("p", { className: "first-hint" }, { overlay: "hint" }, words, this.outcome);
   }
 
-  update(state: Pick<ViewerState, "mode" | "channels">): void {
-    setText(this.outcome, showsVolumes(state) ? (THEN[state.mode] ?? "") : "");
+  update(state: Pick<ViewerState, "mode" | "channels" | "tiles">): void {
+    const isNews = showsVolumes(state) && !state.tiles.some((tile) => tile.isUnfinished);
+    setText(this.outcome, isNews ? (THEN[state.mode] ?? "") : "");
   }
 
   /** From the first touch on nobody needs it. */
