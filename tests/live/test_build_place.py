@@ -13,6 +13,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.planning.plan import Plan
 from stereocell.planning.preset_choice import load_for
 from stereocell.planning.settle import settle
+from stereocell.storage.lock import alone_in
 from support.phantoms import f_phantom, write_ome_tiff
 
 
@@ -40,6 +41,7 @@ def test_a_second_specimen_of_one_name_gets_a_folder_of_its_own(plans: list[Plan
     place = free_place(first)
     assert place == Path("cell.stereocell")
     require_place(first.source, place, first)
+    assert not place.exists()
     OutFolder(place).save_plan(first)
     assert free_place(second) == Path("cell-2.stereocell")
     Path("cell-2.stereocell").mkdir()
@@ -71,6 +73,14 @@ def test_a_folder_that_can_not_be_written_is_refused(plans: list[Plan]) -> None:
     Path("closed").mkdir(mode=0o555)
     with pytest.raises(OutputError, match="can't be written"):
         require_place(plans[0].source, Path("closed/out"), plans[0])
+
+
+def test_a_folder_into_which_another_command_writes_is_refused(plans: list[Plan]) -> None:
+    with (
+        alone_in(Path("out"), "build"),
+        pytest.raises(OutputError, match=r"`stereocell build` .* is writing here"),
+    ):
+        require_place(plans[0].source, Path("out"), plans[0])
 
 
 def test_a_build_without_results_has_no_finished_bundle(plans: list[Plan]) -> None:

@@ -68,6 +68,30 @@ def test_a_build_is_paused_cancelled_and_continued(
 
 
 @pytest.mark.slow
+def test_a_build_that_is_continued_at_once_is_not_failed_by_the_end_of_the_one_before(
+    begin: Callable[[Any], BuildProcess], tmp_path: Path
+) -> None:
+    process = begin(fake_build.refused_once)
+    assert until(process, lambda state: state.doing == "failed").line == "f.tif: cut off"
+    process.do("continue")
+    assert (process.state.doing, process.state.line) == ("building", "")
+    end = until(process, lambda state: state.doing != "building")
+    assert (end.doing, end.line) == ("complete", "")
+    assert (tmp_path / "starts").read_text() == "**"
+
+
+@pytest.mark.slow
+def test_a_line_is_explained_where_someone_knows_better(tmp_path: Path) -> None:
+    nothing: Any = None
+    build = partial(fake_build.refused, tmp_path)
+    process = BuildProcess(build, tmp_path / "out", lambda line: f"explained: {line}")
+    process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path, {}))
+    line = until(process, lambda state: state.doing == "failed").line
+    assert line == "explained: f.tif: changed since the plan: run it again"
+    process.close()
+
+
+@pytest.mark.slow
 def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
     nothing: Any = None
     coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path, {})

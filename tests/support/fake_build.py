@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -23,6 +24,15 @@ def refused(_: Path, watch: Watch) -> str:
     """End with the line of an error."""
     watch("windows", 0, 1, "")
     return "f.tif: changed since the plan: run it again"
+
+
+def refused_once(folder: Path, watch: Watch) -> str:
+    """End with the line of an error, and a second later as a process; the next one is steady."""
+    if (folder / "starts").exists():
+        return steady(folder, watch)
+    (folder / "starts").write_text("*")
+    threading.Thread(target=time.sleep, args=(1,)).start()
+    return "f.tif: cut off"
 
 
 def killed(_: Path, watch: Watch) -> str:

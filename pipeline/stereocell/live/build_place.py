@@ -14,6 +14,7 @@ from stereocell.planning.plan import Plan
 from stereocell.read.source_place import require_apart
 from stereocell.storage.contents import contents_of
 from stereocell.storage.kinds import Kind
+from stereocell.storage.lock import alone_in
 
 
 def free_place(plan: Plan) -> Path:
@@ -32,10 +33,10 @@ def free_place(plan: Plan) -> Path:
 
 
 def require_place(source: str, out: Path, plan: Plan) -> None:
-    """Create OUT, into which a plan will be built.
+    """Raise what a build of a plan into OUT would raise before it begins; OUT is unchanged.
 
     Raises StereoCellError where the build would refuse it: OUT lies in the source, can't be
-    written, or holds something else.
+    written, holds something else, or another command is writing there.
     """
     require_apart(source, out)
     require_build_or_nothing(out, source)
@@ -47,7 +48,8 @@ def require_place(source: str, out: Path, plan: Plan) -> None:
         from stereocell.building.own_parts import require_own_places
 
         require_own_places(out_folder, is_same_plan=_is_same(there, plan))
-    out_folder.require_writable()
+    with alone_in(out, "view"):  # the build would not wait for another command
+        pass
 
 
 def finished_bundle(out: Path, plan: Plan) -> Path | None:

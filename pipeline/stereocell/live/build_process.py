@@ -110,9 +110,14 @@ class Coarse:
 class BuildProcess:
     """A build behind a page. All methods may be called from any thread."""
 
-    def __init__(self, build: Build, out: Path) -> None:
-        """build: picklable; out: the folder that it writes."""
-        self._build, self.out = build, out
+    def __init__(self, build: Build, out: Path, explain: Callable[[str], str] = str) -> None:
+        """Describe a build, which is not started.
+
+        build    picklable
+        out      the folder that it writes
+        explain  returns the line to be shown for an error's line
+        """
+        self._build, self.out, self._explain = build, out, explain
         self._coarse: Coarse | None = None
         self._is_closed = False
         self._asked = threading.Lock()  # one start or command at a time
@@ -155,6 +160,10 @@ class BuildProcess:
         doing = self.state.doing if is_first else "building"
         if self._coarse is None or doing == "cancelled" or self._is_closed:
             return
+        self._pipe = None  # nobody hears the process before
+        self._set(doing=doing, line="", left_s=None)
+        if self._process is not None:
+            self._process.join(_END_S)  # it has ended, or is about to
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_run, args=(theirs,))
@@ -166,7 +175,6 @@ class BuildProcess:
             ours.send((self._build, self._coarse))
         self._process, self._pipe, self._rests = process, ours, Rests(process.pid)
         self._began_s, self._paused_s = time.monotonic(), 0.0
-        self._set(doing=doing, line="", left_s=None)
         if doing == "pausing":
             self._send("pause")
         threading.Thread(target=self._hear, args=(ours,), daemon=True).start()
@@ -233,6 +241,10 @@ class BuildProcess:
             try:
                 told = pipe.recv()
             except (EOFError, OSError):
+                told = None
+            if pipe is not self._pipe:  # another process builds by now
+                return
+            if told is None:
                 if self.state.doing not in ("cancelled", "failed", "complete"):
                     self._fail(_KILLED)
                 return
@@ -253,6 +265,7 @@ class BuildProcess:
                 self._paused_s += told
 
     def _fail(self, line: str) -> None:
+        line = self._explain(line)
         self._set(doing="failed", line=line, left_s=None)
         console.print(f"the build has stopped: {line}", markup=False, soft_wrap=True)
 

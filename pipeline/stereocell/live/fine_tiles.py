@@ -73,13 +73,19 @@ class FineTiles:
         voxels = coarse.at(places)
         return voxels if holder is None else holder.left_out_at(voxels, places)
 
-    def _require_unchanged(self) -> None:
+    def change(self) -> str:
+        """Return a line where the source has changed since it was planned; empty: it has not."""
         states = first_states(source_of(self.plan))
-        if states is not None and states.changed():
-            raise SourceError(
-                f"{self.plan.source}: changed since it was opened, expected a source that does not "
-                "change while it is shown: end the command and run it again"
-            )
+        if states is None or not states.changed():
+            return ""
+        return (
+            f"{self.plan.source}: changed since it was opened, expected a source that does not "
+            "change while it is shown: end the command and run it again"
+        )
+
+    def _require_unchanged(self) -> None:
+        if line := self.change():
+            raise SourceError(line)
 
     def _is_planned(self, tile: Tile) -> bool:
         return prod(tile.lattice(self.plan.region).shape) <= PLANNED_VOXELS

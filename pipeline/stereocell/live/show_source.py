@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -106,10 +105,10 @@ def show_source(
         _print(f"reading {printable(source)}")  # an answer may take a while
     look = FirstLook.at(source, settings, choice, title=title)
     plan = look.plan
-    build, is_new = None, False
+    fine = FineTiles(plan, look.dataset)
+    build = None
     if behind is not None:
         out = free_place(plan) if behind.out is None else behind.out
-        is_new = not out.exists()
         require_place(source, out, plan)
         if (bundle := finished_bundle(out, plan)) is not None:
             _print(
@@ -118,12 +117,11 @@ def show_source(
             )
             behind.serve_bundle(bundle)
             return
-        build = BuildProcess(partial(behind.build, out), out)
+        build = BuildProcess(partial(behind.build, out), out, lambda line: fine.change() or line)
     else:
         print_notes(plan)  # a build prints them itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
-        fine = FineTiles(plan, look.dataset)
         live = Live(page, scratch / "bundle", first, len(plan.tiles), fine, build, Reading(_print))
 
         def write() -> None:
@@ -151,9 +149,6 @@ def show_source(
         finally:
             if build is not None:
                 build.close()
-                if is_new:
-                    with suppress(OSError):  # it holds something by now
-                        build.out.rmdir()
         if first.done():
             first.result()
 

@@ -15,6 +15,8 @@ export class ProgressLine {
     { live: "dismiss" },
   );
   readonly root: HTMLElement;
+  /** What the line said when it was dismissed; it comes back once it says something else. */
+  private dismissed: string | null = null;
 
   constructor(onCommand: (command: Command) => void) {
     const button = (command: Command, textContent: string) =>
@@ -28,7 +30,10 @@ export class ProgressLine {
       continue: button("continue", "Continue"),
       cancel: button("cancel", "Cancel"),
     };
-    this.close.onclick = () => this.root.remove();
+    this.close.onclick = () => {
+      this.dismissed = this.words.textContent;
+      this.root.hidden = true;
+    };
     this.root = element(
       "aside",
       { className: "build", ariaLabel: "The build" },
@@ -47,15 +52,27 @@ export class ProgressLine {
   update(state: BuildState | null, isShown: boolean): void {
     const doing = state?.doing ?? null;
     const words = state === null ? GONE : wordsOf(state, isShown);
+    if (words !== this.dismissed) this.root.hidden = false;
     setText(this.words, words);
     this.words.title = words; // a narrow window cuts them
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
     this.root.dataset.doing = doing ?? "gone";
+    const isFocused = this.root.contains(document.activeElement);
     const may = state?.mayControl === true;
     this.buttons.pause.hidden = !may || doing !== "building";
     this.buttons.continue.hidden =
       !may || !["paused", "pausing", "cancelled", "failed"].includes(doing ?? "");
     this.buttons.cancel.hidden = !may || !["building", "pausing", "paused"].includes(doing ?? "");
-    this.close.hidden = !(doing === "complete" && isShown) && doing !== "cancelled";
+    const isOver = (doing === "complete" && isShown) || doing === "cancelled" || doing === "failed";
+    this.close.hidden = !isOver;
+    this.keepFocus(isFocused);
+  }
+
+  /** Hands the focus of a button that has just been hidden to the next one. */
+  private keepFocus(isFocused: boolean): void {
+    const buttons = [...Object.values(this.buttons), this.close];
+    const { activeElement } = document;
+    if (!isFocused || buttons.some((each) => each === activeElement && !each.hidden)) return;
+    buttons.find((each) => !each.hidden)?.focus();
   }
 }

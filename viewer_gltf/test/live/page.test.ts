@@ -85,8 +85,12 @@ describeInChromium("a source that is built behind the page", () => {
     await viewer.recolor(state.channels[0].id, "#33cc66");
     await viewer.drag([200, 200], [260, 230]);
     const before = await look();
-    await press("continue");
+    const focused = () =>
+      page.evaluate(() => (document.activeElement as HTMLElement).dataset.live ?? "");
+    await page.locator('[data-live="continue"]').focus();
+    await page.keyboard.press("Enter");
     await expect.poll(words).not.toMatch(/^Paus/);
+    expect(await focused()).toBe("pause");
     await expect.poll(words).toMatch(/^Complete/);
     await expect.poll(hasSurface).toBe(true);
     await viewer.settled();
@@ -102,7 +106,7 @@ describeInChromium("a source that is built behind the page", () => {
     expect(g).toBeGreaterThan(Math.max(r, b));
     expect(faults).toEqual([]);
     await press("dismiss");
-    expect(await page.locator(".build").count()).toBe(0);
+    expect(await page.locator(".build").isVisible()).toBe(false);
   });
 
   it("opens as a bundle afterwards", async () => {
