@@ -141,7 +141,7 @@ function followBuild({ base }: Bundle, live: LiveHost): void {
     const bundle = newer === root ? loaded : { ...loaded, live };
     if (host === null) return;
     host = await exchange(host, (parent) => openIn(parent, bundle, () => undefined));
-    await host.noteOverview();
+    void host.noteOverview().catch(() => undefined); // the page shows all the same, and is not waited for
   };
   const shown = live.folder === "" ? "" : base;
   const isLate = () => host?.display.isLate ?? false;
