@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from stereocell.engine.run import Watch, console
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import Sizes
+from stereocell.live.coarse_tiles import Sizes
 from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan
 

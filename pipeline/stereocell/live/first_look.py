@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from stereocell.live.coarse_channel import CoarseChannel, OnRead
-from stereocell.live.first_view import Sizes, read_channels, write_first_view
+from stereocell.live.coarse_tiles import Sizes
+from stereocell.live.first_view import read_channels, write_first_view
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
 from stereocell.planning.settings import Settings
