@@ -12,12 +12,14 @@ from stereocell.formats.ktx2 import decode_finest
 from stereocell.live import coarse_tiles, first_view
 from stereocell.live.coarse_channel import CoarseChannel, CoarseGrid
 from stereocell.live.fine_tiles import FineTiles
+from stereocell.live.first_appearance import first_appearance
 from stereocell.model.tiling import Box
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
 from stereocell.planning.preset_choice import load_for
 from stereocell.planning.settle import settle
 from stereocell.steps.open_source import open_source
+from stereocell.transfer.opacity import evaluate, invisible_below
 from support.phantoms import f_phantom, write_ome_tiff
 
 
@@ -99,14 +101,39 @@ def test_fewer_bytes_show_the_same_picture(tmp_path: Path, monkeypatch: pytest.M
 
 
 def shares(root: Path) -> NDArray[np.float64]:
-    """Return where the brightness of a volume lies, as shares of its edges, and its mean."""
+    """Return where what shows of a volume lies, as shares of its edges, and its mean brightness."""
     (entry,) = volumes_of(root)
     file = entry["file"]
     assert isinstance(file, dict)
     voxels = decode_finest((root / file["path"]).read_bytes())[1:-1, 1:-1, 1:-1, 0] / 255
+    voxels[voxels < 0.4] = 0
     along = [voxels.sum(axis=tuple({0, 1, 2} - {i})) for i in range(3)]
     middles = [float(one @ np.linspace(0, 1, len(one)) / one.sum()) for one in along]
     return np.array([*middles, float(voxels.mean())])
+
+
+def test_what_shows_and_what_does_not_stays_so_with_fewer_greys(tmp_path: Path) -> None:
+    """Each function shows the same texels; no value moves by more than half a step."""
+    source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
+    settings, choice = load_for(source, None, None, flags={})
+    plan = settle(str(source), settings, choice)
+    dataset = open_source(as_asked(plan.source, plan.settings.plan))
+    (channel,) = plan.channels
+    coarse = first_view.read_channels(plan, dataset)[channel.voxels_id]
+    appearance = first_view.composed(first_appearance(plan, channel, coarse)[0])
+    every = np.arange(256, dtype=np.uint8).reshape(1, 16, 16)
+    for name, points in appearance.transfer_functions.items():
+        own = coarse_tiles._Source(channel, coarse, replace(appearance, chosen=name), None)
+        opacities = np.rint(evaluate(points) * 255).astype(np.uint8)
+        last = invisible_below(opacities)
+        for shown, hidden in coarse_tiles._GREYS:
+            found = own.rounded(every, (shown, hidden)).ravel().astype(int)
+            assert ((found > last) == (np.arange(256) > last)).all()
+            assert (np.diff(found) >= 0).all()
+            moved = np.abs(found - np.arange(256))
+            assert moved[last + 1 :].max() <= 255 / shown / 2 + 0.5
+            assert moved[: last + 1].max(initial=0) <= 255 / hidden / 2 + 0.5
+            assert found[-1] == 255
 
 
 def test_means_of_blocks_lie_in_their_middles() -> None:

@@ -214,7 +214,15 @@ def in_blocks(voxels: NDArray[Any], block: _Triple) -> NDArray[Any]:
 
 def _means(voxels: NDArray[Any], block: _Triple) -> NDArray[np.float32]:
     """Return the means of whole blocks, float32 (z, y, x)."""
-    return np.asarray(in_blocks(voxels, block).mean(axis=(1, 3, 5), dtype=np.float32))
+    counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
+    total = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
+    for axis, size in enumerate(block):  # one after the other: `mean` of all takes five times that
+        along = np.moveaxis(total, axis, 0)
+        added = along[::size].astype(np.float32)
+        for k in range(1, size):
+            added += along[k::size]
+        total = np.moveaxis(added, 0, axis)
+    return np.ascontiguousarray(total / np.float32(prod(block)), np.float32)
 
 
 def _spread(voxels: NDArray[np.generic], most: int) -> NDArray[np.float32]:

@@ -1,13 +1,16 @@
 """Write the coarse volumes of a bundle's tiles, within a bound of bytes.
 
 A volume's voxels are the means of blocks (coarse_channel.py). How well they compress differs ten
-times between specimens, so the bound is on the bytes: where they would be more, the voxels of all
-tiles lie farther apart than the blocks.
+times between specimens, so the bound is on the bytes. Where they would be more, values are rounded
+to fewer greys, first those that the chosen function leaves invisible: noise, which is what
+compresses badly, is mostly in the last bits. If that is not enough, the voxels of all tiles lie
+farther apart than the blocks, which makes what is small and bright fainter.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
@@ -27,15 +30,20 @@ from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
 from stereocell.storage.processes import cores
 from stereocell.transfer.joint_histogram import to_eight_bits
+from stereocell.transfer.opacity import evaluate, invisible_below
 from stereocell.usd.composed_appearance import ComposedAppearance
 
 BYTES = 1_000_000  # most bytes of the files of a view, all channels and tiles together
 _OTHERS = 22_000  # bytes of a channel's other files: tables, histogram, lists
+# steps of grey from black to white, of what shows and of what the chosen function leaves invisible
+_ALL = (255, 255)
+_GREYS = (_ALL, (255, 15), (127, 15), (63, 15))
 _SAMPLED, _EACH = 6, 48  # planes that are compressed for an estimate, of so many
 # bytes of a texture with its mip levels over those of its finest one: noise has 1.14, tissue 1.2
 _MIPS = 1.17
 _STEP = 1.02  # least factor by which voxels lie farther apart in another attempt
 _GAIN = 0.98  # share of the bytes from which an attempt brought too little for another one
+_Greys = tuple[int, int]
 Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
 
 
@@ -87,12 +95,16 @@ def write_coarse_tiles(
 
     def write(tile: Tile) -> BundleTile:
         voxels = {one.channel.id: one.voxels(plan, tile, apart) for one in volumes}
-        return _write_tile(plan, root, tile, appearances, voxels, sizes)
+        stored = {one.channel.id: one.rounded(voxels[one.channel.id], greys) for one in volumes}
+        return _write_tile(plan, root, tile, appearances, stored, voxels, sizes)
 
     with ThreadPoolExecutor(cores()) as pool:
-        estimates = pool.map(lambda one: _estimate(plan, one), volumes)
         most = max(BYTES - len(plan.channels) * _OTHERS, BYTES // 2)
-        apart = max(1.0, (sum(estimates) / most) ** (1 / 3))
+        for greys in _GREYS:
+            estimate = sum(pool.map(partial(_estimate, plan, greys), volumes))
+            if estimate <= most:
+                break
+        apart = max(1.0, (estimate / most) ** (1 / 3))
         before = np.inf
         while True:
             tiles = tuple(pool.map(write, plan.tiles))
@@ -127,19 +139,35 @@ class _Source:
             values = self.holder.left_out_at(values, places)
         return to_eight_bits(values, self.appearance.window)
 
+    def rounded(self, voxels: NDArray[np.uint8], greys: _Greys) -> NDArray[np.uint8]:
+        """Return 8-bit values rounded to so many greys; what shows and what does not stays so."""
+        if greys == _ALL:
+            return voxels
+        points = self.appearance.transfer_functions[self.appearance.chosen]
+        last = invisible_below(np.rint(evaluate(points) * 255).astype(np.uint8))
+        values = np.arange(256)
+        shown, hidden = (_steps(values, count) for count in greys)
+        shown, hidden = np.maximum(shown, last + 1), np.minimum(hidden, max(last, 0))
+        return np.where(values > last, shown, hidden).astype(np.uint8)[voxels]
 
-def _estimate(plan: Plan, source: _Source) -> float:
+
+def _estimate(plan: Plan, greys: _Greys, source: _Source) -> float:
     """Return about how many bytes the volumes of a channel are, where voxels lie as it was read."""
-    return sum(_MIPS * found for tile in plan.tiles for found in _sampled(plan, tile, source))
+    return sum(_MIPS * one for tile in plan.tiles for one in _sampled(plan, tile, source, greys))
 
 
-def _sampled(plan: Plan, tile: Tile, source: _Source) -> Iterator[float]:
+def _sampled(plan: Plan, tile: Tile, source: _Source, greys: _Greys) -> Iterator[float]:
     count = len(places_in(tile.lattice(plan.region), source.coarse.grid.step)[0])
     for first in range(0, count, _EACH):
         planes = min(_EACH, count - first)
         middle = first + max(0, planes - _SAMPLED) // 2
         part = source.voxels(plan, tile, 1.0, slice(middle, middle + _SAMPLED))
-        yield len(encode_3d([part]).data) * planes / len(part)
+        yield len(encode_3d([source.rounded(part, greys)]).data) * planes / len(part)
+
+
+def _steps(values: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Return values of 0 to 255, each the nearest of so many steps; both ends are steps."""
+    return np.rint(np.rint(values * (count / 255)) * (255 / count)).astype(np.int64)
 
 
 def _write_tile(
@@ -147,9 +175,11 @@ def _write_tile(
     root: Path,
     tile: Tile,
     appearances: Sequence[ComposedAppearance],
-    coarse: Mapping[str, NDArray[np.uint8]],
+    stored: Mapping[str, NDArray[np.uint8]],
+    counted: Mapping[str, NDArray[np.uint8]],
     sizes: Sizes,
 ) -> BundleTile:
+    """Write the volumes of a tile; `counted`: the same voxels before they were rounded."""
     lattice = tile.lattice(plan.region)
     first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])
     corners = world_box(first, last)
@@ -157,15 +187,16 @@ def _write_tile(
     matrix = np.array(plan.placement).T  # USD's matrices are for row vectors
     channels = []
     for channel, appearance in zip(plan.channels, appearances, strict=True):
-        if channel.id not in coarse:
+        if channel.id not in stored:
             channels.append(TileChannel(channel.id, (), (), (), None, (), None))
             continue
-        voxels = coarse[channel.id]
+        voxels = stored[channel.id]
         depth, height, width = voxels.shape
         volume = _CoarseVolume((width, height, depth), low, high, matrix)
-        entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels)
+        all_greys = counted[channel.id]
+        entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels, all_greys)
         finer = sizes.get(tile.id, volume.size)
-        if prod(finer) > prod(volume.size):
+        if prod(finer) > prod(volume.size) or (tile.id in sizes and voxels is not all_greys):
             entry["finer_size"] = list(finer)
         channels.append(TileChannel(channel.id, (), (), (), entry, tuple(files), joint))
     bounds = move_box(*corners, matrix)
