@@ -7,7 +7,7 @@ compresses badly, is mostly in the last bits. If that is not enough, the voxels 
 farther apart than the blocks, which makes what is small and bright fainter.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -44,6 +44,7 @@ _MIPS = 1.17
 _STEP = 1.02  # least factor by which voxels lie farther apart in another attempt
 _GAIN = 0.98  # share of the bytes from which an attempt brought too little for another one
 _Greys = tuple[int, int]
+_Sample = tuple[NDArray[np.uint8], float]  # planes, and how many there are for each of them
 Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
 
 
@@ -100,8 +101,9 @@ def write_coarse_tiles(
 
     with ThreadPoolExecutor(cores()) as pool:
         most = max(BYTES - len(plan.channels) * _OTHERS, BYTES // 2)
+        sampled = list(pool.map(partial(_sampled, plan), volumes))
         for greys in _GREYS:
-            estimate = sum(pool.map(partial(_estimate, plan, greys), volumes))
+            estimate = sum(pool.map(partial(_estimate, greys), volumes, sampled))
             if estimate <= most:
                 break
         apart = max(1.0, (estimate / most) ** (1 / 3))
@@ -151,18 +153,25 @@ class _Source:
         return np.where(values > last, shown, hidden).astype(np.uint8)[voxels]
 
 
-def _estimate(plan: Plan, greys: _Greys, source: _Source) -> float:
-    """Return about how many bytes the volumes of a channel are, where voxels lie as it was read."""
-    return sum(_MIPS * one for tile in plan.tiles for one in _sampled(plan, tile, source, greys))
+def _sampled(plan: Plan, source: _Source) -> list[_Sample]:
+    """Return some planes of each part of a channel's volumes, where voxels lie as it was read."""
+    found = []
+    for tile in plan.tiles:
+        count = len(places_in(tile.lattice(plan.region), source.coarse.grid.step)[0])
+        for first in range(0, count, _EACH):
+            planes = min(_EACH, count - first)
+            middle = first + max(0, planes - _SAMPLED) // 2
+            part = source.voxels(plan, tile, 1.0, slice(middle, middle + _SAMPLED))
+            found.append((part, planes / len(part)))
+    return found
 
 
-def _sampled(plan: Plan, tile: Tile, source: _Source, greys: _Greys) -> Iterator[float]:
-    count = len(places_in(tile.lattice(plan.region), source.coarse.grid.step)[0])
-    for first in range(0, count, _EACH):
-        planes = min(_EACH, count - first)
-        middle = first + max(0, planes - _SAMPLED) // 2
-        part = source.voxels(plan, tile, 1.0, slice(middle, middle + _SAMPLED))
-        yield len(encode_3d([source.rounded(part, greys)]).data) * planes / len(part)
+def _estimate(greys: _Greys, source: _Source, sampled: Sequence[_Sample]) -> float:
+    """Return about how many bytes the volumes of a channel have in so many greys."""
+    return sum(
+        _MIPS * share * len(encode_3d([source.rounded(part, greys)]).data)
+        for part, share in sampled
+    )
 
 
 def _steps(values: NDArray[np.int64], count: int) -> NDArray[np.int64]:
