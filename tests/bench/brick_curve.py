@@ -29,9 +29,10 @@ from stereocell.filters.min_max_bricks import mip_levels
 from stereocell.formats.brick_stream import encode_tree
 from stereocell.formats.ktx2 import decode_finest
 from stereocell.formats.voxel_bvh import build
-from stereocell.serve.brick_library import BrickLibrary, invisible_below
+from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.server import BundleServer
 from stereocell.serve.tree_files import Volume
+from stereocell.transfer.opacity import invisible_below
 from support.server.brick_client import BrickClient, look_at, psnr, reconstruct
 from support.server.brick_decoder import reassemble
 
@@ -100,7 +101,7 @@ def tell_functions(bundle: Path, channel: dict, voxels: np.ndarray, ktx2_bytes: 
     rows = decode_finest((bundle / channel["lut"]["path"]).read_bytes())[0]
     print(f"\n{'function':>12} {'threshold':>9} {'bytes':>12} {'of KTX2':>8}")
     for name, row in zip(channel["transfer_functions"], rows, strict=True):
-        threshold = invisible_below(row)
+        threshold = invisible_below(row[:, 3])
         size = len(encode_tree(build(voxels, threshold), bytes(16)))
         print(f"{name:>12} {threshold:9} {size:12,} {size / ktx2_bytes:8.2f}")
 

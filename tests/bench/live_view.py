@@ -2,14 +2,17 @@
 
     .venv/bin/python tests/bench/live_view.py [SOURCE ...]
 
-The sources are those of `STEREOCELL_DATA`, and the CyCIF sample. Of each, `stereocell view` is
-started ROUNDS times without a build: seconds from the start of the command until the page, and
-until all files of the first view have been fetched; CPU seconds until then; the files' bytes. Then
-one file is asked for again and again, alone and beside the build.
+The sources are those of `STEREOCELL_DATA`, and samples. Of each, `stereocell view` is started once,
+so that the disk is warm and Python has its bytecode, and then ROUNDS times without a build: seconds
+from the start of the command until the page, and until all files of the first view have been
+fetched; CPU seconds until then; the bytes of those files, and of the page's own. Then one file is
+asked for again and again, alone and beside the build. Other processes make seconds longer, and CPU
+seconds less so: the load of the machine is printed with them.
 """
 
 import json
 import os
+import re
 import signal
 import statistics
 import subprocess
@@ -32,19 +35,29 @@ SOURCES = {
     "mouse brain": [f"{DATA}/mouse_brain/mouse_brain.ome.tif", "--spacing-um", "25,25,25"],
     "nuclei": [f"{DATA}/nuclei_stardist/img3d.tif", "--spacing-um", "1,0.5,0.5"],
 }
+# arguments of `stereocell sample`, and flags with which its result is built
+SAMPLES = {
+    "CyCIF sample": (["cycif", "cycif.ome.zarr", "--grid", "3x2"], ["--grid", "3x2"]),
+    "head sample": (["mri", "mri"], []),
+    "cells sample": (["cells", "cells.ome.zarr"], []),
+    "brain sample": (["brain-cells", "brain-cells.ome.tif"], []),
+}
+_COMPRESSED = {"Accept-Encoding": "br, gzip"}
+# Variables of this process that a person's terminal lacks: Python would compile all it imports
+_UNSET = ("PYTHONDONTWRITEBYTECODE",)
 
 
 def main(words: list[str]) -> None:
     given = {word: [str(Path(word).resolve())] for word in words} or {
         name: flags for name, flags in SOURCES.items() if Path(flags[0].split(":")[0]).exists()
     }
-    print(f"{'':12} page s  view s  CPU s   MB   alone ms  beside a build ms (median, 95 %)")
+    print(f"{'':12} page s  view s  CPU s   MB  page MB  load   alone ms  beside a build ms")
     with tempfile.TemporaryDirectory() as folder:
-        if not words:
-            sample = f"{folder}/cycif.ome.zarr"
-            cell = ["sample", "cycif", sample, "--grid", "3x2"]
-            subprocess.run([sys.executable, "-m", "stereocell.cli", *cell], check=True)
-            given["CyCIF sample"] = [sample, "--grid", "3x2"]
+        for name, (sample, flags) in SAMPLES.items() if not words else ():
+            kind, place, *rest = sample
+            command = ["sample", kind, f"{folder}/{place}", *rest]
+            subprocess.run([sys.executable, "-m", "stereocell.cli", *command], check=True)
+            given[name] = [f"{folder}/{place}", *flags]
         for name, flags in given.items():
             print(f"{name[-12:]:12} {measured(flags, folder)}", flush=True)
 
@@ -52,6 +65,8 @@ def main(words: list[str]) -> None:
 def measured(flags: list[str], folder: str) -> str:
     """Return a row of the table."""
     first = []
+    with viewing([*flags, "--no-build"], folder) as (_, address, _):
+        page = fetch_page(address)
     for _ in range(ROUNDS):
         with viewing([*flags, "--no-build"], folder) as (server, address, began_s):
             page_s = time.perf_counter() - began_s
@@ -69,7 +84,8 @@ def measured(flags: list[str], folder: str) -> str:
         beside = latencies_ms(address, max(files, key=lambda path: files[path]))
     page_s, view_s, spent_s, megabytes = map(statistics.median, zip(*first, strict=True))
     return (
-        f"{page_s:6.1f} {view_s:7.1f} {spent_s:6.1f} {megabytes:5.2f}   "
+        f"{page_s:6.1f} {view_s:7.1f} {spent_s:6.1f} {megabytes:5.2f} {page / 1e6:7.2f} "
+        f"{os.getloadavg()[0]:6.1f}    "
         f"{alone[0]:4.1f} {alone[1]:4.1f}    {beside[0]:4.1f} {beside[1]:4.1f}"
     )
 
@@ -85,6 +101,7 @@ def viewing(flags: list[str], folder: str) -> Iterator[tuple[subprocess.Popen[st
         stderr=subprocess.DEVNULL,
         text=True,
         cwd=folder,
+        env={name: text for name, text in os.environ.items() if name not in _UNSET},
     ) as server:
         assert server.stdout is not None
         line = server.stdout.readline()
@@ -105,6 +122,13 @@ def fetch_view(address: str) -> dict[str, int]:
     files = json.loads(get(f"{address}manifest.json"))["files"]["path"]
     listed = json.loads(get(address + files))
     return {path: len(get(address + path)) for path in listed}
+
+
+def fetch_page(address: str) -> int:
+    """Fetch the page with its scripts and styles; return their bytes, as they are compressed."""
+    text = get(address).decode()
+    paths = set(re.findall(r"assets/[\w-]+\.(?:js|css)\b(?!\.)", text))
+    return sum(len(get(address + path, **_COMPRESSED)) for path in ("", *paths))
 
 
 def latencies_ms(address: str, path: str) -> tuple[float, float]:

@@ -95,10 +95,15 @@ def test_windows_and_level_are_near_those_of_a_build(f_tiff: Path, tmp_path: Pat
     root = tmp_path / "view"
     plan = write_view_of(f_tiff, root)
     (channel,) = manifest_of(root)["channels"]
-    low, high = window_step(plan, plan.channels[0]).run().statistics.window
+    statistics = window_step(plan, plan.channels[0]).run().statistics
+    low, high = statistics.window
     assert channel["window"] == pytest.approx([low, high], abs=0.02 * (high - low))
     background, body = float(f_phantom().min()), float(f_phantom().max())
     assert channel["iso_value"] == pytest.approx((background + body) / 2, rel=0.15)
+    # the scale of gradients, by which functions of two dimensions tell edges from tissue
+    functions = json.loads((root / channel["transfer_functions_2d"]["file"]["path"]).read_text())
+    steepest = statistics.suggested.transfer_2d.gradient_max
+    assert functions["gradient_max"] == pytest.approx(steepest, rel=0.02)
 
 
 def test_a_large_source_is_read_at_a_coarse_level(

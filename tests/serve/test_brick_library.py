@@ -13,7 +13,8 @@ from stereocell.formats.ktx2 import decode_finest, encode_2d, encode_3d
 from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError, StereoCellError
 from stereocell.serve import tree_files
-from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError, invisible_below
+from stereocell.serve.brick_library import BrickLibrary, UnknownVolumeError
+from stereocell.transfer.opacity import invisible_below
 from support.server.brick_bundles import (
     phantom,
     replace_transfer_functions,
@@ -51,13 +52,13 @@ def test_a_tree_is_that_of_the_bundles_volume(out):
 def test_the_threshold_is_what_a_row_leaves_invisible():
     row = np.zeros((256, 4), np.uint8)
     row[:, :3] = 255
-    assert invisible_below(row) == 254
+    assert invisible_below(row[:, 3]) == 254
     row[100:, 3] = 9
-    assert invisible_below(row) == 99
+    assert invisible_below(row[:, 3]) == 99
     row[40:50, 3] = 1
-    assert invisible_below(row) == 39
+    assert invisible_below(row[:, 3]) == 39
     row[0, 3] = 1
-    assert invisible_below(row) == -1
+    assert invisible_below(row[:, 3]) == -1
 
 
 @pytest.mark.parametrize(("chosen", "threshold"), [("default", 99), ("sharp", 199), ("soft", -1)])

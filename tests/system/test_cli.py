@@ -127,7 +127,7 @@ def test_workers_are_the_cores_that_we_may_run_on(
         assert cli._parser().parse_args(["units", "out"]).workers == 1
     assert 1 <= cli._parser().parse_args(["units", "out"]).workers <= (os.cpu_count() or 1)
     # a container with half of a core's time
-    monkeypatch.setattr("dask.system._try_extract_cgroup_cpu_quota", lambda: (50_000, 100_000))
+    monkeypatch.setattr("stereocell.storage.processes.container_cores", lambda: 0.5)
     assert cli._parser().parse_args(["units", "out"]).workers == 1
 
 

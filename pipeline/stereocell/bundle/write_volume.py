@@ -22,14 +22,17 @@ def write_volume(
     appearance: ComposedAppearance,
     volume: PlacedVolume,
     voxels: NDArray[np.uint8],
+    counted: NDArray[np.uint8] | None = None,
 ) -> tuple[dict[str, Any], list[FileRef], bytes]:
     """Write one volume; return its entry in volumes.json, its files and its counts.
 
-    voxels  uint8 (z, y, x) with the apron, window applied
+    voxels   uint8 (z, y, x) with the apron, window applied
+    counted  voxels of as many, of which the counts are; None: those that are written
 
     The counts are the histogram of value and gradient, packed as `count_tile` returns them.
     Raises OutputError where a file can't be written.
     """
+    counted = voxels if counted is None else counted
     texture = encode_3d(mip_levels(voxels))
     bricks = encode_3d([min_max_bricks(voxels)])
     path = f"volumes/{tile_id}/{appearance.id}"
@@ -59,4 +62,4 @@ def write_volume(
             for level in texture.levels
         ],
     }
-    return entry, files, count_tile(voxels, volume, appearance.transfer_2d.gradient_max)
+    return entry, files, count_tile(counted, volume, appearance.transfer_2d.gradient_max)

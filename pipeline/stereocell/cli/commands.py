@@ -420,9 +420,9 @@ def serve(options: argparse.Namespace) -> Answer:
 
 
 def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
-    from stereocell.serve.server import serve
-
     def run(folder: Path, live: "Live | None" = None) -> None:
+        from stereocell.serve.server import serve  # while a source is read for its first view
+
         serve(
             folder,
             options.port,

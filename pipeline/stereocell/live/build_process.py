@@ -22,7 +22,7 @@ from stereocell.engine.run import Watch, console
 from stereocell.engine.worker_process import end_with_parent
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import Sizes
+from stereocell.live.coarse_tiles import Sizes
 from stereocell.live.rests import Rests, lead_group
 from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan

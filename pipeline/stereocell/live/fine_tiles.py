@@ -17,7 +17,7 @@ from stereocell.planning.input_files import first_states
 from stereocell.planning.plan import Plan
 from stereocell.planning.plan_source import source_of
 from stereocell.read import Dataset
-from stereocell.steps.unit import cut_voxels
+from stereocell.steps.cut_voxels import cut_voxels
 from stereocell.transfer.joint_histogram import to_eight_bits
 
 # Largest tile that is read at the planned level, voxels: about 350 MB while its tree is made

@@ -5,9 +5,12 @@ The rules are those of a build, and the voxels are coarse.
 
 from dataclasses import replace
 
+import numpy as np
+
+from stereocell.filters.denoise import denoise
 from stereocell.isosurface.array_levels import gather_array_evidence
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.model.channel import Appearance
+from stereocell.model.channel import Appearance, TransferFunctions2d
 from stereocell.model.tiling import Box, Tile
 from stereocell.model.volume import Volume
 from stereocell.planning.channel_survey import Chosen, appearance_of
@@ -16,8 +19,23 @@ from stereocell.planning.level_choice import find_level, level_of_tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.survey import is_body
 from stereocell.steps.find_window import Window
-from stereocell.transfer.channel_statistics import find_statistics
+from stereocell.transfer.boundaries import SuggestedShapes
+from stereocell.transfer.channel_statistics import NO_SUGGESTION, find_statistics
+from stereocell.transfer.joint_histogram import (
+    FINE_ROWS,
+    STEEPEST,
+    choose_gradient_max,
+    count_joint,
+    to_eight_bits,
+)
 from stereocell.transfer.windows import parse_window
+
+JOINT_VOXELS = 1_000_000  # about the number of voxels that are counted by value and gradient
+
+
+def load_kernels() -> None:
+    """Load the compiled code that `first_appearance` calls, which takes a third of a second."""
+    denoise(Volume(np.zeros((2, 2, 2), np.float32), (1.0, 1.0, 1.0)), 1.0)
 
 
 def first_appearance(
@@ -38,6 +56,9 @@ def first_appearance(
     statistics = find_statistics(
         coarse.sample.copy(), plan.settings.window, background=found.background, window=given
     )
+    steepest = _find_gradient_max(volume, statistics.window)
+    suggested = SuggestedShapes(TransferFunctions2d(gradient_max=steepest), NO_SUGGESTION.reason)
+    statistics = replace(statistics, suggested=suggested)
     window = Window(statistics, found.counting, None, found.max_shift)
     whole = Tile("r0_c0", Box((0, 0, 0), coarse.voxels.shape))
     # a plan of the coarse voxels: one tile, whose evidence is that of the channel
@@ -48,3 +69,19 @@ def first_appearance(
     fine = replace(plan, tiles=(Tile(whole.id, plan.region),))
     appearance = appearance_of(fine, channel, Chosen(level, 0, {}, iso))
     return appearance, is_body(appearance, statistics)
+
+
+def _find_gradient_max(volume: Volume, window: tuple[float, float]) -> float:
+    """Return the scale of gradients in functions of two dimensions, by the rule of a build.
+
+    Boundaries between materials are not looked for: that takes longer than all else.
+    """
+    every = -(-volume.voxels.size // JOINT_VOXELS)
+    counts = count_joint(
+        to_eight_bits(volume.voxels, window),
+        volume.spacing_um,
+        gradient_max=STEEPEST,
+        rows=FINE_ROWS,
+        every=every,
+    )
+    return choose_gradient_max(counts)

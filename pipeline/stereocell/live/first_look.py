@@ -1,11 +1,14 @@
 """A source as far as it can be shown before it is built: its plan, coarse voxels, a first view."""
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from stereocell.live.coarse_channel import CoarseChannel, OnRead
-from stereocell.live.first_view import Sizes, read_channels, write_first_view
+from stereocell.live.coarse_tiles import Sizes
+from stereocell.live.first_appearance import load_kernels
+from stereocell.live.first_view import read_channels, write_first_view
 from stereocell.planning.input_files import as_asked
 from stereocell.planning.plan import Plan
 from stereocell.planning.settings import Settings
@@ -27,6 +30,8 @@ class FirstLook:
         cls, source: str, settings: Settings, choice: Sequence[str], *, title: str = ""
     ) -> "FirstLook":
         """Settle the plan of a source; the arguments are those of `settle`. Raises as it does."""
+        # while voxels are read and hashed, which leaves the interpreter to others
+        threading.Thread(target=load_kernels, daemon=True).start()
         plan = settle(source, settings, choice, title=title)
         return cls(plan, open_source(as_asked(plan.source, plan.settings.plan)))
 

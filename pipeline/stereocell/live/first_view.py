@@ -6,56 +6,35 @@ same schema, so that every viewer of bundles shows it. Its voxels alone are coar
 
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from math import prod
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.manifest import FILES, MANIFEST
-from stereocell.bundle.tile_part import BundleTile, FileRef, TileChannel, write_file
-from stereocell.bundle.write_volume import write_volume
-from stereocell.isosurface.holder import Holder
-from stereocell.live.coarse_channel import CoarseChannel, OnRead, places_in, read_coarse
+from stereocell.bundle.tile_part import BundleTile, FileRef, write_file
+from stereocell.live.coarse_channel import CoarseChannel, OnRead, read_coarse
 from stereocell.live.coarse_labels import read_coarse_labels
+from stereocell.live.coarse_tiles import Sizes, write_coarse_tiles
 from stereocell.live.first_appearance import first_appearance
 from stereocell.model.channel import DEFAULT_FUNCTION, Appearance
-from stereocell.model.tile_content import APRON
-from stereocell.model.tiling import Tile
-from stereocell.model.world_box import WorldPoint, move_box, world_box
 from stereocell.planning.channels import Channel
 from stereocell.planning.object_tables import appearance_of_labels
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
 from stereocell.storage.processes import cores
-from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.transfer.opacity import SOFT, SURFACE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
-# Largest number of voxels in a first view, all channels together: about 1 MB compressed
+# Largest number of voxels that are kept of a source, all channels together
 VOXELS = 4_000_000
 NOT_BUILT = "its surface is not built yet"
 OBJECTS_NOT_BUILT = "its objects are not built yet"
-Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
-
-
-@dataclass(frozen=True, slots=True)
-class _CoarseVolume:
-    """The place of a tile's coarse volume; see usd.read_volume.ComposedVolume."""
-
-    size: tuple[int, int, int]
-    low: WorldPoint
-    high: WorldPoint
-    matrix: NDArray[np.float64]
-    apron: int = APRON
-    measured: Path | None = None
 
 
 def read_channels(
@@ -102,17 +81,18 @@ def write_first_view(
         found = list(
             pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
         )
-    appearances = [
-        as_surface(composed(appearance), read[channel.voxels_id])
-        for channel, (appearance, _) in zip(plan.channels, found, strict=True)
-    ] or [
+    appearances = [composed(appearance) for appearance, _ in found] or [
         composed(replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT))
         for one in plan.labels
     ]
     shown = _shown(plan)
-    tiles = write_coarse_tiles(shown, root, read, appearances, sizes or {})
+    written = write_coarse_tiles(shown, root, read, appearances, sizes or {})
+    appearances = [
+        as_surface(appearance, read[channel.voxels_id], written.apart)
+        for appearance, channel in zip(appearances, shown.channels, strict=True)
+    ]
     is_cut = plan.opens_cut and any(is_body for _, is_body in found)
-    write_view(shown, root, appearances, tiles, is_cut=is_cut)
+    write_view(shown, root, appearances, written.tiles, is_cut=is_cut)
 
 
 def _shown(plan: Plan) -> Plan:
@@ -121,34 +101,6 @@ def _shown(plan: Plan) -> Plan:
         return plan
     channels = tuple(Channel(one.channel, one.name, one.color) for one in plan.labels)
     return replace(plan, channels=channels, labels=())
-
-
-def write_coarse_tiles(
-    plan: Plan,
-    root: Path,
-    read: Mapping[str, CoarseChannel],
-    appearances: Sequence[ComposedAppearance],
-    sizes: Sizes,
-    holders: Mapping[str, Holder] = MappingProxyType({}),
-) -> list[BundleTile]:
-    """Write the coarse volumes of all tiles into a bundle, and return the tiles.
-
-    sizes    see `write_first_view`
-    holders  what is air in the volumes of a build, by the channel's ID
-    """
-
-    def write(tile: Tile) -> BundleTile:
-        coarse = {
-            channel.id: _coarse_voxels(
-                plan, tile, read[channel.voxels_id], appearance, holders.get(channel.id)
-            )
-            for channel, appearance in zip(plan.channels, appearances, strict=True)
-            if channel.id not in plan.shared_volumes
-        }
-        return _write_tile(plan, root, tile, appearances, coarse, sizes)
-
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(write, plan.tiles))
 
 
 def write_view(
@@ -196,14 +148,18 @@ def write_view(
     write_file(root, MANIFEST, manifest)
 
 
-def as_surface(appearance: ComposedAppearance, coarse: CoarseChannel) -> ComposedAppearance:
+def as_surface(
+    appearance: ComposedAppearance, coarse: CoarseChannel, apart: float
+) -> ComposedAppearance:
     """Return how a channel is drawn until its surface is there.
+
+    apart  see `CoarseTiles`
 
     A channel that opens translucent beside its surface looks like that surface as long as there is
     none: the picture would be much darker than that of the build. Coarse voxels stay translucent:
     their edges are wider than those of a surface, and too bright for one.
     """
-    is_coarse = max(coarse.grid.step) > 1
+    is_coarse = apart * max(coarse.grid.step) > 1
     if is_coarse or appearance.chosen != SOFT or SURFACE not in appearance.transfer_functions:
         return appearance
     return replace(appearance, chosen=SURFACE)
@@ -231,53 +187,3 @@ def composed(appearance: Appearance) -> ComposedAppearance:
         stated,
         appearance.opens,
     )
-
-
-def _coarse_voxels(
-    plan: Plan,
-    tile: Tile,
-    coarse: CoarseChannel,
-    appearance: ComposedAppearance,
-    holder: Holder | None,
-) -> NDArray[np.uint8]:
-    """Return a tile's coarse voxels with the apron, window applied, (z, y, x)."""
-    places = places_in(tile.lattice(plan.region), coarse.grid.step)
-    values = coarse.at(places)
-    if holder is not None:
-        values = holder.left_out_at(values, places)
-    return to_eight_bits(values, appearance.window)
-
-
-def _write_tile(
-    plan: Plan,
-    root: Path,
-    tile: Tile,
-    appearances: Sequence[ComposedAppearance],
-    coarse: Mapping[str, NDArray[np.uint8]],
-    sizes: Sizes,
-) -> BundleTile:
-    lattice = tile.lattice(plan.region)
-    first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])
-    corners = world_box(first, last)
-    low, high = (_point(corner) for corner in corners)
-    matrix = np.array(plan.placement).T  # USD's matrices are for row vectors
-    channels = []
-    for channel, appearance in zip(plan.channels, appearances, strict=True):
-        if channel.id not in coarse:
-            channels.append(TileChannel(channel.id, (), (), (), None, (), None))
-            continue
-        voxels = coarse[channel.id]
-        depth, height, width = voxels.shape
-        volume = _CoarseVolume((width, height, depth), low, high, matrix)
-        entry, files, joint = write_volume(root, tile.id, appearance, volume, voxels)
-        finer = sizes.get(tile.id, volume.size)
-        if prod(finer) > prod(volume.size):
-            entry["finer_size"] = list(finer)
-        channels.append(TileChannel(channel.id, (), (), (), entry, tuple(files), joint))
-    bounds = move_box(*corners, matrix)
-    return BundleTile(tile.id, "mesh", _point(bounds[0]), _point(bounds[1]), tuple(channels))
-
-
-def _point(values: NDArray[np.float64]) -> WorldPoint:
-    x, y, z = (float(n) for n in values)
-    return x, y, z

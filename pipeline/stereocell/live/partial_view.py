@@ -18,13 +18,8 @@ from stereocell.bundle.write import Composed
 from stereocell.bundle.write_tile import write_tile
 from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
-from stereocell.live.first_view import (
-    NOT_BUILT,
-    Sizes,
-    as_surface,
-    write_coarse_tiles,
-    write_view,
-)
+from stereocell.live.coarse_tiles import Sizes, write_coarse_tiles
+from stereocell.live.first_view import NOT_BUILT, as_surface, write_view
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -46,6 +41,7 @@ class _Survey:
     step_m: float
     is_cut: bool
     coarse: Mapping[str, BundleTile]
+    apart: float  # see `CoarseTiles`
 
 
 class PartialView:
@@ -149,7 +145,8 @@ class PartialView:
             composed.appearances,
             composed.step_m,
             plan.opens_cut and any(survey[one.id].is_body for one in plan.channels),
-            {tile.id: tile for tile in coarse},
+            {tile.id: tile for tile in coarse.tiles},
+            coarse.apart,
         )
         return self._survey
 
@@ -181,7 +178,10 @@ class PartialView:
         appearances = survey.appearances
         if len(self._finished) < len(tiles):
             coarse = [self._read[channel.voxels_id] for channel in survey.plan.channels]
-            appearances = tuple(map(as_surface, appearances, coarse))
+            appearances = tuple(
+                as_surface(appearance, one, survey.apart)
+                for appearance, one in zip(appearances, coarse, strict=True)
+            )
         write_view(
             survey.plan,
             root,

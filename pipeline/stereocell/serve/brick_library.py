@@ -27,6 +27,7 @@ from stereocell.formats.voxel_bvh import build
 from stereocell.model.errors import OutputError, SourceError, StereoCellError
 from stereocell.serve.tree_files import BrickFile, TreeFiles, Volume
 from stereocell.storage.json_files import read_json
+from stereocell.transfer.opacity import invisible_below
 
 Texels = Callable[[Volume], NDArray[np.uint8]]  # returns a volume's texels (z, y, x)
 
@@ -149,17 +150,6 @@ def _read_file(bundle: Path, volume: Volume) -> NDArray[np.uint8]:
     return np.asarray(texture[..., 0])
 
 
-def invisible_below(row: NDArray[np.uint8]) -> int:
-    """Return the largest intensity that a row of a table, uint8 (256, 4), leaves at 0; -1: none.
-
-    Texel k is intensity k; between texels opacity is linear, so everything up to the last texel
-    before the first opaque one is invisible.
-    """
-    shown = row[:, 3] > 0
-    first = int(shown.argmax()) if shown.any() else 255
-    return min(first, 255) - 1
-
-
 def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
     manifest = read_manifest(bundle)
     found = {}
@@ -177,7 +167,7 @@ def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
         if channel["transfer_function"] not in names:
             chosen = channel["transfer_function"]
             raise SourceError(f"{MANIFEST}: {chosen} is none of {', '.join(names)}: {REMEDY}")
-        threshold = invisible_below(lut[names.index(channel["transfer_function"])])
+        threshold = invisible_below(lut[names.index(channel["transfer_function"])][:, 3])
         low, high = channel["window"]
         for entry in listed["volumes"]:
             found[entry["tile"], channel["id"]] = Volume(

@@ -19,12 +19,11 @@ from stereocell.model.lattice import Lattice, Step
 from stereocell.model.lattice_field import LatticeField
 from stereocell.model.mesh import Mesh
 from stereocell.model.settings import EIGHT_BITS
-from stereocell.model.tile_content import APRON
-from stereocell.model.tiling import Box
 from stereocell.model.timing import Clock
 from stereocell.model.unit import Cover, Unit
 from stereocell.model.volume import Volume
 from stereocell.steps.closed_copy import close_tile
+from stereocell.steps.cut_voxels import cut_voxels
 from stereocell.textures.ambient_occlusion import find_ambient_visibility
 from stereocell.textures.bake import FineSurface
 from stereocell.textures.lod_chain import make_levels
@@ -250,29 +249,6 @@ class _Shading:
             intensity_window=self._given.painted,
             depth_um=float(self._options.paint_um),
         )
-
-
-def cut_voxels(voxels: NDArray[Any], lattice: Lattice, holder: Holder | None) -> NDArray[Any]:
-    """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat.
-
-    voxels  (z, y, x), of the lattice's window
-    holder  what the surface leaves out, as a table: it is air, so that volume and surface agree
-    """
-    own, region, start = lattice.own, lattice.region, lattice.window.start
-    inside, beyond, firsts, ends = [], [], [], []
-    for a, b, low, high, w in zip(
-        own.start, own.stop, region.start, region.stop, start, strict=True
-    ):
-        first, end = max(a - APRON, low), min(b + APRON, high)
-        firsts.append(first)
-        ends.append(end)
-        inside.append(slice(first - w, end - w))
-        beyond.append((first - (a - APRON), b + APRON - end))
-    kept = voxels[tuple(inside)]
-    if holder is not None:
-        (z0, y0, x0), (z1, y1, x1) = firsts, ends
-        kept = holder.left_out_of(kept, Box((z0, y0, x0), (z1, y1, x1)))
-    return np.pad(kept, beyond, mode="edge")
 
 
 def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:

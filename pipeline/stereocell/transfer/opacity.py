@@ -194,6 +194,17 @@ def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:
     return np.interp(np.linspace(0, 1, size), intensities, opacities).astype(np.float32)
 
 
+def invisible_below(opacities: NDArray[np.uint8]) -> int:
+    """Return the largest intensity, 0..254, that a table of 256 opacities leaves at 0; -1: none.
+
+    Texel k is intensity k; between texels opacity is linear, so everything up to the last texel
+    before the first opaque one is invisible.
+    """
+    shown = opacities > 0
+    first = int(shown.argmax()) if shown.any() else 255
+    return min(first, 255) - 1
+
+
 def _points(*points: tuple[float, float]) -> OpacityPoints:
     """Return the origin and the points, rounded so that text files are the same each time."""
     inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]

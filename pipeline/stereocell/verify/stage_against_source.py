@@ -29,7 +29,8 @@ from stereocell.model.rigid_transform import Matrix
 from stereocell.model.tile_content import APRON
 from stereocell.model.unit import Cover
 from stereocell.steps.build_unit import BuildUnit
-from stereocell.steps.unit import UnitInput, cut_voxels, find_measured, find_surface
+from stereocell.steps.cut_voxels import cut_voxels
+from stereocell.steps.unit import UnitInput, find_measured, find_surface
 from stereocell.steps.unit_files import cover_of, load_lods, load_quality, load_record
 from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.usd.read_levels import ComposedLod, read_lods

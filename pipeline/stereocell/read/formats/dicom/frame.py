@@ -72,6 +72,8 @@ class Frame:
     stated             values that repeat the geometry
     scale              what is stated about the values
     origin             study and series, beside their UIDs
+    start              byte of the file at which its values begin, little-endian, row by row; None:
+                       they have to be decoded, or are a part of an image
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """
@@ -101,3 +103,4 @@ class Frame:
     stated: Stated = Stated()  # noqa: RUF009  (frozen)
     scale: ValueScale = ValueScale()  # noqa: RUF009  (frozen)
     origin: Origin = Origin()  # noqa: RUF009  (frozen)
+    start: int | None = None

@@ -9,13 +9,15 @@ never by its name.
 import hashlib
 import math
 import struct
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 import pydicom
+from pydicom.tag import Tag
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from stereocell.model.modality import MODALITIES
@@ -27,7 +29,8 @@ from stereocell.read.formats.dicom.frame_offsets import (
     has_offsets,
     place_first,
 )
-from stereocell.read.formats.dicom.header_values import find_value, first_item
+from stereocell.read.formats.dicom.header_values import find_number, find_value, first_item
+from stereocell.read.formats.dicom.known_headers import KnownHeaders, digest_of
 from stereocell.read.formats.dicom.modality_table import TABLE_TAGS
 from stereocell.read.formats.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
@@ -43,7 +46,9 @@ from stereocell.read.formats.dicom.stored_values import PLUGINS, is_compressed
 from stereocell.read.formats.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
 from stereocell.read.formats.dicom.ways_out import class_name, way_out
 
-_TAGS: list[Any] = [
+T = TypeVar("T")
+
+_NAMED: list[Any] = [
     "SOPClassUID",
     "Modality",
     "SeriesInstanceUID",
@@ -85,9 +90,22 @@ _TAGS: list[Any] = [
     *SCALE_TAGS,
     *TABLE_TAGS,
 ]
+_TAGS = [Tag(name) for name in _NAMED]  # once: pydicom would look them up for each file
 SEGMENTATION = "of a segmentation"  # how a reason begins
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
+_UNDEFINED = 0xFFFFFFFF  # length of an element that ends with a delimiter
+_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # whose length has four bytes
+# attributes without which pydicom decodes no pixels
+_ASKED = (
+    "Rows",
+    "Columns",
+    "SamplesPerPixel",
+    "PhotometricInterpretation",
+    "BitsAllocated",
+    "BitsStored",
+    "PixelRepresentation",
+)
 # smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
 _SPACINGS = (1e-6, 100.0)
 
@@ -112,10 +130,30 @@ def _lacks_preamble(head: bytes) -> bool:
     return group in (0x0002, 0x0008) and element <= 0x0018
 
 
-def read_frames(path: Path, file: int) -> list[Frame]:
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file whose header is read.
+
+    number  in the order of names
+    known   values of the headers before it
+    key     of its header among them; None: it is compared with no other
+    """
+
+    path: Path
+    number: int
+    known: KnownHeaders
+    key: bytes | None
+
+    def once(self, name: str, find: Callable[[], T]) -> T:
+        """Return a value that all files with such a header share; see `KnownHeaders.once`."""
+        return self.known.once(self.key, name, find)
+
+
+def read_frames(path: Path, file: int, known: KnownHeaders | None = None) -> list[Frame]:
     """Return the planes of a file, from its header alone.
 
-    file  the file's number in the order of names
+    file   the file's number in the order of names
+    known  values of the headers before it, of one folder
 
     Raises NoPlaneError, whose text holds no value of the file.
     """
@@ -130,9 +168,11 @@ def read_frames(path: Path, file: int) -> list[Frame]:
             header = pydicom.dcmread(
                 opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
             )
+            # before a value is asked for, which would be converted
+            own = _File(path, file, known or KnownHeaders(), digest_of(header))
             segmentation = segmentation_of(header)
             try:
-                return _frames(header, opened, path, file, segmentation)
+                return _frames(header, opened, own, segmentation)
             except NoPlaneError as error:
                 raise _explained(error, header, segmentation) from None
     except DICOM_FAULTS:
@@ -156,10 +196,10 @@ def _refuse_deflated(path: Path) -> None:
 
 
 def _frames(
-    header: Any, opened: BinaryIO, path: Path, file: int, segmentation: Segmentation | None
+    header: Any, opened: BinaryIO, file: _File, segmentation: Segmentation | None
 ) -> list[Frame]:
     rows, columns = int(header.get("Rows") or 0), int(header.get("Columns") or 0)
-    size = path.stat().st_size
+    size = file.path.stat().st_size
     if opened.tell() >= size or rows < 1 or columns < 1:
         raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ["MONOCHROME1", "MONOCHROME2"]
@@ -171,10 +211,11 @@ def _frames(
     shared = first_item(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None
-    is_float, held = _check_pixels(header, opened, size, rows * columns, is_mask=is_mask)
+    is_float, held, begin = _check_pixels(header, opened, size, rows * columns, is_mask=is_mask)
     count, count_notes = count_frames(int(header.get("NumberOfFrames") or 1), len(own), held)
     if held is not None and held < count:
         raise NoPlaneError("cut short")
+    frame_bytes = rows * columns * int(header.get("BitsAllocated") or 0) // 8
     place_first(header)
     uids = "SeriesInstanceUID", "SOPInstanceUID", "FrameOfReferenceUID", "ConcatenationUID"
     series, instance, reference, whole = (
@@ -182,10 +223,10 @@ def _frames(
     )
     parts = int(header.get("InConcatenationTotalNumber") or 0)
     if "SOPInstanceUID" not in header:  # then nothing identifies copies
-        instance = f"{file}".encode()
+        instance = f"{file.number}".encode()
     modality = str(header.get("Modality", "")).strip()
     is_quadruped = str(header.get("AnatomicalOrientationType", "")).strip() == "QUADRUPED"
-    origin = origin_of(header)
+    origin = file.once("origin", lambda: origin_of(header))
     offsets = None
     if (own or count > 1) and len(own) != count:
         if has_offsets(header):
@@ -198,16 +239,26 @@ def _frames(
         groups = [own[index] if own else None, shared]
         stack = find_value({}, groups, "FrameContentSequence", "StackID")
         segment = find_value({}, groups, "SegmentIdentificationSequence", "ReferencedSegmentNumber")
-        kind = FrameKind() if is_mask else kind_of(header, groups)
-        stated = stated_of(header, groups, count_notes)
-        scale = ValueScale() if is_mask else scale_of(header, groups)
-        directions, spacing = _axes(header, groups)
-        mosaic = _mosaic(header, path, groups, (rows, columns), directions, spacing)
+        kind = FrameKind() if is_mask else file.once("kind", partial(kind_of, header, groups))
+        stated = replace(
+            file.once("stated", partial(stated_of, header, groups)),
+            location_mm=find_number(header, groups, "", "SliceLocation"),
+            count_notes=count_notes,
+        )
+        scale = ValueScale() if is_mask else file.once("scale", partial(scale_of, header, groups))
+        directions, spacing = file.once("axes", partial(_axes, header, groups))
+        mosaic = _mosaic(header, file.path, groups, (rows, columns), directions, spacing)
         if offsets is not None:
             mosaic = _shifted(mosaic, offsets[index], directions)
+        encoding = file.once(
+            f"encoding, {is_float=}",
+            partial(encoding_of, header, groups, colours == "MONOCHROME1", is_float, scale),
+        )
+        is_whole = (mosaic.rows, mosaic.columns) == (rows, columns)
+        start = begin + index * frame_bytes if begin is not None and is_whole else None
         frames += [
             Frame(
-                file,
+                file.number,
                 index,
                 series,
                 instance,
@@ -220,7 +271,7 @@ def _frames(
                 tile.position,
                 *directions,
                 spacing,
-                encoding_of(header, groups, colours == "MONOCHROME1", is_float, scale),
+                encoding,
                 number,
                 tile.corner,
                 int(segment or 0) if is_mask else 0,
@@ -231,6 +282,7 @@ def _frames(
                 stated,
                 scale,
                 origin,
+                start,
             )
             for number, tile in enumerate(mosaic.tiles)
         ]
@@ -283,16 +335,17 @@ def _kind(header: Any) -> str:
 
 def _check_pixels(
     header: Any, opened: BinaryIO, size: int, pixels: int, *, is_mask: bool
-) -> tuple[bool, int | None]:
-    """Return whether the pixels are floats, and how many whole frames there are.
+) -> tuple[bool, int | None, int | None]:
+    """Return whether the pixels are floats, how many whole frames there are, and where they begin.
 
     opened   stands at the element of the pixels: tag, (VR, 2 bytes,) length
     size     of the file in bytes
     pixels   of a frame
     is_mask  a pixel may be one bit
 
-    The number of compressed frames is None: it takes a decoder. Raises NoPlaneError where the
-    pixels can't be read.
+    The number of compressed frames is None: it takes a decoder. The byte of the file at which
+    frames begin is None where their values are not those of this machine, one after the other.
+    Raises NoPlaneError where the pixels can't be read.
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -307,9 +360,15 @@ def _check_pixels(
     if is_compressed(syntax):
         if syntax not in PLUGINS:
             raise NoPlaneError("compressed in a way that is not read")
-        return is_float, None
+        return is_float, None, None
     begin = opened.tell() - (4 if implicit else 0)
-    return is_float, 8 * min(length, size - begin) // (bits * pixels)
+    is_plain = (
+        little and bits > 1 and length != _UNDEFINED and all(map(header.__contains__, _ASKED))
+    )
+    if not implicit:
+        is_plain = is_plain and head[4:6] in _LONG_VRS
+    held = 8 * min(length, size - begin) // (bits * pixels)
+    return is_float, held, begin if is_plain else None
 
 
 def _numbers(value: Any, count: int, lacking: str = _NO_PLACE) -> tuple[float, ...]:

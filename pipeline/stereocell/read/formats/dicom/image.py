@@ -26,6 +26,7 @@ from stereocell.read.beside import or_one_of
 from stereocell.read.dataset import VoxelArray
 from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.formats.dicom.header import SEGMENTATION, is_dicom, read_frames
+from stereocell.read.formats.dicom.known_headers import KnownHeaders
 from stereocell.read.formats.dicom.label_stack import stack_labels
 from stereocell.read.formats.dicom.lesser_kind import lesser_notes
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
@@ -229,9 +230,10 @@ def _find(location: Location) -> Found:
     frames: dict[bytes, Frame] = {}
     copies: list[tuple[Frame, Frame]] = []
     ways: list[str] = []
+    known = KnownHeaders()
     for index, path in enumerate(paths):
         try:
-            for frame in read_frames(path, index):
+            for frame in read_frames(path, index, known):
                 key = frame.instance + frame.index.to_bytes(4) + frame.tile.to_bytes(4)
                 earlier = frames.setdefault(key, frame)
                 if earlier is not frame:

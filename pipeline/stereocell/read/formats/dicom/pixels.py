@@ -1,6 +1,6 @@
 """Decode the pixels of DICOM frames: codec, bits, sign, MONOCHROME1, rescale, padding."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -17,6 +17,8 @@ from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.formats.dicom.stored_values import open_pixels, stored_values
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.storage.library_errors import raise_if_short
+
+_HALF = 16  # bits: values of so many are unpacked in 32
 
 
 def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
@@ -56,12 +58,7 @@ def decode(
             indices = list(of_index)
             try:
                 with quiet():
-                    dataset, plugin = open_pixels(paths[file])
-                    stored = (
-                        apart.decode(paths[file], indices)
-                        if plugin == "gdcm"
-                        else stored_values(dataset, plugin, indices)
-                    )
+                    stored = _stored(paths[file], [frames[place] for place in wanted], apart)
                     for index, whole in zip(indices, stored, strict=True):
                         for place in of_index[index]:
                             frame, encoding = frames[place], frames[place].encoding
@@ -79,6 +76,30 @@ def decode(
                 ) from None
     padding.fill(planes)
     return planes
+
+
+def _stored(path: Path, frames: Sequence[Frame], apart: GdcmProcess) -> Iterable[NDArray[Any]]:
+    """Return the stored values of a file's frames, each once, in their order.
+
+    The header is read anew for those alone that have to be decoded. Raises DICOM_FAULTS.
+    """
+    by_index = {frame.index: frame for frame in frames}
+    if all(frame.start is not None for frame in frames):
+        return [_plain_values(path, frame) for frame in by_index.values()]
+    dataset, plugin = open_pixels(path)
+    if plugin == "gdcm":
+        return apart.decode(path, list(by_index))
+    return stored_values(dataset, plugin, list(by_index))
+
+
+def _plain_values(path: Path, frame: Frame) -> NDArray[Any]:
+    encoding, count = frame.encoding, frame.rows * frame.columns
+    kind = "f" if encoding.bits == 0 else "i" if encoding.is_signed else "u"
+    dtype = f"<{kind}{encoding.allocated // 8}"
+    values = np.fromfile(path, dtype, count, offset=frame.start or 0)
+    if len(values) < count:  # the file is shorter than when its header was read
+        raise ValueError
+    return values.reshape(frame.rows, frame.columns)
 
 
 def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:
@@ -106,15 +127,17 @@ def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:
 
     values  integers or floats of any shape
 
-    Bits above `high_bit` may hold an overlay; they are cut off. Integers are returned as int64 or
-    in their own dtype.
+    Bits above `high_bit` may hold an overlay; they are cut off. Integers are returned in a
+    signed dtype that holds them, or in their own.
     """
     if encoding.bits == 0:
         return values
     low, high = encoding.stored_range
     shift = encoding.high_bit + 1 - encoding.bits
     if encoding.bits < encoding.allocated or encoding.is_inverted or shift:
-        wide = values.astype(np.int64) >> shift
+        wide: NDArray[np.signedinteger[Any]]
+        wide = values.astype(np.int32 if encoding.allocated <= _HALF else np.int64)
+        wide >>= shift
         wide &= (1 << encoding.bits) - 1
         if encoding.is_signed:
             wide -= (wide >> (encoding.bits - 1)) << encoding.bits

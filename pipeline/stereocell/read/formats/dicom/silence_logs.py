@@ -33,7 +33,8 @@ def quiet() -> Iterator[None]:
     """Suppress all logs and warnings of pydicom and the codecs inside the block."""
     for name in ("pydicom", "pylibjpeg", "openjpeg", "highdicom"):
         logger = logging.getLogger(name)
-        logger.setLevel(logging.CRITICAL + 1)  # permanently, and for all loggers below
+        if logger.level <= logging.CRITICAL:  # each setting empties the caches of all loggers
+            logger.setLevel(logging.CRITICAL + 1)  # permanently, and for all loggers below
         logger.propagate = False
     mode = pydicom_config.settings.reading_validation_mode
     pydicom_config.settings.reading_validation_mode = pydicom_config.IGNORE

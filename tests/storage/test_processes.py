@@ -1,0 +1,48 @@
+"""How many cores this process may use."""
+
+import math
+import os
+from pathlib import Path
+
+import pytest
+from dask.system import cpu_count
+
+from stereocell.storage import processes
+from stereocell.storage.processes import container_cores, cores
+
+
+def test_cores_are_those_that_dask_counts() -> None:
+    assert cores() == cpu_count()
+
+
+def test_affinity_and_quota_both_bound_the_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(8)), raising=False)
+    for quota, expected in ((math.inf, 8), (2.5, 3), (0.5, 1), (16.0, 8)):
+        monkeypatch.setattr(processes, "container_cores", lambda quota=quota: quota)
+        assert cores() == expected
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({}, math.inf),
+        ({"cpu,cpuacct/cpu.cfs_quota_us": "150000"}, 1.5),
+        ({"cpuacct,cpu/cpu.cfs_quota_us": "50000"}, 0.5),
+        ({"cpuacct,cpu/cpu.cfs_quota_us": "-1"}, math.inf),
+        ({"one/two/cpu.max": "200000 100000"}, 2.0),
+        ({"one/two/cpu.max": "max 100000"}, math.inf),
+        ({"one/two/cpu.max": "damaged"}, math.inf),
+    ],
+)
+def test_quota_is_that_of_the_container_s_group(
+    tmp_path: Path, files: dict[str, str], expected: float
+) -> None:
+    group = tmp_path / "proc/self/cgroup"
+    group.parent.mkdir(parents=True)
+    group.write_text("0::/one/two\n")
+    for name, text in files.items():
+        file = tmp_path / "sys/fs/cgroup" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text + "\n")
+        file.with_name("cpu.cfs_period_us").write_text("100000\n")
+    assert container_cores(tmp_path) == expected
