@@ -47,12 +47,12 @@ def container_cores(root: Path = Path("/")) -> float:
     for folder in ("cpuacct,cpu", "cpu,cpuacct"):
         first = root / "sys/fs/cgroup" / folder
         with suppress(OSError, ValueError, ZeroDivisionError):
-            quota = int((first / "cpu.cfs_quota_us").read_text())
-            share = quota / int((first / "cpu.cfs_period_us").read_text())
+            quota = int((first / "cpu.cfs_quota_us").read_text("ascii"))
+            share = quota / int((first / "cpu.cfs_period_us").read_text("ascii"))
             return share if share > 0 else math.inf
     with suppress(OSError, ValueError, ZeroDivisionError):
-        group = (root / "proc/self/cgroup").read_text().strip().rpartition(":")[2].strip("/")
-        words = (root / "sys/fs/cgroup" / group / "cpu.max").read_text().split()
+        group = (root / "proc/self/cgroup").read_text("ascii").strip().rpartition(":")[2].strip("/")
+        words = (root / "sys/fs/cgroup" / group / "cpu.max").read_text("ascii").split()
         quota, period = map(int, words)  # `max` in place of a number: no limit
         return quota / period if quota > 0 else math.inf
     return math.inf
