@@ -143,13 +143,17 @@ class Reader:
         }
 
     def first_view(
-        self, source: Source, choices: Choices, bundle: str
+        self, source: Source, choices: Choices, bundle: str | None
     ) -> tuple[Plan, Mapping[str, CoarseChannel], Resolved]:
-        """Write the first view of a source, and return what the build behind it starts with."""
+        """Write the first view of a source, and return what the build behind it starts with.
+
+        bundle  the folder of the view; None: it is written already
+        """
         if self._look is None:
             self._settle(source, choices)
         assert self._look is not None
-        self._look.write(Path(bundle))
+        if bundle is not None:
+            self._look.write(Path(bundle))
         return self._look.plan, self._look.read(), resolve(source.place)
 
     def _settle(self, source: Source, choices: Choices) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from stereocell.building.out_folder import require_build_or_nothing
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.build_state import WatchedBuild
 from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_look import FirstLook
 from stereocell.live.reading import Reading
@@ -62,7 +63,6 @@ class Live:
     page     the folder of the viewer
     bundle   the folder of the first view, once `first` has a result
     first    done once the first view is written; its error is why that can't be
-    tiles    how many there are
     fine     the tiles that are looked at, read from the source; None: the views stay coarse
     build    the build behind the view; None: it is only looked at
     reading  how much has been read for the first view
@@ -71,9 +71,8 @@ class Live:
     page: Path
     bundle: Path
     first: Future[None]
-    tiles: int
     fine: FineTiles | None
-    build: BuildProcess | None
+    build: WatchedBuild | None
     reading: Reading
 
 
@@ -113,7 +112,7 @@ def show_source(
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
         fine = FineTiles(plan, look.dataset)
-        live = Live(page, scratch / "bundle", first, len(plan.tiles), fine, build, Reading(_print))
+        live = Live(page, scratch / "bundle", first, fine, build, Reading(_print))
 
         def write() -> None:
             try:

@@ -95,7 +95,7 @@ describe("what a person can do", () => {
   it.each([
     [item({ doing: "unpacking" }), ["delete"]],
     [item({}), ["look", "build", "delete"]],
-    [item({ doing: "queued" }), ["cancel", "delete"]],
+    [item({ doing: "queued" }), ["look", "cancel", "delete"]],
     [item({ doing: "building", page: VIEW }), ["open", "pause", "cancel", "delete"]],
     [item({ doing: "paused" }), ["continue", "cancel", "delete"]],
     [item({ doing: "cancelled" }), ["delete"]],

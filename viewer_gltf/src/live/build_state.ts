@@ -1,6 +1,16 @@
 /** What a server reports of the build behind the page. Pure. */
 
-const DOINGS = ["building", "pausing", "paused", "cancelled", "failed", "complete"] as const;
+const DOINGS = [
+  "unbuilt",
+  "queued",
+  "building",
+  "pausing",
+  "paused",
+  "cancelled",
+  "failed",
+  "complete",
+  "deleted",
+] as const;
 
 export type BuildState = Readonly<{
   doing: (typeof DOINGS)[number];
@@ -21,7 +31,11 @@ export type BuildState = Readonly<{
   hasBundle: boolean;
   /** Why the build has failed; or empty. */
   line: string;
+  /** From 1 in a queue of builds; 0: it does not wait there. */
+  place: number;
   mayControl: boolean;
+  /** Whether a build that was cancelled or has failed can begin again. */
+  mayContinue: boolean;
 }>;
 
 /** Reads a message of the server; null: it is none that this page knows. */
@@ -48,7 +62,9 @@ export function readBuildState(text: string): BuildState | null {
     folder: /^g\d+\/$/.test(words("folder")) ? words("folder") : "",
     hasBundle: found.has_bundle === true,
     line: words("line"),
+    place: Math.max(0, number("place")),
     mayControl: found.may_control === true,
+    mayContinue: found.may_continue === true,
   };
 }
 
@@ -67,10 +83,16 @@ const PARTS: Readonly<Record<string, string>> = {
 /** The state in one line, as `Building surfaces: 3 of 10 tiles, about 40 s left`. */
 export function wordsOf(state: BuildState): string {
   switch (state.doing) {
+    case "unbuilt":
+      return "";
+    case "queued":
+      return `Waiting for ${state.place > 1 ? "other builds" : "its build to begin"}.`;
     case "failed":
-      return `The build has stopped: ${state.line}. The picture stays.`;
+      return `The build has stopped${state.line === "" ? "" : `: ${state.line}`}. The picture stays.`;
     case "cancelled":
       return "The build was cancelled. What is finished is kept.";
+    case "deleted":
+      return "It was deleted, or its time is over. The picture stays until this page is closed.";
     case "complete":
       return "Complete: all surfaces are built.";
     case "paused":

@@ -14,9 +14,15 @@ export class ProgressLine {
     { type: "button", textContent: "×", ariaLabel: "Dismiss" },
     { live: "dismiss" },
   );
-  readonly root: HTMLElement;
+  private readonly root: HTMLElement;
+  /** The state at which a person has put the line away; empty: nobody has. */
+  private dismissed = "";
 
-  constructor(onCommand: (command: Command) => void) {
+  /** @param parent holds the line as long as there is something to report */
+  constructor(
+    private readonly parent: HTMLElement,
+    onCommand: (command: Command) => void,
+  ) {
     const button = (command: Command, textContent: string) =>
       element(
         "button",
@@ -28,7 +34,10 @@ export class ProgressLine {
       continue: button("continue", "Continue"),
       cancel: button("cancel", "Cancel"),
     };
-    this.close.onclick = () => this.root.remove();
+    this.close.onclick = () => {
+      this.dismissed = this.root.dataset.doing ?? "";
+      this.root.remove();
+    };
     this.root = element(
       "aside",
       { className: "build", ariaLabel: "The build" },
@@ -48,11 +57,16 @@ export class ProgressLine {
     this.words.title = words; // a narrow window cuts them
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
     this.root.dataset.doing = doing ?? "gone";
+    if (this.dismissed !== this.root.dataset.doing) this.dismissed = "";
+    if (words === "" || this.dismissed !== "") this.root.remove();
+    else if (!this.root.isConnected) this.parent.append(this.root);
     const may = state?.mayControl === true;
+    const isOver = doing === "cancelled" || doing === "failed";
     this.buttons.pause.hidden = !may || doing !== "building";
     this.buttons.continue.hidden =
-      !may || !["paused", "pausing", "cancelled", "failed"].includes(doing ?? "");
-    this.buttons.cancel.hidden = !may || !["building", "pausing", "paused"].includes(doing ?? "");
-    this.close.hidden = doing !== "complete" && doing !== "cancelled";
+      !may || !(isOver ? state?.mayContinue : doing === "paused" || doing === "pausing");
+    this.buttons.cancel.hidden =
+      !may || !["queued", "building", "pausing", "paused"].includes(doing ?? "");
+    this.close.hidden = doing !== "complete" && !isOver && doing !== "deleted";
   }
 }

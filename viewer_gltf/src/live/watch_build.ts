@@ -12,11 +12,10 @@ export function watchBuild(
   show: (base: string) => Promise<void>,
 ): void {
   const views = new ViewFollower(root, shown, show);
-  const line = new ProgressLine((command) => feed.send(command));
-  document.body.append(line.root);
+  const line = new ProgressLine(document.body, (command) => feed.send(command));
   const feed = new BuildFeed(live.socket, (state) => {
     line.update(state);
     if (state !== null) views.take(state);
-    if (state?.doing === "complete") feed.dispose();
+    if (state?.doing === "complete" || state?.doing === "deleted") feed.dispose();
   });
 }
