@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from stereocell import read
-from stereocell.inbox.address import forget_credentials
+from stereocell.inbox.address import read_as_stranger
 from stereocell.inbox.arrange import arrange
 from stereocell.inbox.choices import BRIGHT, DARK, Choices
 from stereocell.inbox.limits import InboxLimits
@@ -63,14 +63,14 @@ class Reader:
         """Turn to an item, once.
 
         upload       the folder that alone may hold an identity
-        is_stranger  use no credentials of this machine
+        is_stranger  use no credentials of this machine, and public hosts alone
         """
         self._upload = Path(upload)
         fetched = self._upload / FETCHED
         fetched.mkdir(exist_ok=True)
         os.environ["TMPDIR"] = tempfile.tempdir = str(fetched)
         if is_stranger:
-            forget_credentials()
+            read_as_stranger()
 
     def arrange(self, limits: InboxLimits) -> str:
         """Return the file or folder to open; see `arrange`."""
