@@ -1,5 +1,7 @@
 /** What the server reports of the inbox: all items, and what this page may do. Pure. */
 
+import { inPageWords } from "./page_words";
+
 const DOINGS = [
   "uploading",
   "unpacking",
@@ -92,7 +94,7 @@ function readItem(found: Found): Item | null {
     id,
     doing,
     title: textOf(found.title),
-    line: textOf(found.line),
+    line: inPageWords(textOf(found.line)),
     bytes: positive(found.bytes, 0),
     total: positive(found.total, 0),
     place: positive(found.place, 0),
