@@ -1,21 +1,9 @@
 /** What the server reports of the inbox: all items, and what this page may do. Pure. */
 
+import { ITEM_STATES } from "../bundle/generated/item_states";
 import { inPageWords } from "./page_words";
 
-const DOINGS = [
-  "uploading",
-  "unpacking",
-  "understanding",
-  "understood",
-  "failed",
-  "queued",
-  "building",
-  "paused",
-  "cancelled",
-  "built",
-] as const;
-
-export type Doing = (typeof DOINGS)[number];
+export type Doing = (typeof ITEM_STATES)[number];
 
 /** One specimen that was handed in: dropped files, or an address. */
 export type Item = Readonly<{
@@ -87,7 +75,7 @@ export function readInboxState(text: string): InboxState | null {
 }
 
 function readItem(found: Found): Item | null {
-  const doing = DOINGS.find((each) => each === found?.doing);
+  const doing = ITEM_STATES.find((each) => each === found?.doing);
   const id = textOf(found?.id);
   if (doing === undefined || !/^[\w-]+$/.test(id)) return null;
   return {

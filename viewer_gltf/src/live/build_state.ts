@@ -1,19 +1,9 @@
 /** What a server reports of the build behind the page. Pure. */
 
-const DOINGS = [
-  "unbuilt",
-  "queued",
-  "building",
-  "pausing",
-  "paused",
-  "cancelled",
-  "failed",
-  "complete",
-  "deleted",
-] as const;
+import { BUILD_STATES } from "../bundle/generated/build_states";
 
 export type BuildState = Readonly<{
-  doing: (typeof DOINGS)[number];
+  doing: (typeof BUILD_STATES)[number];
   /** The running part of the build, as `units`, and how far it is; empty: it has not begun. */
   label: string;
   done: number;
@@ -46,7 +36,7 @@ export function readBuildState(text: string): BuildState | null {
   } catch {
     return null;
   }
-  const doing = DOINGS.find((each) => each === found?.doing);
+  const doing = BUILD_STATES.find((each) => each === found?.doing);
   if (doing === undefined) return null;
   const number = (name: string) => Number(found[name]) || 0;
   const words = (name: string) => String(found[name] ?? "");
