@@ -8,7 +8,7 @@ from stereocell.inbox.choices import Choices
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import Doing, Item
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.preparing import read_first_look, titled
+from stereocell.inbox.preparing import read_first_look
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Build, BuildProcess
 from stereocell.read.addresses.resolved import Resolved
@@ -54,10 +54,15 @@ class Builds:
             with item.reading:
                 if item.is_deleted:
                     return
-                coarse, found = read_first_look(inbox, item, self._page)
-            source = item.place().place
+                coarse, inputs = read_first_look(inbox, item, self._page)
             build = BuildProcess(
-                self._make(source, found, titled(item), item.out, is_stranger=not item.is_local),
+                self._make(
+                    inputs.source,
+                    inputs.found,
+                    inputs.choices,
+                    item.out,
+                    is_stranger=not item.is_local,
+                ),
                 item.out,
             )
             with inbox.changed:

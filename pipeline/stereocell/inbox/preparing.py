@@ -13,14 +13,13 @@ from stereocell.inbox.item import Item
 from stereocell.inbox.item_build import ItemBuild
 from stereocell.inbox.limits import UNPACK_S
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.reader import Source
+from stereocell.inbox.reader import Source, ToBuild
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Coarse
 from stereocell.live.reading import Reading
 from stereocell.live.show_source import Live
 from stereocell.live.view_folders import next_view
 from stereocell.model.errors import StereoCellError
-from stereocell.read.addresses.resolved import Resolved
 from stereocell.storage.json_files import write_json
 
 _FOUND = "found.json"  # below the upload: the place that an address led to
@@ -74,32 +73,35 @@ def source_of(item: Item) -> Source:
     return replace(source, found=content["source"], found_notes=tuple(content["notes"]))
 
 
-def titled(item: Item) -> Choices:
+def _titled(item: Item) -> Choices:
     """Return the choices of an item with the title that it is shown by."""
     return replace(item.choices, title=item.title or item.choices.title)
 
 
-def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, Resolved]:
+def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBuild]:
     """Write the first view of an item, unless it has one of its choices.
 
     page  the folder of the viewer
 
-    Returns the inputs of a build behind it, and the place that the source was found at. The caller
-    holds `reading` of the item. Raises as the reader does.
+    Returns the inputs of the views of a build behind it, and those of that build. The caller holds
+    `reading` of the item. Raises as the reader does.
     """
     item.view_folder.mkdir(parents=True, exist_ok=True)
     round_, bundle = item.round, None if item.page else next_view(item.view_folder)
-    plan, read, found = inbox.reader.run(
-        item, "first_view", source_of(item), titled(item), None if bundle is None else str(bundle)
+    plan, read, inputs = inbox.reader.run(
+        item, "first_view", source_of(item), _titled(item), None if bundle is None else str(bundle)
     )
     if item.address:
-        write_json(item.upload_folder / _FOUND, {"source": found.source, "notes": found.notes})
+        write_json(
+            item.upload_folder / _FOUND,
+            {"source": inputs.found.source, "notes": inputs.found.notes},
+        )
     if bundle is not None:
         with inbox.changed:
             item.live = _live_of(page, bundle, ItemBuild(inbox, item))
             item.looked, item.newest = round_, f"{bundle.name}/"
             inbox.changed.notify_all()
-    return Coarse(plan, read, item.out, item.view_folder, {}), found
+    return Coarse(plan, read, item.out, item.view_folder, {}), inputs
 
 
 def _live_of(page: Path, bundle: Path, build: ItemBuild) -> Live:

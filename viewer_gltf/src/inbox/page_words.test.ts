@@ -30,6 +30,7 @@ it.each([
 });
 
 it.each([
+  ["--labels . builds its objects", "`stereocell build --labels .` builds its objects"],
   ["(--labels NAME builds one)", "(`stereocell build --labels NAME` builds one)"],
   [
     "x.zarr/0 --axes zyx --spacing-um z,y,x reads the voxels",

@@ -34,6 +34,7 @@ const isPlaceholder = (value: string) => value === "" || /^[A-Z]+$/.test(value);
 /** Values that stand after a flag in lines: lengths, numbers, axes, placeholders and a few words. */
 const VALUE = [
   "\\d+=[^\\s`;,)]+",
+  "\\.(?= )",
   "[\\w.?]+(?:,[\\w.?]+)+",
   "\\d+(?:\\.\\d+)?",
   "[xyzct]{2,5}",
