@@ -90,7 +90,7 @@ export class Card {
     this.root.dataset.rests = String(!canChoose(item));
     setText(this.title, titleOf(item, ownName));
     setText(this.summary, understood === null ? "" : summaryOf(understood));
-    setText(this.badge, stateName(item, upload));
+    setText(this.badge, stateName(item, upload, isMoving));
     setText(this.words, wordsOf(item, upload, isMoving, limits));
     setText(this.fault, fault);
     this.fault.hidden = fault === "";

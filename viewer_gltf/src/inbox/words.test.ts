@@ -73,8 +73,9 @@ describe("the words for an item", () => {
     expect(wordsOf(UPLOADING, null, true, LIMITS)).toBe(
       "312 MB of 1.2 GB have arrived from another page.",
     );
-    expect(stateName(UPLOADING, null)).toBe("Unfinished");
-    expect(stateName(UPLOADING, upload({ doing: "lost" }))).toBe("No connection");
+    expect(stateName(UPLOADING, null, false)).toBe("Unfinished");
+    expect(stateName(UPLOADING, null, true)).toBe("Uploading");
+    expect(stateName(UPLOADING, upload({ doing: "lost" }), false)).toBe("No connection");
   });
 
   it("go with a share where something is measured", () => {
