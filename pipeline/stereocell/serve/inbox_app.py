@@ -236,7 +236,7 @@ class InboxApp:
     def _view_of(self, item: Item) -> ASGIApp:
         """Return the application of an item's view. Raises RefusedError where there is none."""
         if not item.has_view:
-            raise RefusedError(404, "it can't be looked at yet")
+            raise RefusedError(404, "it can't be looked at yet: press Look in the inbox")
         known = self._views.get(item.id)
         if known is None or known[0] is not item.live:
             live = item.live
