@@ -62,7 +62,7 @@ VIEWER := viewer_gltf
 VIEWER_READY := $(VIEWER)/node_modules/.ready
 VIEWER_DIST := $(VIEWER)/dist/index.html
 VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/scripts/types.ts $(VIEWER)/*.html $(VIEWER)/*.ts $(VIEWER)/*.json schemas -type f 2>/dev/null) \
-  $(addprefix pipeline/stereocell/,filters/min_max_bricks.py formats/voxel_bvh.py $(patsubst %,transfer/%.py,presets opacity mr_grey channel_statistics))
+  $(addprefix pipeline/stereocell/,filters/min_max_bricks.py formats/voxel_bvh.py inbox/item.py live/build_state.py $(patsubst %,transfer/%.py,presets opacity mr_grey channel_statistics))
 ifndef CHROMIUM
 export CHROMIUM := $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
 endif

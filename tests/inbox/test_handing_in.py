@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from support.server.inbox_client import (
     LIMITS,
     FakeBuilds,
     InboxClient,
+    end_build,
     files_below,
     serving_inbox,
 )
@@ -260,3 +262,36 @@ def test_a_websocket_stays_open_without_news_and_a_silent_sender_is_cut_off(
         ids: list[str] = [item]
         while item in ids:  # it is told, so that it is open
             ids = [one["id"] for one in json.loads(events.recv(timeout=PATIENCE_S))["items"]]
+
+
+def test_of_a_file_of_several_datasets_one_is_read_and_the_others_can_be_chosen(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "several.h5"
+    with h5py.File(path, "w") as file:
+        for name, values in {"label": f_phantom(1) // 7000, "raw": f_phantom(1)}.items():
+            dataset = file.create_dataset(f"volumes/{name}", data=values.astype(np.uint16))
+            dataset.attrs["element_size_um"] = (1.0, 0.5, 0.5)
+    make = FakeBuilds()
+    with serving_inbox(tmp_path, make) as server:
+        client = InboxClient(server.port)
+        item = client.hand_in([("several.h5", path.read_bytes())])
+        assert client.wait(item, "understood", "failed")["line"] == ""
+        understood = client.ask("GET", f"/items/{item}/understood")[1]
+        series = understood["choices"]["series"]
+        assert series["value"] == "2"
+        assert [one["text"].split()[0] for one in series["options"]] == [
+            "/volumes/label",
+            "/volumes/raw",
+        ]
+        assert understood["channels"][0]["has_surface"]
+        assert client.ask("PUT", f"/items/{item}/choices", {"series": "3"})[0] == 202
+        assert client.wait(item, "failed")["line"] == "series: found 3, expected 1 to 2"
+        assert client.ask("PUT", f"/items/{item}/choices", {"series": "2"})[0] == 202
+        client.wait(item, "understood")
+        client.command(item, "build")
+        end_build(server, item)
+        client.wait(item, "built")
+    ((source, choices, _),) = make.asked
+    assert source.endswith("specimen.h5:/volumes/raw")
+    assert choices.series == ""

@@ -222,3 +222,12 @@ def test_the_stream_of_an_upload_is_cut_into_its_files_at_any_byte(tmp_path: Pat
         found = [upload.part(k).read_bytes() for k in range(len(files))]
         assert found == list(files.values())
     assert json.loads((folder / "names.json").read_text())["files"][1] == ["b", 5]
+
+
+@pytest.mark.slow
+def test_an_item_is_read_again_after_its_idle_reader_was_ended(tmp_path: Path, head: bytes) -> None:
+    with serving_inbox(tmp_path, FakeBuilds(), is_near=False) as server:
+        client = InboxClient(server.port)
+        item = hand_in(client, "a.nii", head)
+        server.inbox.reader.stop(server.inbox.find(item))  # as a cancelled build does
+        assert client.command(item, "look")["page"]

@@ -5,11 +5,13 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from stereocell.live.build_process import BuildProcess, Coarse, State
+from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.build_state import State
 from support import fake_build
 
 PATIENCE_S = 120
@@ -23,7 +25,7 @@ def begin(tmp_path: Path) -> Iterator[Callable[[Any], BuildProcess]]:
     def start(build: Any) -> BuildProcess:
         process = BuildProcess(partial(build, tmp_path), tmp_path / "out")
         started.append(process)
-        nothing: Any = None  # there is no view to write
+        nothing: Any = SimpleNamespace(tiles=())  # there is no view to write
         process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path, {}))
         return process
 
@@ -93,7 +95,7 @@ def test_a_line_is_explained_where_someone_knows_better(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(tiles=())
     coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path, {})
     process = BuildProcess(partial(fake_build.steady, tmp_path), tmp_path / "out")
     process.do("cancel")

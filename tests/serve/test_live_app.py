@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from stereocell.live.build_process import BuildProcess, State
+from stereocell.live.build_process import BuildProcess
+from stereocell.live.build_state import State
 from stereocell.live.reading import Reading
 from stereocell.live.show_source import Live
 from stereocell.model.errors import SourceError
-from stereocell.serve import live_app
+from stereocell.serve import live_app, live_socket
 from stereocell.serve.server import BundleServer
 from support.server.requests import ask
 from support.server.running import running
@@ -55,8 +55,9 @@ def live(tmp_path: Path) -> Live:
             (tmp_path / folder / name).write_text(text)
     (tmp_path / "secret").write_text("secret")
     build = FakeBuild(tmp_path / "out")
+    build.set(all_tiles=10)
     return Live(
-        tmp_path / "page", tmp_path / "first", Future(), 10, None, build, Reading(lambda _: None)
+        tmp_path / "page", tmp_path / "first", Future(), None, build, Reading(lambda _: None)
     )
 
 
@@ -112,7 +113,7 @@ def test_the_manifest_is_that_of_the_newest_view_and_names_its_folder(
     build = build_of(live)
     with serving(live) as port:
         assert ask(port, "/g1/manifest.json")[0].status == 404  # not reported by the build
-        build.views["g1"] = tmp_path / "g1"
+        build._views["g1"] = tmp_path / "g1"
         build.set(folder="g1/")
         response, body = ask(port, "/manifest.json")
         assert body == b"second"
@@ -125,7 +126,7 @@ def test_once_there_is_a_bundle_it_is_served_and_views_stay(live: Live, tmp_path
     live.first.set_result(None)
     build = build_of(live)
     with serving(live) as port:
-        build.views["g1"] = tmp_path / "g1"
+        build._views["g1"] = tmp_path / "g1"
         build.set(has_bundle=True, doing="complete")
         response, body = ask(port, "/manifest.json")
         assert body == b"built"
@@ -141,7 +142,7 @@ def test_once_there_is_a_bundle_it_is_served_and_views_stay(live: Live, tmp_path
 )
 def test_no_path_leads_out_of_the_folders(live: Live, tmp_path: Path, path: str) -> None:
     live.first.set_result(None)
-    build_of(live).views["g1"] = tmp_path / "g1"
+    build_of(live)._views["g1"] = tmp_path / "g1"
     with serving(live) as port:
         response, body = ask(port, path)
         assert response.status in (400, 404)
@@ -183,9 +184,11 @@ def test_a_page_whose_frames_are_late_lets_the_build_rest(live: Live) -> None:
 def test_a_phone_that_looks_on_can_not_stop_the_build(
     live: Live, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live_app, "_is_here", lambda _: False)
+    monkeypatch.setattr(live_app, "is_here", lambda _: False)
+    build_of(live).set(doing="failed", line="patient.dcm: cut off")
     with serving(live) as port, connect(f"ws://localhost:{port}/live") as socket:
-        assert json.loads(socket.recv())["may_control"] is False
+        state = json.loads(socket.recv())
+        assert (state["may_control"], state["line"]) == (False, "")
         socket.send("cancel")
         with pytest.raises(ConnectionClosed):
             socket.recv()
@@ -197,9 +200,7 @@ def test_a_phone_that_looks_on_can_not_stop_the_build(
     [("127.0.0.1", True), ("::1", True), ("192.168.1.7", False), ("fe80::1", False), ("", False)],
 )
 def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_here: bool) -> None:
-    nothing: Any = None
-    scope = {"type": "websocket", "client": (address, 50_000)}
-    assert live_app._is_here(WebSocket(scope, nothing, nothing)) is is_here
+    assert live_socket.is_here({"type": "websocket", "client": (address, 50_000)}) is is_here
 
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:

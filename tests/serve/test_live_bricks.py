@@ -211,8 +211,8 @@ def serving(fine: FineTiles, root: Path) -> Iterator[int]:
     (page / "index.html").write_text("<html>")
     build = BuildProcess(lambda _: "", root.parent / "out")
     if root.name != "view":
-        build.views[root.name] = root
-    live = Live(page, root, first, len(fine.plan.tiles), fine, build, Reading(lambda _: None))
+        build._views[root.name] = root
+    live = Live(page, root, first, fine, build, Reading(lambda _: None))
     with running(BundleServer(live.bundle, 0, False, live=live)) as server:
         yield server.port
 

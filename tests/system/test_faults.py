@@ -23,7 +23,7 @@ from stereocell.building import phases
 from stereocell.cli.__main__ import main
 from stereocell.model.errors import SourceError
 from stereocell.storage import location
-from stereocell.storage.http_redirects import checks
+from stereocell.storage.http_hosts import checks
 from stereocell.storage.location import Location
 from support import phantoms
 from support.error_lines import error_line

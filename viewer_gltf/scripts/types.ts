@@ -90,6 +90,20 @@ async function readPresets(): Promise<Readonly<Record<string, string>>> {
   };
 }
 
+/** The states that the server reports, by the generated file: the constant and the module with its `Doing`. */
+const STATES: Readonly<Record<string, readonly [string, string]>> = {
+  "item_states.ts": ["ITEM_STATES", "inbox/item.py"],
+  "build_states.ts": ["BUILD_STATES", "live/build_state.py"],
+};
+
+/** Reads the values of a module's `Doing = Literal[...]`, a line each. */
+async function readStates(name: string, module: string): Promise<string> {
+  const rows = /^Doing = Literal\[\n((?: {4}"\w+",.*\n)+)\]$/m.exec(await readModule(module));
+  if (rows === null) throw new Error(`${module}: found no Doing, expected 'Doing = Literal['`);
+  const values = [...rows[1].matchAll(/^ {4}"(\w+)"/gm)].map((row) => row[1]);
+  return `/** From ${module}. */\nexport const ${name} = ${JSON.stringify(values, null, 2)} as const;\n`;
+}
+
 /** make goes by dates: what is the same stays as old as it is. */
 async function writeChanged(name: string, text: string): Promise<void> {
   const file = new URL(name, OUT);
@@ -102,6 +116,9 @@ for (const [file, numbers] of Object.entries(CONSTANTS)) {
   await writeChanged(file, await readConstants(numbers));
 }
 for (const [name, text] of Object.entries(await readPresets())) await writeChanged(name, text);
+for (const [file, [name, module]] of Object.entries(STATES)) {
+  await writeChanged(file, await readStates(name, module));
+}
 for (const name of ["bundle", "volumes", "transfer2d", "objects"]) {
   const text = await readFile(new URL(`${name}.schema.json`, SCHEMAS), "utf8");
   const schema = toOlderDraft(JSON.parse(text)) as { [key: string]: Json };

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from stereocell.cli.build_behind import RunToLine
 from stereocell.engine.run import Watch
-from stereocell.inbox.address import forget_credentials
+from stereocell.inbox.address import read_as_stranger
 from stereocell.inbox.choices import Choices
 from stereocell.live.build_process import Build
 from stereocell.read.addresses.resolve import remember
@@ -34,7 +34,7 @@ def _build(
     main = import_module("stereocell.cli.__main__")
     run: RunToLine = main.run_to_line
     if is_stranger:
-        forget_credentials()
+        read_as_stranger()
     _be_silent()
     remember(source, found)
     words = ["build", "--out", str(out), "--title", choices.title]

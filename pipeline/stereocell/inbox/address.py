@@ -11,7 +11,11 @@ import re
 from stereocell.inbox.refused import RefusedError
 from stereocell.model.errors import StereoCellError
 from stereocell.read.addresses.dicomweb import TOKEN
-from stereocell.storage.public_hosts import public_numbers_of, split_address
+from stereocell.storage.public_hosts import (
+    connect_to_public_alone,
+    public_numbers_of,
+    split_address,
+)
 
 _BUCKET = re.compile(r"[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]")
 _IP = re.compile(r"[0-9.]+")
@@ -43,10 +47,14 @@ def check_address(address: str, *, is_local: bool) -> str:
     return text
 
 
-def forget_credentials() -> None:
-    """Let this process, and those that it starts, read as a stranger does: without credentials."""
+def read_as_stranger() -> None:
+    """Let this process, and those that it starts, read what a stranger can reach.
+
+    They have no credentials of this machine, and connect to public hosts alone.
+    """
     import fsspec
 
+    connect_to_public_alone()
     os.environ.pop(TOKEN, None)
     for name in [name for name in os.environ if name.startswith(("AWS_", "FSSPEC_"))]:
         del os.environ[name]

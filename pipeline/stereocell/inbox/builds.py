@@ -8,7 +8,7 @@ from stereocell.inbox.choices import Choices
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import Doing, Item
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.preparing import live_of, titled, write_first_look
+from stereocell.inbox.preparing import read_first_look
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Build, BuildProcess
 from stereocell.read.addresses.resolved import Resolved
@@ -30,13 +30,12 @@ class Builds:
 
     def __init__(self, inbox: Inbox, page: Path, make: MakeBuild) -> None:
         self._inbox, self._page, self._make = inbox, page, make
-        self._running: Item | None = None
+        self._running: tuple[Item, BuildProcess] | None = None
 
     def step(self) -> None:
         """Take over how far the running build is, or start the next one."""
-        item = self._running
-        if item is not None:
-            self._follow(item)
+        if self._running is not None:
+            self._follow(*self._running)
         if self._running is None:
             waiting = [one for one in self._inbox.waiting() if one.doing == "queued"]
             if waiting:
@@ -44,8 +43,8 @@ class Builds:
 
     def close(self) -> None:
         """End the running build, which goes on at the next start."""
-        if self._running is not None and self._running.build is not None:
-            self._running.build.close()
+        if self._running is not None:
+            self._running[1].close()
 
     def _start(self, item: Item) -> None:
         inbox = self._inbox
@@ -55,10 +54,15 @@ class Builds:
             with item.reading:
                 if item.is_deleted:
                     return
-                coarse, found, bundle = write_first_look(inbox, item)
-            source = item.place().place
+                coarse, inputs = read_first_look(inbox, item, self._page)
             build = BuildProcess(
-                self._make(source, found, titled(item), item.out, is_stranger=not item.is_local),
+                self._make(
+                    inputs.source,
+                    inputs.found,
+                    inputs.choices,
+                    item.out,
+                    is_stranger=not item.is_local,
+                ),
                 item.out,
             )
             with inbox.changed:
@@ -67,8 +71,7 @@ class Builds:
                 if item.doing == "paused":
                     build.do("pause")
                 item.build = build
-                item.live = live_of(self._page, bundle, len(coarse.plan.tiles), build)
-                self._running = item
+                self._running = item, build
             build.start(coarse)
         except Exception as error:  # whatever a reader meets in a stranger's files
             with inbox.changed:
@@ -76,29 +79,26 @@ class Builds:
                     item.queued = 0
                     inbox.set(item, "failed", line_of(item, error))
 
-    def _follow(self, item: Item) -> None:
-        inbox, build = self._inbox, item.build
-        if build is None or not inbox.is_here(item):
-            self._running = None
-            return
-        state = build.state
-        if state.doing == "complete":
-            build.close()
+    def _follow(self, item: Item, build: BuildProcess) -> None:
+        inbox, state = self._inbox, build.state
+        is_ours = inbox.is_here(item) and item.build is build
+        if not is_ours or item.doing not in ("building", "paused"):  # cancelled, or queued again
+            self._end(build)
+        elif state.doing == "complete":
+            self._end(build)
             if not item.keep_upload:
                 inbox.remove_upload(item)
-            self._end(item)
+            item.queued = 0
             inbox.set(item, "built")
-        elif state.doing in ("failed", "cancelled") or item.doing == "cancelled":
-            line = without_identity(item, state.line)
-            build.close()
-            self._end(item)
-            if item.doing != "cancelled":
-                inbox.set(item, "failed" if state.doing == "failed" else "cancelled", line)
+        elif state.doing == "failed":
+            self._end(build)
+            item.queued = 0
+            inbox.set(item, "failed", without_identity(item, state.line))
         elif (doing := _doing_of(state.doing)) != item.doing:
             inbox.set(item, doing)
 
-    def _end(self, item: Item) -> None:
-        item.queued = 0
+    def _end(self, build: BuildProcess) -> None:
+        build.close()
         self._running = None
 
 

@@ -22,7 +22,7 @@ from stereocell.inbox.queue_file import load_items, save_items
 from stereocell.inbox.readers import ReaderProcess
 from stereocell.inbox.refused import RefusedError
 from stereocell.inbox.upload import Announced, Upload, parse_announced
-from stereocell.live.build_process import COMMANDS
+from stereocell.live.build_state import COMMANDS
 
 _BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
 _WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
@@ -96,6 +96,11 @@ class Inbox:
         with self.changed:
             found = [item for item in self._items.values() if item.doing in _WAITING]
         return sorted(found, key=lambda item: item.queued)
+
+    def place_of(self, item: Item) -> int:
+        """Return the place of an item among the builds that run or wait, from 1; 0: none."""
+        waiting = self.waiting()
+        return 1 + waiting.index(item) if item in waiting else 0
 
     # --- uploads
 
@@ -258,7 +263,7 @@ class Inbox:
             if command == "pause":
                 self._require(item, ("building",), "paused")
                 self.set(item, "paused")
-            elif command == "continue" and item.doing == "cancelled" and item.title:
+            elif command == "continue" and item.doing in ("cancelled", "failed") and item.title:
                 self._enqueue(item)
                 return
             elif command == "continue":
@@ -276,6 +281,9 @@ class Inbox:
     def _enqueue(self, item: Item) -> None:
         if item.upload is None:
             raise RefusedError(409, "its upload is gone: hand it in again")
+        if item.build is not None:
+            item.newest = item.build.state.folder or item.newest
+            item.build = None
         item.queued = 1 + max((one.queued for one in self._items.values()), default=0)
         self.set(item, "queued")
 

@@ -52,6 +52,8 @@ class Item:
     queued    place among the builds that wait, smaller ones first; 0: it does not wait
     is_local  whether it was handed in at this machine
     round     counts the choices, so that an answer to older ones is not taken for one to newer
+    looked    the round of the first view; -1: there is none
+    newest    folder of the newest view but for those of the build, as `g1/`; or empty
     writer    the piece that may write: a later one takes over
     writing   held while bytes are written
     reading   held while its upload is read and what is found in it is written
@@ -73,6 +75,8 @@ class Item:
     live: Live | None = None
     build: BuildProcess | None = None
     round: int = 0
+    looked: int = -1
+    newest: str = ""
     writer: object = None
     writing: threading.Lock = field(default_factory=threading.Lock)
     reading: threading.Lock = field(default_factory=threading.Lock)
@@ -104,9 +108,15 @@ class Item:
         return "" if self.upload is None else self.upload.announced.address
 
     @property
+    def has_view(self) -> bool:
+        """Whether there is a view of it, of older choices perhaps."""
+        return self.live is not None or self.doing == "built"
+
+    @property
     def page(self) -> str:
-        """The address of its page, relative to the inbox; empty: there is nothing to look at."""
-        return f"items/{self.id}/view/" if self.live or self.doing == "built" else ""
+        """The address of its page, relative to the inbox; empty: it has no view of its choices."""
+        is_newest = self.doing == "built" or self.looked == self.round
+        return f"items/{self.id}/view/" if self.has_view and is_newest else ""
 
     def place(self) -> Source:
         """Return the source as a reader takes it; its upload must be there."""

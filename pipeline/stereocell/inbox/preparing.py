@@ -10,15 +10,16 @@ from typing import Any
 from stereocell.inbox.choices import Choices
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import Item
+from stereocell.inbox.item_build import ItemBuild
 from stereocell.inbox.limits import UNPACK_S
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.reader import Source
+from stereocell.inbox.reader import Source, ToBuild
 from stereocell.inbox.refused import RefusedError
-from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.build_process import Coarse
 from stereocell.live.reading import Reading
 from stereocell.live.show_source import Live
+from stereocell.live.view_folders import next_view
 from stereocell.model.errors import StereoCellError
-from stereocell.read.addresses.resolved import Resolved
 from stereocell.storage.json_files import write_json
 
 _FOUND = "found.json"  # below the upload: the place that an address led to
@@ -72,33 +73,42 @@ def source_of(item: Item) -> Source:
     return replace(source, found=content["source"], found_notes=tuple(content["notes"]))
 
 
-def titled(item: Item) -> Choices:
+def _titled(item: Item) -> Choices:
     """Return the choices of an item with the title that it is shown by."""
     return replace(item.choices, title=item.title or item.choices.title)
 
 
-def write_first_look(inbox: Inbox, item: Item) -> tuple[Coarse, Resolved, Path]:
-    """Write the first view of an item, whose `reading` the caller holds.
+def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBuild]:
+    """Write the first view of an item, unless it has one of its choices.
 
-    Returns the inputs of a build behind it, the place that the source was found at, and the folder
-    of the view. Raises as the reader does.
+    page  the folder of the viewer
+
+    Returns the inputs of the views of a build behind it, and those of that build. The caller holds
+    `reading` of the item. Raises as the reader does.
     """
-    shutil.rmtree(item.view_folder, ignore_errors=True)
-    item.view_folder.mkdir(parents=True)
-    bundle = item.view_folder / "bundle"
-    plan, read, found = inbox.reader.run(
-        item, "first_view", source_of(item), titled(item), str(bundle)
+    item.view_folder.mkdir(parents=True, exist_ok=True)
+    round_, bundle = item.round, None if item.page else next_view(item.view_folder)
+    plan, read, inputs = inbox.reader.run(
+        item, "first_view", source_of(item), _titled(item), None if bundle is None else str(bundle)
     )
     if item.address:
-        write_json(item.upload_folder / _FOUND, {"source": found.source, "notes": found.notes})
-    return Coarse(plan, read, item.out, item.view_folder, {}), found, bundle
+        write_json(
+            item.upload_folder / _FOUND,
+            {"source": inputs.found.source, "notes": inputs.found.notes},
+        )
+    if bundle is not None:
+        with inbox.changed:
+            item.live = _live_of(page, bundle, ItemBuild(inbox, item))
+            item.looked, item.newest = round_, f"{bundle.name}/"
+            inbox.changed.notify_all()
+    return Coarse(plan, read, item.out, item.view_folder, {}), inputs
 
 
-def live_of(page: Path, bundle: Path, tiles: int, build: BuildProcess | None) -> Live:
+def _live_of(page: Path, bundle: Path, build: ItemBuild) -> Live:
     """Return a view whose first picture is written."""
     first: Future[None] = Future()
     first.set_result(None)
-    return Live(page, bundle, first, tiles, None, build, Reading(lambda _: None))
+    return Live(page, bundle, first, None, build, Reading(lambda _: None))
 
 
 def look(inbox: Inbox, item: Item, page: Path) -> str:
@@ -120,11 +130,7 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
         if item.is_deleted:
             raise RefusedError(410, "it has been deleted")
         try:
-            coarse, _, bundle = write_first_look(inbox, item)
+            read_first_look(inbox, item, page)
         except StereoCellError as error:
             raise RefusedError(422, line_of(item, error)) from None
-        with inbox.changed:
-            if inbox.is_here(item):
-                item.live = live_of(page, bundle, len(coarse.plan.tiles), None)
-                inbox.changed.notify_all()
     return item.page

@@ -13,14 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from stereocell import read
-from stereocell.inbox.address import forget_credentials
+from stereocell.inbox.address import read_as_stranger
 from stereocell.inbox.arrange import arrange
 from stereocell.inbox.choices import BRIGHT, DARK, Choices
 from stereocell.inbox.limits import InboxLimits
 from stereocell.inbox.middle_slices import ShownChannel, hex_of, write_middle_slices
+from stereocell.inbox.refused import RefusedError
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.first_appearance import first_appearance
 from stereocell.live.first_look import FirstLook
+from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan
 from stereocell.planning.preset_choice import load_for
 from stereocell.planning.settings import NO_PRESET, preset_names
@@ -28,6 +30,7 @@ from stereocell.preview.views import views_of
 from stereocell.read.addresses.resolve import remember, resolve
 from stereocell.read.addresses.resolved import Resolved
 from stereocell.read.known_formats import format_of
+from stereocell.read.series import SeveralDatasetsError
 
 FETCHED = "fetched"  # the folder, in that of an upload, for files that an address leads to
 _MODALITIES = {"PT": "PET", "NM": "SPECT"}  # words for codes of DICOM
@@ -51,6 +54,15 @@ class Source:
     found_notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class ToBuild:
+    """The inputs of the build of an item; see `builds.MakeBuild`."""
+
+    source: str
+    found: Resolved
+    choices: Choices
+
+
 class Reader:
     """Reads one item. It lives in a process of its own; see `storage.child_process`."""
 
@@ -58,19 +70,20 @@ class Reader:
         self._upload = Path()
         self._look: FirstLook | None = None
         self._series: dict[str, list[dict[str, str]]] = {}
+        self._datasets: SeveralDatasetsError | None = None
 
     def begin(self, upload: str, is_stranger: bool) -> None:
         """Turn to an item, once.
 
         upload       the folder that alone may hold an identity
-        is_stranger  use no credentials of this machine
+        is_stranger  use no credentials of this machine, and public hosts alone
         """
         self._upload = Path(upload)
         fetched = self._upload / FETCHED
         fetched.mkdir(exist_ok=True)
         os.environ["TMPDIR"] = tempfile.tempdir = str(fetched)
         if is_stranger:
-            forget_credentials()
+            read_as_stranger()
 
     def arrange(self, limits: InboxLimits) -> str:
         """Return the file or folder to open; see `arrange`."""
@@ -129,7 +142,7 @@ class Reader:
                         {"id": str(i), "name": one.name} for i, one in enumerate(dataset.channels)
                     ],
                 },
-                "series": {"value": choices.series or _series_in(plan), "options": series}
+                "series": {"value": self._chosen_series(choices), "options": series}
                 if len(series) > 1
                 else None,
                 "background": {
@@ -143,28 +156,69 @@ class Reader:
         }
 
     def first_view(
-        self, source: Source, choices: Choices, bundle: str
-    ) -> tuple[Plan, Mapping[str, CoarseChannel], Resolved]:
-        """Write the first view of a source, and return what the build behind it starts with."""
+        self, source: Source, choices: Choices, bundle: str | None
+    ) -> tuple[Plan, Mapping[str, CoarseChannel], ToBuild]:
+        """Write the first view of a source, and return what the build behind it starts with.
+
+        bundle  the folder of the view; None: it is written already
+        """
         if self._look is None:
             self._settle(source, choices)
         assert self._look is not None
-        self._look.write(Path(bundle))
-        return self._look.plan, self._look.read(), resolve(source.place)
+        if bundle is not None:
+            self._look.write(Path(bundle))
+        place, chosen = self._place_of(source, choices)
+        found = resolve(place) if place == source.place else Resolved(place)
+        return self._look.plan, self._look.read(), ToBuild(place, found, chosen)
 
     def _settle(self, source: Source, choices: Choices) -> tuple[str, ...]:
         """Settle the plan; return the notes on the choice of its preset."""
         self._look = None
         if source.found:
             remember(source.place, Resolved(source.found, source.found_notes))
-        flags = {"plan": choices.settings()}
-        settings, choice = load_for(source.place, choices.preset or None, None, flags=flags)
-        look = FirstLook.at(source.place, settings, choice)
+        place, chosen = self._place_of(source, choices)
+        flags = {"plan": chosen.settings()}
+        settings, choice = load_for(place, choices.preset or None, None, flags=flags)
+        look = FirstLook.at(place, settings, choice)
         look.plan = replace(look.plan, name=choices.title or title_of(look.plan))
         self._look = look
         return choice
 
+    def _place_of(self, source: Source, choices: Choices) -> tuple[str, Choices]:
+        """Return the place that is read, and the choices for it.
+
+        A file of several datasets becomes one of them, which the choice of a series names.
+
+        Raises RefusedError where there is no such dataset.
+        """
+        place = resolve(source.place).source
+        if self._datasets is None and format_of(place).has_parts:
+            try:
+                read.open(place)
+            except SeveralDatasetsError as error:
+                self._datasets = error
+            except StereoCellError:  # the next reader reports it
+                pass
+        if self._datasets is None:
+            return source.place, choices
+        count = len(self._datasets.places)
+        index = int(choices.series) - 1 if choices.series else self._datasets.likely
+        if index not in range(count):
+            raise RefusedError(422, f"series: found {index + 1}, expected 1 to {count}")
+        return self._datasets.places[index], replace(choices, series="")
+
+    def _chosen_series(self, choices: Choices) -> str:
+        assert self._look is not None
+        if choices.series:
+            return choices.series
+        if self._datasets is not None:
+            return str(self._datasets.likely + 1)
+        return _series_in(self._look.plan)
+
     def _list_series(self, source: Source) -> list[dict[str, str]]:
+        if self._datasets is not None:
+            labels = enumerate(self._datasets.labels, start=1)
+            return [{"id": str(number), "text": label} for number, label in labels]
         place = resolve(source.place).source
         if place not in self._series:
             has_some = format_of(place).list_series is not None

@@ -18,6 +18,7 @@ class ReaderProcess:
         self._busy = threading.Lock()
         self._child: Child | None = None
         self._item: Item | None = None
+        self._stopped: Child | None = None  # the process that was ended while it may have been idle
         self._is_closed = False
 
     def run(self, item: Item, method: str, *arguments: Any, seconds: float = READ_S) -> Any:
@@ -30,6 +31,8 @@ class ReaderProcess:
         with self._busy:
             if item.is_deleted:
                 raise RefusedError(410, "it has been deleted")
+            if self._child is self._stopped:
+                self._close()
             if self._item is not item:
                 if self._item is not None:
                     self._close()
@@ -61,6 +64,7 @@ class ReaderProcess:
         """End what runs for an item: its caller gets ChildError."""
         child = self._child if self._item is item else None
         if child is not None:
+            self._stopped = child
             child.close()
 
     def release(self) -> None:

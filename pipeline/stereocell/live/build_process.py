@@ -15,12 +15,13 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from stereocell.engine.interrupts import children_ignore_interrupts
 from stereocell.engine.run import Watch, console
 from stereocell.engine.worker_process import end_with_parent
 from stereocell.isosurface.holder import Holder
+from stereocell.live.build_state import Command, State
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.coarse_tiles import Sizes
 from stereocell.live.rests import Rests, lead_group
@@ -30,9 +31,6 @@ from stereocell.planning.plan import Plan
 if TYPE_CHECKING:
     from stereocell.live.partial_view import PartialView
 
-Command = Literal["pause", "continue", "cancel"]
-COMMANDS: tuple[Command, ...] = ("pause", "continue", "cancel")
-Doing = Literal["building", "pausing", "paused", "cancelled", "failed", "complete"]
 # builds, and is watched; returns the line of an error, empty where there is none
 Build = Callable[[Watch], str]
 
@@ -50,31 +48,6 @@ _TELLING = 0.15  # share of a build from which its pace tells when it ends: it s
 _NICE = 10  # of 19, the lowest priority
 _END_S = 15  # s that a cancelled build has to remove what is half written
 _KILLED = "the build was stopped from outside"
-
-
-@dataclass(frozen=True, slots=True)
-class State:
-    """The state of a build, which the server sends to the page.
-
-    label, done, total  its running tasks
-    tiles               how many tiles have their surfaces
-    share               how much of the build is done, 0..1
-    left_s              s until its end; None: not known yet
-    folder              of the newest view, as `g2/`; empty: the first view is the newest
-    has_bundle          whether OUT/bundle is whole, which then is the newest view
-    line                why it has failed; or empty
-    """
-
-    doing: Doing = "building"
-    label: str = ""
-    done: int = 0
-    total: int = 0
-    tiles: int = 0
-    share: float = 0.0
-    left_s: float | None = None
-    folder: str = ""
-    has_bundle: bool = False
-    line: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,10 +108,9 @@ class BuildProcess:
         """The newest state."""
         return self._state
 
-    @property
-    def views(self) -> dict[str, Path]:
-        """The folder of each view by its name, as `g2`, but for the first view."""
-        return self._views
+    def find_view(self, name: str) -> Path | None:
+        """Return the folder of a later view by its name; None: there is no such view."""
+        return self._views.get(name)
 
     @property
     def bundle(self) -> Path | None:
@@ -161,7 +133,7 @@ class BuildProcess:
         if self._coarse is None or doing == "cancelled" or self._is_closed:
             return
         self._pipe = None  # nobody hears the process before
-        self._set(doing=doing, line="", left_s=None)
+        self._set(doing=doing, line="", left_s=None, all_tiles=len(self._coarse.plan.tiles))
         if self._process is not None:
             self._process.join(_END_S)  # it has ended, or is about to
         context = multiprocessing.get_context("spawn")
@@ -265,9 +237,7 @@ class BuildProcess:
                 self._paused_s += told
 
     def _fail(self, line: str) -> None:
-        line = self._explain(line)
-        self._set(doing="failed", line=line, left_s=None)
-        console.print(f"the build has stopped: {line}", markup=False, soft_wrap=True)
+        self._set(doing="failed", line=self._explain(line), left_s=None)
 
     def _take(self, task: _Task) -> None:
         share = _share_of(task)

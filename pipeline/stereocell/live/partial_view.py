@@ -20,6 +20,7 @@ from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.coarse_tiles import Sizes, write_coarse_tiles
 from stereocell.live.first_view import NOT_BUILT, as_surface, write_view
+from stereocell.live.view_folders import next_view
 from stereocell.model.tiling import Tile
 from stereocell.planning.plan import Plan
 from stereocell.planning.stage_steps import stage_step, stage_tile_step
@@ -71,7 +72,6 @@ class PartialView:
         self._rest, self._next_s, self._has_news = rest, 0.0, False
         self._survey: _Survey | None = None
         self._finished: dict[str, BundleTile] = {}
-        self._views = 0
         self.holders: Mapping[str, Holder] = {}  # what a build leaves out, by the channel's ID
 
     @property
@@ -125,6 +125,8 @@ class PartialView:
         survey = read_survey(out_folder)
         found = {channel.id: survey[channel.id].holder for channel in plan.channels}
         self.holders = {name: holder for name, holder in found.items() if holder is not None}
+        for left in ("coarse", "parts", "stage"):  # by a build that was ended; its views stay
+            shutil.rmtree(self._scratch / left, ignore_errors=True)
         steps = unit_steps(plan, survey)
         units = {name: out_folder.unit_dir(name, step.key) for name, step in steps.items()}
         folder = self._stage.parent
@@ -168,8 +170,7 @@ class PartialView:
         return replace(coarse, channels=tuple(merged))
 
     def _write(self, survey: _Survey) -> Path:
-        self._views += 1
-        root = self._scratch / f"g{self._views}"
+        root = next_view(self._scratch)
         tiles = [self._finished.get(tile.id, survey.coarse[tile.id]) for tile in survey.plan.tiles]
         for tile in tiles:
             for ref in (ref for channel in tile.channels for ref in channel.files):

@@ -13,6 +13,7 @@ from pathlib import Path
 from stereocell.engine.run import Watch, console
 from stereocell.live.build_place import finished_bundle, free_place, require_place
 from stereocell.live.build_process import BuildProcess, Coarse
+from stereocell.live.build_state import WatchedBuild
 from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_look import FirstLook
 from stereocell.live.reading import Reading
@@ -62,7 +63,6 @@ class Live:
     page     the folder of the viewer
     bundle   the folder of the first view, once `first` has a result
     first    done once the first view is written; its error is why that can't be
-    tiles    how many there are
     fine     the tiles that are looked at, read from the source; None: the views stay coarse
     build    the build behind the view; None: it is only looked at
     reading  how much has been read for the first view
@@ -71,9 +71,8 @@ class Live:
     page: Path
     bundle: Path
     first: Future[None]
-    tiles: int
     fine: FineTiles | None
-    build: BuildProcess | None
+    build: WatchedBuild | None
     reading: Reading
 
 
@@ -117,12 +116,12 @@ def show_source(
             )
             behind.serve_bundle(bundle)
             return
-        build = BuildProcess(partial(behind.build, out), out, lambda line: fine.change() or line)
+        build = BuildProcess(partial(behind.build, out), out, partial(_why_stopped, fine))
     else:
         print_notes(plan)  # a build prints them itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
-        live = Live(page, scratch / "bundle", first, len(plan.tiles), fine, build, Reading(_print))
+        live = Live(page, scratch / "bundle", first, fine, build, Reading(_print))
 
         def write() -> None:
             try:
@@ -151,6 +150,13 @@ def show_source(
                 build.close()
         if first.done():
             first.result()
+
+
+def _why_stopped(fine: FineTiles, line: str) -> str:
+    """Return, and print, why a build has stopped, which has ended with a line."""
+    why = fine.change() or line
+    _print(f"the build has stopped: {why}")
+    return why
 
 
 def _print(line: str) -> None:

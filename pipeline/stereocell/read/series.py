@@ -1,12 +1,12 @@
 """Which image of a file of several is read: the one that `--series` names, else the largest."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from stereocell.model.counted import counted
-from stereocell.model.errors import UsageError
+from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.image import Image
 from stereocell.read.spacing import Triple
 from stereocell.storage.location import Location
@@ -112,8 +112,44 @@ def choose(where: str, candidates: Sequence[Candidate], series: int) -> tuple[in
     return largest, (note,) if count > 1 else ()
 
 
+class SeveralDatasetsError(SourceError):
+    """A source has several datasets, and none of them was named.
+
+    places  sources that name one each
+    labels  a line for each of them
+    likely  the index of the one that is likely an image
+    """
+
+    def __init__(
+        self, line: str, places: Sequence[str], labels: Sequence[str], likely: int
+    ) -> None:
+        super().__init__(line)
+        self.places, self.labels, self.likely = tuple(places), tuple(labels), likely
+
+    @classmethod
+    def of(
+        cls, where: str, source: str, labels: Mapping[str, str], *, most: int
+    ) -> "SeveralDatasetsError":
+        """Return the error for datasets, by the endings that name them, as `:/raw`.
+
+        where   the file, or the part of it that was named
+        source  the file
+        labels  a line for each dataset; at most `most` of them are shown
+        """
+        endings = list(labels)
+        likely = likely_image(endings)
+        listed = ", ".join(list(labels.values())[:most]) + ", ..." * (len(labels) > most)
+        line = f"{where}: several datasets: found {listed}, expected one, as {source}{likely}"
+        places = [f"{source}{ending}" for ending in endings]
+        return cls(line, places, list(labels.values()), endings.index(likely))
+
+    def __reduce__(self) -> tuple[type["SeveralDatasetsError"], tuple[Any, ...]]:
+        """Pickle all arguments: a process of its own may raise it."""
+        return type(self), (str(self), self.places, self.labels, self.likely)
+
+
 def likely_image(paths: Sequence[str]) -> str:
-    """Return the first path whose name is not that of a label map, as an example for messages."""
+    """Return the first path whose name is not that of a label map."""
     images = (path for path in paths if not any(word in path.lower() for word in _LABELS))
     return next(images, paths[0])
 

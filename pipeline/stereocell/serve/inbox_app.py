@@ -3,6 +3,7 @@
     /                       the page; its files lie beside it
     /items, /items/ID/...   see docs/inbox.md
     /items/ID/view/         the viewer of an item, as `stereocell view` serves it at /
+    /items/ID/view/live     a websocket with the state of its build; see serve/live_app.py
     /events                 a websocket with the state of all items, whenever it changes
 
 Each refusal is one line of JSON, {"line": "..."}. The session of a viewer may only look.
@@ -25,6 +26,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import ID, Item
+from stereocell.inbox.item_build import ItemBuild
 from stereocell.inbox.lines import status_of
 from stereocell.inbox.preparing import look
 from stereocell.inbox.refused import RefusedError
@@ -36,6 +38,7 @@ from stereocell.serve.bundle_app import built_app
 from stereocell.serve.headers import policy
 from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
 from stereocell.serve.live_app import LiveApp
+from stereocell.serve.live_socket import LiveSocket
 from stereocell.serve.static_files import BundleFiles
 
 _PAGE = "inbox.html"
@@ -59,6 +62,7 @@ class InboxApp:
         self._files = BundleFiles(page, {})
         self._views: dict[str, tuple[Live | None, ASGIApp]] = {}
         self._sockets = 0
+        self._live = LiveSocket(_may_upload)
         self._handlers: dict[tuple[str, str], Handler] = {
             ("PATCH", "bytes"): self._take_piece,
             ("HEAD", "bytes"): self._tell_offset,
@@ -78,7 +82,9 @@ class InboxApp:
             await self._live_through(receive, send)
             return
         item_id, slash, rest = _split(scope["path"])
-        if item_id and (rest == "view" or rest.startswith("view/")):
+        if scope["type"] == "websocket" and rest == "view/live":
+            await self._watch(item_id, WebSocket(scope, receive, send))
+        elif item_id and (rest == "view" or rest.startswith("view/")):
             await self._show(item_id, rest, scope, receive, send)
         elif scope["type"] == "websocket":
             socket = WebSocket(scope, receive, send)
@@ -116,7 +122,7 @@ class InboxApp:
     def _find(self, item_id: str, scope: Scope) -> Item:
         """Return the item of a path, if the client may see it. Raises RefusedError."""
         item = self._inbox.find(item_id)
-        if not _may_upload(scope) and not item.page:
+        if not _may_upload(scope) and not item.has_view:
             raise RefusedError(404, "no such item, or it can't be looked at yet")
         return item
 
@@ -200,6 +206,15 @@ class InboxApp:
 
     # --- views
 
+    async def _watch(self, item_id: str, socket: WebSocket) -> None:
+        """Talk to one page that watches the build of an item."""
+        try:
+            item = self._find(item_id, socket.scope)
+        except RefusedError:
+            await self._live.refuse(socket)
+            return
+        await self._live.talk(socket, ItemBuild(self._inbox, item))
+
     async def _show(
         self, item_id: str, rest: str, scope: Scope, receive: Receive, send: Send
     ) -> None:
@@ -220,8 +235,8 @@ class InboxApp:
 
     def _view_of(self, item: Item) -> ASGIApp:
         """Return the application of an item's view. Raises RefusedError where there is none."""
-        if not item.page:
-            raise RefusedError(404, "it can't be looked at yet")
+        if not item.has_view:
+            raise RefusedError(404, "it can't be looked at yet: press Look in the inbox")
         known = self._views.get(item.id)
         if known is None or known[0] is not item.live:
             live = item.live

@@ -10,47 +10,39 @@
     /live           a websocket with the state of the build, which takes commands
 
 The server sends the state whenever it changes, at most four times a second: see
-`build_process.State`.
+`live/build_state.py`.
 
     {"doing": "building", "label": "units", "done": 3, "total": 20, "tiles": 1, "share": 0.41,
-     "left_s": 38.5, "folder": "g1/", "has_bundle": false, "line": "", "all_tiles": 10,
-     "may_control": true}
+     "left_s": 38.5, "folder": "g1/", "has_bundle": false, "line": "", "all_tiles": 10, "place": 0,
+     "may_continue": true, "may_control": true}
 
 A client may send `pause`, `continue` or `cancel` as text, and `late`: its frames are late, and the
 build rests for a moment. Only clients of this machine may: on the LAN a phone that looks on can't
-stop the build.
+stop the build, and gets no line of an error. Of an inbox those may that may upload.
 """
 
 import asyncio
-import json
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import asdict
-from functools import partial
-from ipaddress import ip_address
 from pathlib import Path
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from stereocell.bundle.manifest import MANIFEST
-from stereocell.live.build_process import COMMANDS
 from stereocell.live.show_source import Live
 from stereocell.model.errors import StereoCellError
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.brick_session import BrickEndpoint
 from stereocell.serve.headers import policy
-from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
 from stereocell.serve.live_bricks import LiveBricks
+from stereocell.serve.live_socket import LiveSocket, is_here
 from stereocell.serve.static_files import BundleFiles, bricks_header
 
 LIVE_HEADER = "Stereocell-Live"
-LATE = "late"
 READING = "stereocell-reading"  # on the page: `/reading` tells how far the first view is
 _NOW = {"Cache-Control": "no-store", **policy("application/json")}
-_EACH_S = 0.25  # s between two states
 
 
 class LiveApp:
@@ -64,7 +56,7 @@ class LiveApp:
             None if live.fine is None else LiveBricks(live.fine, live.bundle.parent, live.build)
         )
         self._endpoint = BrickEndpoint()
-        self._sockets = 0
+        self._socket = LiveSocket(is_here)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or talk over a websocket."""
@@ -89,7 +81,7 @@ class LiveApp:
         """Return the folder of the later view that a path names; None: it names none."""
         if self._build is None:
             return None
-        return self._build.views.get(_first_of(scope["path"]))
+        return self._build.find_view(_first_of(scope["path"]))
 
     async def _send_bricks(self, socket: WebSocket) -> None:
         """Talk to one client that asks for the bricks of a view."""
@@ -123,7 +115,7 @@ class LiveApp:
             path = path.partition("/")[2]
         elif path == MANIFEST and self._build is not None:
             newest = self._build.state.folder
-            folder = self._build.views.get(newest.rstrip("/"))
+            folder = self._build.find_view(newest.rstrip("/"))
             headers = {LIVE_HEADER: f"version=1; folder={newest if folder else ''}"}
         answer = await self._file(folder, path, headers, scope, receive)
         await answer(scope, receive, send)
@@ -154,43 +146,10 @@ class LiveApp:
         return await BundleFiles(folder or self._live.bundle, headers).answer(request)
 
     async def _talk(self, socket: WebSocket) -> None:
-        """Send one client the state until it leaves, and take its commands."""
         if self._build is None:
             await socket.close()
-            return
-        build = self._build
-        await socket.accept()
-        if self._sockets >= min(MAX_CONNECTIONS, 4 * CLIENT_SOCKETS):
-            await socket.close(1013, "too many connections are open, try again later")
-            return
-        self._sockets += 1
-        may_control = _is_here(socket)
-        heard = asyncio.ensure_future(socket.receive_text())
-        sent = ""
-        try:
-            while True:
-                about = {"all_tiles": self._live.tiles, "may_control": may_control}
-                text = json.dumps({**asdict(build.state), **about})
-                if text != sent:
-                    await socket.send_text(text)
-                    sent = text
-                await asyncio.wait([heard], timeout=_EACH_S)
-                if not heard.done():
-                    continue
-                command = heard.result()
-                known = next((one for one in COMMANDS if one == command), None)
-                if (known is None and command != LATE) or not may_control:
-                    await socket.close(
-                        1008, "expected pause, continue, cancel or late, of this machine"
-                    )
-                    return
-                await asyncio.to_thread(build.rest if known is None else partial(build.do, known))
-                heard = asyncio.ensure_future(socket.receive_text())
-        except (WebSocketDisconnect, KeyError, RuntimeError):  # it has left, or has sent bytes
-            pass
-        finally:
-            self._sockets -= 1
-            heard.cancel()
+        else:
+            await self._socket.talk(socket, self._build)
 
     async def _live_through(self, receive: Receive, send: Send) -> None:
         while True:
@@ -206,10 +165,3 @@ class LiveApp:
 def _first_of(path: str) -> str:
     """Return the first part of a path, as `g1`."""
     return path.lstrip("/").partition("/")[0]
-
-
-def _is_here(socket: WebSocket) -> bool:
-    """Return whether a client is on this machine."""
-    with suppress(ValueError):
-        return socket.client is not None and ip_address(socket.client.host).is_loopback
-    return False

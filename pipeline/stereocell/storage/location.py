@@ -16,6 +16,7 @@ from fsspec.exceptions import FSTimeoutError
 
 from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.storage.first_bytes import HEAD_BYTES
+from stereocell.storage.public_hosts import connects_to_public_alone
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
 ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
@@ -115,11 +116,12 @@ class Location:
         requests it, else anonymous ones, which public buckets accept. The endpoint comes from the
         usual environment (`AWS_ENDPOINT_URL`); timeouts of `FSSPEC_S3` take precedence.
         http: a timeout for silence only; else aiohttp stops any transfer after 5 minutes. Redirects
-        of public hosts into a private network are refused.
+        of public hosts into a private network are refused, and so is each connection into one in a
+        process that reads for a stranger.
         """
         scheme = urlsplit(self.source).scheme
         if scheme in ("http", "https"):
-            return {"client_kwargs": _http_client()}
+            return _http_options()
         if scheme not in ("s3", "s3a"):
             return {}
         configured = fsspec.config.conf.get("s3", {})
@@ -137,17 +139,18 @@ class Location:
         return {**options, "anon": not signed}
 
 
-def _http_client() -> dict[str, Any]:
+def _http_options() -> dict[str, Any]:
     """Return aiohttp's settings: ours, overridden by the user's for fsspec."""
     from aiohttp import ClientTimeout  # slow to import, and only the network needs it
 
-    from stereocell.storage.http_redirects import checks
+    from stereocell.storage.http_hosts import checks, public_client
 
     waits = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
     configured: dict[str, Any] = {}
     for protocol in ("http", "https"):  # fsspec has one file system for both
         configured |= fsspec.config.conf.get(protocol, {}).get("client_kwargs", {})
-    return {"timeout": waits, "trace_configs": checks(), **configured}
+    options = {"client_kwargs": {"timeout": waits, "trace_configs": checks(), **configured}}
+    return {**options, "get_client": public_client} if connects_to_public_alone() else options
 
 
 def does_answer(files: AbstractFileSystem, path: str) -> bool:

@@ -4,10 +4,16 @@ A person may name any host, also one in the own network. An answer of a server i
 redirect or a link in it could point at a machine that only this one reaches (a router, the metadata
 service of a cloud). Such an address is refused. The message shows it, so that a person who trusts
 it can name it.
+
+A process that reads for a stranger connects to public hosts alone: see `connect_to_public_alone`.
+There each connection is checked by the IP address that it goes to, since a name may have another
+one each time it is looked up.
 """
 
 import ipaddress
+import os
 import socket
+from collections.abc import Iterable
 from urllib.parse import SplitResult, urljoin, urlsplit
 
 from stereocell.model.errors import SourceError
@@ -15,6 +21,7 @@ from stereocell.model.errors import SourceError
 # addresses that hold one of IPv4: a gateway translates the former, and old systems the latter
 _OF_IPV4 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("::/96"))
 _PORTS = {"http": 80, "https": 443}
+_ALONE = "STEREOCELL_PUBLIC_HOSTS"  # in the environment, which a process hands on to its workers
 
 
 def split_address(address: str) -> SplitResult:
@@ -65,7 +72,26 @@ def numbers_of(address: str) -> list[str]:
         raise SourceError(
             f"{host:.200}: no such host, or no network, expected a host that is up"
         ) from None
-    return [str(one[4][0]) for one in found]
+    numbers = [str(one[4][0]) for one in found]
+    if connects_to_public_alone():
+        require_public_numbers(host, numbers)
+    return numbers
+
+
+def connect_to_public_alone() -> None:
+    """Let this process, and those that it starts, open no address in a private network."""
+    os.environ[_ALONE] = "alone"
+
+
+def connects_to_public_alone() -> bool:
+    """Return whether this process opens public addresses alone."""
+    return os.environ.get(_ALONE) == "alone"
+
+
+def require_public_numbers(host: str, numbers: Iterable[str]) -> None:
+    """Raise SourceError where one of a host's IP addresses is not public."""
+    if not all(map(is_public, numbers)):
+        raise SourceError(f"{host:.200}: leads into a private network, expected a public address")
 
 
 def public_numbers_of(address: str) -> list[str]:

@@ -52,7 +52,11 @@ export function actionsOf(item: Item, situation: Situation): readonly Action[] {
         ? [LOOK, { ...BUILD, label: "Build again" }, DELETE]
         : [DELETE];
     case "queued":
-      return [...open, { name: "cancel", label: "Leave the queue" }, DELETE];
+      return [
+        ...(open.length > 0 ? open : [LOOK]),
+        { name: "cancel", label: "Leave the queue" },
+        DELETE,
+      ];
     case "building":
       return [
         ...open,

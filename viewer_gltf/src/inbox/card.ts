@@ -4,6 +4,7 @@ import { type Action, type ActionName, actionsOf, canChoose, type Situation } fr
 import { factsView, notesView, slicesView, summaryOf } from "./facts";
 import type { Item, Limits } from "./inbox_state";
 import type { Choices } from "./server";
+import { NAMES } from "./setting_names";
 import { isSameForm, settingsForm } from "./settings_form";
 import { spacingField } from "./spacing_field";
 import type { Understood } from "./understood";
@@ -89,7 +90,7 @@ export class Card {
     this.root.dataset.rests = String(!canChoose(item));
     setText(this.title, titleOf(item, ownName));
     setText(this.summary, understood === null ? "" : summaryOf(understood));
-    setText(this.badge, stateName(item, upload));
+    setText(this.badge, stateName(item, upload, isMoving));
     setText(this.words, wordsOf(item, upload, isMoving, limits));
     setText(this.fault, fault);
     this.fault.hidden = fault === "";
@@ -110,7 +111,7 @@ export class Card {
     const go = element("button", { type: "submit", className: "primary", textContent: "Go on" });
     const form = element(
       "form",
-      { className: "question", noValidate: true, ariaLabel: "Voxel spacing" },
+      { className: "question", noValidate: true, ariaLabel: NAMES.spacing },
       {},
       field.root,
       element("div", { className: "buttons" }, {}, go),

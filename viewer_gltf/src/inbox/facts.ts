@@ -1,6 +1,8 @@
 /** The part of a card that shows an image: its middle slices with contours, its facts, its notes. */
 import { element } from "../dom/element";
 import { sizeText } from "../math/length_text";
+import { inPageWords } from "./page_words";
+import { NAMES } from "./setting_names";
 import type { Understood } from "./understood";
 import { bytesText } from "./words";
 
@@ -49,7 +51,7 @@ export function factsOf(understood: Understood): readonly (readonly [string, str
     ["Format", [format, modality].filter((part) => part !== "").join(", ")],
     ["Size", understood.sizeText],
     ["Voxels", voxels.join(" × ")],
-    ["Voxel spacing", spacingText(spacing_um)],
+    [NAMES.spacing, spacingText(spacing_um)],
     ["When built", built.filter((part) => part !== "").join(", ")],
   ];
   return rows.filter(([, text]) => text !== "");
@@ -66,7 +68,7 @@ export function spacingText(spacing_um: readonly number[]): string {
 /** Notes on contradictions and assumptions, the first few at once. */
 export function notesView({ notes }: Understood): HTMLElement {
   const listOf = (some: readonly string[]) =>
-    element("ul", {}, {}, ...some.map((note) => element("li", { textContent: note })));
+    element("ul", {}, {}, ...some.map((note) => element("li", { textContent: inPageWords(note) })));
   const SHOWN = 3;
   const view = element("div", { className: "notes" });
   view.hidden = notes.length === 0;

@@ -295,7 +295,8 @@ export class InboxPage {
     };
     memory.card.update({ item, situation, understood, limits, ownName, isBusy, fault, reading });
     const words = wordsOf(item, upload, situation.isMoving, limits);
-    this.sayAloud(item, memory, `${titleOf(item, ownName)}: ${words}`);
+    const state = stateName(item, upload, situation.isMoving);
+    this.sayAloud(item, memory, state, `${titleOf(item, ownName)}: ${words}`);
     return memory.card.root;
   }
 
@@ -316,8 +317,7 @@ export class InboxPage {
   }
 
   /** Reports a new state to screen readers, and no progress. */
-  private sayAloud(item: Item, memory: Memory, words: string): void {
-    const state = stateName(item, this.progressOf(item));
+  private sayAloud(item: Item, memory: Memory, state: string, words: string): void {
     if (state === memory.said) return;
     const isFirst = memory.said === "";
     memory.said = state;

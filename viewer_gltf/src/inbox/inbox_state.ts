@@ -1,19 +1,9 @@
 /** What the server reports of the inbox: all items, and what this page may do. Pure. */
 
-const DOINGS = [
-  "uploading",
-  "unpacking",
-  "understanding",
-  "understood",
-  "failed",
-  "queued",
-  "building",
-  "paused",
-  "cancelled",
-  "built",
-] as const;
+import { ITEM_STATES } from "../bundle/generated/item_states";
+import { inPageWords } from "./page_words";
 
-export type Doing = (typeof DOINGS)[number];
+export type Doing = (typeof ITEM_STATES)[number];
 
 /** One specimen that was handed in: dropped files, or an address. */
 export type Item = Readonly<{
@@ -85,14 +75,14 @@ export function readInboxState(text: string): InboxState | null {
 }
 
 function readItem(found: Found): Item | null {
-  const doing = DOINGS.find((each) => each === found?.doing);
+  const doing = ITEM_STATES.find((each) => each === found?.doing);
   const id = textOf(found?.id);
   if (doing === undefined || !/^[\w-]+$/.test(id)) return null;
   return {
     id,
     doing,
     title: textOf(found.title),
-    line: textOf(found.line),
+    line: inPageWords(textOf(found.line)),
     bytes: positive(found.bytes, 0),
     total: positive(found.total, 0),
     place: positive(found.place, 0),

@@ -1,6 +1,7 @@
 /** The server's side of the inbox: one function for each request. */
 
 import { pageOf, positive, textOf } from "./inbox_state";
+import { inPageWords } from "./page_words";
 import { readUnderstood, type Understood } from "./understood";
 import type { NamedFile, UploadFiles } from "./upload_files";
 
@@ -151,7 +152,7 @@ async function lineOf(answer: Response): Promise<string> {
   const text = await answer.text().catch(() => "");
   try {
     const { line } = JSON.parse(text) as { line?: unknown };
-    if (typeof line === "string" && line !== "") return line;
+    if (typeof line === "string" && line !== "") return inPageWords(line);
   } catch {
     // the server's lowest layer answers with a line of plain text, and a proxy with a page
   }

@@ -1,27 +1,9 @@
 /** The few settings of an item that matter. Each change is handed on at once. */
 import { element } from "../dom/element";
 import type { Choices } from "./server";
+import { BACKGROUNDS, NAMES, PRESETS } from "./setting_names";
 import { spacingField } from "./spacing_field";
 import type { Channel, Choice, Option, Understood } from "./understood";
-
-/** Presets in a person's words; the others stand under their own names. */
-const PRESETS: Readonly<Record<string, string>> = {
-  cycif: "Confocal or light sheet, thin sections",
-  lightsheet: "Light sheet, cleared tissue",
-  em: "Electron microscopy",
-  mri: "MRI",
-  ct: "CT: skin",
-  "ct-bone": "CT: bones",
-  pet: "PET or SPECT",
-  vessels: "Vessels (angiogram)",
-  none: "Another kind",
-};
-
-/** What lies around the structures of an image. */
-const BACKGROUNDS: Readonly<Record<string, string>> = {
-  dark: "Dark",
-  bright: "Bright",
-};
 
 type OnChange = (choices: Choices) => void;
 
@@ -36,11 +18,11 @@ export function settingsForm(
   form.onsubmit = (event) => event.preventDefault(); // the page's policy lets no form be sent
   form.append(
     titleField(understood, name, onChange),
-    ...select("preset", "Kind of image", preset && named(preset, PRESETS), name, onChange),
-    ...select("series", "Series", series, name, onChange),
+    ...select("preset", NAMES.preset, preset && named(preset, PRESETS), name, onChange),
+    ...select("series", NAMES.series, series, name, onChange),
     ...select(
       "background",
-      "Background",
+      NAMES.background,
       background && named(background, BACKGROUNDS),
       name,
       onChange,
@@ -77,7 +59,7 @@ function titleField({ title }: Understood, name: string, onChange: OnChange): HT
     if (text === "") input.value = title;
     else if (text !== title) onChange({ title: text });
   };
-  return field("Title", input);
+  return field(NAMES.title, input);
 }
 
 /** Nothing where there is nothing to choose. */
@@ -129,7 +111,7 @@ function channelField(
   };
   for (const { box } of boxes) box.onchange = () => change(box);
   const labels = boxes.map(({ label }) => label);
-  const legend = element("legend", { textContent: "Channels" });
+  const legend = element("legend", { textContent: NAMES.channels });
   const list = element("div", { className: "channel-list" }, {}, ...labels);
   return [element("fieldset", {}, {}, legend, list)];
 }

@@ -1,5 +1,6 @@
 /** Three fields for the voxel spacing, which some files state wrongly or not at all. */
 import { element } from "../dom/element";
+import { NAMES } from "./setting_names";
 
 export type SpacingField = Readonly<{
   root: HTMLElement;
@@ -46,7 +47,7 @@ export function spacingField(
         autocomplete: "off",
         id: `${name}-spacing-${axis}`,
         value: known === undefined ? "" : String(Number((known / unit.um).toPrecision(DIGITS))),
-        ariaLabel: `Voxel spacing along ${axis}, in ${unit.name}`,
+        ariaLabel: `${NAMES.spacing} along ${axis}, in ${unit.name}`,
       },
       { setting: `spacing-${axis}` },
     );
@@ -77,7 +78,7 @@ export function spacingField(
       input,
     ),
   );
-  const legend = element("legend", { textContent: `Voxel spacing, ${unit.sign}` });
+  const legend = element("legend", { textContent: `${NAMES.spacing}, ${unit.sign}` });
   const row = element("div", { className: "axes" }, {}, ...fields);
   return { root: element("fieldset", { className: "spacing" }, {}, legend, row), read };
 }

@@ -56,7 +56,7 @@ export function readUnderstood(answer: unknown): Understood {
     modality: textOf(found.modality),
     voxels: numbersOf(found.size_voxels),
     spacing_um: numbersOf(found.spacing_um),
-    sizeText: textOf(found.size_text).replaceAll(" x ", " × "),
+    sizeText: textOf(found.size_text).replaceAll(" x ", " × ").replace(/ um$/, " µm"),
     tiles: positive(found.tiles, 0),
     bytesEstimate: positive(found.bytes_estimate, 0),
     notes: textsOf(found.notes),

@@ -73,8 +73,9 @@ describe("the words for an item", () => {
     expect(wordsOf(UPLOADING, null, true, LIMITS)).toBe(
       "312 MB of 1.2 GB have arrived from another page.",
     );
-    expect(stateName(UPLOADING, null)).toBe("Unfinished");
-    expect(stateName(UPLOADING, upload({ doing: "lost" }))).toBe("No connection");
+    expect(stateName(UPLOADING, null, false)).toBe("Unfinished");
+    expect(stateName(UPLOADING, null, true)).toBe("Uploading");
+    expect(stateName(UPLOADING, upload({ doing: "lost" }), false)).toBe("No connection");
   });
 
   it("go with a share where something is measured", () => {
@@ -95,7 +96,7 @@ describe("what a person can do", () => {
   it.each([
     [item({ doing: "unpacking" }), ["delete"]],
     [item({}), ["look", "build", "delete"]],
-    [item({ doing: "queued" }), ["cancel", "delete"]],
+    [item({ doing: "queued" }), ["look", "cancel", "delete"]],
     [item({ doing: "building", page: VIEW }), ["open", "pause", "cancel", "delete"]],
     [item({ doing: "paused" }), ["continue", "cancel", "delete"]],
     [item({ doing: "cancelled" }), ["delete"]],

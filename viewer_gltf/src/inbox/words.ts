@@ -13,10 +13,14 @@ export function bytesText(bytes: number): string {
   return `${value.toFixed(digits)} ${UNITS[power]}`;
 }
 
-/** A word or two for the state, as a badge shows it. */
-export function stateName({ doing, place }: Item, upload: Progress | null): string {
+/** A word or two for the state, as a badge shows it. The arguments are those of `wordsOf`. */
+export function stateName(
+  { doing, place }: Item,
+  upload: Progress | null,
+  isMoving: boolean,
+): string {
   if (doing === "uploading") {
-    if (upload === null) return "Unfinished";
+    if (upload === null) return isMoving ? "Uploading" : "Unfinished";
     const names = { lost: "No connection", waiting: "Waiting", refused: "Stopped" };
     return names[upload.doing as keyof typeof names] ?? "Uploading";
   }

@@ -13,7 +13,9 @@ const SENT = {
   folder: "g1/",
   has_bundle: false,
   line: "",
+  place: 0,
   may_control: true,
+  may_continue: true,
 };
 const read = (changes: Partial<Record<keyof typeof SENT, unknown>> = {}) =>
   readBuildState(JSON.stringify({ ...SENT, ...changes })) as BuildState;
@@ -22,7 +24,8 @@ describe("a message of the server", () => {
   it("is read by its names", () => {
     expect(read()).toEqual({
       ...{ doing: "building", label: "units", done: 3, total: 20, tiles: 1, allTiles: 10 },
-      ...{ share: 0.41, left_s: 38.5, folder: "g1/", hasBundle: false, line: "", mayControl: true },
+      ...{ share: 0.41, left_s: 38.5, folder: "g1/", hasBundle: false, line: "", place: 0 },
+      ...{ mayControl: true, mayContinue: true },
     });
   });
 
@@ -56,7 +59,11 @@ describe("the words for a build", () => {
       { doing: "failed", line: "a.tif: cut off" },
       "The build has stopped: a.tif: cut off. The picture stays.",
     ],
+    [{ doing: "failed" }, "The build has stopped. The picture stays."],
     [{ doing: "complete" }, "Complete: all surfaces are built."],
+    [{ doing: "unbuilt" }, ""],
+    [{ doing: "queued", place: 3 }, "Waiting for other builds."],
+    [{ doing: "queued", place: 1 }, "Waiting for its build to begin."],
   ])("%o are %s", (changes, words) => {
     expect(wordsOf(read(changes), true)).toBe(words);
   });

@@ -1,9 +1,9 @@
 /** What a server reports of the build behind the page. Pure. */
 
-const DOINGS = ["building", "pausing", "paused", "cancelled", "failed", "complete"] as const;
+import { BUILD_STATES } from "../bundle/generated/build_states";
 
 export type BuildState = Readonly<{
-  doing: (typeof DOINGS)[number];
+  doing: (typeof BUILD_STATES)[number];
   /** The running part of the build, as `units`, and how far it is; empty: it has not begun. */
   label: string;
   done: number;
@@ -21,7 +21,11 @@ export type BuildState = Readonly<{
   hasBundle: boolean;
   /** Why the build has failed; or empty. */
   line: string;
+  /** From 1 in a queue of builds; 0: it does not wait there. */
+  place: number;
   mayControl: boolean;
+  /** Whether a build that was cancelled or has failed can begin again. */
+  mayContinue: boolean;
 }>;
 
 /** Reads a message of the server; null: it is none that this page knows. */
@@ -32,7 +36,7 @@ export function readBuildState(text: string): BuildState | null {
   } catch {
     return null;
   }
-  const doing = DOINGS.find((each) => each === found?.doing);
+  const doing = BUILD_STATES.find((each) => each === found?.doing);
   if (doing === undefined) return null;
   const number = (name: string) => Number(found[name]) || 0;
   const words = (name: string) => String(found[name] ?? "");
@@ -48,7 +52,9 @@ export function readBuildState(text: string): BuildState | null {
     folder: /^g\d+\/$/.test(words("folder")) ? words("folder") : "",
     hasBundle: found.has_bundle === true,
     line: words("line"),
+    place: Math.max(0, number("place")),
     mayControl: found.may_control === true,
+    mayContinue: found.may_continue === true,
   };
 }
 
@@ -71,10 +77,16 @@ const PARTS: Readonly<Record<string, string>> = {
  */
 export function wordsOf(state: BuildState, isShown: boolean): string {
   switch (state.doing) {
+    case "unbuilt":
+      return "";
+    case "queued":
+      return `Waiting for ${state.place > 1 ? "other builds" : "its build to begin"}.`;
     case "failed":
-      return `The build has stopped: ${state.line}. The picture stays.`;
+      return `The build has stopped${state.line === "" ? "" : `: ${state.line}`}. The picture stays.`;
     case "cancelled":
       return "The build was cancelled. What is finished is kept.";
+    case "deleted":
+      return "It was deleted, or its time is over. The picture stays until this page is closed.";
     case "complete":
       return isShown ? "Complete: all surfaces are built." : "Built. Opening the surfaces.";
     case "paused":

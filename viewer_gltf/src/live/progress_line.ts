@@ -14,11 +14,15 @@ export class ProgressLine {
     { type: "button", textContent: "×", ariaLabel: "Dismiss" },
     { live: "dismiss" },
   );
-  readonly root: HTMLElement;
-  /** What the line said when it was dismissed; it comes back once it says something else. */
-  private dismissed: string | null = null;
+  private readonly root: HTMLElement;
+  /** The state at which a person has put the line away; empty: nobody has. */
+  private dismissed = "";
 
-  constructor(onCommand: (command: Command) => void) {
+  /** @param parent holds the line as long as there is something to report */
+  constructor(
+    private readonly parent: HTMLElement,
+    onCommand: (command: Command) => void,
+  ) {
     const button = (command: Command, textContent: string) =>
       element(
         "button",
@@ -31,8 +35,8 @@ export class ProgressLine {
       cancel: button("cancel", "Cancel"),
     };
     this.close.onclick = () => {
-      this.dismissed = this.words.textContent;
-      this.root.hidden = true;
+      this.dismissed = this.root.dataset.doing ?? "";
+      this.root.remove();
     };
     this.root = element(
       "aside",
@@ -58,13 +62,17 @@ export class ProgressLine {
     if (state !== null) this.fill.style.width = `${100 * state.share}%`;
     this.root.dataset.doing = doing ?? "gone";
     const isFocused = this.root.contains(document.activeElement);
+    if (this.dismissed !== this.root.dataset.doing) this.dismissed = "";
+    if (words === "" || this.dismissed !== "") this.root.remove();
+    else if (!this.root.isConnected) this.parent.append(this.root);
     const may = state?.mayControl === true;
+    const isOver = doing === "cancelled" || doing === "failed";
     this.buttons.pause.hidden = !may || doing !== "building";
     this.buttons.continue.hidden =
-      !may || !["paused", "pausing", "cancelled", "failed"].includes(doing ?? "");
-    this.buttons.cancel.hidden = !may || !["building", "pausing", "paused"].includes(doing ?? "");
-    const isOver = (doing === "complete" && isShown) || doing === "cancelled" || doing === "failed";
-    this.close.hidden = !isOver;
+      !may || !(isOver ? state?.mayContinue : doing === "paused" || doing === "pausing");
+    this.buttons.cancel.hidden =
+      !may || !["queued", "building", "pausing", "paused"].includes(doing ?? "");
+    this.close.hidden = !(isOver || doing === "deleted" || (doing === "complete" && isShown));
     this.keepFocus(isFocused);
   }
 

@@ -20,14 +20,13 @@ export type BuildWatch = Readonly<{
 
 export function watchBuild({ live, root, shown, show, isLate }: BuildWatch): void {
   const views = new ViewFollower(root, shown, show, () => line.update(now, views.isNewestShown));
-  const line = new ProgressLine((command) => feed.send(command));
-  document.body.append(line.root);
+  const line = new ProgressLine(document.body, (command) => feed.send(command));
   let now: BuildState | null = null;
   const feed = new BuildFeed(live.socket, (state) => {
     now = state;
     if (state !== null) views.take(state);
     line.update(state, views.isNewestShown);
-    if (state?.doing !== "complete") return;
+    if (state?.doing !== "complete" && state?.doing !== "deleted") return;
     clearInterval(looks);
     feed.dispose();
   });

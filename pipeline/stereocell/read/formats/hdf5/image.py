@@ -22,7 +22,7 @@ from stereocell.read.formats.hdf5.spacing import settle_spacing
 from stereocell.read.formats.hdf5.values import value_attributes
 from stereocell.read.hdf5_file.tree import Hdf5Array, Hdf5Tree
 from stereocell.read.image import MAX_CHANNELS, Image
-from stereocell.read.series import likely_image
+from stereocell.read.series import SeveralDatasetsError
 from stereocell.read.spacing import grid_of
 from stereocell.read.value_scale import scaled
 from stereocell.storage.library_errors import one_line
@@ -100,9 +100,6 @@ def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:
             f"{tree.where}{':' + key if key else ''}: found no volume{held}, "
             "expected a dataset of numbers with at least three axes longer than 1"
         )
-    listed = ", ".join(f"{one.name} {one.shape} {one.dtype}" for one in found[:_LISTED])
-    more = ", ..." if len(found) > _LISTED else ""
-    raise SourceError(
-        f"{tree.where}{':' + key if key else ''}: several datasets: found {listed}{more}, "
-        f"expected one, as {tree.where}:{likely_image([str(one.name) for one in found])}"
-    )
+    labels = {f":{one.name}": f"{one.name} {one.shape} {one.dtype}" for one in found}
+    where = f"{tree.where}{':' + key if key else ''}"
+    raise SeveralDatasetsError.of(where, tree.where, labels, most=_LISTED)

@@ -32,7 +32,7 @@ from stereocell.read.formats.n5.blocks import unpack_block
 from stereocell.read.formats.n5.files import N5Files
 from stereocell.read.formats.n5.statements import named_axes, order_note, settle_spacing
 from stereocell.read.image import MAX_CHANNELS, Image
-from stereocell.read.series import likely_image
+from stereocell.read.series import SeveralDatasetsError
 from stereocell.read.spacing import Triple
 from stereocell.read.stated_numbers import numbers_of
 from stereocell.read.value_scale import ignored_note, scaled
@@ -146,10 +146,8 @@ def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str 
             f"{files.where}: no dataset: found no attributes.json with `dimensions`, expected one, "
             "or s0 below"
         )
-    raise SourceError(
-        f"{files.where}: several datasets: found {', '.join(found[:_LISTED])}, expected one, as "
-        f"{files.where}/{likely_image(found)}"
-    )
+    labels = {f"/{path}": path for path in found}
+    raise SeveralDatasetsError.of(files.where, files.where, labels, most=_LISTED)
 
 
 def _levels(files: N5Files, path: str) -> list[tuple[str, Mapping[str, Any]]]:

@@ -30,7 +30,7 @@ from stereocell.read.formats.ome_zarr.store import (
 )
 from stereocell.read.formats.ome_zarr.values import with_values
 from stereocell.read.image import MAX_CHANNELS, Image
-from stereocell.read.series import likely_image
+from stereocell.read.series import SeveralDatasetsError, likely_image
 from stereocell.read.spacing import grid_of
 from stereocell.read.statements import Statement, Trust
 from stereocell.read.value_scale import ignored_note
@@ -130,10 +130,14 @@ def read_only_array(
         return replace(image, notes=(note, *image.notes))
     listed = ", ".join(f"{path} {node.shape}" for path, node in found[:_LISTED])
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
-    raise SourceError(
+    paths = [path for path, _ in found]
+    likely = likely_image(paths)
+    raise SeveralDatasetsError(
         f"{location.shown}: no multiscales: found {listed}{more}; expected the attribute "
-        f"`multiscales` of an image, or one array, as {location.shown}/"
-        f"{likely_image([path for path, _ in found])}"
+        f"`multiscales` of an image, or one array, as {location.shown}/{likely}",
+        [f"{location.source}/{path}" for path in paths],
+        [f"{path} {node.shape}" for path, node in found],
+        paths.index(likely),
     )
 
 

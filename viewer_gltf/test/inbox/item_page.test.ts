@@ -1,0 +1,78 @@
+/** The page that *Look* has opened follows the build that is begun in the page of the inbox. */
+import { existsSync } from "node:fs";
+import { mkdtemp, rm } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import type { Page } from "playwright-core";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { ViewerPage } from "../support/browser/page";
+import { STEREOCELL, serve } from "../support/browser/served";
+import { openBrowser } from "../support/browser/shared_browser";
+import { describeInChromium } from "../support/browser/skip";
+import { drop } from "../support/inbox/drop";
+import { askPython } from "../support/python";
+
+describeInChromium("an image that is looked at before it is built", () => {
+  if (!existsSync(STEREOCELL)) {
+    it.skip("needs Python");
+    return;
+  }
+  let folder: string;
+  let server: Awaited<ReturnType<typeof serve>>;
+  let browser: Awaited<ReturnType<typeof openBrowser>>;
+  let page: Page;
+  const faults: string[] = [];
+
+  beforeAll(async () => {
+    folder = await mkdtemp(join(tmpdir(), "stereocell-item-"));
+    await askPython("live_source", [join(folder, "f.ome.tif")], "");
+    server = await serve(`--inbox=${join(folder, "box")}`);
+    const viewport = { width: 500, height: 360 };
+    browser = await openBrowser({ viewport, serviceWorkers: "block" });
+    page = await browser.context.newPage();
+    page.on("pageerror", ({ message }) => faults.push(message));
+    await page.goto(server.address);
+    await page.getByText("Nothing is here yet").waitFor();
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    await server?.stop("SIGTERM");
+    await rm(folder, { recursive: true, force: true, maxRetries: 5 });
+  });
+
+  const card = () => page.locator("article").first();
+  const state = () => card().locator("[data-state]").textContent();
+
+  it("gets its surfaces and its bundle without a reload, and commands its build from there", async () => {
+    await drop(page, join(folder, "f.ome.tif"));
+    await expect.poll(state).toBe("Ready");
+    const [tab] = await Promise.all([
+      page.waitForEvent("popup"),
+      card().locator('[data-action="look"]').click(),
+    ]);
+    tab.on("pageerror", ({ message }) => faults.push(message));
+    await tab.waitForFunction(() => window.stereocell !== undefined);
+    await tab.evaluate(() => window.stereocell?.ready);
+    const viewer = new ViewerPage(tab);
+    const hasSurface = async () => (await viewer.snapshot()).state.channels[0].hasSurface;
+    const words = () => tab.locator('[data-live="words"]').textContent();
+    expect(await hasSurface()).toBe(false);
+    expect(await tab.locator(".build").count()).toBe(0); // nobody has asked for a build
+
+    await card().locator('[data-action="build"]').click();
+    await tab.locator('[data-live="pause"]').click();
+    await expect.poll(state).toBe("Paused");
+    await expect.poll(words).toMatch(/^Paused/);
+    await tab.locator('[data-live="cancel"]').click();
+    await expect.poll(state).toBe("Cancelled");
+    await tab.locator('[data-live="continue"]').click();
+    await expect.poll(words).toMatch(/^Complete/);
+    await expect.poll(state).toBe("Built");
+    await expect.poll(hasSurface).toBe(true);
+
+    await tab.locator('[data-live="dismiss"]').click();
+    expect(await tab.locator(".build").count()).toBe(0);
+    expect(faults).toEqual([]);
+  });
+});
