@@ -101,7 +101,7 @@ function linkOf(
   if (state.isolated !== null) parts.only = encodeURIComponent(state.isolated);
   const { box, plane } = state.clip;
   if (box !== null) parts.box = written([...box.min, ...box.max]);
-  if (plane !== null && plane !== start.clip.plane) {
+  if (plane !== null && JSON.stringify(plane) !== JSON.stringify(start.clip.plane)) {
     parts.cut = written([...plane.normal, plane.offset_um]);
   }
   if (plane === null && start.clip.plane !== null) parts.cut = UNCUT;

@@ -85,12 +85,22 @@ describeInChromium("a source that is built behind the page", () => {
     await viewer.recolor(state.channels[0].id, "#33cc66");
     await viewer.drag([200, 200], [260, 230]);
     const before = await look();
+    // a picture of another size is cleared when it takes the place of the one before
+    const sizes = page.waitForFunction(() => {
+      const stages = ["#app.preparing", "#app:not(.preparing)"].map((app) =>
+        document.querySelector(`${app}:has(.panel) .stage`),
+      );
+      const found = stages.map((stage) => [stage?.clientWidth, stage?.clientHeight].join());
+      return stages.includes(null) ? null : found;
+    });
     const focused = () =>
       page.evaluate(() => (document.activeElement as HTMLElement).dataset.live ?? "");
     await page.locator('[data-live="continue"]').focus();
     await page.keyboard.press("Enter");
     await expect.poll(words).not.toMatch(/^Paus/);
     expect(await focused()).toBe("pause");
+    const [newer, older] = (await (await sizes).jsonValue()) ?? [];
+    expect(newer).toBe(older);
     await expect.poll(words).toMatch(/^Complete/);
     await expect.poll(hasSurface).toBe(true);
     await viewer.settled();
