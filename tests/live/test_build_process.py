@@ -84,7 +84,7 @@ def test_a_build_that_is_continued_at_once_is_not_failed_by_the_end_of_the_one_b
 
 @pytest.mark.slow
 def test_a_line_is_explained_where_someone_knows_better(tmp_path: Path) -> None:
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(tiles=())
     build = partial(fake_build.refused, tmp_path)
     process = BuildProcess(build, tmp_path / "out", lambda line: f"explained: {line}")
     process.start(Coarse(nothing, {}, tmp_path / "out", tmp_path, {}))

@@ -7,6 +7,7 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from stereocell.live.build_process import BuildProcess, Coarse
@@ -14,7 +15,7 @@ from support import fake_build
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(tiles=())
     process = BuildProcess(partial(fake_build.endless, folder), folder / "out")
     process.start(Coarse(nothing, {}, folder / "out", folder, {}))
     while not (folder / "build").exists():
