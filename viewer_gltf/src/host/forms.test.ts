@@ -46,6 +46,18 @@ describe("the forms of a specimen", () => {
     expect(formsOf(ofFirst, late).shownPoints(STATE)).toBeNull();
   });
 
+  it("are the box of a channel without a surface, and what its volume shows while it is built", () => {
+    const point: Vec3 = [1, -2, 3];
+    const channels = STATE.channels.map((each) => ({ ...each, hasSurface: false }));
+    const built = { ...STATE, channels };
+    const form: Form = { outline: () => [point] };
+    expect(formsOf(form).shownPoints(built)).not.toContainEqual(point);
+    const tiles = STATE.tiles.map((tile) => ({ ...tile, isUnfinished: true as const }));
+    const [only, ...others] = formsOf(form).shownPoints({ ...built, tiles }) ?? [];
+    expect(only).toEqual(point);
+    expect(others.every((each) => `${each}` === `${point}`)).toBe(true);
+  });
+
   it("go on with all fades, also after one that has not ended", () => {
     let count = 0;
     const fading = (isFading: boolean): Form => ({

@@ -108,7 +108,8 @@ export class Forms {
   }
 
   private outlineOf(state: ViewerState, channel: ChannelState): readonly Vec3[] | null {
-    if (!channel.hasSurface) return cornersOf(this.manifest.specimen.bounds_um);
+    const isBuilt = !state.tiles.some((tile) => tile.isUnfinished);
+    if (isBuilt && !channel.hasSurface) return cornersOf(this.manifest.specimen.bounds_um);
     for (const form of this.all) {
       const points = form.outline?.(state, channel);
       if (points !== undefined) return points;
