@@ -18,18 +18,26 @@ describeInChromium("a source that is built behind the page", () => {
   }
   const folder = mkdtempSync(join(tmpdir(), "stereocell-live-"));
   const source = join(folder, "f.ome.tif");
-  const flags = ["--out", join(folder, "out"), "--tile-size", "32,48,72"];
-  let server: Awaited<ReturnType<typeof serve>>;
+  const out = join(folder, "out");
+  const flags = ["--out", out, "--tile-size", "32,48,72"];
+  let server: Awaited<ReturnType<typeof serve>> | undefined;
   let browser: Awaited<ReturnType<typeof openBrowser>>;
   let page: Page;
   let viewer: ViewerPage;
 
   beforeAll(async () => {
     await askPython("live_source", [source], "");
-    server = await serve(source, flags);
     const viewport = { width: 700, height: 420 };
     browser = await openBrowser({ viewport, serviceWorkers: "block" });
     page = await browser.context.newPage();
+    viewer = new ViewerPage(page);
+  });
+
+  /** Open the page of a build that is paused before anything is built. */
+  async function begin(): Promise<void> {
+    await server?.stop("SIGTERM");
+    rmSync(out, { recursive: true, force: true });
+    server = await serve(source, flags);
     // before the page draws, which may take a busy machine longer than the build of so small a source
     await page.goto(`${server.address}sw.js`);
     await page.evaluate(
@@ -40,9 +48,8 @@ describeInChromium("a source that is built behind the page", () => {
           socket.onmessage = ({ data }) => String(data).includes('"paus') && resolve();
         }),
     );
-    viewer = new ViewerPage(page);
     await viewer.open(server.address);
-  });
+  }
 
   afterAll(async () => {
     await browser?.close();
@@ -60,6 +67,7 @@ describeInChromium("a source that is built behind the page", () => {
   const hasSurface = async () => (await viewer.snapshot()).state.channels[0].hasSurface;
 
   it("shows its coarse volumes at once, and its surfaces at the end, as the user has set the view", async () => {
+    await begin();
     const faults: string[] = [];
     page.on("pageerror", ({ message }) => faults.push(message));
     const { state } = await viewer.snapshot();
@@ -120,13 +128,13 @@ describeInChromium("a source that is built behind the page", () => {
   });
 
   it("opens as a bundle afterwards", async () => {
-    await viewer.open(server.address);
+    await viewer.open(server?.address ?? "");
     expect(await page.locator(".build").count()).toBe(0);
     expect(await hasSurface()).toBe(true);
   });
 
   it("finds its build finished when it is served again, and its picture outlives the server", async () => {
-    await server.stop("SIGTERM");
+    await server?.stop("SIGTERM");
     server = await serve(source, flags);
     await viewer.open(server.address);
     await expect.poll(hasSurface).toBe(true);
