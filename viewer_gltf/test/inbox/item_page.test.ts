@@ -18,7 +18,7 @@ describeInChromium("an image that is looked at before it is built", () => {
     return;
   }
   let folder: string;
-  let server: Awaited<ReturnType<typeof serve>>;
+  let server: Awaited<ReturnType<typeof serve>> | undefined;
   let browser: Awaited<ReturnType<typeof openBrowser>>;
   let page: Page;
   const faults: string[] = [];
@@ -26,14 +26,20 @@ describeInChromium("an image that is looked at before it is built", () => {
   beforeAll(async () => {
     folder = await mkdtemp(join(tmpdir(), "stereocell-item-"));
     await askPython("live_source", [join(folder, "f.ome.tif")], "");
-    server = await serve(`--inbox=${join(folder, "box")}`);
     const viewport = { width: 500, height: 360 };
     browser = await openBrowser({ viewport, serviceWorkers: "block" });
     page = await browser.context.newPage();
     page.on("pageerror", ({ message }) => faults.push(message));
+  });
+
+  /** Open the page of an inbox that is empty. */
+  async function begin(): Promise<void> {
+    await server?.stop("SIGTERM");
+    server = await serve(`--inbox=${await mkdtemp(join(folder, "box-"))}`);
     await page.goto(server.address);
     await page.getByText("Nothing is here yet").waitFor();
-  });
+    faults.length = 0;
+  }
 
   afterAll(async () => {
     await browser?.close();
@@ -45,6 +51,7 @@ describeInChromium("an image that is looked at before it is built", () => {
   const state = () => card().locator("[data-state]").textContent();
 
   it("gets its surfaces and its bundle without a reload, and commands its build from there", async () => {
+    await begin();
     await drop(page, join(folder, "f.ome.tif"));
     await expect.poll(state).toBe("Ready");
     const [tab] = await Promise.all([
