@@ -68,7 +68,7 @@ class ItemBuild:
 
     @property
     def holders(self) -> Mapping[str, Holder]:
-        """What the views of the build leave out, by the channel's ID."""
+        """The air that the views of the build leave out, by the channel's ID."""
         build = self._item.build
         return {} if build is None else build.holders
 

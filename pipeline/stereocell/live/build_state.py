@@ -77,7 +77,7 @@ class WatchedBuild(Protocol):
 
     @property
     def holders(self) -> Mapping[str, Holder]:
-        """What the later views leave out, by the channel's ID; see `PartialView`."""
+        """The air that the later views leave out, by the channel's ID; see `PartialView`."""
 
     def find_view(self, name: str) -> Path | None:
         """Return the folder of a later view by its name, as `g2`; None: there is no such view."""

@@ -120,7 +120,7 @@ def write_coarse_tiles(
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """What the volumes of a channel are made of."""
+    """The inputs of a channel's volumes."""
 
     channel: Channel
     coarse: CoarseChannel

@@ -30,9 +30,12 @@ class FirstLook:
         cls, source: str, settings: Settings, choice: Sequence[str], *, title: str = ""
     ) -> "FirstLook":
         """Settle the plan of a source; the arguments are those of `settle`. Raises as it does."""
-        # while voxels are read and hashed, which leaves the interpreter to others
-        threading.Thread(target=load_kernels, daemon=True).start()
+        # while the source is read and hashed, which leaves the interpreter to others
+        loading = threading.Thread(target=load_kernels, daemon=True)
+        loading.start()
         plan = settle(source, settings, choice, title=title)
+        # USD may be imported next: it would wait for ever for a thread that loads a library
+        loading.join()
         return cls(plan, open_source(as_asked(plan.source, plan.settings.plan)))
 
     def read(self, on_read: OnRead = lambda share: None) -> Mapping[str, CoarseChannel]:

@@ -163,7 +163,7 @@ export class InboxPage {
     }
   }
 
-  // What is done with an item
+  // The actions on an item
 
   private async act(item: Item, action: ActionName, keepsUpload: boolean): Promise<void> {
     if (action === "retry") this.uploads.get(item.id)?.retryNow();
@@ -238,7 +238,7 @@ export class InboxPage {
     }
   }
 
-  // What is shown
+  // The cards and the list
 
   private memoryOf({ id, bytes }: Item): Memory {
     let memory = this.memories.get(id);

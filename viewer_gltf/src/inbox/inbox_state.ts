@@ -1,4 +1,4 @@
-/** What the server reports of the inbox: all items, and what this page may do. Pure. */
+/** The state of the inbox that the server reports: all items, and the rights of this page. Pure. */
 
 import { ITEM_STATES } from "../bundle/generated/item_states";
 import { inPageWords } from "./page_words";
@@ -34,7 +34,10 @@ export type Item = Readonly<{
   keepsUpload: boolean;
 }>;
 
-/** Of one item: bytes and files. `piece`: most bytes of one request. `hours`: how long an upload is kept unfinished. */
+/**
+ * The limits of one item, in bytes and files. A request has at most `piece` bytes. An unfinished upload is kept for
+ * so many `hours`.
+ */
 export type Limits = Readonly<{
   bytes: number;
   files: number;

@@ -20,7 +20,7 @@ function openDatabase(): Promise<IDBDatabase> {
   });
 }
 
-/** What a request to the store gives; null: the browser keeps nothing. */
+/** Returns the result of a request to the store; null: the browser keeps nothing. */
 async function ask<T>(
   mode: IDBTransactionMode,
   request: (store: IDBObjectStore) => IDBRequest<T>,

@@ -22,7 +22,7 @@ export const PRESETS: Readonly<Record<string, string>> = {
   none: "Another kind",
 };
 
-/** What lies around the structures of an image. */
+/** The names of the ground around the structures of an image. */
 export const BACKGROUNDS: Readonly<Record<string, string>> = {
   dark: "Dark",
   bright: "Bright",

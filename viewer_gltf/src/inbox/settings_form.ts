@@ -33,7 +33,7 @@ export function settingsForm(
   return form;
 }
 
-/** Of two contents, whether one form serves both: then it stays, with focus and place. */
+/** Returns whether one form serves two summaries: the form then stays, with its focus and its place. */
 export function isSameForm(a: Understood, b: Understood): boolean {
   const shape = ({ title, preset, series, background, ...rest }: Understood) =>
     JSON.stringify([

@@ -1,4 +1,4 @@
-/** What the server has understood of an item, before anything heavy runs. Pure. */
+/** The summary of an item that the server makes before anything heavy runs. Pure. */
 import { positive, textOf } from "./inbox_state";
 
 export type Channel = Readonly<{

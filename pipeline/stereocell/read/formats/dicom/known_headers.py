@@ -1,4 +1,4 @@
-"""What the files of a series state alike, understood once.
+"""The header values that the files of a series share, which are decoded once.
 
 Slices of a series differ in their places and numbers. All else in their headers is mostly the same,
 byte by byte, and pydicom takes longer to turn it into values than to read it. Headers are compared
