@@ -115,6 +115,7 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
         told = server.stderr.read()
     assert server.returncode == 0
     assert "Traceback" not in told
+    assert "stopped" not in told  # by the user, who knows
 
 
 def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:

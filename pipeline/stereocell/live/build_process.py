@@ -217,7 +217,8 @@ class BuildProcess:
             if pipe is not self._pipe:  # another process builds by now
                 return
             if told is None:
-                if self.state.doing not in ("cancelled", "failed", "complete"):
+                is_over = self.state.doing in ("cancelled", "failed", "complete")
+                if not is_over and not self._is_closed:
                     self._fail(_KILLED)
                 return
             if isinstance(told, _Task):
