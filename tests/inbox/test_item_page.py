@@ -11,10 +11,13 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
+from stereocell.live import first_view
 from stereocell.serve import inbox_app
 from support.nifti_files import write as write_nifti
 from support.phantoms import f_phantom
+from support.server.brick_client import reconstruct
 from support.server.inbox_client import FakeBuilds, InboxClient, end_build, serving_inbox
+from support.server.sent_bricks import sent
 from support.server.timeouts import PATIENCE_S, connect
 
 
@@ -161,3 +164,48 @@ def test_a_session_that_may_only_look_sees_the_build_and_can_not_command_it(
                 socket.recv(timeout=PATIENCE_S)
         monkeypatch.undo()
         assert client.item(item)["doing"] == "failed"
+
+
+def test_a_tile_that_is_looked_at_gets_the_voxels_of_the_upload_before_any_build(
+    tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(first_view, "VOXELS", 10_000)
+    with serving_inbox(tmp_path, FakeBuilds()) as server:
+        client = InboxClient(server.port)
+        item, other = (hand_in(client, head, name) for name in ("a.nii", "b.nii"))
+        client.command(item, "look")
+        _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
+        folder = folder_in(headers)
+        assert headers["Stereocell-Bricks"] == headers["Stereocell-Live"]
+        volume = {"tile": manifest["tiles"][0]["id"], "channel": manifest["channels"][0]["id"]}
+        asked = f"/items/{item}/view/{folder}bricks", [volume]
+        with server.inbox.find(other).reading, server.inbox.reader._busy:  # it reads another item
+            found = sent(server.port, *asked, tuple(manifest["specimen"]["bounds_um"].values()))
+        assert found.done[1]["reason"] == "complete"
+        (tree,) = found.trees.values()
+        low, high = manifest["channels"][0]["window"]
+        expected = np.clip((f_phantom(1) - low) / (high - low) * 255, 0, 255)
+        voxels = reconstruct(tree.table, tree.frames)[1:-1, 1:-1, 1:-1]
+        # in any order: the axes of the file are not those of the specimen
+        shown, known = (np.sort(one[one > tree.table.threshold + 1]) for one in (voxels, expected))
+        assert shown.size
+        np.testing.assert_allclose(shown, known, atol=0.51)
+
+
+def test_an_upload_that_is_damaged_after_the_look_is_an_error_without_its_name(
+    tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(first_view, "VOXELS", 10_000)
+    with serving_inbox(tmp_path, FakeBuilds()) as server:
+        client = InboxClient(server.port)
+        item = hand_in(client, head, "Doe^Jane.nii")
+        client.command(item, "look")
+        _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
+        volume = {"tile": manifest["tiles"][0]["id"], "channel": manifest["channels"][0]["id"]}
+        next((tmp_path / "box" / item / "upload").rglob("*.nii")).write_bytes(head[:-1000])
+        found = sent(server.port, f"/items/{item}/view/{folder_in(headers)}bricks", [volume])
+        (error,) = (one for one in found.said if one["type"] == "error")
+        assert error["code"] == "damaged"
+        assert "Doe" not in str(error)
+        client.ask("DELETE", f"/items/{item}")
+        assert not (tmp_path / "box" / item).exists()

@@ -1,6 +1,5 @@
 """Bricks of a source that is not built: those of its build, where the window is the same."""
 
-import json
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -29,10 +28,10 @@ from stereocell.serve.tree_files import BrickFile
 from stereocell.steps.open_source import open_source
 from stereocell.transfer.joint_histogram import to_eight_bits
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
-from support.server.brick_client import BrickClient, look_at, reconstruct
+from support.server.brick_client import reconstruct
 from support.server.requests import ask
 from support.server.running import running
-from support.server.timeouts import connect
+from support.server.sent_bricks import sent
 
 TILES = (32, 48, 72)
 SPACING = (1.0, 0.5, 0.5)
@@ -215,31 +214,6 @@ def serving(fine: FineTiles, root: Path) -> Iterator[int]:
     live = Live(page, root, first, fine, build, Reading(lambda _: None))
     with running(BundleServer(live.bundle, 0, False, live=live)) as server:
         yield server.port
-
-
-def sent(port: int, path: str, volumes: list[dict[str, str]]) -> BrickClient:
-    """Return a client that was sent all bricks of these volumes, or the errors for them."""
-    client, opened = BrickClient(), 0
-    with connect(f"ws://localhost:{port}{path}") as socket:
-
-        def say(**message: Any) -> None:
-            socket.send(json.dumps(message))
-
-        say(type="hello", version=1)
-        say(type="open", volumes=volumes)
-        while opened < len(volumes):
-            for answer in client.take(socket.recv()):
-                say(**answer)
-            errors = sum(one["type"] == "error" for one in client.said)
-            opened = errors + sum(client.is_ready(tree) for tree in client.trees)
-        if client.trees:
-            view = look_at([18, -24, 200], [18, -24, 0])
-            fineness = {"pixels_per_radian": 1e6, "texel_px": 0.001, "budget": 10**8}
-            say(type="view", id=1, trees=list(client.trees), **view, **fineness)
-            while 1 not in client.done:
-                for answer in client.take(socket.recv()):
-                    say(**answer)
-    return client
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,8 @@ class Inbox:
     def __init__(self, folder: Path, limits: InboxLimits) -> None:
         """Raises OutputError where the folder is no inbox and holds other files."""
         self.folder, self.limits = folder, limits
-        self.reader = ReaderProcess()
+        self.reader = ReaderProcess()  # of what is handed in, and of first views
+        self.tile_reader = ReaderProcess()  # of tiles that are looked at, which can't wait for that
         self._is_closed = False
         self.changed = threading.Condition(threading.RLock())
         self._items = {item.id: item for item in load_items(folder)}
@@ -202,10 +203,11 @@ class Inbox:
             item.is_deleted = True
             self.save()
             self.changed.notify_all()
-        self.reader.stop(item)
+        for reader in (self.reader, self.tile_reader):
+            reader.stop(item)
         if item.build is not None:
             item.build.close()
-        with item.writing, item.reading:  # a piece ends at its next bytes, a reader has been ended
+        with item.writing, item.reading:  # a piece ends at its next bytes, readers have been ended
             for _ in range(20):  # a process that was ended may write one more file
                 shutil.rmtree(item.folder, ignore_errors=True)
                 if not item.folder.exists():
@@ -217,6 +219,7 @@ class Inbox:
         with self.changed:
             self._is_closed = True
         self.reader.close()
+        self.tile_reader.close()
 
     def remove_upload(self, item: Item) -> None:
         """Remove what was uploaded: from here on nothing holds an identity."""

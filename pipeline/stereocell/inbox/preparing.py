@@ -11,9 +11,10 @@ from stereocell.inbox.choices import Choices
 from stereocell.inbox.inbox import Inbox
 from stereocell.inbox.item import Item
 from stereocell.inbox.item_build import ItemBuild
+from stereocell.inbox.item_tiles import ItemTiles
 from stereocell.inbox.limits import UNPACK_S
 from stereocell.inbox.lines import line_of, without_identity
-from stereocell.inbox.reader import Source, ToBuild
+from stereocell.inbox.reader import Looked, Source, ToBuild
 from stereocell.inbox.refused import RefusedError
 from stereocell.live.build_process import Coarse
 from stereocell.live.reading import Reading
@@ -88,27 +89,31 @@ def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBui
     """
     item.view_folder.mkdir(parents=True, exist_ok=True)
     round_, bundle = item.round, None if item.page else next_view(item.view_folder)
-    plan, read, inputs = inbox.reader.run(
-        item, "first_view", source_of(item), _titled(item), None if bundle is None else str(bundle)
+    choices = _titled(item)
+    looked: Looked = inbox.reader.run(
+        item, "first_view", source_of(item), choices, None if bundle is None else str(bundle)
     )
+    found = looked.to_build.found
     if item.address:
         write_json(
             item.upload_folder / _FOUND,
-            {"source": inputs.found.source, "notes": inputs.found.notes},
+            {"source": found.source, "notes": found.notes},
         )
     if bundle is not None:
         with inbox.changed:
-            item.live = _live_of(page, bundle, ItemBuild(inbox, item))
+            tiles = ItemTiles(inbox, item, source_of(item), choices)
+            item.live = _live_of(page, bundle, tiles, ItemBuild(inbox, item))
             item.looked, item.newest = round_, f"{bundle.name}/"
             inbox.changed.notify_all()
-    return Coarse(plan, read, item.out, item.view_folder, {}), inputs
+    coarse = Coarse(looked.plan, looked.read, item.out, item.view_folder, looked.sizes)
+    return coarse, looked.to_build
 
 
-def _live_of(page: Path, bundle: Path, build: ItemBuild) -> Live:
+def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Live:
     """Return a view whose first picture is written."""
     first: Future[None] = Future()
     first.set_result(None)
-    return Live(page, bundle, first, None, build, Reading(lambda _: None))
+    return Live(page, bundle, first, tiles, build, Reading(lambda _: None))
 
 
 def look(inbox: Inbox, item: Item, page: Path) -> str:

@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stereocell import read
 from stereocell.inbox.address import read_as_stranger
 from stereocell.inbox.arrange import arrange
@@ -19,7 +22,10 @@ from stereocell.inbox.choices import BRIGHT, DARK, Choices
 from stereocell.inbox.limits import InboxLimits
 from stereocell.inbox.middle_slices import ShownChannel, hex_of, write_middle_slices
 from stereocell.inbox.refused import RefusedError
+from stereocell.isosurface.holder import Holder
 from stereocell.live.coarse_channel import CoarseChannel
+from stereocell.live.coarse_tiles import Sizes
+from stereocell.live.fine_tiles import FineTiles
 from stereocell.live.first_appearance import first_appearance
 from stereocell.live.first_look import FirstLook
 from stereocell.model.errors import StereoCellError
@@ -63,12 +69,27 @@ class ToBuild:
     choices: Choices
 
 
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """What the first view of an item was made of.
+
+    read   the coarse voxels of its channels; see `first_view.read_channels`
+    sizes  see `FineTiles.sizes`
+    """
+
+    plan: Plan
+    read: Mapping[str, CoarseChannel]
+    sizes: Sizes
+    to_build: ToBuild
+
+
 class Reader:
     """Reads one item. It lives in a process of its own; see `storage.child_process`."""
 
     def __init__(self) -> None:
         self._upload = Path()
         self._look: FirstLook | None = None
+        self._choices = Choices()  # by which it was settled
         self._series: dict[str, list[dict[str, str]]] = {}
         self._datasets: SeveralDatasetsError | None = None
 
@@ -155,21 +176,39 @@ class Reader:
             },
         }
 
-    def first_view(
-        self, source: Source, choices: Choices, bundle: str | None
-    ) -> tuple[Plan, Mapping[str, CoarseChannel], ToBuild]:
-        """Write the first view of a source, and return what the build behind it starts with.
+    def first_view(self, source: Source, choices: Choices, bundle: str | None) -> Looked:
+        """Write the first view of a source, and return what it was made of.
 
         bundle  the folder of the view; None: it is written already
         """
-        if self._look is None:
-            self._settle(source, choices)
-        assert self._look is not None
+        look = self._settled(source, choices)
+        sizes = FineTiles(look.plan, look.dataset).sizes()
         if bundle is not None:
-            self._look.write(Path(bundle))
+            look.write(Path(bundle), sizes)
         place, chosen = self._place_of(source, choices)
         found = resolve(place) if place == source.place else Resolved(place)
-        return self._look.plan, self._look.read(), ToBuild(place, found, chosen)
+        return Looked(look.plan, look.read(), sizes, ToBuild(place, found, chosen))
+
+    def fine_tile(
+        self,
+        source: Source,
+        choices: Choices,
+        tile: str,
+        channel: str,
+        window: tuple[float, float],
+        holder: Holder | None,
+    ) -> NDArray[np.uint8]:
+        """Return a tile's voxels; see `FineTiles.read`."""
+        look = self._settled(source, choices)
+        return FineTiles(look.plan, look.dataset).read(tile, channel, window, holder)
+
+    def _settled(self, source: Source, choices: Choices) -> FirstLook:
+        """Return the source as it was settled last; settle it where that was by other choices."""
+        # a title changes neither what is read nor how
+        if self._look is None or replace(choices, title=self._choices.title) != self._choices:
+            self._settle(source, choices)
+        assert self._look is not None
+        return self._look
 
     def _settle(self, source: Source, choices: Choices) -> tuple[str, ...]:
         """Settle the plan; return the notes on the choice of its preset."""
@@ -181,7 +220,7 @@ class Reader:
         settings, choice = load_for(place, choices.preset or None, None, flags=flags)
         look = FirstLook.at(place, settings, choice)
         look.plan = replace(look.plan, name=choices.title or title_of(look.plan))
-        self._look = look
+        self._look, self._choices = look, choices
         return choice
 
     def _place_of(self, source: Source, choices: Choices) -> tuple[str, Choices]:

@@ -1,6 +1,7 @@
-"""The process that reads: one at a time, one item each, with bounds of time and memory."""
+"""A process that reads: one item at a time, with bounds of time and memory."""
 
 import threading
+import time
 from typing import Any
 
 from stereocell.inbox.item import Item
@@ -20,6 +21,7 @@ class ReaderProcess:
         self._item: Item | None = None
         self._stopped: Child | None = None  # the process that was ended while it may have been idle
         self._is_closed = False
+        self._used_s = 0.0  # when it was last asked, by time.monotonic()
 
     def run(self, item: Item, method: str, *arguments: Any, seconds: float = READ_S) -> Any:
         """Return what a method of the reader of an item returns.
@@ -45,6 +47,8 @@ class ReaderProcess:
             except BaseException:
                 self._close()
                 raise
+            finally:
+                self._used_s = time.monotonic()
 
     def warm(self) -> None:
         """Start a process for the next item, while its upload comes: imports take seconds."""
@@ -55,6 +59,7 @@ class ReaderProcess:
             try:
                 if self._child is None and not self._is_closed:
                     self._child = Child(Reader)
+                    self._used_s = time.monotonic()
             except ChildError:  # the next item starts one, and has its error
                 pass
             finally:
@@ -67,11 +72,12 @@ class ReaderProcess:
             self._stopped = child
             child.close()
 
-    def release(self) -> None:
-        """End the process where it is idle."""
+    def release(self, idle_s: float) -> None:
+        """End the process where nothing has been asked of it for so many seconds."""
         if self._busy.acquire(blocking=False):
             try:
-                self._close()
+                if time.monotonic() - self._used_s > idle_s:
+                    self._close()
             finally:
                 self._busy.release()
 

@@ -44,7 +44,7 @@ class Work:
         self._builds.close()
 
     def _prepare(self) -> None:
-        inbox, used_s = self._inbox, 0.0
+        inbox = self._inbox
         while not self._is_over.is_set():
             with inbox.changed:
                 items = [i for i in inbox.items() if i.doing in ("unpacking", "understanding")]
@@ -53,9 +53,8 @@ class Work:
             if items and not self._is_over.is_set():
                 with suppress(OutputError):  # the queue file: it is written at the next change
                     prepare(inbox, items[0])
-                used_s = time.monotonic()
-            elif time.monotonic() - used_s > _IDLE_S:
-                inbox.reader.release()
+            for reader in (inbox.reader, inbox.tile_reader):
+                reader.release(_IDLE_S)
 
     def _build(self) -> None:
         next_s = 0.0

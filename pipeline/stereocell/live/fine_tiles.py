@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import prod
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,14 @@ from stereocell.transfer.joint_histogram import to_eight_bits
 # Largest tile that is read at the planned level, voxels: about 350 MB while its tree is made
 PLANNED_VOXELS = 1 << 26
 COARSER_VOXELS = 1 << 24  # voxels of a larger tile, which is read coarser than planned
+
+
+class ReadFine(Protocol):
+    """Reads one tile as finely as a build does; see `FineTiles.read`."""
+
+    def read(
+        self, tile_id: str, channel_id: str, window: tuple[float, float], holder: Holder | None
+    ) -> NDArray[np.uint8]: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from stereocell.engine.run import Watch, console
 from stereocell.live.build_place import finished_bundle, free_place, require_place
 from stereocell.live.build_process import BuildProcess, Coarse
 from stereocell.live.build_state import WatchedBuild
-from stereocell.live.fine_tiles import FineTiles
+from stereocell.live.fine_tiles import FineTiles, ReadFine
 from stereocell.live.first_look import FirstLook
 from stereocell.live.reading import Reading
 from stereocell.model.errors import OutputError
@@ -71,7 +71,7 @@ class Live:
     page: Path
     bundle: Path
     first: Future[None]
-    fine: FineTiles | None
+    fine: ReadFine | None
     build: WatchedBuild | None
     reading: Reading
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stereocell.isosurface.holder import Holder
 from stereocell.live.build_state import WatchedBuild
-from stereocell.live.fine_tiles import FineTiles
+from stereocell.live.fine_tiles import ReadFine
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.tree_files import TreeFiles, Volume
 
@@ -23,7 +23,7 @@ _FOLDER = "bricks"
 class LiveBricks:
     """The libraries of a source's views."""
 
-    def __init__(self, fine: FineTiles, scratch: Path, build: WatchedBuild | None) -> None:
+    def __init__(self, fine: ReadFine, scratch: Path, build: WatchedBuild | None) -> None:
         """Describe the libraries; nothing is read yet.
 
         scratch  the folder of the views, in which the trees get a folder of their own
