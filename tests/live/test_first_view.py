@@ -1,6 +1,7 @@
 """The first view of a source is a bundle: coarse, at the places and in the windows of a build."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from stereocell.planning.settle import settle
 from stereocell.planning.survey_steps import window_step
 from stereocell.read import Dataset
 from stereocell.steps.open_source import open_source
+from stereocell.usd.composed_appearance import StatedLevel
 from support.phantoms import f_phantom, write_ome_tiff, write_ome_zarr
 
 
@@ -218,4 +220,17 @@ def test_a_translucent_channel_looks_like_its_surface_where_voxels_are_those_of_
         root = tmp_path / f"view-{voxels}"
         write_view_of(f_tiff, root)
         opened.append(manifest_of(root)["channels"][0]["transfer_function"])
-    assert opened == ["surface", "soft"]
+    assert opened == ["surface", "sharp"]
+
+
+def test_coarse_voxels_stay_translucent_where_the_surface_lies_above_a_background(
+    f_tiff: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(first_view, "VOXELS", 10_000)
+    plan, dataset = planned(f_tiff)
+    (channel,) = plan.channels
+    coarse = first_view.read_channels(plan, dataset)[channel.voxels_id]
+    found = first_view.composed(first_view.first_appearance(plan, channel, coarse)[0])
+    assert first_view.as_surface(found, coarse, 1.0).chosen == "sharp"
+    uneven = replace(found, level=StatedLevel(100.0, (20.0, 400.0), 0.0))
+    assert first_view.as_surface(uneven, coarse, 1.0).chosen == "soft"

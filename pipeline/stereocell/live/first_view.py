@@ -27,7 +27,7 @@ from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 from stereocell.storage.file_list import encode
 from stereocell.storage.processes import cores
-from stereocell.transfer.opacity import SOFT, SURFACE
+from stereocell.transfer.opacity import SHARP, SOFT, SURFACE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
@@ -156,13 +156,16 @@ def as_surface(
     apart  see `CoarseTiles`
 
     A channel that opens translucent beside its surface looks like that surface as long as there is
-    none: the picture would be much darker than that of the build. Coarse voxels stay translucent:
-    their edges are wider than those of a surface, and too bright for one.
+    none: the picture would be much darker than that of the build. Of coarse voxels a surface would
+    be full of holes, so they are opaque bodies. If the surface lies at a height above a background,
+    no one value of the voxels is where it is, and they stay translucent.
     """
     is_coarse = apart * max(coarse.grid.step) > 1
-    if is_coarse or appearance.chosen != SOFT or SURFACE not in appearance.transfer_functions:
+    like = SHARP if is_coarse else SURFACE
+    has_background = appearance.level is not None and appearance.level.background is not None
+    if appearance.chosen != SOFT or like not in appearance.transfer_functions:
         return appearance
-    return replace(appearance, chosen=SURFACE)
+    return appearance if is_coarse and has_background else replace(appearance, chosen=like)
 
 
 def composed(appearance: Appearance) -> ComposedAppearance:

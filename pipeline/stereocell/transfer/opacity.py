@@ -13,6 +13,7 @@ from stereocell.model.channel import OpacityPoints
 
 SOFT = "soft"  # name of the translucent function
 SURFACE = "surface"  # name of the function that looks like the surface
+SHARP = "sharp"  # name of the function of an opaque body that ends at the level
 # Mean optical depth of the whole volume along its shortest edge, at most, by the soft function.
 # Light then crosses it, and bodies show within others, however many voxels the volume has. Chosen
 # by eye on stained cells, nuclei, an ovule and a cleared brain, of 15 to 270 voxels.
@@ -82,7 +83,7 @@ def make_transfer_functions(
     functions = {
         "default": _points((floor, 0.0), (top, at_top), (bright, IN_BODY), (1.0, 0.6)),
         SOFT: _thinned(soft, histogram, depth_voxels),
-        "sharp": _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
+        SHARP: _points((0.97 * level, 0.0), (min(1.03 * level, 0.99), 0.8), (1.0, 0.9)),
         SURFACE: _points(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
         ),
