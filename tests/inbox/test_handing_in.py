@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.cli.inbox_build import make_inbox_build
+from stereocell.inbox.item import Item
+from stereocell.inbox.lines import without_identity
+from stereocell.inbox.upload import Announced, Upload
 from stereocell.serve.inbox_protocol import InboxHttp
 from support.dicom_series import grid, write_series
 from support.identity_search import find
@@ -295,3 +298,41 @@ def test_of_a_file_of_several_datasets_one_is_read_and_the_others_can_be_chosen(
     ((source, choices, _),) = make.asked
     assert source.endswith("specimen.h5:/volumes/raw")
     assert choices.series == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "is_shown"),
+    [
+        ("mri.zip", True),
+        ("CT_head_2.nii", True),
+        ("Smith.zip", False),
+        ("mri_smith.nii", False),
+        ("Möller.nii", False),
+        ("2015-01-30.nii", False),
+        ("max.nii", False),
+    ],
+)
+def test_a_name_is_left_out_of_lines_unless_it_is_words_of_the_program(
+    tmp_path: Path, name: str, *, is_shown: bool
+) -> None:
+    item = Item("0" * 16, tmp_path, 0.0, is_local=True)
+    item.upload = Upload.create(tmp_path / "upload", Announced((name,), (1,)))
+    stem = name.partition(".")[0]
+    shown = stem if is_shown else "..."
+    assert without_identity(item, f"{stem}: preset mri") == f"{shown}: preset mri"
+
+
+def test_an_item_that_waits_for_the_one_before_it_says_so(tmp_path: Path) -> None:
+    with serving_inbox(tmp_path) as server:
+        client = InboxClient(server.port)
+        path = tmp_path / "a.nii"
+        write_nifti(path, np.eye(4), f_phantom(1).astype(np.int16))
+        with server.inbox.reader._busy:  # the first one is being read as long as this lasts
+            first, second = (
+                client.hand_in([(name, path.read_bytes())]) for name in ("a.nii", "b.nii")
+            )
+            end_s = time.monotonic() + PATIENCE_S
+            while not client.item(second)["waits"] or client.item(first)["waits"]:
+                assert time.monotonic() < end_s
+                time.sleep(0.02)
+        assert client.wait(second, "understood")["waits"] is False

@@ -5,7 +5,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+import tifffile
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.live.build_place import finished_bundle, free_place, require_place
@@ -48,6 +50,22 @@ def test_a_second_specimen_of_one_name_gets_a_folder_of_its_own(plans: list[Plan
     Path("cell-2.stereocell/letter.txt").write_text("not a build")
     assert free_place(second) == Path("cell-3.stereocell")
     assert free_place(first) == place
+
+
+def test_a_source_that_is_the_working_folder_gets_a_folder_beside_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scan = tmp_path / "scan"
+    for z in range(3):
+        (scan / "deep").mkdir(parents=True, exist_ok=True)
+        tifffile.imwrite(scan / f"{z}.tif", np.full((8, 9), 100 * z, np.uint16))
+    settings, choice = load_for(str(scan), None, None, flags={"plan": {"spacing_um": (1, 1, 1)}})
+    plan = settle(str(scan), settings, choice)
+    for working in (scan, scan / "deep"):
+        monkeypatch.chdir(working)
+        place = free_place(plan)
+        assert place == tmp_path / f"{plan.name}.stereocell"
+        require_place(str(scan), place, plan)
 
 
 def test_a_folder_that_a_build_would_refuse_is_refused_at_once(plans: list[Plan]) -> None:

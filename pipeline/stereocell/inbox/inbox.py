@@ -27,6 +27,7 @@ from stereocell.live.build_state import COMMANDS
 _BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
 _WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
 _ASKS_SPACING = "--spacing-um"  # in the line of files that state no voxel size
+PREPARED: tuple[Doing, ...] = ("unpacking", "understanding")  # one item at a time is
 _FREE_STEP = 100_000_000  # bytes: free disk is told in steps, so that it is no news each time
 
 
@@ -38,6 +39,7 @@ class Inbox:
         self.folder, self.limits = folder, limits
         self.reader = ReaderProcess()  # of what is handed in, and of first views
         self.tile_reader = ReaderProcess()  # of tiles that are looked at, which can't wait for that
+        self.prepared: Item | None = None  # the item that is unpacked or understood now
         self._is_closed = False
         self.changed = threading.Condition(threading.RLock())
         self._items = {item.id: item for item in load_items(folder)}
@@ -304,7 +306,13 @@ class Inbox:
         with suppress(OSError):
             free = max(0, shutil.disk_usage(self.folder).free - limits.reserve)
         return {
-            "items": [_shown(item, places.get(item.id, 0), may_upload) for item in shown],
+            "items": [
+                {
+                    **_shown(item, places.get(item.id, 0), may_upload),
+                    "waits": item.doing in PREPARED and item is not self.prepared,
+                }
+                for item in shown
+            ],
             "limits": {
                 "bytes": limits.bytes,
                 "files": limits.files,
@@ -331,6 +339,7 @@ def _shown(item: Item, place: int, may_upload: bool) -> dict[str, Any]:
         "share": 1.0 if item.doing == "built" else round(state.share, 3) if state else 0.0,
         "label": state.label if state else "",
         "tiles": state.tiles if state else 0,
+        "all_tiles": state.all_tiles if state else 0,
         "left_s": None if state is None or state.left_s is None else round(state.left_s),
         "page": item.page,
         "has_upload": upload is not None,

@@ -1,20 +1,23 @@
 """One line for each error of an item, without a name, a tag or an address of its upload."""
 
 import re
+from functools import cache
 
 from stereocell.inbox.item import Item
 from stereocell.inbox.refused import RefusedError
 from stereocell.model.errors import StereoCellError
+from stereocell.model.modality import MODALITIES
+from stereocell.planning.settings import preset_names
 from stereocell.read.image import printable
+from stereocell.read.known_formats import known_formats
 from stereocell.storage.child_process import ChildError
 from stereocell.storage.location import Location
 from stereocell.storage.processes import shortage
 
 _LONGEST = 600  # characters of a line
-# names of files that are words of messages, and of nobody
-_WORDS = frozenset(
-    ("image", "volume", "scan", "specimen", "file", "folder", "source", "dicom", "zarr", "data")
-)
+# names of files that are words of messages, and of nobody; see `_own_words`
+_WORDS = "image volume scan specimen file folder source data level series channel tile head brain"
+_LETTERS = re.compile(r"[^\W\d_]+")
 _SHORTEST_NAME = 3  # characters of a part of a name that is replaced: shorter ones are words, too
 
 
@@ -41,13 +44,36 @@ def without_identity(item: Item, text: str) -> str:
             for shown in {address, Location.of(address).shown}:
                 text = text.replace(shown, "the address")
         own = {part for parts in item.upload.announced.parts for part in parts}
-        stems = {one.partition(".")[0] for one in own} - _WORDS
-        names = [one for one in own | stems if len(one) >= _SHORTEST_NAME and not one.isdecimal()]
+        named = own | {one.partition(".")[0] for one in own}
+        names = [
+            one
+            for one in named
+            if len(one) >= _SHORTEST_NAME and not one.isdecimal() and not _is_own(one)
+        ]
         if names:
             any_name = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
             text = re.sub(rf"(?<!\w)(?:{any_name})(?!\w)", "...", text)
     line = " ".join(printable(text).split())
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 4]} ..."
+
+
+def _is_own(name: str) -> bool:
+    """Return whether a name consists of words of the program, as `mri` and `ct_head_2`."""
+    words = _LETTERS.findall(name.lower())
+    return bool(words) and _own_words().issuperset(words)
+
+
+@cache
+def _own_words() -> frozenset[str]:
+    """Return the words, in lower case, of which messages are made: none of them names a person.
+
+    They are the names of presets, modalities and formats, with some that messages use often. Those
+    of settings are not among them: `max` is a person's name, too.
+    """
+    formats = known_formats()
+    texts = [_WORDS, *preset_names(), *MODALITIES, *formats]
+    texts += [one.title for one in formats.values()]
+    return frozenset(_LETTERS.findall(" ".join(texts).lower()))
 
 
 def status_of(error: StereoCellError) -> int:

@@ -30,7 +30,11 @@ def prepare(inbox: Inbox, item: Item) -> None:
     """Unpack and understand an item; what goes wrong becomes its line."""
     with item.reading:
         if not item.is_deleted:
-            _prepare(inbox, item)
+            inbox.prepared = item
+            try:
+                _prepare(inbox, item)
+            finally:
+                inbox.prepared = None
 
 
 def _prepare(inbox: Inbox, item: Item) -> None:

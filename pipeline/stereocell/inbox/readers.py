@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 from stereocell.inbox.item import Item
@@ -18,6 +19,8 @@ class ReaderProcess:
     def __init__(self) -> None:
         self._busy = threading.Lock()
         self._child: Child | None = None
+        self._next: Child | None = None  # a process for the next item, which has done its imports
+        self._starting = threading.Lock()  # held while it starts
         self._item: Item | None = None
         self._stopped: Child | None = None  # the process that was ended while it may have been idle
         self._is_closed = False
@@ -38,7 +41,7 @@ class ReaderProcess:
             if self._item is not item:
                 if self._item is not None:
                     self._close()
-                child = self._child = self._child or Child(Reader)
+                child = self._child = self._take_next() or Child(Reader)
                 self._item = item
                 child.call("begin", str(item.upload_folder), not item.is_local)
             assert self._child is not None
@@ -55,15 +58,15 @@ class ReaderProcess:
         threading.Thread(target=self._warm, daemon=True).start()
 
     def _warm(self) -> None:
-        if self._busy.acquire(blocking=False):
-            try:
-                if self._child is None and not self._is_closed:
-                    self._child = Child(Reader)
-                    self._used_s = time.monotonic()
-            except ChildError:  # the next item starts one, and has its error
-                pass
-            finally:
-                self._busy.release()
+        with self._starting, suppress(ChildError):  # the next item starts one, and has its error
+            if self._next is None and not self._is_closed:
+                self._next = Child(Reader)
+                self._used_s = time.monotonic()
+
+    def _take_next(self) -> Child | None:
+        with self._starting:
+            child, self._next = self._next, None
+        return child
 
     def stop(self, item: Item) -> None:
         """End what runs for an item: its caller gets ChildError."""
@@ -78,6 +81,7 @@ class ReaderProcess:
             try:
                 if time.monotonic() - self._used_s > idle_s:
                     self._close()
+                    self._close_next()
             finally:
                 self._busy.release()
 
@@ -86,6 +90,11 @@ class ReaderProcess:
         self._is_closed = True
         child = self._child
         if child is not None:
+            child.close()
+        self._close_next()
+
+    def _close_next(self) -> None:
+        if (child := self._take_next()) is not None:
             child.close()
 
     def _close(self) -> None:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from stereocell.inbox.builds import Builds, MakeBuild
-from stereocell.inbox.inbox import Inbox
+from stereocell.inbox.inbox import PREPARED, Inbox
 from stereocell.inbox.preparing import prepare
 from stereocell.model.errors import OutputError
 
@@ -47,10 +47,12 @@ class Work:
         inbox = self._inbox
         while not self._is_over.is_set():
             with inbox.changed:
-                items = [i for i in inbox.items() if i.doing in ("unpacking", "understanding")]
+                items = [item for item in inbox.items() if item.doing in PREPARED]
                 if not items:
                     inbox.changed.wait(_IDLE_S / 4)
             if items and not self._is_over.is_set():
+                if len(items) > 1:
+                    inbox.reader.warm()
                 with suppress(OutputError):  # the queue file: it is written at the next change
                     prepare(inbox, items[0])
             for reader in (inbox.reader, inbox.tile_reader):

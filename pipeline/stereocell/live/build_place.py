@@ -11,7 +11,7 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder, require_build_or_nothing
 from stereocell.building.replaced_plan import replaced_plan, require_own_settings
 from stereocell.planning.plan import Plan
-from stereocell.read.source_place import require_apart
+from stereocell.read.source_place import require_apart, working_folder_outside
 from stereocell.storage.contents import contents_of
 from stereocell.storage.kinds import Kind
 from stereocell.storage.lock import alone_in
@@ -20,11 +20,13 @@ from stereocell.storage.lock import alone_in
 def free_place(plan: Plan) -> Path:
     """Return a folder in the working folder that is named after a specimen.
 
-    A number follows the name where folders of other specimens, or other files, have it already.
+    In a folder that is itself the source it lies beside that folder, as nothing is written into the
+    data. A number follows the name where other specimens, or other files, have it already.
     """
     name = re.sub(r"[^\w.+-]+", "_", plan.name).strip("._-") or "specimen"
+    folder = working_folder_outside(plan.source)
     for number in count(1):
-        place = Path(f"{name}.stereocell" if number == 1 else f"{name}-{number}.stereocell")
+        place = folder / (f"{name}.stereocell" if number == 1 else f"{name}-{number}.stereocell")
         found = contents_of(place)
         is_ours = found.kind is Kind.BUILD and found.fingerprint in ("", plan.fingerprint)
         if is_ours or found.kind is Kind.NOTHING:

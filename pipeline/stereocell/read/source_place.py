@@ -35,15 +35,35 @@ def _stem(name: str) -> str:
 
 def require_apart(source: str | Path, out: Path) -> None:
     """Raise UsageError if OUT is a local source, or lies inside one (or a folder around it)."""
-    location = Location.of(source)
-    if not location.is_local:
-        return
-    path = Path(location.source)
-    whole = tuple(ending for one in known_formats().values() for ending in one.folder_endings)
-    outermost = next((p for p in [*reversed(path.parents), path] if p.name.endswith(whole)), path)
-    # not Path.resolve, which raises its own error for a ring of links
-    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(outermost)):
+    outermost = _outermost(source)
+    if outermost is not None and _is_in(out, outermost):
         raise UsageError(
             f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
             "it would write into the data"
         )
+
+
+def working_folder_outside(source: str | Path) -> Path:
+    """Return the working folder, or the one that holds a source which the working folder is in."""
+    outermost = _outermost(source)
+    if outermost is None or not _is_in(Path(), outermost):
+        return Path()
+    return Path(os.path.realpath(outermost)).parent
+
+
+def _outermost(source: str | Path) -> Path | None:
+    """Return the folder that a source is a part of, as a dataset of files, or the source itself.
+
+    None: the source is at an address.
+    """
+    location = Location.of(source)
+    if not location.is_local:
+        return None
+    path = Path(location.source)
+    whole = tuple(ending for one in known_formats().values() for ending in one.folder_endings)
+    return next((p for p in [*reversed(path.parents), path] if p.name.endswith(whole)), path)
+
+
+def _is_in(place: Path, folder: Path) -> bool:
+    # not Path.resolve, which raises its own error for a ring of links
+    return Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder))

@@ -17,7 +17,7 @@ from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import Headers
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
@@ -29,6 +29,17 @@ from stereocell.serve.static_files import redirect
 COOKIE = "__Host-stereocell"
 _ATTRIBUTES = "Path=/; Secure; HttpOnly; SameSite=Lax"
 
+
+_SCAN = (
+    "Scan the QR code in the terminal where this server was started. Each code works once, and the "
+    "next one is shown there."
+)
+_PAGE = (
+    '<!doctype html><html lang="en"><meta charset="utf-8"><title>StereoCell</title>'
+    '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    '<body style="margin:10vh auto;max-width:30em;padding:0 1.5em;font:1.2em/1.5 system-ui;'
+    'background:#0b0d12;color:#dfe3ea"><h1 style="font-size:1.3em">A new code is needed</h1><p>{}'
+)
 
 MAY_UPLOAD = "may_upload"  # in the state of a request: whether its client may hand things in
 
@@ -129,9 +140,9 @@ class Access:
         tokens = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
         is_known = gate.knows(_cookie(headers)) or is_uploader
         if not tokens:
-            return None if is_known else _no_session()
+            return None if is_known else _no_session(headers)
         if scope["type"] != "http" or scope["method"] != "GET":  # a HEAD is a preview, not a visit
-            return _no_session()
+            return _no_session(headers)
         if is_uploader or (is_known and self._uploaders is None):
             return redirect(scope["path"])
         session = None if self._uploaders is None else self._uploaders.exchange(tokens[0])
@@ -140,7 +151,7 @@ class Access:
         if session is None:
             session = gate.exchange(tokens[0])
         if session is None:
-            return _no_session()
+            return _no_session(headers)
         answer = redirect(scope["path"])
         answer.headers["set-cookie"] = f"{COOKIE}={session}; {_ATTRIBUTES}"
         return answer
@@ -182,9 +193,9 @@ def _cookie(headers: Headers) -> str:
     return "" if morsel is None else morsel.value
 
 
-def _no_session() -> Response:
-    return PlainTextResponse(
-        "scan the QR code in the terminal where this server was started; each works once",
-        403,
-        {"Cache-Control": "no-store"},
-    )
+def _no_session(headers: Headers) -> Response:
+    """Return the refusal of a client without a session: a page for whoever has opened one."""
+    never = {"Cache-Control": "no-store"}
+    if "text/html" not in headers.get("accept", ""):
+        return PlainTextResponse(_SCAN, 403, never)
+    return HTMLResponse(_PAGE.format(_SCAN), 403, never)

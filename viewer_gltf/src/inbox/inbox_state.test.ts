@@ -5,7 +5,7 @@ import { readUnderstood } from "./understood";
 const ITEM = {
   ...{ id: "a1", title: "Head", doing: "building", line: "", bytes: 10, total: 10, place: 0 },
   ...{ share: 0.4, label: "units", tiles: 1, all_tiles: 4, left_s: 30, page: "items/a1/view/" },
-  ...{ has_upload: true, keep_upload: false, asks: "" },
+  ...{ has_upload: true, keep_upload: false, asks: "", waits: true },
 };
 const LIMITS = { bytes: 100, files: 5, piece: 8, free_bytes: 70, hours: 24 };
 const read = (items: unknown[], more = {}) =>
@@ -24,6 +24,7 @@ describe("a message of the server", () => {
           ...{ place: 0, share: 0.4, label: "units", tiles: 1, allTiles: 4, left_s: 30 },
           ...{ page: "items/a1/view/", hasUpload: true, keepsUpload: false },
           asksSpacing: false,
+          waits: true,
         },
       ],
     });

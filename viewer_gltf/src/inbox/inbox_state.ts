@@ -15,6 +15,8 @@ export type Item = Readonly<{
   /** Bytes of the upload that have arrived, and all. */
   bytes: number;
   total: number;
+  /** Whether the server reads another item first. */
+  waits: boolean;
   /** From 1 in the queue of builds; 0: it is not in the queue. */
   place: number;
   /** How much of the build is done, 0..1. */
@@ -88,6 +90,7 @@ function readItem(found: Found): Item | null {
     line: inPageWords(textOf(found.line)),
     bytes: positive(found.bytes, 0),
     total: positive(found.total, 0),
+    waits: found.waits === true,
     place: positive(found.place, 0),
     share: Math.min(1, positive(found.share, 0)),
     label: textOf(found.label),

@@ -7,7 +7,7 @@ import { bytesText, deletionWords, refusalOf, shareOf, stateName, wordsOf } from
 const item = (changes: Partial<Item>): Item => ({
   ...{ id: "a1", title: "Head", doing: "understood", line: "", bytes: 0, total: 0, place: 0 },
   ...{ share: 0, label: "", tiles: 0, allTiles: 0, left_s: null, page: "" },
-  ...{ hasUpload: true, keepsUpload: false, asksSpacing: false },
+  ...{ hasUpload: true, keepsUpload: false, asksSpacing: false, waits: false },
   ...changes,
 });
 const upload = (changes: Partial<Progress>): Progress => ({
@@ -27,6 +27,14 @@ describe("bytes", () => {
     [1.24e9, "1.2 GB"],
     [5e15, "5000 TB"],
   ])("%d are %s", (bytes, text) => expect(bytesText(bytes)).toBe(text));
+});
+
+it("says that an image waits for the one before it", () => {
+  const waiting = item({ doing: "understanding", waits: true });
+  expect(stateName(waiting, null, false)).toBe("Waiting");
+  expect(wordsOf(waiting, null, false, LIMITS)).toBe(
+    "It waits until the image before it has been read.",
+  );
 });
 
 describe("the words for an upload of this page", () => {

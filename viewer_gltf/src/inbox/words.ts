@@ -15,7 +15,7 @@ export function bytesText(bytes: number): string {
 
 /** A word or two for the state, as a badge shows it. The arguments are those of `wordsOf`. */
 export function stateName(
-  { doing, place }: Item,
+  { doing, place, waits }: Item,
   upload: Progress | null,
   isMoving: boolean,
 ): string {
@@ -24,9 +24,10 @@ export function stateName(
     const names = { lost: "No connection", waiting: "Waiting", refused: "Stopped" };
     return names[upload.doing as keyof typeof names] ?? "Uploading";
   }
+  if (waits) return "Waiting";
   if (doing === "queued") return place > 0 ? `In the queue: ${place}` : "In the queue";
   return {
-    unpacking: "Unpacking",
+    unpacking: "Checking",
     understanding: "Reading",
     understood: "Ready",
     failed: "Stopped",
@@ -49,6 +50,7 @@ export function wordsOf(
   isMoving: boolean,
   { hours }: Pick<Limits, "hours">,
 ): string {
+  if (item.waits) return "It waits until the image before it has been read.";
   switch (item.doing) {
     case "uploading":
       if (upload !== null) return uploadWords(upload);
@@ -58,7 +60,7 @@ export function wordsOf(
         (hours > 0 ? ` An unfinished upload is deleted after ${hoursText(hours)}.` : "")
       );
     case "unpacking":
-      return "The files are checked and unpacked.";
+      return "The files are being checked, and unpacked if they are an archive.";
     case "understanding":
       return "The image is being read. This takes a few seconds.";
     case "understood":
