@@ -336,3 +336,15 @@ def test_an_item_that_waits_for_the_one_before_it_says_so(tmp_path: Path) -> Non
                 assert time.monotonic() < end_s
                 time.sleep(0.02)
         assert client.wait(second, "understood")["waits"] is False
+
+
+def test_an_address_is_left_out_of_lines_and_the_forms_that_are_expected_stay(
+    tmp_path: Path,
+) -> None:
+    item = Item("0" * 16, tmp_path, 0.0, is_local=True)
+    host = "https://images.example/webclient/"
+    item.upload = Upload.create(tmp_path / "upload", Announced(address=f"{host}?show=51"))
+    line = f"{host}?show=51: another form, expected {host}?show=image-ID or {host}img/ID/"
+    expected = f"the address: another form, expected {host}?show=image-ID or {host}img/ID/"
+    assert without_identity(item, line) == expected
+    assert without_identity(item, f"{host}0/.zarray: missing") == "the address0/.zarray: missing"

@@ -94,6 +94,26 @@ def test_a_restart_goes_on_with_uploads_the_queue_and_the_build(
         assert client.item(third)["doing"] == "understood"
 
 
+def test_a_server_that_ends_as_a_build_does_loses_nothing(tmp_path: Path, head: bytes) -> None:
+    with serving_inbox(tmp_path) as server:
+        client = InboxClient(server.port)
+        item = hand_in(client, "a.nii", head)
+        client.command(item, "build")
+        client.wait(item, "building")
+        server.inbox.close()
+        end_build(server, item)
+        client.wait(item, "built")
+    box, upload = tmp_path / "box", tmp_path / "box" / item / "upload"
+    assert upload.exists()
+    inbox = Inbox(box, LIMITS)
+    found = inbox.find(item)
+    assert found.doing == "queued"  # which finds that all is built
+    inbox.set(found, "built")
+    assert upload.exists()
+    assert Inbox(box, LIMITS).find(item).doing == "built"  # after a power cut at this moment
+    assert not upload.exists()
+
+
 def test_delete_deletes_everything_and_ends_what_runs(tmp_path: Path, head: bytes) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)

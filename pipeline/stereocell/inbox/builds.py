@@ -86,10 +86,10 @@ class Builds:
             self._end(build)
         elif state.doing == "complete":
             self._end(build)
-            if not item.keep_upload:
-                inbox.remove_upload(item)
             item.queued = 0
             inbox.set(item, "built")
+            if not item.keep_upload:
+                inbox.remove_upload(item)
         elif state.doing == "failed":
             self._end(build)
             item.queued = 0

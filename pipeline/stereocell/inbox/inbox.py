@@ -53,6 +53,8 @@ class Inbox:
         shutil.rmtree(item.view_folder, ignore_errors=True)
         if item.doing == "built" and not (item.out / "bundle" / "manifest.json").exists():
             self._fail(item, "its build is gone: hand it in again")
+        elif item.doing == "built" and not item.keep_upload:
+            self.remove_upload(item)  # the server ended before it was
         elif item.doing in ("building", "paused"):
             item.doing = "queued"  # with its old place, which is the first
         if item.doing in ("uploading", *_BUSY, "understood", "queued") and item.upload is None:
@@ -224,8 +226,13 @@ class Inbox:
         self.tile_reader.close()
 
     def remove_upload(self, item: Item) -> None:
-        """Remove what was uploaded: from here on nothing holds an identity."""
+        """Remove what was uploaded: from here on nothing holds an identity.
+
+        A closed inbox keeps it, since it has not written down that nobody needs it any more.
+        """
         with self.changed:
+            if self._is_closed:
+                return
             item.upload = None
         shutil.rmtree(item.upload_folder, ignore_errors=True)
 

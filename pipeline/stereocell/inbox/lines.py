@@ -41,8 +41,10 @@ def without_identity(item: Item, text: str) -> str:
             text = text.replace(f"{shown}/", "").replace(shown, "the upload")
     if item.upload is not None:
         if address := item.address:
-            for shown in {address, Location.of(address).shown}:
-                text = text.replace(shown, "the address")
+            places = sorted({address, Location.of(address).shown}, key=len, reverse=True)
+            one_of = "|".join(map(re.escape, places))
+            # forms of addresses that are expected may begin like it, and have an ID in it
+            text = re.sub(rf"(?:{one_of})(?!\S*\bID\b)", "the address", text)
         own = {part for parts in item.upload.announced.parts for part in parts}
         named = own | {one.partition(".")[0] for one in own}
         names = [

@@ -18,7 +18,9 @@ from stereocell.preview.png_slices import to_bytes
 from stereocell.preview.views import View
 
 _LONGEST_PX = 480  # pixels, longest side of a picture
-_WHITE = 0.5  # share of white in a contour, so that it stands out from the voxels of its channel
+# Share of white in a contour, and of its full light in the channel of the same colour around it:
+# without the two a contour is lost in bright voxels.
+_WHITE, _LIGHT = 0.6, 0.6
 _NO_LINES = np.zeros((0, 2, 2))
 
 
@@ -59,7 +61,8 @@ def _slice(channels: Sequence[ShownChannel], view: View, spacing_um: Spacing) ->
         plane = _cut(shown.coarse.voxels, box, view)
         bytes_ = to_bytes(plane, shown.appearance.window)
         color = (255, 255, 255) if is_one else _srgb(shown.appearance.color)
-        tinted = bytes_[..., None] * (np.array(color, np.float32) / 255)
+        light = 1.0 if is_one else _LIGHT
+        tinted = bytes_[..., None] * (light * np.array(color, np.float32) / 255)
         grey = tinted if grey is None else grey + _fitted(tinted, grey.shape[:2])
         level = shown.appearance.level
         if level is None:
