@@ -94,6 +94,17 @@ def test_a_line_is_explained_where_someone_knows_better(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_the_lines_of_several_tasks_become_one_that_says_what_to_do(
+    begin: Callable[[Any], BuildProcess],
+) -> None:
+    for build, expected in (
+        (fake_build.starved, "the disk is full: make room, then continue the build"),
+        (fake_build.refused_twice, "A: f.tif: cut off (and 2 more lines)"),
+    ):
+        assert until(begin(build), lambda state: state.doing == "failed").line == expected
+
+
+@pytest.mark.slow
 def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
     nothing: Any = SimpleNamespace(tiles=())
     coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path, {})

@@ -4,7 +4,10 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numcodecs
@@ -390,3 +393,16 @@ def test_a_source_without_rights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(tifffile.TiffFile, "__init__", refuse)  # tests may run as root
     assert "Permission denied" in refusal(path)
+
+
+def test_a_host_that_sends_no_parts_of_files_is_named_as_the_reason(tmp_path: Path) -> None:
+    """Python's own server is such a host; files that fit into one read need no parts."""
+    voxels = np.zeros((16, 512, 512), np.uint16)
+    write_ome_tiff(tmp_path / "large.ome.tif", voxels)
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        dataset = read.open(f"http://127.0.0.1:{server.server_address[1]}/large.ome.tif")
+        with pytest.raises(SourceError, match="the host sends no parts of files: ask whoever runs"):
+            dataset.read(0, Box((15, 0, 0), (16, 512, 512)))
+        server.shutdown()

@@ -1,5 +1,6 @@
 """Builds for tests of `BuildProcess`: they report tasks, and compute nothing."""
 
+import errno
 import os
 import signal
 import threading
@@ -24,6 +25,19 @@ def refused(_: Path, watch: Watch) -> str:
     """End with the line of an error."""
     watch("windows", 0, 1, "")
     return "f.tif: changed since the plan: run it again"
+
+
+def starved(_: Path, watch: Watch) -> str:
+    """End with the lines of two tasks that found no room on the disk."""
+    watch("units", 0, 2, "")
+    no_room = os.strerror(errno.ENOSPC)
+    return f"r0_c0/A: out/units: can't be written: {no_room}\nunits: 2 of 2 failed"
+
+
+def refused_twice(_: Path, watch: Watch) -> str:
+    """End with a line for each of two tasks, and one for both."""
+    watch("units", 0, 2, "")
+    return "A: f.tif: cut off\nB: f.tif: not a number\nunits: 2 of 2 failed"
 
 
 def refused_once(folder: Path, watch: Watch) -> str:

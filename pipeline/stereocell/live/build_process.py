@@ -5,6 +5,7 @@ asked to pause, to continue and to end. A pause begins when the running tasks ha
 pauses the build rests for moments, while someone waits for a picture; see `rests`.
 """
 
+import errno
 import multiprocessing
 import os
 import sys
@@ -25,6 +26,7 @@ from stereocell.live.build_state import Command, State
 from stereocell.live.coarse_channel import CoarseChannel
 from stereocell.live.coarse_tiles import Sizes
 from stereocell.live.rests import Rests, lead_group
+from stereocell.model.counted import counted
 from stereocell.model.errors import StereoCellError
 from stereocell.planning.plan import Plan
 
@@ -237,8 +239,16 @@ class BuildProcess:
             elif isinstance(told, float):
                 self._paused_s += told
 
-    def _fail(self, line: str) -> None:
-        self._set(doing="failed", line=self._explain(line), left_s=None)
+    def _fail(self, text: str) -> None:
+        """Take down that the build has failed.
+
+        text  a line for each cause, as the build reports them; the page has room for one
+        """
+        if os.strerror(errno.ENOSPC) in text:
+            text = "the disk is full: make room, then continue the build"
+        first, *others = self._explain(text).splitlines() or [""]
+        line = f"{first} (and {counted(len(others), 'more line')})" if others else first
+        self._set(doing="failed", line=line, left_s=None)
 
     def _take(self, task: _Task) -> None:
         share = _share_of(task)

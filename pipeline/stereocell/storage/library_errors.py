@@ -196,6 +196,11 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}" if is_json else f"metadata: found {content.words}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
+    if "support range requests" in str(error):  # fsspec's words, which are for programmers
+        return (
+            "the host sends no parts of files: ask whoever runs it to turn on range requests, or "
+            "download the file first"
+        )
     if isinstance(error, TimeoutError):  # aiohttp's text is longer for silence than for other waits
         is_silence = bool(str(error))
         return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"

@@ -97,6 +97,8 @@ describe("the panel's layout", () => {
     const [tile, ...others] = off.tiles;
     const unfinished = { ...off, tiles: [{ ...tile, isUnfinished: true as const }, ...others] };
     expect(status(unfinished)).toBe("Volumes, as not all surfaces are built");
+    const without = off.tiles.map((each) => ({ ...each, isUnfinished: true as const }));
+    expect(status({ ...off, tiles: without })).toBe("Volumes");
     const all = reduce(unfinished, { type: "set", id: "mode", value: "all" });
     expect(status(all)).toBe("Volumes");
     const none = { ...off, channels: off.channels.map((each) => ({ ...each, shown: false })) };

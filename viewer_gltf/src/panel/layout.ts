@@ -260,7 +260,8 @@ function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts
   const isUnfinished = tiles.some((tile) => tile.isUnfinished);
   if (channels.every(({ shown }) => !shown)) return "All channels are hidden";
   const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
-  const form = isUnfinished && mode !== "all" && mode !== "traced" ? UNFINISHED : STATUS[mode];
+  const unfinished = tiles.some((tile) => !tile.isUnfinished) ? UNFINISHED : STATUS.all;
+  const form = isUnfinished && mode !== "all" && mode !== "traced" ? unfinished : STATUS[mode];
   const parts = [channels.some(({ hasObjects }) => !hasObjects) ? form : "Objects", alone];
   if (isLoading) parts.push("loading …");
   else if (samples !== null) parts.push(samplesText(samples));

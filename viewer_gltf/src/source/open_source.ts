@@ -30,8 +30,11 @@ export async function openAddress(address: string, report: Report): Promise<Show
   try {
     return await shown(await openZarr(new RemoteFolder(url), name), report);
   } catch (error) {
-    const isFile = isNothingFound(error) && FILE.test(path) && !path.endsWith(".zarr");
-    throw isFile ? otherFormat(name, url.href) : error;
+    if (!isNothingFound(error)) throw error;
+    if (FILE.test(path) && !path.endsWith(".zarr")) throw otherFormat(name, url.href);
+    // with the whole address: one that was given without https:// is below that of the page
+    const { message } = error as SourceError;
+    throw new SourceError(message.replace(`${name}:`, `${url.href}:`));
   }
 }
 
@@ -45,7 +48,11 @@ export async function openLocal(source: LocalSource, report: Report): Promise<Sh
   if (source.kind === "file")
     return shown(await openFile(new LocalFile(source.file), report), report);
   const name = nameOf(source.name);
-  return shown(await openZarr(new LocalFolder(source.find), name), report);
+  try {
+    return await shown(await openZarr(new LocalFolder(source.find), name), report);
+  } catch (error) {
+    throw isNothingFound(error) ? otherFormat(name) : error;
+  }
 }
 
 async function openFile(file: ByteSource, report: Report): Promise<OpenedImage> {

@@ -54,7 +54,8 @@ export class ZipStore implements FileStore {
     const root = rootOf([...members.keys()]);
     if (root === null) {
       throw new SourceError(
-        `${archive.name}: found a zip archive without a Zarr group, expected OME-Zarr.`,
+        `${archive.name}: found a zip archive without a Zarr group, expected OME-Zarr: for other formats, and DICOM, ` +
+          "use stereocell view",
       );
     }
     return new ZipStore(archive, members, root);

@@ -1,0 +1,19 @@
+import { describe, expect, it } from "vitest";
+import { type LocalSource, openLocal } from "./open_source";
+
+const faultOf = (source: LocalSource) =>
+  openLocal(source, () => undefined).then(
+    () => "none",
+    (error: Error) => error.message,
+  );
+
+describe("what a person has dropped and the page can't read", () => {
+  it.each<[string, LocalSource]>([
+    ["a folder of DICOM", { kind: "folder", name: "scan", find: async () => null }],
+    ["a TIFF", { kind: "file", file: new File(["II*"], "cells.tif") }],
+  ])("is %s: another way is named", async (_, source) => {
+    const fault = await faultOf(source);
+    expect(fault).toContain("for other formats, and DICOM, use stereocell view");
+    expect(fault).not.toContain("host");
+  });
+});
