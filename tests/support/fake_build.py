@@ -29,15 +29,15 @@ def refused(_: Path, watch: Watch) -> str:
 
 def starved(_: Path, watch: Watch) -> str:
     """End with the lines of two tasks that found no room on the disk."""
-    watch("units", 0, 2, "")
+    watch("evidence", 0, 2, "")
     no_room = os.strerror(errno.ENOSPC)
-    return f"r0_c0/A: out/units: can't be written: {no_room}\nunits: 2 of 2 failed"
+    return f"r0_c0/A: out: can't be written: {no_room}\nevidence: 2 of 2 failed"
 
 
 def refused_twice(_: Path, watch: Watch) -> str:
     """End with a line for each of two tasks, and one for both."""
-    watch("units", 0, 2, "")
-    return "A: f.tif: cut off\nB: f.tif: not a number\nunits: 2 of 2 failed"
+    watch("evidence", 0, 2, "")
+    return "A: f.tif: cut off\nB: f.tif: not a number\nevidence: 2 of 2 failed"
 
 
 def refused_once(folder: Path, watch: Watch) -> str:
