@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom
 
 from stereocell.export import pictures
 from stereocell.export.chosen import Chosen
@@ -21,7 +21,7 @@ from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import UsageError
 from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
-from stereocell.usd.write_objects import COLUMNS
+from stereocell.usd.layer import SHOWN
 from support import spheres
 from support.bundles import CD31
 
@@ -40,22 +40,22 @@ def covered(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 @pytest.mark.slow
-def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
+def test_a_picture_opens_with_the_channels_that_the_stage_shows(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Surfaces of the image's channels would show through them in patches."""
+    def show_one(stage: Usd.Stage) -> None:
+        for prim in stage.GetPrimAtPath(SHOWN).GetChildren():
+            if prim.GetName() != "CD31":
+                UsdGeom.Imageable(prim).MakeInvisible()
 
-    def make_label_map(stage: Usd.Stage) -> None:
-        prim = stage.GetPrimAtPath(CD31)
-        prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
-
-    layer, small = edited(make_label_map), ExportOptions(width=64)
+    layer, small = edited(show_one), ExportOptions(width=64)
     said = "CD31 alone, as the viewer opens: --channels takes others"
     for file, options, is_said in (
         ("s.png", small, True),
         ("t.png", replace(small, channels=("CD31", "Hoechst 33342")), False),
         ("s.usdz", ExportOptions(), True),
-        ("s.glb", ExportOptions(), False),
+        ("s.glb", ExportOptions(), True),
+        ("s.stl", ExportOptions(), False),
     ):
         told: list[str] = []
         export_stage(layer, tmp_path / file, options=options, report=told.append)
@@ -65,17 +65,19 @@ def test_a_picture_opens_with_label_maps_alone_as_the_viewer(
     assert [channel.name for channel in chosen.channels] == ["CD31"]
 
 
-def test_label_maps_that_an_edit_has_hidden_leave_the_picture_to_the_others(
+def test_shown_channels_whose_surfaces_are_hidden_leave_the_picture_to_the_others(
     edited: Callable[..., Path],
 ) -> None:
-    def hide_label_map(stage: Usd.Stage) -> None:
+    def hide(stage: Usd.Stage) -> None:
         prim = stage.GetPrimAtPath(CD31)
-        prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
+        for one in stage.GetPrimAtPath(SHOWN).GetChildren():
+            if one.GetName() != prim.GetName():
+                UsdGeom.Imageable(one).MakeInvisible()
         for tile in stage.GetPrimAtPath("/Specimen/Tiles").GetChildren():
             surface = stage.OverridePrim(tile.GetPath().AppendChild(prim.GetName()))
             UsdGeom.Imageable(surface).MakeInvisible()
 
-    chosen = Chosen(edited(hide_label_map), ExportOptions(width=64))
+    chosen = Chosen(edited(hide), ExportOptions(width=64))
     chosen.show_as_viewer()
     assert len(chosen.channels) > 1
 

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from stereocell.isosurface.options import parse_level
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.channel import Appearance, SurfaceLevel
-from stereocell.planning.channels import MR_GREY, Channel, has_brain, opens
+from stereocell.planning.channels import MR_GREY, Channel, has_brain
 from stereocell.planning.settings import load, preset_names
 from stereocell.planning.survey import ChannelSurvey
 from stereocell.planning.vessel_color import VESSEL_RED, color_vessels
 from stereocell.transfer.channel_statistics import find_statistics, make_appearance
-from stereocell.transfer.ct_colors import tissue_shapes
-from stereocell.transfer.mr_grey import grey_shapes
 from stereocell.transfer.opacity import evaluate
-from stereocell.transfer.shapes2d import evaluate2d, find_fault
+from stereocell.transfer.shapes2d import evaluate2d
 from stereocell.transfer.windows import parse_window
 from support.plans import plan_of
 
@@ -202,37 +200,3 @@ def test_only_a_body_is_cut_open_and_vessels_are_shown_whole_and_red(
     assert color_vessels(survey, modality="CT") == survey
     stated = replace(survey, appearance=replace(look, color=(0.0, 0.0, 1.0)))
     assert color_vessels(stated, modality="MR") == stated
-
-
-def test_autofluorescence_is_off_at_first_beside_other_channels() -> None:
-    def shown(*names: str) -> list[bool]:
-        channels = [Channel(index, name, (1, 1, 1)) for index, name in enumerate(names)]
-        return [opens(channel, channels) for channel in channels]
-
-    assert shown("signal", "background") == [True, False]
-    assert shown("Cells", "Autofluorescence") == [True, False]
-    assert shown("background") == [True]
-    assert shown("DAPI", "AF488") == [True, True]  # a dye
-
-
-@pytest.mark.parametrize("level", [0.02, 0.3, 0.9])
-@pytest.mark.parametrize("foot", [0.5, 0.98, 1.5])
-@pytest.mark.parametrize("brightest", [0.1, 1.0])
-def test_grey_values_have_valid_shapes_wherever_noise_lets_opacity_begin(
-    level: float, foot: float, brightest: float
-) -> None:
-    start = min(foot * level, 0.97)
-    opacity = ((0.0, 0.0), (start, 0.0), (min(start + 0.02, 0.99), 0.2), (1.0, 0.6))
-    shapes = grey_shapes(level, max(brightest, level), opacity, 0.1)
-    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
-
-
-@pytest.mark.parametrize("level", [-900.0, -300.0, -120.0, 0.0, 140.0])
-@pytest.mark.parametrize("window", [(-1024.0, 2000.0), (-160.0, 240.0), (0.0, 80.0)])
-def test_tissues_have_valid_shapes_and_none_below_the_surface(
-    level: float, window: tuple[float, float]
-) -> None:
-    shapes = tissue_shapes(level, window, 0.05)
-    assert [find_fault(shape) for shape in shapes] == [""] * len(shapes)
-    lows = [shape.values[0] * (window[1] - window[0]) + window[0] for shape in shapes]
-    assert all(low >= max(level - MOST_BELOW_HU, window[0]) for low in lows)

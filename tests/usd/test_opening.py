@@ -3,14 +3,16 @@
 from pathlib import Path
 
 import pytest
-from pxr import Gf, Usd
+from pxr import Gf, Usd, UsdGeom
 
 from stereocell.model.channel import Appearance
 from stereocell.model.errors import StageError
-from stereocell.usd.layer import OPENING_CUT, ROOT
-from stereocell.usd.read_appearances import read_appearances
-from stereocell.usd.read_stage import open_stage, opening_cut_of
+from stereocell.usd.drawn_prims import is_visible
+from stereocell.usd.layer import CHANNELS, OPENING_CUT, ROOT, SHOWN
+from stereocell.usd.read_appearances import read_appearances, shows_at_first
+from stereocell.usd.read_stage import open_stage, opening_cut_of, tile_prims
 from stereocell.usd.write_stage import TileExtent, write_stage
+from support.stages import F_ID, write_whole
 
 FUNCTIONS = dict.fromkeys(("default", "bone"), ((0.0, 0.0), (1.0, 0.5)))
 
@@ -45,3 +47,32 @@ def test_channels_open_shown_or_not_and_with_their_own_function(tmp_path: Path) 
     skin, bone = read_appearances(_written(tmp_path, opens_cut=False))
     assert (skin.opens, skin.chosen) == (False, "default")
     assert (bone.opens, bone.chosen) == (True, "bone")
+
+
+def test_one_edit_hides_a_channel_in_all_tiles_and_the_bundle_still_has_it(tmp_path: Path) -> None:
+    stage = Usd.Stage.Open(str(write_whole(tmp_path)))
+    branches = [prim.GetChild(F_ID) for prim in tile_prims(stage)]
+    assert len(branches) > 1
+    shown = UsdGeom.Imageable(stage.GetPrimAtPath(SHOWN.AppendChild(F_ID)))
+    material = stage.GetPrimAtPath(CHANNELS.AppendChild(F_ID))
+    assert all(_seen(branch) for branch in branches)
+    shown.MakeInvisible()
+    assert not any(_seen(branch) for branch in branches)  # what every program draws
+    assert all(is_visible(branch) for branch in branches)  # what a bundle holds
+    assert not shows_at_first(material)
+    UsdGeom.Imageable(branches[0]).GetVisibilityAttr().Set("invisible")
+    assert [is_visible(branch) for branch in branches] == [False] + [True] * (len(branches) - 1)
+    shown.GetVisibilityAttr().Set("inherited")
+    assert [_seen(branch) for branch in branches] == [False] + [True] * (len(branches) - 1)
+
+
+def _seen(prim: Usd.Prim) -> bool:
+    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+
+
+def test_a_visibility_over_time_is_refused(tmp_path: Path) -> None:
+    stage = _written(tmp_path, opens_cut=False)
+    shown = UsdGeom.Imageable(stage.GetPrimAtPath(SHOWN.AppendChild("Bone")))
+    shown.GetVisibilityAttr().Set("invisible", 1.0)
+    with pytest.raises(StageError, match="values over time"):
+        read_appearances(stage)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Usd, UsdGeom, UsdShade
 
 from stereocell.usd import write_usdz as usdz_writer
+from stereocell.usd.layer import SHOWN
 from stereocell.usd.validate import validate_usdz
-from stereocell.usd.write_objects import COLUMNS
 from stereocell.usd.write_usdz import write_usdz
 from stereocell.verify.formats import check
 from support.stages import BALL_ID, COLORS, F_ID, HEAD, SHAPE, SPACING_UM, write_whole
@@ -101,21 +101,21 @@ def test_a_heavy_specimen_is_shown_at_a_coarser_level(
     assert file.resolvedPath.endswith(f"specimen.usdz[textures/{F_ID}_r0_c0_normal.png]")
 
 
-def as_label_map(stage_path: Path, edit: Path, channel: str) -> Usd.Stage:
-    """Open a layer over the stage in which a channel's surfaces are objects."""
+def with_one_shown(stage_path: Path, edit: Path, channel: str) -> Usd.Stage:
+    """Open a layer over the stage that shows one channel alone."""
     edit.write_text(f"{HEAD}subLayers = [@{stage_path}@])\n")
     stage = Usd.Stage.Open(str(edit))
-    prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
-    prim.CreateAttribute(COLUMNS, Sdf.ValueTypeNames.TokenArray).Set([])
+    for prim in stage.GetPrimAtPath(SHOWN).GetChildren():
+        if prim.GetName() != channel:
+            UsdGeom.Imageable(prim).MakeInvisible()
     return stage
 
 
-def test_label_maps_are_shown_alone_unless_they_are_hidden(
+def test_channels_that_show_are_alone_in_it_unless_their_surfaces_are_hidden(
     stage_path: Path, tmp_path: Path
 ) -> None:
-    """Surfaces of their image would break through them."""
     edit = tmp_path / "edit.usda"
-    stage = as_label_map(stage_path, edit, BALL_ID)
+    stage = with_one_shown(stage_path, edit, BALL_ID)
     stage.Save()
     balls = {f"{BALL_ID}_r0_c0", f"{BALL_ID}_r0_c1"}
     every = balls | {f"{F_ID}_r0_c0", f"{F_ID}_r0_c1"}
@@ -134,11 +134,11 @@ def test_label_maps_are_shown_alone_unless_they_are_hidden(
     assert shown() == every - balls
 
 
-def test_other_channels_weigh_nothing_beside_label_maps(
+def test_channels_that_do_not_show_weigh_nothing(
     stage_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     edit, path = tmp_path / "edit.usda", tmp_path / "edit.usdz"
-    as_label_map(stage_path, edit, BALL_ID).Save()
+    with_one_shown(stage_path, edit, BALL_ID).Save()
     write_usdz(edit, path)
     balls = Usd.Stage.Open(str(path))
     count = sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes(balls).values())

@@ -113,18 +113,18 @@ class Chosen:
         return [one for one in self.channels if read_columns(self.stage, one.id) is not None]
 
     def show_as_viewer(self) -> None:
-        """Choose label maps alone where any is drawn, as the viewer opens, if no channel is named.
+        """Choose the channels that show at first, if no channel is named and any of them is drawn.
 
-        Surfaces of their image's channels would show through them in patches.
+        All of them would hide one another, or show through one another in patches.
         """
-        every, maps = self.channels, self.label_maps
-        if self.options.channels or not maps or len(maps) == len(every):
+        every, shown = self.channels, [one for one in self.channels if one.opens]
+        if self.options.channels or not shown or len(shown) == len(every):
             return
-        self.channels = maps
+        self.channels = shown
         if any(self.count_triangles()):
-            names = ", ".join(one.name for one in maps)
+            names = ", ".join(one.name for one in shown)
             self.report(f"{names} alone, as the viewer opens: --channels takes others")
-        else:  # an edit has hidden them
+        else:
             self.channels = every
 
     @property

@@ -12,7 +12,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
-from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, TILES, UP_AXIS, export
+from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, SHOWN, TILES, UP_AXIS, export
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
@@ -43,7 +43,7 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     for name in chosen.all_tiles:
         if name not in chosen.tiles:
             _remove(flat, TILES.AppendChild(name))
-    for place in (CHANNELS, *map(TILES.AppendChild, chosen.tiles)):
+    for place in (CHANNELS, SHOWN, *map(TILES.AppendChild, chosen.tiles)):
         for one in _channels(stage, place):
             if one not in kept:
                 _remove(flat, place.AppendChild(one))

@@ -66,7 +66,7 @@ class Format:
 _USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
 _PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
 _VOLUME = frozenset({"tiles", "region", "units", "bits"})
-_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"})
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, is_seen=True)
 _PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
 FORMATS = {
     ".glb": _GLTF,

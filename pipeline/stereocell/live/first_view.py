@@ -81,11 +81,12 @@ def write_first_view(
         found = list(
             pool.map(lambda one: first_appearance(plan, one, read[one.voxels_id]), plan.channels)
         )
-    appearances = [composed(appearance) for appearance, _ in found] or [
-        composed(replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT))
-        for one in plan.labels
-    ]
     shown = _shown(plan)
+    made = [appearance for appearance, _ in found] or [
+        replace(appearance_of_labels(one), surface_reason=OBJECTS_NOT_BUILT) for one in plan.labels
+    ]
+    opens = shown.shown_at_first
+    appearances = [composed(replace(one, opens=one.id in opens)) for one in made]
     written = write_coarse_tiles(shown, root, read, appearances, sizes or {})
     appearances = [
         as_surface(appearance, read[channel.voxels_id], written.apart)
@@ -98,7 +99,7 @@ def write_first_view(
 def _shown(plan: Plan) -> Plan:
     """Return a plan with the channels of its first view: its own, or else its label maps."""
     if plan.channels:
-        return plan
+        return replace(plan, labels=())
     channels = tuple(Channel(one.channel, one.name, one.color) for one in plan.labels)
     return replace(plan, channels=channels, labels=())
 

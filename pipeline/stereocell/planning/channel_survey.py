@@ -17,7 +17,7 @@ from stereocell.isosurface.repair_rules import choose_repair
 from stereocell.model.channel import Appearance, SurfaceLevel
 from stereocell.model.lattice_field import make_iso_field
 from stereocell.model.modality import SEGMENTATION
-from stereocell.planning.channels import Channel, opens
+from stereocell.planning.channels import Channel
 from stereocell.planning.level_choice import (
     Components,
     Found,
@@ -132,11 +132,7 @@ def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
             for n, spacing in zip(plan.region.shape, plan.spacing_um, strict=True)
         ),
     )
-    return replace(
-        appearance,
-        painted_by=painter.id if painter else "",
-        opens=opens(channel, plan.channels),
-    )
+    return replace(appearance, painted_by=painter.id if painter else "")
 
 
 def _surface_level(plan: Plan, chosen: Chosen) -> SurfaceLevel | None:

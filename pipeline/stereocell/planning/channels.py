@@ -33,6 +33,8 @@ FLESH = (0.78, 0.66, 0.55)
 SKIN = (0.72, 0.5, 0.37)
 # ... and of the brightest tissue of an MR, which is nearly white in its slices.
 MR_GREY = (0.92, 0.88, 0.82)
+# Most channels that show when a specimen is opened: as many as the viewer draws volumes of at once
+MOST_SHOWN = 4
 BODY_MODALITIES = ("MR", "CT")
 # Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
 BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
@@ -70,16 +72,23 @@ class Channel:
         return to_identifier(self.name)
 
 
-def opens(channel: Channel, channels: Sequence[Channel]) -> bool:
-    """Return whether a channel shows when the specimen is opened.
+def shown_at_first(channels: Sequence[Channel], label_maps: Sequence[str] = ()) -> frozenset[str]:
+    """Return the IDs of the channels that show when the specimen is opened: at most MOST_SHOWN.
 
-    Where classes of a brain are built, they alone show. A channel of autofluorescence shows the
-    same tissue as the others do. Its surface would hide theirs, or run through it.
+    label_maps  IDs of the label maps that are built beside the channels
+
+    Label maps show alone, since their closed objects would hide an image, or lie in it. Where
+    classes of a brain are built, they alone show. A channel of autofluorescence shows the same
+    tissue as the others do: its surface would hide theirs, or run through it. Of the others the
+    first ones show. All of a dozen stains at once hide one another.
     """
+    if label_maps:
+        return frozenset(label_maps[:MOST_SHOWN])
     if has_brain(channels):
-        return channel.name in BRAIN
-    names = [one.base or one.name for one in channels]
-    return not shows_own_light(channel.base or channel.name) or all(map(shows_own_light, names))
+        found = [one for one in channels if one.name in BRAIN]
+    else:
+        found = [one for one in channels if not shows_own_light(one.base or one.name)]
+    return frozenset(one.id for one in (found or channels)[:MOST_SHOWN])
 
 
 def shows_own_light(name: str) -> bool:

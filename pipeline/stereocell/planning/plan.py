@@ -23,6 +23,7 @@ from stereocell.planning.channels import (
     has_brain,
     painted,
     require_no_background,
+    shown_at_first,
     windows_of,
 )
 from stereocell.planning.settings import Settings
@@ -136,6 +137,11 @@ class Plan:
                 shared.add(channel.id)
             seen.add(channel.base)
         return frozenset(shared)
+
+    @property
+    def shown_at_first(self) -> frozenset[str]:
+        """The IDs of the channels and label maps that show when the specimen is opened."""
+        return shown_at_first(self.channels, [one.id for one in self.labels])
 
     @property
     def opens_cut(self) -> bool:

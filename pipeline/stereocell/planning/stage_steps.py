@@ -1,6 +1,7 @@
 """The steps that write a plan's stage, with all that they depend on."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from stereocell.model.channel import PaintColors
@@ -64,6 +65,8 @@ def stage_step(
     for labels in plan.labels:
         painter = plan.painter(labels)
         appearances.append(appearance_of_labels(labels, painter=painter.id if painter else ""))
+    shown = plan.shown_at_first
+    appearances = [replace(one, opens=one.id in shown) for one in appearances]
     return WriteStage(
         plan.name,
         tuple(tiles),

@@ -75,7 +75,7 @@ class WriteStageTile(Step[StageTile]):
     stage_dir  the folder with the tile's files, where an artist may edit them
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[Document[StageTile]] = Document(
         "units.schema.json#StageTile", asdict, _from_json, written_files.REMEDY
     )

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.model.errors import StageError
+from stereocell.usd.layer import SHOWN
 from stereocell.usd.read_attributes import require_still
 from stereocell.usd.typed_values import one_line
 
@@ -26,8 +27,23 @@ def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
 
 
 def is_visible(prim: Usd.Prim) -> bool:
-    """Return whether neither a prim nor one above it is hidden."""
-    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+    """Return whether neither a prim nor one above it is hidden.
+
+    A channel that does not show at first is none that is hidden: a bundle has it all the same.
+    """
+    if UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible:
+        return True
+    above = map(prim.GetStage().GetPrimAtPath, prim.GetPath().GetAncestorsRange())
+    return not any(map(_is_hidden, above))
+
+
+def _is_hidden(prim: Usd.Prim) -> bool:
+    """Return whether a prim's own opinion hides it, or one that it inherits from no SHOWN prim."""
+    visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
+    if not visibility or visibility.Get() != UsdGeom.Tokens.invisible:
+        return False
+    strongest = visibility.GetPropertyStack(Usd.TimeCode.Default())[0]
+    return not strongest.path.HasPrefix(SHOWN)
 
 
 def to_world(prim: Usd.Prim) -> NDArray[np.float64]:

@@ -21,10 +21,11 @@ UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
 # on /Specimen: the plane that it opens cut by, as its normal (x, y, z) and its offset, um, world
 OPENING_CUT = "stereocell:openingCut"
-OPENS = "stereocell:opens"  # on a channel's prim: whether it shows when the specimen is opened
 PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
 BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: the colour of the build
 CHANNELS = ROOT.AppendChild("Channels")
+# a prim for each channel, from which its surfaces and volumes in all tiles inherit the visibility
+SHOWN = ROOT.AppendChild("Shown")
 CLASSES = ROOT.AppendChild("Classes")  # by channel: materials of its objects' classes
 TILES = ROOT.AppendChild("Tiles")
 CAMERAS = ROOT.AppendChild("Cameras")

@@ -3,7 +3,7 @@
 import itertools
 from typing import get_args
 
-from pxr import Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.formats.gltf import Material
 from stereocell.model.channel import (
@@ -15,11 +15,12 @@ from stereocell.model.channel import (
 from stereocell.model.errors import StageError
 from stereocell.model.settings import MAX_VOXEL_VALUE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
-from stereocell.usd.layer import BUILT_COLOR, CHANNELS, OPENS
+from stereocell.usd.layer import BUILT_COLOR, CHANNELS, SHOWN
 from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
     color_of,
     numbers_of,
+    require_still,
     select_variant,
     shortest,
     value_of,
@@ -130,8 +131,21 @@ def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
         _number(prim, "stereocell:threshold"),
         text_of(prim.GetAttribute("stereocell:surfaceReason")),
         _level(prim),
-        read_as(prim.GetAttribute(OPENS), Sdf.ValueTypeNames.Bool) is not False,
+        shows_at_first(prim),
     )
+
+
+def shows_at_first(prim: Usd.Prim) -> bool:
+    """Return whether a channel, given by its material, shows when the specimen is opened.
+
+    It does in stages that do not say. Raises StageError for a visibility over time.
+    """
+    shown = UsdGeom.Imageable(prim.GetStage().GetPrimAtPath(SHOWN.AppendChild(prim.GetName())))
+    if not shown:
+        return True
+    attribute = shown.GetVisibilityAttr()
+    require_still(attribute)
+    return bool(attribute.Get() != UsdGeom.Tokens.invisible)
 
 
 def _level(prim: Usd.Prim) -> StatedLevel | None:

@@ -32,9 +32,9 @@ from stereocell.usd.layer import (
     BUILT_COLOR,
     CHANNEL_API,
     CHANNELS,
-    OPENS,
     PAINTED_BY,
     ROOT,
+    SHOWN,
     export,
     new_stage,
     set_attribute,
@@ -60,7 +60,13 @@ def write_appearances(
     stage = new_stage(".usda", ROOT.name)
     stage.OverridePrim(ROOT)
     UsdGeom.Scope.Define(stage, CHANNELS)
+    UsdGeom.Scope.Define(stage, SHOWN)
     for appearance in appearances:
+        shown = UsdGeom.Scope.Define(stage, SHOWN.AppendChild(appearance.id))
+        shown.GetPrim().SetDisplayName(appearance.name)
+        visibility = shown.CreateVisibilityAttr(UsdGeom.Tokens.inherited)
+        if not appearance.opens:
+            visibility.Set(UsdGeom.Tokens.invisible)
         material = UsdShade.Material.Define(stage, CHANNELS.AppendChild(appearance.id))
         _author_appearance(material, appearance)
         is_fed = bool(appearance.painted_by) or appearance.id in tables
@@ -124,8 +130,6 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
         set_attribute(prim, f"stereocell:{name}", _Types.Float2, Gf.Vec2f(*appearance.window))
     set_attribute(prim, "stereocell:isoConfidence", _Types.Float, appearance.iso_confidence)
     set_attribute(prim, "stereocell:surfaceVerdict", _Types.Token, appearance.surface)
-    if not appearance.opens:
-        set_attribute(prim, OPENS, _Types.Bool, False)
     if appearance.surface_reason:
         reason = appearance.surface_reason
         set_attribute(prim, "stereocell:surfaceReason", _Types.String, reason)

@@ -7,6 +7,8 @@ reaches them all. Baked maps belong to the tile: normals, occlusion and sampled 
 level feed the shader inside the level's variant. The channel's opinion would be the stronger one,
 so a channel with a sampled channel has no opinion about diffuseColor.
 
+In the same way a channel's surface and volume inherit the visibility of /Specimen/Shown/<channel>.
+
 `lod1` is the default: an artist arranges and lights all tiles at once, for which the finest level
 is millions of triangles too heavy, and selects `lod0` for the final frame. So neither of the two
 requests less detail on the phone, but a coarser level does (usd/read_variants.py).
@@ -39,6 +41,7 @@ from stereocell.usd.layer import (
     DISTANCE_SAMPLES,
     LARGEST_DISTANCE,
     SHAPE_HASH,
+    SHOWN,
     SURFACE_API,
     export,
     hash_shape,
@@ -106,6 +109,7 @@ def _compose(tile: TileContent) -> Sdf.Layer:
     for channel in tile.channels:
         branch = UsdGeom.Xform.Define(stage, root.GetPath().AppendChild(channel.channel_id))
         branch.GetPrim().SetDisplayName(from_identifier(channel.channel_id))
+        branch.GetPrim().GetInherits().AddInherit(SHOWN.AppendChild(channel.channel_id))
         _define_look(branch, tile, channel)
         if channel.lods:
             _define_mesh(branch, tile, channel)

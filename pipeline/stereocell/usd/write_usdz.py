@@ -4,9 +4,8 @@ AR viewers expect metres, a scene that stands on the floor, and a few hundred th
 the specimen is scaled to the size of a hand (its longest edge is SIZE_M long), stands with its
 lowest point at y = 0 and its middle above the origin, and has the finest level of detail of at most
 MAX_TRIANGLES triangles (the coarsest, if none is that small). The layer's customLayerData states
-`stereocell:scale`, metres in the file for one metre of the specimen, and `size`. Of label maps and
-an image it has the maps alone, as the viewer opens, if any is drawn: both would break through each
-other.
+`stereocell:scale`, metres in the file for one metre of the specimen, and `size`. It has the
+channels that the stage shows, if any of them is drawn.
 
 Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
 which comes first, the baked maps of that level, and the stage's lights with the image of the dome.
@@ -30,8 +29,8 @@ from pxr import Kind as Kinds
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
 from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.read_appearances import shows_at_first
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
-from stereocell.usd.read_objects import read_columns
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
@@ -71,7 +70,7 @@ def write_usdz(
     as_written  the lists to compare the stage's files with; None: no comparison
     level       of detail; None: the finest that is light enough
     tiles       IDs of those that are written; empty: all
-    channels    the same; empty: label maps where any is drawn, else all
+    channels    the same; empty: those that show at first, if any is drawn, else all
 
     Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
     the stage can't be read, OutputError where the file can't be written.
@@ -103,9 +102,10 @@ def write_usdz(
 
 def _choices(stage: Usd.Stage) -> list[list[str]]:
     """Return the IDs of the channels to show: the first choice of which any is drawn."""
-    every = [str(prim.GetName()) for prim in stage.GetPrimAtPath(CHANNELS).GetChildren()]
-    maps = [channel for channel in every if read_columns(stage, channel) is not None]
-    return [maps, every] if maps else [every]
+    every = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    names = [str(prim.GetName()) for prim in every]
+    shown = [name for name, prim in zip(names, every, strict=True) if shows_at_first(prim)]
+    return [shown, names] if shown else [names]
 
 
 def _choose_level(stage: Usd.Stage, channels: Collection[str], as_written: AsWritten) -> int | None:

@@ -25,18 +25,14 @@ function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number]
 }
 
 /**
- * The state in which a bundle opens: the label maps or else the first channels, as surfaces from afar and as volumes in
- * the disc when near; in the tiles that the stage draws as volumes, as those.
+ * The state in which a bundle opens: the channels that the stage shows, as surfaces from afar and as volumes in the disc
+ * when near; in the tiles that the stage draws as volumes, as those.
  */
 export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   const ordered = fromTheMiddle(manifest);
   const staged = ordered.filter((tile) => tile.representation !== "mesh");
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
-  // label maps alone, where there are any: their closed objects would hide an image, or lie in it
-  const maps = manifest.channels.filter(({ objects }) => objects !== undefined);
-  const opening = manifest.channels.filter(({ opens }) => opens !== false);
-  const images = opening.length > 0 ? opening : manifest.channels;
-  const opened = (maps.length > 0 ? maps : images).slice(0, MAX_CHANNELS);
+  const opened = manifest.channels.filter(({ opens }) => opens !== false).slice(0, MAX_CHANNELS);
   const shown = new Set(opened.map(({ id }) => id));
   return {
     ...START_SETTINGS,

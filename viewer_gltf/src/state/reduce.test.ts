@@ -85,10 +85,12 @@ describe("the viewer's state", () => {
     expect(state.middle).toBe("r0_c2");
   });
 
-  it("opens with the label maps alone", () => {
+  it("opens with a label map as surfaces", () => {
     const plain = sampleManifest(6);
     const table = { path: "o.json", bytes: 1, sha256: "0".repeat(64) };
-    const channels = plain.channels.map((one, i) => (i === 5 ? { ...one, objects: table } : one));
+    const channels = plain.channels.map((one, i) =>
+      i === 5 ? { ...one, objects: table } : { ...one, opens: false },
+    );
     const state = initialState({ ...plain, channels });
     expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c5"]);
     // which have no volumes, and stay surfaces however near they come
@@ -104,9 +106,9 @@ describe("the viewer's state", () => {
     const state = initialState({ ...plain, channels, specimen: { ...plain.specimen, cut } });
     expect(state.clip.plane).toEqual(cut);
     expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c2", "c3"]);
-    const none = plain.channels.map((one) => ({ ...one, opens: false }));
-    const all = initialState({ ...plain, channels: none });
-    expect(all.channels.every((c) => c.shown)).toBe(true);
+    const hidden = plain.channels.map((one) => ({ ...one, opens: false }));
+    const none = initialState({ ...plain, channels: hidden });
+    expect(none.channels.some((c) => c.shown)).toBe(false);
   });
 
   it("draws an unsure surface from afar as it does a clear one", () => {
