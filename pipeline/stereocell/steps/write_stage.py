@@ -31,7 +31,7 @@ class Tables:
 class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
 
     name: str
     tiles: tuple[WriteStageTile, ...]

@@ -96,8 +96,9 @@ def write_usdz(
     images = {
         _texture_name(part, kind): file for part in found for kind, file in _images(part).items()
     }
-    images |= copy_lights(stage, flat)
-    _pack(flat.GetRootLayer(), images, path, as_written)
+    content = {name: as_written.require(file).read_bytes() for name, file in images.items()}
+    content |= copy_lights(stage, flat, as_written)
+    _pack(flat.GetRootLayer(), content, path)
     return shown
 
 
@@ -238,18 +239,17 @@ def _texture_name(part: _Part, kind: Kind) -> str:
     return f"textures/{part.channel}_{part.tile}_{kind}.png"
 
 
-def _pack(layer: Sdf.Layer, images: Mapping[str, Path], path: Path, as_written: AsWritten) -> None:
+def _pack(layer: Sdf.Layer, images: Mapping[str, bytes], path: Path) -> None:
     """Put the layer and its images, by their names, into an archive, the layer first.
 
-    Raises OutputError where it can't be written, StageError for a damaged image.
+    Raises OutputError where it can't be written.
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
-        files = {_LAYER: Path(folder) / _LAYER}
-        files |= {name: as_written.require(file) for name, file in images.items()}
+        files = {_LAYER: (Path(folder) / _LAYER).read_bytes(), **images}
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for name, file in files.items():
-                archive.writestr(_entry(name, archive.start_dir), file.read_bytes())
+            for name, content in files.items():
+                archive.writestr(_entry(name, archive.start_dir), content)
 
 
 def _entry(name: str, offset: int) -> zipfile.ZipInfo:
