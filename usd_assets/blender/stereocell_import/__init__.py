@@ -11,7 +11,7 @@ Blender 4.5 or newer. 1 unit is 1 um, or the specimen has its true size.
 """
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .choice import AS_STAGED, Choice, open_stage, shared_functions
@@ -76,11 +76,25 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
         ],
     )
 
+    is_lit: BoolProperty(
+        name="Light the scene",
+        description="The stage's lights, a dark backdrop, colours as they are, and Cycles for "
+        "volumes: the scene is ready to be rendered. Off: lights and settings stay as they are",
+        default=True,
+    )
+    is_stereo: BoolProperty(
+        name="Render both eyes",
+        description="Pictures are rendered twice, for the left and the right eye",
+        default=False,
+    )
+
     def execute(self, context):
         function = self.transfer_function or AS_STAGED
         choice = Choice(self.tiles, self.lod, self.representation, function)
         try:
-            root = import_stage(context, self.filepath, choice, self.size == "TRUE")
+            root = import_stage(
+                context, self.filepath, choice, self.size == "TRUE", self.is_lit, self.is_stereo
+            )
         except StageProblem as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}

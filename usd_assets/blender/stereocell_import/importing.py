@@ -13,6 +13,7 @@ import bpy
 
 from .cameras import pair_cameras
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
+from .lighting import begin_world, end_world, light_scene
 from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
@@ -40,14 +41,23 @@ class _Hook(bpy.types.USDHook):
         return True
 
 
-def import_stage(context, path, choice, is_true_size):
-    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem."""
+def import_stage(context, path, choice, is_true_size, is_lit=True, is_stereo=False):
+    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem.
+
+    is_lit     whether the scene gets the stage's lights and what else a good picture takes
+    is_stereo  whether pictures are rendered for both eyes
+    """
     stage = open_stage(path)
     scale = METERS_PER_UNIT if is_true_size else 1.0
     made = {}
+    world = context.scene.world
+    if is_lit:
+        begin_world(context.scene)
 
     def keep(composed, prim_map):
-        made["state"] = _finish(context, composed, prim_map, scale)
+        made["state"] = _finish(context, composed, prim_map, scale, is_stereo)
+        if is_lit:
+            light_scene(context.scene, composed, _objects_of(prim_map), world)
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "choice.usda"
@@ -59,7 +69,8 @@ def import_stage(context, path, choice, is_true_size):
                 filepath=str(file),
                 apply_unit_conversion_scale=False,
                 merge_parent_xform=False,
-                import_lights=False,  # they light the room of a USD client, not the scene at hand
+                import_lights=is_lit,
+                create_world_material=is_lit,
                 mtl_name_collision_mode="MAKE_UNIQUE",
                 set_frame_range=False,
             )
@@ -68,6 +79,8 @@ def import_stage(context, path, choice, is_true_size):
         finally:
             bpy.utils.unregister_class(_Hook)
             _Hook.finish = None
+            if is_lit and "state" not in made:
+                end_world(context.scene, world)
     if "state" not in made:
         raise StageProblem(f"{path}: Blender imported nothing of it")
     root, state = made["state"]
@@ -86,16 +99,17 @@ def import_stage(context, path, choice, is_true_size):
     return root
 
 
-def _finish(context, stage, prim_map, scale):
+def _finish(context, stage, prim_map, scale, is_stereo):
     """Build the looks and cameras; return the root object and the state to be compared with."""
-    objects, materials = {}, []
-    for path, made in prim_map.items():
-        for block in made:
-            if isinstance(block, bpy.types.Object):
-                objects[str(path)] = block
-                block[PRIM] = str(path)
-            elif isinstance(block, bpy.types.Material):
-                materials.append((str(path), block))
+    objects = _objects_of(prim_map)
+    for path, block in objects.items():
+        block[PRIM] = path
+    materials = [
+        (str(path), block)
+        for path, made in prim_map.items()
+        for block in made
+        if isinstance(block, bpy.types.Material)
+    ]
     if ROOT not in objects:
         raise StageProblem(f"Blender made no object of {ROOT}")
     root = objects[ROOT]
@@ -110,7 +124,7 @@ def _finish(context, stage, prim_map, scale):
         _shade_volumes(stage, root, prim.GetName(), look, group, objects)
     keep_labels(stage, {name for name, one in channels.items() if one["objects"]}, objects)
     context.view_layer.update()
-    pair_cameras(context.scene, stage, objects, scale)
+    pair_cameras(context.scene, stage, objects, scale, is_stereo)
     leaves = [p for p, o in objects.items() if o.type in ("MESH", "VOLUME")]
     selected = {
         prim.GetName(): dict(prim.GetVariantSets().GetAllVariantSelections())
@@ -125,6 +139,16 @@ def _finish(context, stage, prim_map, scale):
         "snapshots": {p: take_snapshot(block) for p, block in objects.items()},
         "materials": take_materials(objects[path] for path in leaves),
         "others": [block.name for block in context.scene.objects if block not in own],
+    }
+
+
+def _objects_of(prim_map):
+    """Return Blender's objects by the path of their prim."""
+    return {
+        str(path): block
+        for path, made in prim_map.items()
+        for block in made
+        if isinstance(block, bpy.types.Object)
     }
 
 
