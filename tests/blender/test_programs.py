@@ -72,6 +72,12 @@ def test_each_channel_has_the_hue_of_its_colour(pictures: Pictures, column: str)
     assert {name: hue for name, hue in hues.items() if hue > HUE_DEGREES} == {}
 
 
+def test_three_draws_in_the_light_of_the_stage_as_storm_does(pictures: Pictures) -> None:
+    """Materials and lights mean the same to both."""
+    storm, three = (pictures[column].measures for column in ("Storm, stage", "three, glb"))
+    assert three.luminance == pytest.approx(storm.luminance, abs=0.04)
+
+
 def test_all_programs_draw_the_same_silhouette(pictures: Pictures) -> None:
     surfaces = [column for column in COLUMNS if column != VOLUMES]
     for column in surfaces:

@@ -18,17 +18,28 @@ type View = Readonly<{
   near: number;
   far: number;
 }>;
+/** Distant lights by where they come from, and the intensity of usd_assets/studio.exr all around. */
+type Lights = Readonly<{
+  suns: readonly Readonly<{
+    color: readonly [number, number, number];
+    intensity: number;
+    towards: readonly [number, number, number];
+  }>[];
+  dome: number;
+}>;
 type Job = Readonly<{
   program: "three" | "cesium";
   file: string;
   view: View;
+  /** For three.js alone: Cesium has light of its own. */
+  lights: Lights;
   pixels: readonly [number, number];
   picture: string;
 }>;
 
 const NODE_MODULES = new URL("../node_modules/", import.meta.url).pathname;
 
-/** three.js with the lights of a stage, which a glTF file does not have: those of usd_assets/lights.usda. */
+/** three.js with the lights of a stage, which a glTF file does not have. */
 const THREE_PAGE = `<!doctype html><body style="margin: 0"><script type="importmap">
 {"imports": {"three": "/modules/three/build/three.module.js", "three/addons/": "/modules/three/examples/jsm/"}}
 </script><script type="module">
@@ -42,17 +53,17 @@ document.body.append(renderer.domElement);
 const image = await new EXRLoader().loadAsync("/lights/studio.exr");
 image.mapping = THREE.EquirectangularReflectionMapping;
 
-window.draw = async (address, view, [width, height]) => {
+window.draw = async (address, view, lights, [width, height]) => {
   const isGltf = /[.]gl(b|tf)$/.test(address);
   const loaded = await (isGltf ? new GLTFLoader() : new USDLoader()).loadAsync(address);
   const scene = new THREE.Scene();
   scene.environment = image;
-  scene.environmentIntensity = 0.6;
+  scene.environmentIntensity = lights.dome;
   scene.environmentRotation.y = -Math.PI / 2; // USD and three begin an image of all directions elsewhere
   scene.add(isGltf ? loaded.scene : loaded);
-  for (const [color, intensity, x, y] of isGltf ? LIGHTS : []) {
+  for (const { color, intensity, towards } of lights.suns) {
     const light = new THREE.DirectionalLight(new THREE.Color(...color), intensity);
-    light.position.set(0, 0, 1).applyEuler(new THREE.Euler(x, y, 0, "ZYX"));
+    light.position.set(...towards);
     scene.add(light);
   }
   const fov = (2 * Math.atan(view.slopes[1]) * 180) / Math.PI;
@@ -62,11 +73,6 @@ window.draw = async (address, view, [width, height]) => {
   renderer.render(scene, camera);
   return renderer.domElement.toDataURL("image/png");
 };
-const degrees = Math.PI / 180;
-const LIGHTS = [
-  [[1, 0.97, 0.92], 0.5, -35 * degrees, 40 * degrees],
-  [[0.85, 0.92, 1], 0.15, -10 * degrees, -50 * degrees],
-];
 window.isReady = true;
 </script>`;
 
@@ -77,7 +83,12 @@ const CESIUM_PAGE = `<!doctype html>
 
 declare global {
   interface Window {
-    draw: (address: string, view: View, pixels: readonly [number, number]) => Promise<string>;
+    draw: (
+      address: string,
+      view: View,
+      lights: Lights,
+      pixels: readonly [number, number],
+    ) => Promise<string>;
     isReady?: boolean;
   }
 }
@@ -156,7 +167,9 @@ host.overrides.set("/cesium.html", { status: 200, body: CESIUM_PAGE });
 const chromium = await startChromium();
 try {
   for (const program of ["three", "cesium"] as const) {
-    for (const { file, view, pixels, picture } of jobs.filter((job) => job.program === program)) {
+    for (const { file, view, lights, pixels, picture } of jobs.filter(
+      (job) => job.program === program,
+    )) {
       const [width, height] = pixels;
       const browser = await enter(chromium, { viewport: { width, height }, pixelRatio: 1 });
       const page = await browser.context.newPage();
@@ -172,11 +185,10 @@ try {
       const address = `/files/${folders.indexOf(dirname(file))}/${basename(file)}`;
       const drawn =
         program === "three"
-          ? await page.evaluate(([address, view, pixels]) => window.draw(address, view, pixels), [
-              address,
-              view,
-              pixels,
-            ] as const)
+          ? await page.evaluate(
+              ([address, view, lights, pixels]) => window.draw(address, view, lights, pixels),
+              [address, view, lights, pixels] as const,
+            )
           : await page.evaluate(drawByCesium, [address, view] as const);
       if (errors.length > 0) throw new Error(`${program}: ${file}: ${errors.join("; ")}`);
       await writeFile(picture, Buffer.from(drawn.slice(drawn.indexOf(",") + 1), "base64"));

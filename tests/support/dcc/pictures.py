@@ -17,6 +17,7 @@ from support.dcc.programs import (
     export_files,
 )
 from support.dcc.truth import Truth, find_truth
+from support.dcc.view import lights_of
 
 UNITS = {"stage": 1e-6, "flat": 1e-6, "usdz": 1.0}  # metres in a unit of each USD file
 VOLUMES = "add-on, volumes"
@@ -68,6 +69,7 @@ def _place(folder: Path, column: str) -> Path:
 
 def _draw(files: Files, folder: Path, size: tuple[int, int]) -> None:
     by_blender, for_the_web = [], []
+    lights = lights_of(Usd.Stage.Open(str(files.stage)))
     for column, (program, kind) in COLUMNS.items():
         file, view, picture = getattr(files, kind), files.views[kind], _place(folder, column)
         job = {"file": file, "view": view.json(), "pixels": size, "picture": picture}
@@ -80,7 +82,9 @@ def _draw(files: Files, folder: Path, size: tuple[int, int]) -> None:
                 job["choices"] = {"representation": "volume"}
             by_blender.append({**job, "by": program})
         else:
-            for_the_web.append({**job, "program": program})
+            # a .glb has no lights, a .usdz its own but for the image of the dome
+            suns = lights["suns"] if kind == "glb" else []
+            for_the_web.append({**job, "program": program, "lights": {**lights, "suns": suns}})
     draw_by_blender(by_blender, folder)
     draw_for_the_web(for_the_web, folder)
 

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+
+from stereocell.usd.layer import LIGHTS
 
 CAMERA = "/Specimen/Cameras/mono"
 
@@ -37,6 +39,25 @@ def view_of(stage: Usd.Stage) -> View:
     reach = camera.clippingRange
     half = window.GetSize() / 2
     return View(tuple(eye), (half[0], half[1]), reach.min, reach.max)
+
+
+def lights_of(stage: Usd.Stage) -> dict[str, Any]:
+    """Return the stage's lights for a program that reads none.
+
+    suns  by color (linear), intensity, and the direction (x, y, z) that they come from
+    dome  the intensity of the image of usd_assets
+    """
+    suns, dome = [], 0.0
+    for prim in stage.GetPrimAtPath(LIGHTS).GetChildren():
+        light = UsdLux.LightAPI(prim)
+        intensity = light.GetIntensityAttr().Get()
+        if prim.IsA(UsdLux.DomeLight):
+            dome = intensity
+            continue
+        towards = UsdGeom.XformCache().GetLocalToWorldTransform(prim).GetRow3(2)
+        color = tuple(light.GetColorAttr().Get())
+        suns.append({"color": color, "intensity": intensity, "towards": tuple(towards)})
+    return {"suns": suns, "dome": dome}
 
 
 def fit(view: View, scale: float, shift: NDArray[np.float64]) -> View:

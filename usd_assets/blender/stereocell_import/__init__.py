@@ -15,7 +15,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .choice import AS_STAGED, Choice, open_stage, shared_functions
-from .importing import import_stage
+from .importing import DISPLAY, MICROMETRES, TRUE, describe_size, import_stage
 from .objects import CLASSES
 from .overlay import export_edits
 from .problem import StageProblem
@@ -71,8 +71,13 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     size: EnumProperty(
         name="Size",
         items=[
-            ("MICROMETRES", "1 unit is 1 um", "Right for viewing, lighting and rendering"),
-            ("TRUE", "True size", "1 unit is 1 m: to stand beside other true things"),
+            (MICROMETRES, "1 unit is 1 um", "Right for viewing, lighting and rendering"),
+            (
+                DISPLAY,
+                "Display size",
+                "1 unit is 1 m, and the specimen is enlarged by a power of ten, up to 1 m",
+            ),
+            (TRUE, "True size", "1 unit is 1 m: to stand beside other true things"),
         ],
     )
 
@@ -93,12 +98,13 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
         choice = Choice(self.tiles, self.lod, self.representation, function)
         try:
             root = import_stage(
-                context, self.filepath, choice, self.size == "TRUE", self.is_lit, self.is_stereo
+                context, self.filepath, choice, self.size, self.is_lit, self.is_stereo
             )
         except StageProblem as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
         context.view_layer.objects.active = root
+        self.report({"INFO"}, f"The specimen is {describe_size(open_stage(self.filepath))}")
         return {"FINISHED"}
 
 

@@ -10,15 +10,17 @@ import tempfile
 from pathlib import Path
 
 import bpy
+from pxr import Usd, UsdGeom
 
 from .cameras import pair_cameras
-from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
+from .choice import CHANNELS, DISPLAY_SCALE, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
 from .lighting import begin_world, end_world, light_scene
 from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import take_materials, take_snapshot
 
+MICROMETRES, TRUE, DISPLAY = "MICROMETRES", "TRUE", "DISPLAY"  # sizes of an import
 STATE = "stereocell"
 PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
@@ -41,14 +43,15 @@ class _Hook(bpy.types.USDHook):
         return True
 
 
-def import_stage(context, path, choice, is_true_size, is_lit=True, is_stereo=False):
+def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo=False):
     """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem.
 
+    size       MICROMETRES: a unit is 1 um; TRUE: 1 m; DISPLAY: 1 m, and the specimen is enlarged
     is_lit     whether the scene gets the stage's lights and what else a good picture takes
     is_stereo  whether pictures are rendered for both eyes
     """
     stage = open_stage(path)
-    scale = METERS_PER_UNIT if is_true_size else 1.0
+    scale = _scale_of(stage, size)
     made = {}
     world = context.scene.world
     if is_lit:
@@ -94,9 +97,34 @@ def import_stage(context, path, choice, is_true_size, is_lit=True, is_stereo=Fal
     state["stage"] = str(Path(stage.GetRootLayer().realPath))
     root[STATE] = json.dumps(state)
     units = context.scene.unit_settings
-    units.system, units.scale_length = "METRIC", METERS_PER_UNIT / scale
+    units.system = "METRIC"
+    units.scale_length = METERS_PER_UNIT if size == MICROMETRES else 1.0
     units.length_unit = "ADAPTIVE"
     return root
+
+
+def describe_size(stage):
+    """Return a stage's physical size in words, by the boxes of its tiles, loaded or not."""
+    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes, True)
+    edges = boxes.ComputeWorldBound(stage.GetPrimAtPath(TILES)).ComputeAlignedRange().GetSize()
+    longest = max(edges)
+    unit, um = ("um", 1) if longest < 1e3 else ("mm", 1e3) if longest < 1e6 else ("m", 1e6)
+    return f"{' x '.join(f'{edge / um:.3g}' for edge in edges)} {unit}"
+
+
+def _scale_of(stage, size):
+    """Return Blender's units for a unit of the stage. Raises StageProblem."""
+    if size == MICROMETRES:
+        return 1.0
+    if size == TRUE:
+        return METERS_PER_UNIT
+    enlarged = stage.GetPrimAtPath(ROOT).GetAttribute(DISPLAY_SCALE).Get()
+    if enlarged is None:
+        raise StageProblem(
+            f"{ROOT}.{DISPLAY_SCALE}: no value, expected a number: run `stereocell stage OUT`"
+        )
+    return METERS_PER_UNIT * enlarged
 
 
 def _finish(context, stage, prim_map, scale, is_stereo):
