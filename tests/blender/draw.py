@@ -66,7 +66,6 @@ def render(job):
     scene.cycles.device = "CPU"
     scene.cycles.samples = job.get("samples", 16)
     scene.cycles.use_denoising = False
-    scene.cycles.volume_biased = True  # else 20 s before the first ray, whatever the picture's size
     scene.render.film_transparent = True
     scene.render.resolution_x, scene.render.resolution_y = job["pixels"]
     scene.render.resolution_percentage = 100

@@ -57,17 +57,23 @@ class Picture:
 def draw_pictures(stage_path: Path, folder: Path, size: tuple[int, int]) -> dict[str, Picture]:
     """Draw a stage and what is exported of it in each program; return the pictures by column."""
     files = export_files(stage_path, folder)
-    _draw(files, folder, size)
-    view = files.views["stage"]
-    truth = find_truth(Usd.Stage.Open(str(stage_path)), view, size)
-    return {column: _read(_place(folder, column), truth, column == VOLUMES) for column in COLUMNS}
+    small = (size[0] // 2, size[1] // 2)  # of volumes, which take longest
+    _draw(files, folder, size, small)
+    stage, view = Usd.Stage.Open(str(stage_path)), files.views["stage"]
+    truth, small_truth = (find_truth(stage, view, pixels) for pixels in (size, small))
+    return {
+        column: _read(_place(folder, column), small_truth, is_seen_through=True)
+        if column == VOLUMES
+        else _read(_place(folder, column), truth)
+        for column in COLUMNS
+    }
 
 
 def _place(folder: Path, column: str) -> Path:
     return folder / f"{column.replace(', ', '_')}.png"
 
 
-def _draw(files: Files, folder: Path, size: tuple[int, int]) -> None:
+def _draw(files: Files, folder: Path, size: tuple[int, int], small: tuple[int, int]) -> None:
     by_blender, for_the_web = [], []
     lights = lights_of(Usd.Stage.Open(str(files.stage)))
     for column, (program, kind) in COLUMNS.items():
@@ -79,7 +85,7 @@ def _draw(files: Files, folder: Path, size: tuple[int, int]) -> None:
             if kind in ("stage", "flat"):
                 job["view"] = None
             if column == VOLUMES:
-                job["choices"] = {"representation": "volume"}
+                job |= {"pixels": small, "choices": {"representation": "volume"}}
             by_blender.append({**job, "by": program})
         else:
             # a .glb has no lights, a .usdz its own but for the image of the dome
@@ -89,8 +95,9 @@ def _draw(files: Files, folder: Path, size: tuple[int, int]) -> None:
     draw_for_the_web(for_the_web, folder)
 
 
-def _read(file: Path, truth: Truth, is_seen_through: bool) -> Picture:
-    image = np.asarray(Image.open(file).convert("RGBA")) / 255
+def _read(file: Path, truth: Truth, *, is_seen_through: bool = False) -> Picture:
+    with Image.open(file) as opened:
+        image = np.asarray(opened.convert("RGBA")) / 255
     return Picture(
         file, image[..., 3] > 0.5, measure(image, truth, is_seen_through=is_seen_through)
     )

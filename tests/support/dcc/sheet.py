@@ -16,8 +16,9 @@ _COLUMNS = 4  # of the pictures of a sample
 
 def write_sheet(file: Path, samples: Mapping[str, Mapping[str, Picture]]) -> None:
     """Write a sheet of the pictures of each sample, by column."""
-    first = Image.open(next(iter(next(iter(samples.values())).values())).file)
-    height = round(first.height * _WIDTH / first.width)
+    every = [picture for row in samples.values() for picture in row.values()]
+    rows_of, columns_of = every[0].drawn.shape
+    height = round(rows_of * _WIDTH / columns_of)
     step = height + 4 * _LINE
     rows = sum(-(-len(row) // _COLUMNS) for row in samples.values())
     sheet = Image.new("RGB", (_WIDTH * _COLUMNS, step * rows), _MARGIN)
@@ -35,7 +36,8 @@ def write_sheet(file: Path, samples: Mapping[str, Mapping[str, Picture]]) -> Non
 
 
 def _over_backdrop(file: Path) -> Image.Image:
-    image = Image.open(file).convert("RGBA")
+    with Image.open(file) as opened:
+        image = opened.convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", image.size, (*BACKDROP, 255)), image).convert(
         "RGB"
     )
