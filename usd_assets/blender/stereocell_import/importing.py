@@ -15,7 +15,7 @@ from pxr import Usd, UsdGeom
 from .cameras import pair_cameras
 from .choice import CHANNELS, DISPLAY_SCALE, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
 from .lighting import begin_world, end_world, light_scene
-from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
+from .looks import color_surface, glow_of, make_color_group, make_volume_material, set_surface_color
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import take_materials, take_snapshot
@@ -235,8 +235,9 @@ def _shade_volumes(stage, root, channel, look, group, objects):
     }
     if not volumes:
         return
+    modality = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality").Get()
     voxel = min(_voxel_um(stage.GetPrimAtPath(path)) for path in volumes)
-    material = make_volume_material(channel, group, look["points"], look["windows"], voxel)
+    material = make_volume_material(channel, group, look, voxel, glow_of(modality))
     root[VOLUME + channel] = material
     for block in volumes.values():
         block.data.materials.clear()
