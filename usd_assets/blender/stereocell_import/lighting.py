@@ -10,7 +10,7 @@ import bpy
 from .choice import ROOT
 
 BACKDROP = (0.0033, 0.0040, 0.0060)  # linear; the background of the web viewer
-SAMPLES = 128  # of a picture by Cycles; its noise is removed
+SAMPLES = 64  # of a picture by Cycles; its noise is removed
 _WORLD = "StereoCell studio"
 _DOMES = ("DomeLight", "DomeLight_1")  # USD's names of the type
 _STARTUP_LAMP_W = 1000.0
