@@ -74,7 +74,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive test-blender torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -284,15 +284,28 @@ endif
 # Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
 BLENDER := $(VENV)/blender
 export BLENDER_BASE ?= python3.11
-test-blender: setup ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
+blender: setup
 	@$(BLENDER)/bin/python -c 'import bpy' >/dev/null 2>&1 \
 	  || { "$$BLENDER_BASE" -m venv --clear $(BLENDER) \
 	       && { $(BIN)/uv pip install --quiet --python $(BLENDER)/bin/python bpy==5.0.1 'numpy<2' \
 	            || $(BLENDER)/bin/pip install --quiet --disable-pip-version-check bpy==5.0.1 'numpy<2'; }; } \
-	  || echo "test-blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
+	  || echo "blender: bpy 5.0.1 can't be installed here (it wants $$BLENDER_BASE and 350 MB)" >&2
+
+test-blender: blender browser ## The Blender add-on in headless Blender (bpy 5.0.1 in .venv/blender)
 	@if $(BLENDER)/bin/python -c 'import bpy' 2>&1; then \
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
+
+# The last of the samples is real data, which isn't everywhere
+DCC_SAMPLES := cycif brain-cells mri cells
+DCC_REAL := $(wildcard $(STEREOCELL_DATA)/brain_cells_2ch/brain_cells_2ch.ome.tif)
+test-dcc: blender browser ## The samples in Storm, Blender, the add-on, three.js and Cesium; contact sheet: out/dcc/sheet.png
+	@for sample in $(DCC_SAMPLES); do \
+	  $(MAKE) --no-print-directory demo SAMPLE=$$sample OUT=out/dcc/$$sample || exit; done
+	@[ -z "$(DCC_REAL)" ] || $(RUN) build "$(DCC_REAL)" --out=out/dcc/brain-cells-2ch --workers="$$WORKERS"
+	STEREOCELL_BLENDER=$(abspath $(BLENDER))/bin/python STEREOCELL_DCC_SHEET=out/dcc/sheet.png \
+	  STEREOCELL_DCC="$(foreach one,$(DCC_SAMPLES) $(if $(DCC_REAL),brain-cells-2ch),$(one)=out/dcc/$(one))" \
+	  $(BIN)/pytest tests/blender/test_programs.py
 
 object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest

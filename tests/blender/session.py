@@ -29,7 +29,7 @@ import stereocell_import  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
 from stereocell_import.looks import color_of, points_of  # noqa: E402
 
-_FIELDS = ("tiles", "lod", "representation", "transfer_function", "size")
+_FIELDS = ("tiles", "lod", "representation", "transfer_function", "size", "is_lit", "is_stereo")
 
 
 def import_stage(arguments):
@@ -398,6 +398,29 @@ def step_plain_import(arguments):
         "colors": {block.name: surface_color(block.data.materials[0]) for block in blocks},
         "lights": {light.name: light.type for light in bpy.data.lights},
         "sky": [bpy.path.abspath(image.filepath) for image in images],
+    }
+
+
+def step_lighting(arguments):
+    """Import into the startup scene; return what a picture of it would depend on."""
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    world = scene.world.name
+    import_stage(arguments)
+    suns = [block for block in bpy.data.objects if block.type == "LIGHT"]
+    nodes = scene.world.node_tree.nodes
+    backdrop = [node for node in nodes if node.label == "backdrop"]
+    return {
+        "suns": {b.data.name: b.data.energy for b in suns if b.data.type == "SUN"},
+        "has_own_world": scene.world.name == world,
+        "worlds": len(bpy.data.worlds),
+        "images": [n.image.name for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"],
+        "backdrop": [list(node.inputs["Color"].default_value)[:3] for node in backdrop],
+        "transform": scene.view_settings.view_transform,
+        "engine": scene.render.engine,
+        "hidden": sorted(block.name for block in scene.objects if block.hide_render),
+        "eyes": scene.render.use_multiview,
+        "camera": scene.camera.name,
     }
 
 

@@ -165,6 +165,12 @@ def test_true_size_is_metres(stage_path: Path, tmp_path: Path) -> None:
     assert not [volume["error"] for volume in found["volumes"].values() if volume["error"]]
 
 
+def test_display_size_is_metres_enlarged(stage_path: Path, tmp_path: Path) -> None:
+    found = run("import", tmp_path, stage=stage_path, size="DISPLAY")
+    assert found["root_scale"] == pytest.approx([1e-2] * 3)  # 12 um as 0.12 m
+    assert found["unit"] == pytest.approx(1)
+
+
 def test_tiles_and_variants_are_chosen_at_the_import(stage_path: Path, tmp_path: Path) -> None:
     found = run(
         "import", tmp_path, stage=stage_path, tiles="x*, r0_c1", lod="lod3",

@@ -45,7 +45,10 @@ def test_another_library_finds_the_sphere_in_metres_with_colour_and_names(
     assert "extensionsUsed" not in found
     assert [node["name"] for node in found["nodes"][:2]] == ["two tiles", "CD31"]
     triangles = sum(len(mesh.faces) for mesh in scene.geometry.values())
-    assert line == f"2 meshes, {triangles:,} triangles at lod0"
+    assert line == (
+        f"2 meshes, {triangles:,} triangles at lod0, in metres; life-size, 20 x 10 x 9 um; "
+        "--scale 10000 enlarges it"
+    )
 
 
 def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
@@ -54,6 +57,12 @@ def test_tiles_meet_without_a_gap(sphere_stage: Path, tmp_path: Path) -> None:
     joined.merge_vertices(merge_norm=True, merge_tex=True)
     joined.update_faces(joined.nondegenerate_faces())
     assert joined.is_watertight
+
+
+def level_of(stage: Path, path: Path, options: ExportOptions) -> str:
+    """Export, and return the level that the line names."""
+    line = export_stage(stage, path, options=options)
+    return line.partition(" at ")[2].partition(",")[0]
 
 
 @pytest.mark.parametrize("name", ["s.glb", "s.gltf"])
@@ -115,7 +124,7 @@ def test_the_finest_level_within_the_bounds_is_taken(sphere_stage: Path, tmp_pat
     for options in (
         ExportOptions(max_triangles=counts[1]), ExportOptions(max_bytes=sizes[1]),
     ):  # fmt: skip
-        assert export_stage(sphere_stage, path, options=options).endswith("at lod1")
+        assert level_of(sphere_stage, path, options) == "lod1"
         assert path.stat().st_size == sizes[1]
     before = path.read_bytes()
     with pytest.raises(UsageError, match=f"--max-bytes is 100: the smallest file has {sizes[2]}"):
@@ -130,16 +139,12 @@ def test_a_level_that_is_given_is_the_finest_within_the_bounds(
 ) -> None:
     path = tmp_path / "s.glb"
     rings = [n for n, _ in spheres.LEVELS]
-    assert export_stage(
-        sphere_stage, path, options=ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
-    ).endswith("at lod1")
-    size = path.stat().st_size
-    assert export_stage(sphere_stage, path, options=ExportOptions(lod=0, max_bytes=size)).endswith(
-        "lod1"
-    )
-    assert export_stage(
-        sphere_stage, path, options=ExportOptions(lod=2, max_triangles=4 * rings[0] ** 2)
-    ).endswith("at lod2")
+    few = ExportOptions(lod=0, max_triangles=4 * rings[1] ** 2)
+    assert level_of(sphere_stage, path, few) == "lod1"
+    small = ExportOptions(lod=0, max_bytes=path.stat().st_size)
+    assert level_of(sphere_stage, path, small) == "lod1"
+    coarse = ExportOptions(lod=2, max_triangles=4 * rings[0] ** 2)
+    assert level_of(sphere_stage, path, coarse) == "lod2"
     with pytest.raises(UsageError, match="--max-triangles is 3: the coarsest level has"):
         export_stage(sphere_stage, path, options=ExportOptions(lod=0, max_triangles=3))
 
@@ -152,9 +157,9 @@ def test_what_a_region_leaves_out_is_not_counted(sphere_stage: Path, tmp_path: P
     within = sum(len(mesh.faces) for mesh in meshes)
     assert within < 4 * spheres.LEVELS[1][0] ** 2  # of the whole at the next level
     options = ExportOptions(region=box, max_triangles=within)
-    assert export_stage(sphere_stage, path, options=options).endswith("at lod0")
+    assert level_of(sphere_stage, path, options) == "lod0"
     options = ExportOptions(region=box, max_triangles=within - 1)
-    assert export_stage(sphere_stage, path, options=options).endswith("at lod1")
+    assert level_of(sphere_stage, path, options) == "lod1"
 
 
 def test_a_region_cuts_the_surface_and_tiles_leave_some_out(

@@ -4,7 +4,9 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 from pxr import Gf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from stereocell.export.options import ExportOptions
@@ -72,3 +74,45 @@ def test_files_on_another_drive_are_named_from_its_root(
     layers, assets, lost = UsdUtils.ComputeAllDependencies(str(tmp_path / "s.usda"))
     assert (len(layers), lost) == (1, [])
     assert all(Path(asset).is_relative_to(sphere_stage.parent) for asset in assets)
+
+
+@pytest.mark.parametrize("ending", ["usdz", "usdc"])
+def test_a_scale_enlarges_the_file_and_the_line_has_both_sizes(
+    sphere_stage: Path, tmp_path: Path, ending: str
+) -> None:
+    true, large = tmp_path / f"true.{ending}", tmp_path / f"large.{ending}"
+    export_stage(sphere_stage, true, options=ExportOptions(lod=1, scale=1))
+    line = export_stage(sphere_stage, large, options=ExportOptions(lod=1, scale=2000))
+    assert "40 x 20 x 18 mm, 2000 times the specimen of 20 x 10 x 9 um" in line
+    stages = [Usd.Stage.Open(str(path)) for path in (true, large)]
+    found = [bounds(stage) * UsdGeom.GetStageMetersPerUnit(stage) for stage in stages]
+    np.testing.assert_allclose(found[1], found[0] * 2000, rtol=1e-5)
+    np.testing.assert_allclose(np.ptp(found[0], axis=0), 2 * spheres.RADIUS * 1e-6, rtol=0.02)
+    assert (validate_usdz if ending == "usdz" else validate_stage)(large) == []
+
+
+def test_the_cameras_of_an_enlarged_file_see_what_they_saw(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    """A camera's clipping range is in units of the stage, whatever is above the camera."""
+    cameras = []
+    for scale in (1.0, 2000.0):
+        path = tmp_path / f"{scale:g}.usda"
+        export_stage(sphere_stage, path, options=ExportOptions(lod=1, scale=scale))
+        stage = Usd.Stage.Open(str(path))
+        cameras.append(UsdGeom.Camera(stage.GetPrimAtPath("/Specimen/Cameras/left")).GetCamera())
+    true, large = cameras
+    eyes = [np.array(camera.transform.ExtractTranslation()) for camera in cameras]
+    np.testing.assert_allclose(eyes[1], eyes[0] * 2000)
+    assert large.clippingRange.max == pytest.approx(true.clippingRange.max * 2000)
+    assert large.focusDistance == pytest.approx(true.focusDistance * 2000)
+    assert large.frustum.window == true.frustum.window
+
+
+def bounds(stage: Usd.Stage) -> NDArray[np.float64]:
+    """Return the least and the largest corner of all meshes in the world, (2, 3)."""
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    found = [boxes.ComputeWorldBound(mesh.GetPrim()) for mesh in meshes(stage).values()]
+    ranges = [one.ComputeAlignedRange() for one in found]
+    low = np.min([one.GetMin() for one in ranges], axis=0)
+    return np.array([low, np.max([one.GetMax() for one in ranges], axis=0)])

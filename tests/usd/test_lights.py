@@ -1,6 +1,6 @@
 """The stage's own lights make the specimen neither black nor white, by UsdLux's definitions."""
 
-import tempfile
+import io
 import zipfile
 from pathlib import Path
 
@@ -9,6 +9,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
 from stereocell.storage.assets import find_asset
@@ -32,9 +33,9 @@ def read_image(asset: Sdf.AssetPath) -> NDArray[np.float64]:
     package, _, inner = asset.resolvedPath.partition("[")
     if not inner:
         return np.array(OpenEXR.File(package).channels()["RGB"].pixels, np.float64)
-    with tempfile.TemporaryDirectory() as folder:
-        unpacked = zipfile.ZipFile(package).extract(inner.rstrip("]"), folder)
-        return np.array(OpenEXR.File(unpacked).channels()["RGB"].pixels, np.float64)
+    packed = Image.open(io.BytesIO(zipfile.ZipFile(package).read(inner.rstrip("]"))))
+    encoded = np.asarray(packed, np.float64) / 255
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def light_of_dome(dome: UsdLux.DomeLight, normal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,7 +102,22 @@ def test_the_usdz_has_the_same_light(stage_path: Path, tmp_path: Path) -> None:
     assert validate_usdz(tmp_path / "s.usdz") == []
     built, small = (Usd.Stage.Open(str(path)) for path in (stage_path, tmp_path / "s.usdz"))
     normal = np.array([0.36, 0.48, 0.8])
-    np.testing.assert_allclose(irradiance(small, normal), irradiance(built, normal), rtol=1e-5)
+    np.testing.assert_allclose(irradiance(small, normal), irradiance(built, normal), rtol=0.01)
+
+
+def test_an_image_with_the_sun_in_it_stays_as_it_is(stage_path: Path, tmp_path: Path) -> None:
+    """8 bits would leave nothing but the sun."""
+    pixels = np.full((8, 16, 3), 0.1, np.float32)
+    pixels[2, 3] = 5000
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": pixels}).write(str(tmp_path / "sun.exr"))
+    dome = 'over "dome"\n{\nasset inputs:texture:file = @./sun.exr@\n}'
+    layer = tmp_path / "edit.usda"
+    lights = f'over "Lights"\n{{\n{dome}\n}}'
+    layer.write_text(f'{HEAD}subLayers = [@{stage_path}@])\nover "Specimen"\n{{\n{lights}\n}}\n')
+    write_usdz(layer, tmp_path / "s.usdz")
+    archive = zipfile.ZipFile(tmp_path / "s.usdz")
+    assert archive.read("textures/dome.exr") == (tmp_path / "sun.exr").read_bytes()
 
 
 @pytest.mark.parametrize("edit", ["active = false", 'token visibility = "invisible"'])
@@ -116,4 +132,4 @@ def test_lights_that_are_not_drawn_are_left_out_of_the_usdz(
     )
     write_usdz(path, tmp_path / "s.usdz")
     assert not Usd.Stage.Open(str(tmp_path / "s.usdz")).GetPrimAtPath(LIGHTS)
-    assert not [name for name in zipfile.ZipFile(tmp_path / "s.usdz").namelist() if "exr" in name]
+    assert not [name for name in zipfile.ZipFile(tmp_path / "s.usdz").namelist() if "dome" in name]

@@ -61,7 +61,7 @@ def test_the_rules_find_no_fault_in_a_sample(tmp_path: Path, sample: str) -> Non
     engine = ValidationEngine()  # all rules that are on by default, for each variant
     assert len(engine.initialized_rules) > 30
     engine.disable_rule(OFF)
-    for name in ("stage.usda", "specimen.usdz"):
+    for name in ("stage.usda", "display.usda", "specimen.usdz"):
         file = tmp_path / "out" / "stage" / name
         assert file.is_file()
         issues = list(engine.validate(str(file)).issues())

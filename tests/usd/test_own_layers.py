@@ -197,7 +197,7 @@ def test_the_files_of_a_stage_are_all_found(out: Path) -> None:
     written = {p.relative_to(out / "stage").as_posix() for p in (out / "stage").rglob("*.*")}
     levels = {name for name in written if name.endswith("_level.json")}  # named, not composed
     assert levels
-    assert files == written - {"specimen.usdz", "files.json"} - levels
+    assert files == written - {"display.usda", "specimen.usdz", "files.json"} - levels
 
 
 def _all(out: Path) -> list[Path]:

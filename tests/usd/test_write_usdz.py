@@ -92,7 +92,7 @@ def test_a_heavy_specimen_is_shown_at_a_coarser_level(
     assert names[0] == "specimen.usdc"
     # the coarse level has normal maps, one for each mesh
     maps = [f"textures/{c}_{t}_normal.png" for c in (F_ID, BALL_ID) for t in ("r0_c0", "r0_c1")]
-    assert sorted(names[1:]) == sorted([*maps, "textures/dome.exr"])
+    assert sorted(names[1:]) == sorted([*maps, "textures/dome.png"])
     stage = Usd.Stage.Open(str(path))
     mesh = meshes(stage)[f"{F_ID}_r0_c0"]
     material, _ = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()

@@ -166,8 +166,8 @@ def _survey(passes: Passes, phase: Phase) -> Survey:
 
 
 def run_stage(out: Path, engine: Engine) -> None:
-    """Write OUT/stage from the units: stage.usda, looks/, tiles/ and, where there is a surface,
-    specimen.usdz; last their list, files.json. Other files stay.
+    """Write OUT/stage from the units: stage.usda, display.usda, looks/, tiles/ and, where there is
+    a surface, specimen.usdz; last their list, files.json. Other files stay.
 
     Raises OutputError where units are missing or damaged, TasksFailedError where tiles fail.
     """
@@ -193,7 +193,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         out_folder.remove(stage_dir / USDZ_NAME)
         out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
         run_missing(engine, "stage", tiles.values())
-        stage.write(stage_dir)
+        phase.print(stage.write(stage_dir))
         out_folder.remove_other_folders(stage_dir / "tiles", {*tiles})
         made = {id_: tile.read() for id_, tile in tiles.items()}
         files = {

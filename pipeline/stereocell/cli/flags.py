@@ -465,7 +465,7 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
     surfaces.add_argument(
         "--scale",
         type=_positive,
-        help="times the specimen (default: life-size; in print the size of a hand)",
+        help="times the specimen (default: life-size; in .usdz and print the size of a hand)",
     )
     surfaces.add_argument(
         "--units",

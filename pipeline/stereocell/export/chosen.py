@@ -20,6 +20,7 @@ from stereocell.formats.gltf import Material
 from stereocell.meshes.clip import clip_mesh
 from stereocell.model.errors import StageError, UsageError
 from stereocell.model.mesh import Mesh
+from stereocell.model.physical_size import describe_size, display_scale
 from stereocell.model.world_box import move_box
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer_units import note_missing
@@ -142,6 +143,21 @@ class Chosen:
         if not (low < high).all():
             raise self.nothing("tile")
         return low, high
+
+    @property
+    def longest_um(self) -> float:
+        """Return the longest edge of the chosen part, um."""
+        low, high = self.box
+        return float((high - low).max())
+
+    def describe_scale(self, scale: float) -> str:
+        """Return the physical size of the chosen part, and its size in a file at a scale."""
+        low, high = self.box
+        size, shown = (describe_size((high - low) * one) for one in (1.0, scale))
+        if scale != 1:
+            return f"{shown}, {scale:.6g} times the specimen of {size}"
+        larger = display_scale(self.longest_um)
+        return f"life-size, {size}" + (f"; --scale {larger:.0f} enlarges it" if larger > 1 else "")
 
     def nothing(self, kind: str) -> UsageError | StageError:
         """Return the error that no such thing is left: a region is told where there are some."""

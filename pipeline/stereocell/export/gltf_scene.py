@@ -58,7 +58,8 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
         if not count:
             raise chosen.nothing("surface")
         document.write(path)
-    return f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
+    meshes = f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
+    return f"{meshes}, in metres; {chosen.describe_scale(options.scale or 1.0)}"
 
 
 def _of_one_color(mesh: Mesh, material: Material) -> tuple[Mesh, Material]:

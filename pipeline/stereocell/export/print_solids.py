@@ -26,6 +26,7 @@ from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
 from stereocell.model.color import to_srgb8
 from stereocell.model.counted import counted
+from stereocell.model.physical_size import describe_size
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_stage import specimen_name
@@ -94,7 +95,9 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
     _WRITERS[ending](path, bodies, specimen_name(chosen.stage), unit)
     x, y, z = np.ptp(np.concatenate([body.positions for body in bodies]), axis=0).tolist()
     count = sum(len(body.triangles) for body in bodies)
-    size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen"
+    low, high = chosen.box
+    size = f"{x:.3g} x {y:.3g} x {z:.3g} {unit}, {scale:g} times the specimen of "
+    size += describe_size(high - low)
     line = f"{counted(len(bodies), 'body', 'bodies')}, {count:,} triangles at lod{level}, {size}"
     if len(thin) > _MAX_TOLD:
         thin[_MAX_TOLD:] = [f"... and of {len(thin) - _MAX_TOLD} more parts"]

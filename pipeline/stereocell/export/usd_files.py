@@ -8,25 +8,43 @@
 import os
 from pathlib import Path
 
-from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
-from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, SHOWN, TILES, UP_AXIS, export
+from stereocell.usd.layer import (
+    CAMERAS,
+    CHANNELS,
+    METERS_PER_UNIT,
+    ROOT,
+    SHOWN,
+    TILES,
+    UP_AXIS,
+    export,
+)
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
-from stereocell.usd.write_usdz import write_usdz
+from stereocell.usd.write_usdz import SIZE_M, write_usdz
 
 
 def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
     """Write .usdz; return a line about it."""
     channels = [channel.id for channel in chosen.channels]
     tiles = chosen.tiles
+    scale = chosen.options.scale
     write_usdz(
-        chosen.path, path, as_written=chosen.as_written, level=level, tiles=tiles, channels=channels
+        chosen.path,
+        path,
+        as_written=chosen.as_written,
+        level=level,
+        tiles=tiles,
+        channels=channels,
+        scale=scale,
     )
-    return f"{counted(len(tiles), 'tile')} at lod{level}, the size of a hand"
+    if scale is None:
+        scale = SIZE_M / (chosen.longest_um * METERS_PER_UNIT)
+    return f"{counted(len(tiles), 'tile')} at lod{level}; {chosen.describe_scale(scale)}"
 
 
 def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
@@ -52,12 +70,38 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     flat.defaultPrim = ROOT.name
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.metersPerUnit, METERS_PER_UNIT)
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.upAxis, UP_AXIS)
+    if chosen.options.scale is not None:
+        _enlarge(flat, chosen.options.scale)
     # where the file will be: it is written in a folder beside its place
     folder = path.parent.parent.resolve()
     UsdUtils.ModifyAssetPaths(flat, lambda asset: _relative(asset, folder))
     export(flat, path)
     tiles = counted(len(chosen.tiles), "tile")
-    return f"{tiles} at lod{level}; volumes and maps stay in {chosen.path.parent}"
+    size = chosen.describe_scale(chosen.options.scale or 1.0)
+    return f"{tiles} at lod{level}; {size}; volumes and maps stay in {chosen.path.parent}"
+
+
+def _enlarge(flat: Sdf.Layer, scale: float) -> None:
+    """Enlarge the tiles by a transform, and move the cameras away as much.
+
+    A transform above the cameras would leave their clipping ranges as they are.
+    """
+    stage = Usd.Stage.Open(flat, Usd.Stage.LoadNone)
+    tiles = UsdGeom.Xformable(stage.GetPrimAtPath(TILES))
+    placed = tiles.GetOrderedXformOps()
+    enlarged = tiles.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
+    enlarged.Set(Gf.Vec3d(scale))
+    tiles.SetXformOpOrder([enlarged, *placed])
+    group = stage.GetPrimAtPath(CAMERAS)
+    for prim in group.GetChildren() if group else ():
+        if not prim.IsA(UsdGeom.Camera):
+            continue
+        camera = UsdGeom.Camera(prim)
+        for attribute in (camera.GetFocusDistanceAttr(), camera.GetClippingRangeAttr()):
+            attribute.Set(attribute.Get() * scale)
+        for op in camera.GetOrderedXformOps():
+            if op.GetOpType() == UsdGeom.XformOp.TypeTranslate:
+                op.Set(op.Get() * scale)
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:

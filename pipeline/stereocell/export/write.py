@@ -63,7 +63,7 @@ class Format:
         return "lod" in self.takes
 
 
-_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes"})
+_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "scale"})
 _PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
 _VOLUME = frozenset({"tiles", "region", "units", "bits"})
 _GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, is_seen=True)

@@ -84,6 +84,26 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])
 
 
+def read_rgb(path: Path) -> NDArray[np.float32]:
+    """Return the colours of an image, linear (height, width, 3); infinities and NaN become 0.
+
+    Raises StageError if the file is missing, damaged, or has no colours.
+    """
+    check_exr(path)
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.array(one.pixels) for name, one in file.channels().items()}
+    except (RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise StageError(f"{path}: can't be read as OpenEXR: {reason}") from error
+    names = "RGB" if "R" in channels else "YYY"
+    lacking = [name for name in names if name not in channels]
+    if lacking:
+        raise StageError(f"{path}: no channel {lacking[0]}, expected an image in colour or grey")
+    image = np.stack([channels[name] for name in names], axis=-1).astype(np.float32)
+    return np.maximum(np.nan_to_num(image, posinf=0.0, neginf=0.0), 0.0)
+
+
 @cache
 def _bytes_of_halves() -> NDArray[np.uint8]:
     """Return the byte of each half float, by its bits: arithmetic takes four times as long."""

@@ -11,6 +11,7 @@ from stereocell.model.object_table import ObjectTable
 from stereocell.model.spacing import Spacing
 from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
 from stereocell.storage.file_list import FileList
+from stereocell.usd.write_display import DISPLAY_NAME
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
 from stereocell.usd.written_files import STAGE_NAME, AsWritten, write_list
@@ -44,13 +45,16 @@ class WriteStage(Keyed):
     opens_cut: bool
     tables: Tables
 
-    def write(self, stage_dir: Path) -> None:
-        """Write stage.usda and looks/ beside the tiles, which are there."""
+    def write(self, stage_dir: Path) -> str:
+        """Write stage.usda, display.usda and looks/ beside the tiles, which are there.
+
+        Returns a line about the specimen's physical size.
+        """
         extents = [
             TileExtent(tile.id, tile.first_um, tile.last_um, self.spacing_um)
             for tile in (step.content for step in self.tiles)
         ]
-        write_stage(
+        return write_stage(
             stage_dir,
             self.name,
             appearances=self.appearances,
@@ -67,4 +71,5 @@ class WriteStage(Keyed):
         """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
         write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
-        write_list(stage_dir, tiles, stage_dir / "looks", stage, small)
+        display = stage_dir / DISPLAY_NAME
+        write_list(stage_dir, tiles, stage_dir / "looks", stage, display, small)

@@ -12,7 +12,7 @@ References: OpenUSD, UsdGeomCamera (units of camera lens attributes).
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdGeom
+from pxr import Gf, Sdf, Usd, UsdGeom
 
 from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, vec3d
 
@@ -22,11 +22,21 @@ FOCAL_LENGTH_MM = 35.0
 APERTURE_MM = (36.0, 20.25)  # (width, height), 16:9
 MARGIN = 1.08  # distance as a multiple of the one at which the specimen fills the frame
 
-_LENS = 0.01 / METERS_PER_UNIT  # mm -> tenths of a stage unit
 
+def define_cameras(
+    stage: Usd.Stage,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    *,
+    group: Sdf.Path = CAMERAS,
+    unit_m: float = METERS_PER_UNIT,
+) -> None:
+    """Define the cameras, seen from +z, for a box with corners (x, y, z), float64, in the world.
 
-def define_cameras(stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
-    """Define the cameras, seen from +z, for a box with corners (x, y, z), float64, world um."""
+    group   the prim above the cameras
+    unit_m  metres in a unit of the stage
+    """
+    lens = 0.01 / unit_m  # mm -> tenths of a stage unit
     width, height, depth = (float(v) for v in high - low)
     eye = 0.5 * PUPIL_DISTANCE_M * max(width, height, depth) / ROOM_SIZE_M
     across, upwards = (0.5 * a / FOCAL_LENGTH_MM for a in APERTURE_MM)
@@ -34,20 +44,20 @@ def define_cameras(stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.
     to_front = MARGIN * max((width / 2 + eye) / across, height / 2 / upwards)
     distance = to_front + depth / 2
     centre = (low + high) / 2
-    UsdGeom.Scope.Define(stage, CAMERAS)
+    UsdGeom.Scope.Define(stage, group)
     roles = {
         "mono": (0.0, UsdGeom.Tokens.mono),
         "left": (-eye, UsdGeom.Tokens.left),
         "right": (eye, UsdGeom.Tokens.right),
     }
     for name, (shift, role) in roles.items():
-        camera = UsdGeom.Camera.Define(stage, CAMERAS.AppendChild(name))
+        camera = UsdGeom.Camera.Define(stage, group.AppendChild(name))
         camera.AddTranslateOp().Set(vec3d(centre + np.array([shift, 0, distance])))
-        camera.CreateFocalLengthAttr(FOCAL_LENGTH_MM * _LENS)
-        camera.CreateHorizontalApertureAttr(APERTURE_MM[0] * _LENS)
-        camera.CreateVerticalApertureAttr(APERTURE_MM[1] * _LENS)
+        camera.CreateFocalLengthAttr(FOCAL_LENGTH_MM * lens)
+        camera.CreateHorizontalApertureAttr(APERTURE_MM[0] * lens)
+        camera.CreateVerticalApertureAttr(APERTURE_MM[1] * lens)
         if shift:
-            camera.CreateHorizontalApertureOffsetAttr(-shift * FOCAL_LENGTH_MM * _LENS / distance)
+            camera.CreateHorizontalApertureOffsetAttr(-shift * FOCAL_LENGTH_MM * lens / distance)
         camera.CreateFocusDistanceAttr(distance)
         camera.CreateClippingRangeAttr(Gf.Vec2f(distance / 100, distance * 10))
         camera.CreateStereoRoleAttr(role)

@@ -21,6 +21,8 @@ UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
 # on /Specimen: the plane that it opens cut by, as its normal (x, y, z) and its offset, um, world
 OPENING_CUT = "stereocell:openingCut"
+# on /Specimen: lengths in display.usda for a length of the specimen, see usd/write_display.py
+DISPLAY_SCALE = "stereocell:displayScale"
 PAINTED_BY = "stereocell:paintedBy"  # on a channel's prim: ID of the channel that is painted on it
 BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: the colour of the build
 CHANNELS = ROOT.AppendChild("Channels")

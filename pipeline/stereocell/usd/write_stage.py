@@ -6,6 +6,7 @@ looks/lights.usda             a copy of usd_assets/lights.usda, and beside it th
 tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
+display.usda                  the stage, larger: see usd/write_display.py
 
 Of the content of tiles and looks, stage.usda states only the selected variants of the tiles. So
 they can be read and changed in the one layer that a person reads, and are known while a tile is
@@ -24,6 +25,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
 from stereocell.model.channel import Appearance
 from stereocell.model.object_table import ObjectTable
+from stereocell.model.physical_size import describe_size, display_scale
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tile_content import Provenance, TileContent
@@ -33,6 +35,7 @@ from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.workspace import cached
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
+    DISPLAY_SCALE,
     LAYER_SUFFIXES,
     OPENING_CUT,
     PATIENT_API,
@@ -48,6 +51,7 @@ from stereocell.usd.layer import (
 )
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 from stereocell.usd.write_appearances import write_appearances
+from stereocell.usd.write_display import DISPLAY_NAME, write_display
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import STAGE_NAME
 
@@ -90,8 +94,10 @@ def write_stage(
     has_sides: bool = False,
     opens_cut: bool = False,
     tables: Mapping[str, ObjectTable] | None = None,
-) -> None:
-    """Write stage.usda and looks/ over tiles that `write_tile` has written.
+) -> str:
+    """Write stage.usda, display.usda and looks/ over tiles that `write_tile` has written.
+
+    Returns a line about the specimen's physical size.
 
     A tile that is written later has its default variants, and no selection in stage.usda.
 
@@ -145,7 +151,11 @@ def write_stage(
     moved = np.array([move_box(low, high, move) for low, high in boxes])
     if opens_cut:
         _state_cut(root, moved)
-    define_cameras(stage, moved[:, 0].min(axis=0), moved[:, 1].max(axis=0))
+    low, high = moved[:, 0].min(axis=0), moved[:, 1].max(axis=0)
+    define_cameras(stage, low, high)
+    scale = display_scale(float((high - low).max()))
+    set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
+    write_display(stage_dir, low, high, scale)
 
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE
@@ -153,6 +163,8 @@ def write_stage(
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
     export(layer, stage_dir / STAGE_NAME)
+    size = describe_size(high - low)
+    return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
 
 
 def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:

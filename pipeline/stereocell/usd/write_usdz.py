@@ -1,11 +1,11 @@
 """Write specimen.usdz: the meshes of a composed stage as one small file for AR viewers.
 
 AR viewers expect metres, a scene that stands on the floor, and a few hundred thousand triangles. So
-the specimen is scaled to the size of a hand (its longest edge is SIZE_M long), stands with its
-lowest point at y = 0 and its middle above the origin, and has the finest level of detail of at most
-MAX_TRIANGLES triangles (the coarsest, if none is that small). The layer's customLayerData states
-`stereocell:scale`, metres in the file for one metre of the specimen, and `size`. It has the
-channels that the stage shows, if any of them is drawn.
+the specimen is scaled to the size of a hand (its longest edge is SIZE_M long) unless a scale is
+given. It stands with its lowest point at y = 0 and its middle above the origin, and has the finest
+level of detail of at most MAX_TRIANGLES triangles (the coarsest, if none is that small). The
+layer's customLayerData states `stereocell:scale`, metres in the file for one metre of the specimen,
+and `size`. It has the channels that the stage shows, if any of them is drawn.
 
 Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
 which comes first, the baked maps of that level, and the stage's lights with the image of the dome.
@@ -28,7 +28,7 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
-from stereocell.usd.layer import CHANNELS, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_appearances import shows_at_first
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
@@ -64,6 +64,7 @@ def write_usdz(
     level: int | None = None,
     tiles: Collection[str] = (),
     channels: Collection[str] = (),
+    scale: float | None = None,
 ) -> int | None:
     """Write the meshes of a stage, or of a layer over it, as `path`; return the level of detail.
 
@@ -71,6 +72,7 @@ def write_usdz(
     level       of detail; None: the finest that is light enough
     tiles       IDs of those that are written; empty: all
     channels    the same; empty: those that show at first, if any is drawn, else all
+    scale       lengths in the file for a length of the specimen; None: the longest edge is SIZE_M
 
     Returns None where no mesh is drawn; then no file is left at `path`. Raises StageError where
     the stage can't be read, OutputError where the file can't be written.
@@ -90,13 +92,16 @@ def write_usdz(
     boxes = [hinted_box(prim) for prim in prims]
     low = np.min([box[0] for box in boxes], axis=0)
     high = np.max([box[1] for box in boxes], axis=0)
-    flat = _new_stage(specimen_name(stage), float((high - low).max()), shown)
-    _define_parts(flat, found, low, high)
+    longest_um = float((high - low).max())
+    size_m = SIZE_M if scale is None else longest_um * METERS_PER_UNIT * scale
+    flat = _new_stage(specimen_name(stage), longest_um, size_m, shown)
+    _define_parts(flat, found, low, high, size_m)
     images = {
         _texture_name(part, kind): file for part in found for kind, file in _images(part).items()
     }
-    images |= copy_lights(stage, flat)
-    _pack(flat.GetRootLayer(), images, path, as_written)
+    content = {name: as_written.require(file).read_bytes() for name, file in images.items()}
+    content |= copy_lights(stage, flat, as_written)
+    _pack(flat.GetRootLayer(), content, path)
     return shown
 
 
@@ -141,15 +146,15 @@ def _read_parts(
                     yield _Part(name, channel, lods[-1])
 
 
-def _new_stage(name: str, longest_um: float, level: int) -> Usd.Stage:
+def _new_stage(name: str, longest_um: float, size_m: float, level: int) -> Usd.Stage:
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     layer.defaultPrim = ROOT.name
     layer.customLayerData = {
         "stereocell": {
             "lod": level,
-            "note": f"Scaled: the longest edge of {longest_um:g} um is {SIZE_M:g} m here.",
-            "scale": SIZE_M / (longest_um * 1e-6),
-            "size": SIZE_M,
+            "note": f"Scaled: the longest edge of {longest_um:g} um is {size_m:g} m here.",
+            "scale": size_m / (longest_um * METERS_PER_UNIT),
+            "size": size_m,
         }
     }
     stage = Usd.Stage.Open(layer)
@@ -162,14 +167,20 @@ def _new_stage(name: str, longest_um: float, level: int) -> Usd.Stage:
 
 
 def _define_parts(
-    stage: Usd.Stage, parts: list[_Part], low: NDArray[np.float64], high: NDArray[np.float64]
+    stage: Usd.Stage,
+    parts: list[_Part],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    size_m: float,
 ) -> None:
     """Define the meshes, tile by tile; `low` and `high` bound the specimen, (x, y, z), world um.
+
+    size_m  the specimen's longest edge in the file
 
     A channel's meshes share one material, except those with a normal map or a look of their own.
     """
     foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    scale = SIZE_M / float((high - low).max())
+    scale = size_m / float((high - low).max())
     looks = UsdGeom.Scope.Define(stage, ROOT.AppendChild("Looks")).GetPath()
     usual: dict[str, Material] = {}
     for part in parts:
@@ -238,18 +249,17 @@ def _texture_name(part: _Part, kind: Kind) -> str:
     return f"textures/{part.channel}_{part.tile}_{kind}.png"
 
 
-def _pack(layer: Sdf.Layer, images: Mapping[str, Path], path: Path, as_written: AsWritten) -> None:
+def _pack(layer: Sdf.Layer, images: Mapping[str, bytes], path: Path) -> None:
     """Put the layer and its images, by their names, into an archive, the layer first.
 
-    Raises OutputError where it can't be written, StageError for a damaged image.
+    Raises OutputError where it can't be written.
     """
     with tempfile.TemporaryDirectory() as folder:
         export(layer, Path(folder) / _LAYER)
-        files = {_LAYER: Path(folder) / _LAYER}
-        files |= {name: as_written.require(file) for name, file in images.items()}
+        files = {_LAYER: (Path(folder) / _LAYER).read_bytes(), **images}
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for name, file in files.items():
-                archive.writestr(_entry(name, archive.start_dir), file.read_bytes())
+            for name, content in files.items():
+                archive.writestr(_entry(name, archive.start_dir), content)
 
 
 def _entry(name: str, offset: int) -> zipfile.ZipInfo:

@@ -11,11 +11,11 @@ Blender 4.5 or newer. 1 unit is 1 um, or the specimen has its true size.
 """
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from .choice import AS_STAGED, Choice, open_stage, shared_functions
-from .importing import import_stage
+from .importing import DISPLAY, MICROMETRES, TRUE, describe_size, import_stage
 from .objects import CLASSES
 from .overlay import export_edits
 from .problem import StageProblem
@@ -71,20 +71,40 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     size: EnumProperty(
         name="Size",
         items=[
-            ("MICROMETRES", "1 unit is 1 um", "Right for viewing, lighting and rendering"),
-            ("TRUE", "True size", "1 unit is 1 m: to stand beside other true things"),
+            (MICROMETRES, "1 unit is 1 um", "Right for viewing, lighting and rendering"),
+            (
+                DISPLAY,
+                "Display size",
+                "1 unit is 1 m, and the specimen is enlarged by a power of ten, up to 1 m",
+            ),
+            (TRUE, "True size", "1 unit is 1 m: to stand beside other true things"),
         ],
+    )
+
+    is_lit: BoolProperty(
+        name="Light the scene",
+        description="The stage's lights, a dark backdrop, colours as they are, and Cycles for "
+        "volumes: the scene is ready to be rendered. Off: lights and settings stay as they are",
+        default=True,
+    )
+    is_stereo: BoolProperty(
+        name="Render both eyes",
+        description="Pictures are rendered twice, for the left and the right eye",
+        default=False,
     )
 
     def execute(self, context):
         function = self.transfer_function or AS_STAGED
         choice = Choice(self.tiles, self.lod, self.representation, function)
         try:
-            root = import_stage(context, self.filepath, choice, self.size == "TRUE")
+            root = import_stage(
+                context, self.filepath, choice, self.size, self.is_lit, self.is_stereo
+            )
         except StageProblem as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
         context.view_layer.objects.active = root
+        self.report({"INFO"}, f"The specimen is {describe_size(open_stage(self.filepath))}")
         return {"FINISHED"}
 
 

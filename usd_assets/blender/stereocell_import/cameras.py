@@ -3,11 +3,12 @@
 from .choice import ROOT
 
 
-def pair_cameras(scene, stage, objects, scale):
+def pair_cameras(scene, stage, objects, scale, is_stereo):
     """Look through `mono` with the eyes of `left` and `right`, whose ranges become the scene's.
 
-    objects  Blender's objects by the path of their prim
-    scale    Blender's units for a unit of the stage
+    objects    Blender's objects by the path of their prim
+    scale      Blender's units for a unit of the stage
+    is_stereo  whether both eyes are rendered
     """
     for block in objects.values():
         if block.type == "CAMERA":
@@ -27,5 +28,5 @@ def pair_cameras(scene, stage, objects, scale):
     stereo.convergence_mode = "OFFAXIS"
     stereo.interocular_distance = (right - left).GetLength() * scale
     stereo.convergence_distance = focus * scale
-    scene.render.use_multiview = True
+    scene.render.use_multiview = is_stereo
     scene.render.views_format = "STEREO_3D"

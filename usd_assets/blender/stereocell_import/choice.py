@@ -13,6 +13,7 @@ ROOT = "/Specimen"
 TILES = f"{ROOT}/Tiles"
 CHANNELS = f"{ROOT}/Channels"
 METERS_PER_UNIT = 1e-6
+DISPLAY_SCALE = "stereocell:displayScale"  # on /Specimen: lengths at display size for one of its
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,17 @@ import tempfile
 from pathlib import Path
 
 import bpy
+from pxr import Usd, UsdGeom
 
 from .cameras import pair_cameras
-from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
-from .looks import color_surface, make_color_group, make_volume_material, set_surface_color
+from .choice import CHANNELS, DISPLAY_SCALE, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
+from .lighting import begin_world, end_world, light_scene
+from .looks import color_surface, glow_of, make_color_group, make_volume_material, set_surface_color
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import take_materials, take_snapshot
 
+MICROMETRES, TRUE, DISPLAY = "MICROMETRES", "TRUE", "DISPLAY"  # sizes of an import
 STATE = "stereocell"
 PRIM = "stereocell_prim"
 COLOR = "stereocell_color_"
@@ -40,14 +43,24 @@ class _Hook(bpy.types.USDHook):
         return True
 
 
-def import_stage(context, path, choice, is_true_size):
-    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem."""
+def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo=False):
+    """Import what was chosen of a stage; return the object of /Specimen. Raises StageProblem.
+
+    size       MICROMETRES: a unit is 1 um; TRUE: 1 m; DISPLAY: 1 m, and the specimen is enlarged
+    is_lit     whether the scene gets the stage's lights and what else a good picture takes
+    is_stereo  whether pictures are rendered for both eyes
+    """
     stage = open_stage(path)
-    scale = METERS_PER_UNIT if is_true_size else 1.0
+    scale = _scale_of(stage, size)
     made = {}
+    world = context.scene.world
+    if is_lit:
+        begin_world(context.scene)
 
     def keep(composed, prim_map):
-        made["state"] = _finish(context, composed, prim_map, scale)
+        made["state"] = _finish(context, composed, prim_map, scale, is_stereo)
+        if is_lit:
+            light_scene(context.scene, composed, _objects_of(prim_map), world)
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "choice.usda"
@@ -59,7 +72,8 @@ def import_stage(context, path, choice, is_true_size):
                 filepath=str(file),
                 apply_unit_conversion_scale=False,
                 merge_parent_xform=False,
-                import_lights=False,  # they light the room of a USD client, not the scene at hand
+                import_lights=is_lit,
+                create_world_material=is_lit,
                 mtl_name_collision_mode="MAKE_UNIQUE",
                 set_frame_range=False,
             )
@@ -68,6 +82,8 @@ def import_stage(context, path, choice, is_true_size):
         finally:
             bpy.utils.unregister_class(_Hook)
             _Hook.finish = None
+            if is_lit and "state" not in made:
+                end_world(context.scene, world)
     if "state" not in made:
         raise StageProblem(f"{path}: Blender imported nothing of it")
     root, state = made["state"]
@@ -81,21 +97,47 @@ def import_stage(context, path, choice, is_true_size):
     state["stage"] = str(Path(stage.GetRootLayer().realPath))
     root[STATE] = json.dumps(state)
     units = context.scene.unit_settings
-    units.system, units.scale_length = "METRIC", METERS_PER_UNIT / scale
+    units.system = "METRIC"
+    units.scale_length = METERS_PER_UNIT if size == MICROMETRES else 1.0
     units.length_unit = "ADAPTIVE"
     return root
 
 
-def _finish(context, stage, prim_map, scale):
+def describe_size(stage):
+    """Return a stage's physical size in words, by the boxes of its tiles, loaded or not."""
+    purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes, True)
+    edges = boxes.ComputeWorldBound(stage.GetPrimAtPath(TILES)).ComputeAlignedRange().GetSize()
+    longest = max(edges)
+    unit, um = ("um", 1) if longest < 1e3 else ("mm", 1e3) if longest < 1e6 else ("m", 1e6)
+    return f"{' x '.join(f'{edge / um:.3g}' for edge in edges)} {unit}"
+
+
+def _scale_of(stage, size):
+    """Return Blender's units for a unit of the stage. Raises StageProblem."""
+    if size == MICROMETRES:
+        return 1.0
+    if size == TRUE:
+        return METERS_PER_UNIT
+    enlarged = stage.GetPrimAtPath(ROOT).GetAttribute(DISPLAY_SCALE).Get()
+    if enlarged is None:
+        raise StageProblem(
+            f"{ROOT}.{DISPLAY_SCALE}: no value, expected a number: run `stereocell stage OUT`"
+        )
+    return METERS_PER_UNIT * enlarged
+
+
+def _finish(context, stage, prim_map, scale, is_stereo):
     """Build the looks and cameras; return the root object and the state to be compared with."""
-    objects, materials = {}, []
-    for path, made in prim_map.items():
-        for block in made:
-            if isinstance(block, bpy.types.Object):
-                objects[str(path)] = block
-                block[PRIM] = str(path)
-            elif isinstance(block, bpy.types.Material):
-                materials.append((str(path), block))
+    objects = _objects_of(prim_map)
+    for path, block in objects.items():
+        block[PRIM] = path
+    materials = [
+        (str(path), block)
+        for path, made in prim_map.items()
+        for block in made
+        if isinstance(block, bpy.types.Material)
+    ]
     if ROOT not in objects:
         raise StageProblem(f"Blender made no object of {ROOT}")
     root = objects[ROOT]
@@ -110,7 +152,7 @@ def _finish(context, stage, prim_map, scale):
         _shade_volumes(stage, root, prim.GetName(), look, group, objects)
     keep_labels(stage, {name for name, one in channels.items() if one["objects"]}, objects)
     context.view_layer.update()
-    pair_cameras(context.scene, stage, objects, scale)
+    pair_cameras(context.scene, stage, objects, scale, is_stereo)
     leaves = [p for p, o in objects.items() if o.type in ("MESH", "VOLUME")]
     selected = {
         prim.GetName(): dict(prim.GetVariantSets().GetAllVariantSelections())
@@ -125,6 +167,16 @@ def _finish(context, stage, prim_map, scale):
         "snapshots": {p: take_snapshot(block) for p, block in objects.items()},
         "materials": take_materials(objects[path] for path in leaves),
         "others": [block.name for block in context.scene.objects if block not in own],
+    }
+
+
+def _objects_of(prim_map):
+    """Return Blender's objects by the path of their prim."""
+    return {
+        str(path): block
+        for path, made in prim_map.items()
+        for block in made
+        if isinstance(block, bpy.types.Object)
     }
 
 
@@ -183,8 +235,9 @@ def _shade_volumes(stage, root, channel, look, group, objects):
     }
     if not volumes:
         return
+    modality = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality").Get()
     voxel = min(_voxel_um(stage.GetPrimAtPath(path)) for path in volumes)
-    material = make_volume_material(channel, group, look["points"], look["windows"], voxel)
+    material = make_volume_material(channel, group, look, voxel, glow_of(modality))
     root[VOLUME + channel] = material
     for block in volumes.values():
         block.data.materials.clear()

@@ -9,7 +9,8 @@ intensities, alphas are opacities.
 
 An opacity holds for one voxel of the volume, as it does in the bundle's viewer: the extinction per
 um is -ln(1 - opacity) / voxel. Blender keeps densities in object space, so that a scaled specimen
-looks alike. Voxels that let light pass glow as a fluorescent stain does.
+looks alike. Voxels glow as a fluorescent stain does, except those of MR and CT: there a glow would
+drown the shading of a body that is opaque.
 """
 
 import math
@@ -19,6 +20,7 @@ import bpy
 from .problem import StageProblem
 
 GLOW = 0.4  # emission for the same density of absorption
+_MODALITIES_LIT = ("MR", "CT")  # DICOM's codes of the modalities whose volumes do not glow
 _MAX_POINTS = 32  # a ramp of Blender's holds no more
 _MIN_PASSED = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
 
@@ -60,12 +62,20 @@ def set_surface_color(material, color):
     material.diffuse_color = (*color, 1.0)
 
 
-def make_volume_material(channel, group, points, windows, voxel_um):
+def glow_of(modality):
+    """Return the emission of a modality's volumes for the same density of absorption."""
+    return 0.0 if modality in _MODALITIES_LIT else GLOW
+
+
+def make_volume_material(channel, group, look, voxel_um, glow):
     """Return the material of a channel's volumes.
 
-    points   transfer function: pairs of intensity and opacity, 0..1, intensities rising
-    windows  voxel values that are shown as 0 and 1, and those that are 0 and 1 in the volumes
+    look  its `points`, the transfer function: pairs of intensity and opacity, 0..1, intensities
+          rising; and its `windows`: voxel values that are shown as 0 and 1, and those that are 0
+          and 1 in the volumes
+    glow  emission for the same density of absorption
     """
+    points, windows = look["points"], look["windows"]
     if len(points) > _MAX_POINTS:
         raise StageProblem(
             f"{channel}: its transfer function has {len(points)} points, "
@@ -90,12 +100,12 @@ def make_volume_material(channel, group, points, windows, voxel_um):
     passed = _math(tree, "MAXIMUM", -150, passed, _MIN_PASSED)
     depth = _math(tree, "LOGARITHM", 0, passed, math.e)
     density = _math(tree, "MULTIPLY", 150, depth, -1 / voxel_um)
-    glow = _math(tree, "MULTIPLY", 300, density, GLOW)
+    emission = _math(tree, "MULTIPLY", 300, density, glow)
 
     shader = _node(tree, "ShaderNodeVolumePrincipled", 500)
     shader.inputs["Density Attribute"].default_value = ""  # the ramp's, and not the grid's
     tree.links.new(density, shader.inputs["Density"])
-    tree.links.new(glow, shader.inputs["Emission Strength"])
+    tree.links.new(emission, shader.inputs["Emission Strength"])
     _feed(tree, group, shader, "Color", "Emission Color")
     output = _node(tree, "ShaderNodeOutputMaterial", 800)
     tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])

@@ -1,0 +1,57 @@
+"""Write display.usda: the stage at a size that stands beside everyday things.
+
+A specimen of 67 um lies in true size below the clipping plane of most cameras. display.usda is in
+metres; it references stage.usda and carries the display scale as a transform, so that the stage
+itself stays in true size. Its cameras are its own: USD scales the place of a camera below a
+transform, but not its clipping range.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom
+
+from stereocell.model.physical_size import describe_size
+from stereocell.usd.cameras import define_cameras
+from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, ROOT, UP_AXIS, export
+from stereocell.usd.written_files import STAGE_NAME
+
+DISPLAY_NAME = "display.usda"
+DISPLAY = Sdf.Path("/Display")
+
+
+def write_display(
+    stage_dir: Path, low: NDArray[np.float64], high: NDArray[np.float64], scale: float
+) -> None:
+    """Write display.usda beside stage.usda.
+
+    low, high  corners of the specimen (x, y, z), world um
+    scale      lengths there for a length of the specimen
+
+    Raises OutputError where it can't be written.
+    """
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.defaultPrim = DISPLAY.name
+    size = describe_size(high - low)
+    layer.documentation = (
+        f"The stage in metres, {scale:g} times the specimen, whose size is {size}. "
+        "To edit the specimen, put a layer over stage.usda; this one follows."
+    )
+    stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UP_AXIS)
+    root = UsdGeom.Xform.Define(stage, DISPLAY).GetPrim()
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
+    specimen = UsdGeom.Xform.Define(stage, DISPLAY.AppendChild(ROOT.name))
+    factor = scale * METERS_PER_UNIT
+    specimen.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display").Set(Gf.Vec3d(factor))
+    hidden = Sdf.CreatePrimInLayer(layer, specimen.GetPath().AppendChild(CAMERAS.name))
+    hidden.active = False
+    define_cameras(
+        stage, low * factor, high * factor, group=DISPLAY.AppendChild(CAMERAS.name), unit_m=1.0
+    )
+    del stage  # the reference only resolves beside the file
+    reference = layer.GetPrimAtPath(specimen.GetPath()).referenceList
+    reference.prependedItems.append(Sdf.Reference(f"./{STAGE_NAME}"))
+    export(layer, stage_dir / DISPLAY_NAME)

@@ -1,0 +1,85 @@
+"""Draw files in Blender as an artist sees them first: by its own importers, and by the add-on.
+
+It runs in Blender's Python. Its argument is a file with a list of jobs:
+    file     what is opened
+    by       "blender", by its own importer into the default scene, or "add-on"
+    view     the camera, in the numbers of the file; null: the file's own camera `mono`
+    choices  of the add-on's import
+    pixels, samples, picture
+
+A picture's alpha is the silhouette of what is drawn. Jobs share the process, but no scene. Unlike
+the steps of session.py they don't run in forks, in which images of OpenEXR wait for lost threads.
+"""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import bpy
+
+LOCAL = Path(bpy.utils.resource_path("LOCAL"))
+sys.path += [str(path) for path in LOCAL.glob("python/lib/python3*/site-packages")]
+sys.path.append(str(Path(__file__).parents[2] / "usd_assets" / "blender"))
+
+import stereocell_import  # noqa: E402
+
+
+def open_plainly(job):
+    """Open a file by Blender's own importer, where the default scene's cube was."""
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    file = job["file"]
+    if file.endswith((".glb", ".gltf")):
+        assert bpy.ops.import_scene.gltf(filepath=file) == {"FINISHED"}
+    else:
+        assert bpy.ops.wm.usd_import(filepath=file) == {"FINISHED"}
+    scene, view = bpy.context.scene, job["view"]
+    scene.camera = bpy.data.objects["mono"] if view is None else add_camera(scene, view)
+
+
+def add_camera(scene, view):
+    """Add a camera that looks along the -z of a file with y up, which is Blender's y."""
+    block = bpy.data.objects.new("view", bpy.data.cameras.new("view"))
+    scene.collection.objects.link(block)
+    x, y, z = view["eye"]
+    block.location = (x, -z, y)
+    block.rotation_euler = (math.pi / 2, 0, 0)
+    block.data.sensor_fit = "HORIZONTAL"
+    block.data.lens = block.data.sensor_width / (2 * view["slopes"][0])
+    block.data.clip_start, block.data.clip_end = view["near"], view["far"]
+    return block
+
+
+def import_by_the_addon(job):
+    """Import a stage by the add-on into the default scene, as its menu does."""
+    stereocell_import.register()
+    done = bpy.ops.import_scene.stereocell(filepath=job["file"], **job.get("choices", {}))
+    stereocell_import.unregister()
+    assert done == {"FINISHED"}
+
+
+def render(job):
+    """Write a picture with few samples by Cycles: Blender's other renderers need a GPU."""
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.use_multiview = False
+    scene.cycles.device = "CPU"
+    scene.cycles.samples = job.get("samples", 16)
+    scene.cycles.use_denoising = False
+    scene.render.film_transparent = True
+    scene.render.resolution_x, scene.render.resolution_y = job["pixels"]
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.color_mode = "RGBA"
+    scene.render.filepath = job["picture"]
+    bpy.ops.render.render(write_still=True)
+
+
+def main():
+    for job in json.loads(Path(sys.argv[1]).read_text("utf-8")):
+        bpy.ops.wm.read_factory_settings()
+        {"blender": open_plainly, "add-on": import_by_the_addon}[job["by"]](job)
+        render(job)
+
+
+main()
