@@ -221,9 +221,9 @@ def test_a_material_that_reaches_no_surface_is_named(edit, options, told):
     assert factor(edited) == [1.0, 0.2, 0.1, 1]
 
 
-def test_a_material_that_is_bound_nowhere_needs_no_word(edit):
+def test_a_material_that_is_bound_nowhere_is_named(edit):
     edit(lambda s: bind(s, ""))
-    assert edit.told == []
+    assert edit.told == ["Material /Specimen/Mine is not taken over: no mesh is bound to it"]
 
 
 def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):

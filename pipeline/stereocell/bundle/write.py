@@ -33,6 +33,7 @@ from stereocell.storage.file_list import encode
 from stereocell.storage.workspace import move
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer_units import note_missing
+from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_bindings import notes_on_bindings
 from stereocell.usd.read_objects import painter_of, read_columns
@@ -84,10 +85,17 @@ class Composed:
         return cls(path, stage, appearances, names, step_m, as_written)
 
     def notes(self) -> Iterator[str]:
-        """Yield notes on units that the layer does not state, and on materials above channels."""
+        """Yield notes on units that the layer does not state, on materials above channels, and on
+        each edit that the bundle does not take over. Raises StageError for an edit over time.
+        """
         if note := note_missing(self.stage):
             yield note
         yield from notes_on_bindings(self.stage)
+        yield from notes_on_edits(self.stage)
+
+    def require_all_taken(self) -> None:
+        """Raise StageError where the bundle does not take over an edit."""
+        require_no_lost_edit(self.stage)
 
 
 def fill_bundle(

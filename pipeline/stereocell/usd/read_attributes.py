@@ -28,10 +28,15 @@ def require_still(*attributes: Usd.Attribute) -> None:
     """Raise StageError for values over time, as of an animation: those are not looked at."""
     for attribute in attributes:
         if attribute and attribute.GetNumTimeSamples():
-            raise StageError(
-                f"{attribute.GetPath()}: found values over time, expected one without a time: "
-                "nothing moves here, export one frame"
-            )
+            raise StageError(over_time(attribute))
+
+
+def over_time(attribute: Usd.Attribute) -> str:
+    """Return the message for an attribute that has values over time."""
+    return (
+        f"{attribute.GetPath()}: found values over time, expected one without a time: "
+        "nothing moves here, export one frame"
+    )
 
 
 def file_of(attribute: Usd.Attribute) -> Path:
