@@ -120,6 +120,16 @@ def _choose(path: str, name: str, variant: str) -> Callable[[Usd.Stage], object]
     return lambda stage: stage.GetPrimAtPath(path).GetVariantSet(name).SetVariantSelection(variant)
 
 
+def _fade(stage: Usd.Stage) -> None:
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(MESH))
+    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "displayOpacity", _Types.FloatArray, UsdGeom.Tokens.vertex
+    )
+    primvar.Set(
+        [k / len(mesh.GetPointsAttr().Get()) for k in range(len(mesh.GetPointsAttr().Get()))]
+    )
+
+
 CASES: tuple[EditCase, ...] = (
     EditCase(
         "`inputs:color` of a channel",
@@ -156,6 +166,42 @@ CASES: tuple[EditCase, ...] = (
         _put(SURFACE, "inputs:roughness", _Types.Float, 0.2),
         "taken",
         "roughness of the surfaces",
+    ),
+    EditCase(
+        "`inputs:opacity` of a channel's shader",
+        _put(SURFACE, "inputs:opacity", _Types.Float, 0.4),
+        "taken",
+        "translucent surfaces: `alphaMode` BLEND, in `specimen.usdz` too",
+    ),
+    EditCase(
+        "`inputs:emissiveColor` of a channel's shader",
+        _put(SURFACE, "inputs:emissiveColor", _Types.Color3f, Gf.Vec3f(0, 0.5, 0)),
+        "taken",
+        "surfaces that glow, in `specimen.usdz` too",
+    ),
+    EditCase(
+        "`displayOpacity` of a channel",
+        _put(CHANNEL, "primvars:displayOpacity", _Types.FloatArray, [0.4]),
+        "taken",
+        "translucent surfaces of the channel",
+    ),
+    EditCase(
+        "`displayOpacity` of a mesh",
+        _put(MESH, "primvars:displayOpacity", _Types.FloatArray, [0.4]),
+        "taken",
+        "a translucent surface in that tile",
+    ),
+    EditCase(
+        "`displayOpacity` of a mesh by its points",
+        _fade,
+        "reported",
+        "primvars:displayOpacity is not taken over: one value for the whole mesh is taken over",
+    ),
+    EditCase(
+        "`displayColor` of a mesh",
+        _put(MESH, "primvars:displayColor", _Types.Color3fArray, [Gf.Vec3f(0, 1, 0)]),
+        "taken",
+        "the colour of that tile's surface",
     ),
     EditCase(
         "`inputs:clearcoat` of a channel's shader",
@@ -208,6 +254,19 @@ CASES: tuple[EditCase, ...] = (
         "taken",
         "the tile is left out",
     ),
+    EditCase(
+        "`purpose` of a tile: `guide` or `proxy`",
+        _put(TILE, "purpose", _Types.Token, "guide"),
+        "taken",
+        "the tile is left out, as in other final pictures",
+    ),
+    EditCase(
+        "`purpose` of a mesh: `guide` or `proxy`",
+        _put(MESH, "purpose", _Types.Token, "proxy"),
+        "taken",
+        "the surface is left out",
+    ),
+    EditCase("display name of a tile", _name(TILE, "Left half"), "taken", "its name"),
     EditCase(
         "visibility of a channel's material",
         _put(CHANNEL, "visibility", _Types.Token, "invisible"),

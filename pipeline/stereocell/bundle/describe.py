@@ -43,6 +43,7 @@ def describe_bundle(
         "tiles": [
             {
                 "id": tile.id,
+                **({"name": tile.name} if tile.name else {}),
                 "representation": tile.representation,
                 "bounds_um": _bounds([tile]),
                 **({"unfinished": True} if tile.id in unfinished else {}),

@@ -9,6 +9,7 @@ from stereocell.usd.read_attributes import require_still
 from stereocell.usd.typed_values import one_line
 
 _PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
+_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)  # of what a final picture shows
 FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -26,8 +27,10 @@ def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
 
 
 def is_visible(prim: Usd.Prim) -> bool:
-    """Return whether neither a prim nor one above it is hidden."""
-    return bool(UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible)
+    """Return whether neither a prim nor one above it is hidden, or is a guide or a stand-in."""
+    imageable = UsdGeom.Imageable(prim)
+    is_shown = imageable.ComputeVisibility() != UsdGeom.Tokens.invisible
+    return bool(is_shown and imageable.ComputePurpose() in _PURPOSES)
 
 
 def to_world(prim: Usd.Prim) -> NDArray[np.float64]:

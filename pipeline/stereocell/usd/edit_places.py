@@ -3,13 +3,14 @@
 from collections.abc import Iterator
 from contextlib import suppress
 
-from pxr import Sdf, Usd, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_table import is_taken
 from stereocell.usd.layer import CHANNELS, ROOT, TILES
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 from stereocell.usd.read_appearances import surface_of
+from stereocell.usd.read_display import is_single, shows_display_color
 from stereocell.usd.read_textures import vertex_values_of
 from stereocell.usd.write_objects import COLUMNS, LABELS
 
@@ -115,8 +116,13 @@ def _material_over(prim: Usd.Prim) -> Usd.Prim | None:
 
 def read_primvars(mesh: Usd.Prim) -> Iterator[str]:
     """Yield the names of the primvars of a tile's mesh that its objects or its material use."""
+    if is_single(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayOpacity")):
+        yield "displayOpacity"
     with suppress(StageError):  # the reader of the mesh raises it
-        yield from vertex_values_of(surface_of(mesh))
+        surface = surface_of(mesh)
+        yield from vertex_values_of(surface)
+        if shows_display_color(surface):
+            yield "displayColor"
     if not mesh.HasAttribute(LABELS):
         return
     yield from (OBJECT_ID, PAINT, "displayColor")

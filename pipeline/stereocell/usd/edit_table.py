@@ -23,13 +23,22 @@ from stereocell.usd.write_objects import (
 )
 
 _PLACED = ("xformOp:*", "xformOpOrder")
-_SHOWN = ("visibility", "@active")
+_SHOWN = ("visibility", "purpose", "@active")
+# a display colour or opacity holds for all meshes below
+_DISPLAYED = ("primvars:displayColor*", "primvars:displayOpacity*")
 
 TAKEN: dict[str, tuple[str, ...]] = {
-    "specimen": (*_PLACED, *_SHOWN, "stereocell:modality", OPENING_CUT, "@displayName"),
-    "tiles": (*_PLACED, *_SHOWN, *SIDES.values()),
-    "tile": (*_PLACED, *_SHOWN, "extentsHint"),
-    "branch": (*_PLACED, *_SHOWN),
+    "specimen": (
+        *_PLACED,
+        *_SHOWN,
+        *_DISPLAYED,
+        "stereocell:modality",
+        OPENING_CUT,
+        "@displayName",
+    ),
+    "tiles": (*_PLACED, *_SHOWN, *_DISPLAYED, *SIDES.values()),
+    "tile": (*_PLACED, *_SHOWN, *_DISPLAYED, "extentsHint", "@displayName"),
+    "branch": (*_PLACED, *_SHOWN, *_DISPLAYED),
     "mesh": (
         *_PLACED,
         *_SHOWN,
@@ -47,8 +56,6 @@ TAKEN: dict[str, tuple[str, ...]] = {
         TOUCHING,
         WALL_UM2,
     ),
-    # primvars of a mesh that are taken over where its objects or its material use them
-    "mesh of objects": ("primvars:*",),
     "volume": (
         *_PLACED,
         *_SHOWN,
@@ -65,6 +72,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "@displayName",
         "inputs:color",
         "outputs:surface",
+        "primvars:displayOpacity",
         "stereocell:window",
         "stereocell:volumeWindow",
         "stereocell:opacityPoints",
@@ -91,6 +99,9 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "inputs:diffuseColor",
         "inputs:metallic",
         "inputs:roughness",
+        "inputs:opacity",
+        "inputs:opacityThreshold",
+        "inputs:emissiveColor",
     ),
     # inputs that are taken over from an image or a primvar alone
     "UsdPreviewSurface, fed": ("inputs:normal", "inputs:occlusion"),
@@ -126,8 +137,14 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("crease*", "surfaces are not subdivided here: apply the subdivision and export points"),
     ("corner*", "surfaces are not subdivided here: apply the subdivision and export points"),
     ("outputs:*", "the viewer draws with its own shaders, and takes a UsdPreviewSurface alone"),
+    (
+        "primvars:displayOpacity*",
+        "one value for the whole mesh is taken over, and this has several",
+    ),
+    ("primvars:displayColor*", "another value feeds the colour of the mesh's material"),
     ("primvars:*", "no material of the mesh reads this primvar"),
     ("xformOp*", "nothing in the bundle stands at this prim"),
+    ("purpose", "nothing in the bundle is drawn by this prim"),
     ("visibility", "nothing in the bundle is drawn by this prim"),
     ("userProperties:*", "properties of the program that wrote the layer stay there"),
     ("@customData", "custom data stay with the stage"),

@@ -1,0 +1,60 @@
+"""Bundles of a stage and of layers over it: `python -m support.edited_bundle FOLDER`.
+
+The stage is that of two tiles with a sphere across their border (`support.bundles`). The layers are
+made by USD's own API. A folder of each name gets a bundle.
+"""
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from support.bundles import write, write_tiles
+from support.edit_cases import SURFACE, TILE
+from support.stages import edit_over
+
+OPACITY = 0.4
+EMISSION = (0.0, 0.4, 0.0)
+TILE_NAME = "Left half"
+
+
+def _translucent(stage: Usd.Stage) -> None:
+    shader = stage.OverridePrim(SURFACE)
+    shader.CreateAttribute("inputs:opacity", Sdf.ValueTypeNames.Float).Set(OPACITY)
+
+
+def _glowing(stage: Usd.Stage) -> None:
+    shader = stage.OverridePrim(SURFACE)
+    glow = shader.CreateAttribute("inputs:emissiveColor", Sdf.ValueTypeNames.Color3f)
+    glow.Set(Gf.Vec3f(*EMISSION))
+
+
+def _named(stage: Usd.Stage) -> None:
+    stage.OverridePrim(TILE).SetDisplayName(TILE_NAME)
+
+
+def _guide(stage: Usd.Stage) -> None:
+    UsdGeom.Imageable(stage.OverridePrim(TILE)).CreatePurposeAttr("guide")
+
+
+LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
+    "built": lambda _: None,
+    "translucent": _translucent,
+    "glowing": _glowing,
+    "named": _named,
+    "guide": _guide,
+}
+
+
+def write_all(folder: Path) -> None:
+    """Write a bundle of each layer."""
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        stage = write_tiles(Path(scratch) / "stage")
+        for name, change in LAYERS.items():
+            write(edit_over(Path(scratch) / f"{name}.usda", stage, change), folder / name)
+
+
+if __name__ == "__main__":
+    write_all(Path(sys.argv[1]))

@@ -1,0 +1,75 @@
+/** What an artist adds in a layer over the stage is what the viewer shows: tests/support/edited_bundle.py. */
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { type Picture, takePicture } from "../support/browser/picture";
+import { describeInChromium } from "../support/browser/skip";
+import { prepareStand } from "../support/browser/stand";
+import { askPython, hasPython } from "../support/python";
+
+// as in tests/support/edited_bundle.py
+const OPACITY = 0.4;
+const EMISSION = [0, 0.4, 0] as const;
+const TILE_NAME = "Left half";
+
+/** The part of light that a pixel's 8 bits stand for, 0..1 (sRGB). */
+const linear = (v: number) => (v > 10 ? ((v / 255 + 0.055) / 1.055) ** 2.4 : v / 255 / 12.92);
+
+describeInChromium("edits of a stage", () => {
+  if (!hasPython) {
+    it.skip("needs Python");
+    return;
+  }
+  const folder = mkdtempSync(join(tmpdir(), "stereocell-edits-"));
+  beforeAll(() => askPython("edited_bundle", [folder], ""));
+  afterAll(() => rmSync(folder, { recursive: true, force: true }));
+  const stand = prepareStand({
+    viewport: { width: 320, height: 200 },
+    pixelRatio: 1,
+    bundle: join(folder, "built"),
+    mounts: () => ({ "/edits/": folder }),
+  });
+
+  /** The surfaces alone, from the front; `query` goes behind the bundle's address. */
+  async function look(name: string, query = ""): Promise<Picture> {
+    await stand.viewer.open(
+      `${stand.host.address}/app/?bundle=../edits/${name}/&view=front&mode=off${query}#v=1&depth=0`,
+    );
+    await stand.viewer.settled();
+    return takePicture(stand.viewer.page);
+  }
+
+  it("shows a channel as translucent as the stage has it", async () => {
+    const [opaque, clear] = [await look("built"), await look("translucent")];
+    const [x, y] = [opaque.width / 2 - 8, opaque.height / 2 - 8];
+    const behind = clear.at(4, opaque.height / 2);
+    const [full, part] = [opaque.at(x, y).map(linear), clear.at(x, y).map(linear)];
+    expect(full[0]).toBeGreaterThan(0.1);
+    part.forEach((light, i) => {
+      const wanted = OPACITY * full[i] + (1 - OPACITY) * linear(behind[i]);
+      expect(Math.abs(light - wanted)).toBeLessThan(0.02);
+    });
+  });
+
+  it("calls a tile by the name that the stage gives it", async () => {
+    await look("named");
+    const label = await stand.viewer.page.locator('[data-tile-choice="r0_c0"]').ariaSnapshot();
+    expect(label).toContain(TILE_NAME);
+  });
+
+  it("leaves a tile out that the stage draws as a guide", async () => {
+    await look("guide");
+    const { state } = await stand.viewer.snapshot();
+    expect(state.tiles.map(({ id }) => id)).toEqual(["r0_c1"]);
+  });
+
+  it("adds the light that a channel emits", async () => {
+    const [dark, bright] = [await look("built"), await look("glowing")];
+    const [x, y] = [dark.width / 2 - 8, dark.height / 2 - 8];
+    const [before, after] = [dark.at(x, y).map(linear), bright.at(x, y).map(linear)];
+    before.forEach((light, i) => {
+      expect(Math.abs(after[i] - light - EMISSION[i])).toBeLessThan(0.03);
+    });
+  });
+});
