@@ -27,12 +27,14 @@ class EditCase:
     what    the edit in words, for the table of the docs
     change  makes it on a stage whose edit target is the artist's layer
     words   what the line on it says; of a taken edit, what becomes of it
+    is_partial  whether only a part of it is lost
     """
 
     what: str
     change: Callable[[Usd.Stage], object]
     outcome: Outcome
     words: str
+    is_partial: bool = False
 
 
 def _put(
@@ -83,6 +85,17 @@ def _bind(where: str, strength: str) -> Callable[[Usd.Stage], object]:
         UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(where)).Bind(material, strength)
 
     return change
+
+
+def define_camera(stage: Usd.Stage, roll_deg: float = 0) -> None:
+    """Add a camera in front of the sphere, 20 um before its middle."""
+    camera = UsdGeom.Camera.Define(stage, "/Specimen/Cameras/close")
+    camera.GetPrim().SetDisplayName("Close")
+    camera.AddTranslateOp().Set(Gf.Vec3d(10, -5, 24))
+    if roll_deg:
+        camera.AddRotateZOp().Set(roll_deg)
+    camera.CreateFocalLengthAttr(50.0)
+    camera.CreateVerticalApertureAttr(20.0)
 
 
 def define_arrow(stage: Usd.Stage, path: str = "/Specimen/Annotations/Arrow") -> UsdGeom.Mesh:
@@ -308,6 +321,19 @@ CASES: tuple[EditCase, ...] = (
         lambda stage: define_material(stage, "/Specimen/Mine", (0, 1, 0)),
         "reported",
         "Material /Specimen/Mine is not taken over: no mesh is bound to it",
+    ),
+    EditCase(
+        "a camera",
+        define_camera,
+        "taken",
+        "a named view of the viewer, in order",
+    ),
+    EditCase(
+        "a camera with a roll",
+        lambda stage: define_camera(stage, roll_deg=30),
+        "reported",
+        "roll of camera 'Close', 30 degrees, is not taken over: the viewer keeps up upright",
+        is_partial=True,
     ),
     EditCase(
         "a prim outside `/Specimen`",

@@ -39,12 +39,24 @@ def _guide(stage: Usd.Stage) -> None:
     UsdGeom.Imageable(stage.OverridePrim(TILE)).CreatePurposeAttr("guide")
 
 
+def _framed(stage: Usd.Stage) -> None:
+    """Add two cameras that look at the sphere: one from the side, and one from the front."""
+    for name, place, turn in (("side", (40, -5, 4), 90.0), ("front", (10, -5, 24), 0.0)):
+        camera = UsdGeom.Camera.Define(stage, f"/Specimen/Cameras/{name}")
+        camera.GetPrim().SetDisplayName(f"From the {name}")
+        camera.AddTranslateOp().Set(Gf.Vec3d(*place))
+        camera.AddRotateYOp().Set(turn)
+        camera.CreateFocalLengthAttr(50.0)
+        camera.CreateVerticalApertureAttr(20.0)
+
+
 LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
     "built": lambda _: None,
     "translucent": _translucent,
     "glowing": _glowing,
     "named": _named,
     "guide": _guide,
+    "framed": _framed,
 }
 
 

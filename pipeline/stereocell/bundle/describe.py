@@ -16,6 +16,7 @@ from stereocell.storage.file_list import to_json
 from stereocell.storage.json_files import compact_json, sealed
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.composed_appearance import ComposedAppearance
+from stereocell.usd.read_views import StageView
 
 
 def describe_bundle(
@@ -26,6 +27,7 @@ def describe_bundle(
     index: FileRef,
     ar: dict[str, Any] | None = None,
     unfinished: Collection[str] = (),
+    views: Sequence[StageView] = (),
 ) -> bytes:
     """Return manifest.json, with its hash.
 
@@ -34,6 +36,7 @@ def describe_bundle(
     index     files.json
     ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
     unfinished  IDs of the tiles whose surfaces are not built yet, which volumes stand for
+    views     of the cameras that a layer adds to the stage
     """
     manifest = {
         "format": "stereocell-bundle",
@@ -51,10 +54,20 @@ def describe_bundle(
             for tile in tiles
         ],
         "channels": channels,
+        **({"views": [_describe_view(view) for view in views]} if views else {}),
         **(ar or {}),
         "files": asdict(index),
     }
     return to_json(sealed(manifest))
+
+
+def _describe_view(view: StageView) -> dict[str, Any]:
+    return {
+        "name": view.name,
+        "position_um": list(view.position),
+        "target_um": list(view.target),
+        "fov_deg": view.fov_deg,
+    }
 
 
 def write_channel(

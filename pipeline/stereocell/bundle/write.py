@@ -17,6 +17,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pxr import Usd
 
 from stereocell.bundle.copy_viewer import copy_viewer
@@ -47,6 +48,7 @@ from stereocell.usd.read_stage import (
     specimen_name,
     tile_prims,
 )
+from stereocell.usd.read_views import StageView, notes_on_rolls, read_views
 from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
 
@@ -92,10 +94,11 @@ class Composed:
             yield note
         yield from notes_on_bindings(self.stage)
         yield from notes_on_edits(self.stage)
+        yield from notes_on_rolls(views_of(self.stage))
 
     def require_all_taken(self) -> None:
         """Raise StageError where the bundle does not take over an edit."""
-        require_no_lost_edit(self.stage)
+        require_no_lost_edit(self.stage, notes_on_rolls(views_of(self.stage)))
 
 
 def fill_bundle(
@@ -145,12 +148,20 @@ def fill_bundle(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
-    manifest = describe_bundle(_specimen_of(stage), tiles, channels=channels, index=index, ar=ar)
+    manifest = describe_bundle(
+        _specimen_of(stage), tiles, channels=channels, index=index, ar=ar, views=views_of(stage)
+    )
     write_file(root, MANIFEST, manifest)
     for tile in tiles:
         for channel in tile.channels:
             if channel.edit:
                 yield f"{tile.id}/{channel.channel_id}: {channel.edit}"
+
+
+def views_of(stage: Usd.Stage) -> list[StageView]:
+    """Return the named views of a stage. Raises StageError."""
+    boxes = np.array([hinted_box(prim) for prim in tile_prims(stage)])
+    return list(read_views(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
 
 
 def _specimen_of(stage: Usd.Stage) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 from stereocell.usd.read_appearances import surface_of
 from stereocell.usd.read_display import is_single, shows_display_color
 from stereocell.usd.read_textures import vertex_values_of
+from stereocell.usd.read_views import is_view
 from stereocell.usd.write_objects import COLUMNS, LABELS
 
 _READER = "UsdPrimvarReader"
@@ -44,6 +45,8 @@ class Places:
         prim = self._stage.GetPrimAtPath(path)
         if not prim:
             return ""
+        if is_view(prim):
+            return "camera"
         if path.GetParentPath() == CHANNELS:
             return "channel" if prim.IsA(UsdShade.Material) else ""
         return self._of_shading(prim)

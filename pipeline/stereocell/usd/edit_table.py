@@ -92,6 +92,16 @@ TAKEN: dict[str, tuple[str, ...]] = {
         DEFAULT,
         HIDDEN,
     ),
+    # the window's shape decides what shows at the sides, and nothing is clipped
+    "camera": (
+        *_PLACED,
+        *_SHOWN,
+        "focalLength",
+        "horizontalAperture",
+        "verticalAperture",
+        "clippingRange",
+        "@displayName",
+    ),
     "material": ("outputs:surface",),
     "UsdPreviewSurface": (
         "info:id",
@@ -155,7 +165,6 @@ REASONS: tuple[tuple[str, str], ...] = (
 
 # Reasons for prims that a layer adds, by type; the first whose name the type's begins with or is
 ADDED: dict[str, str] = {
-    "Camera": "cameras are not taken over",
     "Light": "lights reach specimen.usdz alone, if they are distant or a dome, below "
     "/Specimen/Lights",
     "Mesh": "it is no surface of a channel in a tile",

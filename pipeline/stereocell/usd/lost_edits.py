@@ -75,15 +75,18 @@ def notes_on_edits(stage: Usd.Stage) -> Iterator[str]:
         yield f"{stage.GetRootLayer().realPath}: {_FLAT}"
 
 
-def require_no_lost_edit(stage: Usd.Stage) -> None:
-    """Raise StageError where an edit is lost, or where that can't be found."""
+def require_no_lost_edit(stage: Usd.Stage, more: Iterable[str] = ()) -> None:
+    """Raise StageError where an edit is lost, or where that can't be found.
+
+    more  lines on edits that are lost in part
+    """
     layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)
     if not built:
         raise StageError(f"{layer}: {_FLAT}")
-    found = find_lost_edits(stage, built)
+    found = [*describe(find_lost_edits(stage, built)), *more]
     if found:
         words = "1 edit" if len(found) == 1 else f"{len(found)} edits"
-        lines = "\n".join(describe(found))
+        lines = "\n".join(found)
         raise StageError(
             f"{lines}\n{layer}: found {words} that no bundle takes over, expected none with "
             "--strict: nothing is written; remove them or leave --strict out"

@@ -3,7 +3,7 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { type Picture, takePicture } from "../support/browser/picture";
+import { isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { askPython, hasPython } from "../support/python";
@@ -62,6 +62,27 @@ describeInChromium("edits of a stage", () => {
     await look("guide");
     const { state } = await stand.viewer.snapshot();
     expect(state.tiles.map(({ id }) => id)).toEqual(["r0_c1"]);
+  });
+
+  it("goes through the views of the stage's cameras, by name and in order", async () => {
+    await look("framed");
+    const next = async (name: string) => {
+      const button = { name: `Next kept view: ${name}` };
+      await stand.viewer.page.getByRole("button", button).click({ force: true });
+      await stand.viewer.settled();
+      const { look } = await stand.viewer.snapshot();
+      return { look, picture: await takePicture(stand.viewer.page) };
+    };
+    const side = await next("From the side");
+    expect(side.look.position[0]).toBeGreaterThan(Math.abs(10 * side.look.position[2]));
+    const front = await next("From the front");
+    // Its window is 8 um high at the middle of the sphere, whose radius is 3.5 um. The viewer's own lens shows as much
+    // from nearer by.
+    const half = Math.tan((20 * Math.PI) / 180);
+    const wanted = Math.tan(Math.asin(3.5 / (4 / half))) / half;
+    const shown = front.picture.where((pixel) => !isBackground(pixel));
+    const high = Math.max(...shown.map(([, y]) => y)) - Math.min(...shown.map(([, y]) => y));
+    expect(Math.abs(high / front.picture.height - wanted)).toBeLessThan(0.015);
   });
 
   it("adds the light that a channel emits", async () => {
