@@ -106,7 +106,18 @@ def define_arrow(stage: Usd.Stage, path: str = "/Specimen/Annotations/Arrow") ->
     mesh.CreateFaceVertexCountsAttr([3, 4])
     mesh.CreateFaceVertexIndicesAttr([0, 2, 1, 3, 4, 5, 6])
     mesh.CreateSubdivisionSchemeAttr("none")
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(0, 0, 1)])
     return mesh
+
+
+def define_wire(stage: Usd.Stage) -> UsdGeom.BasisCurves:
+    """Add a straight wire through the sphere's middle, 1 um thick."""
+    curves = UsdGeom.BasisCurves.Define(stage, "/Specimen/Electrode/Wire")
+    curves.CreateTypeAttr("linear")
+    curves.CreateCurveVertexCountsAttr([2])
+    curves.CreatePointsAttr([Gf.Vec3f(2, -5, 4), Gf.Vec3f(18, -5, 4)])
+    curves.CreateWidthsAttr([1.0])
+    return curves
 
 
 def _draw_as_cards(stage: Usd.Stage) -> None:
@@ -321,6 +332,20 @@ CASES: tuple[EditCase, ...] = (
         lambda stage: define_material(stage, "/Specimen/Mine", (0, 1, 0)),
         "reported",
         "Material /Specimen/Mine is not taken over: no mesh is bound to it",
+    ),
+    EditCase("an added mesh", define_arrow, "taken", "a layer of the bundle, shown and hidden"),
+    EditCase("added curves", define_wire, "taken", "a layer of the bundle: tubes"),
+    EditCase(
+        "an added mesh over time",
+        lambda stage: define_arrow(stage).GetPointsAttr().Set([Gf.Vec3f(0)] * 7, 2.0),
+        "refused",
+        "Arrow.points: found values over time",
+    ),
+    EditCase(
+        "an added sphere, cube or other shape without points",
+        lambda stage: UsdGeom.Sphere.Define(stage, "/Specimen/Annotations/Ball"),
+        "reported",
+        "Sphere /Specimen/Annotations/Ball is not taken over: nothing in the bundle is made of",
     ),
     EditCase(
         "a camera",

@@ -12,12 +12,12 @@ from pathlib import Path
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from support.bundles import write, write_tiles
-from support.edit_cases import SURFACE, TILE
+from support.edit_cases import SURFACE, TILE, define_arrow, define_wire
 from support.stages import edit_over
 
 OPACITY = 0.4
 EMISSION = (0.0, 0.4, 0.0)
-TILE_NAME = "Left half"
+TILE_NAME, ARROW_NAME = "Left half", "Here"
 
 
 def _translucent(stage: Usd.Stage) -> None:
@@ -50,6 +50,11 @@ def _framed(stage: Usd.Stage) -> None:
         camera.CreateVerticalApertureAttr(20.0)
 
 
+def _added(stage: Usd.Stage) -> None:
+    define_arrow(stage).GetPrim().SetDisplayName(ARROW_NAME)
+    define_wire(stage)
+
+
 LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
     "built": lambda _: None,
     "translucent": _translucent,
@@ -57,6 +62,7 @@ LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
     "named": _named,
     "guide": _guide,
     "framed": _framed,
+    "added": _added,
 }
 
 

@@ -1,6 +1,6 @@
 """Write what a channel of a bundle has once, and describe channels and bundle for the manifest."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ def describe_bundle(
     *,
     channels: Sequence[dict[str, Any]],
     index: FileRef,
-    ar: dict[str, Any] | None = None,
+    more: Mapping[str, Any] | None = None,
     unfinished: Collection[str] = (),
     views: Sequence[StageView] = (),
 ) -> bytes:
@@ -34,7 +34,7 @@ def describe_bundle(
     specimen  its name and modality, the fingerprint of its source, and where a patient's sides are
     channels  as `describe_channel` returns them
     index     files.json
-    ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
+    more      specimen.usdz, or why there is none, and what layers add; None: nothing is said of it
     unfinished  IDs of the tiles whose surfaces are not built yet, which volumes stand for
     views     of the cameras that a layer adds to the stage
     """
@@ -55,7 +55,7 @@ def describe_bundle(
         ],
         "channels": channels,
         **({"views": [_describe_view(view) for view in views]} if views else {}),
-        **(ar or {}),
+        **(more or {}),
         "files": asdict(index),
     }
     return to_json(sealed(manifest))

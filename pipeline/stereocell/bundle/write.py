@@ -5,6 +5,7 @@
                        transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
+    additions.glb                                  what a layer adds: see write_additions
     specimen.usdz                                  its surfaces, small: see write_ar
     index.html  assets/                            the viewer
 
@@ -25,6 +26,7 @@ from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.gather_table import gather_table
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import FileRef, read_part, write_file
+from stereocell.bundle.write_additions import write_additions
 from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import path_from_stage
@@ -35,6 +37,7 @@ from stereocell.storage.workspace import move
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer_units import note_missing
 from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
+from stereocell.usd.read_additions import notes_on_additions
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_bindings import notes_on_bindings
 from stereocell.usd.read_objects import painter_of, read_columns
@@ -94,11 +97,16 @@ class Composed:
             yield note
         yield from notes_on_bindings(self.stage)
         yield from notes_on_edits(self.stage)
+        yield from self._notes_on_parts()
+
+    def _notes_on_parts(self) -> Iterator[str]:
+        """Yield a line on each edit of which a part is lost."""
         yield from notes_on_rolls(views_of(self.stage))
+        yield from notes_on_additions(self.stage)
 
     def require_all_taken(self) -> None:
         """Raise StageError where the bundle does not take over an edit."""
-        require_no_lost_edit(self.stage, notes_on_rolls(views_of(self.stage)))
+        require_no_lost_edit(self.stage, self._notes_on_parts())
 
 
 def fill_bundle(
@@ -138,6 +146,9 @@ def fill_bundle(
             written += more
         channels.append(entry)
         files += written
+    additions = write_additions(stage, root)
+    if additions is not None:
+        files.append(additions.file)
     usdz, usdz_reason = write_ar(composed.path, root, composed.as_written)
     if usdz is None:
         yield f"no specimen.usdz: {usdz_reason}"
@@ -148,8 +159,14 @@ def fill_bundle(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
+    added = {} if additions is None else {"additions": additions.describe()}
     manifest = describe_bundle(
-        _specimen_of(stage), tiles, channels=channels, index=index, ar=ar, views=views_of(stage)
+        _specimen_of(stage),
+        tiles,
+        channels=channels,
+        index=index,
+        more={**added, **ar},
+        views=views_of(stage),
     )
     write_file(root, MANIFEST, manifest)
     for tile in tiles:

@@ -9,6 +9,7 @@ from stereocell.model.errors import StageError
 from stereocell.usd.edit_table import is_taken
 from stereocell.usd.layer import CHANNELS, ROOT, TILES
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
+from stereocell.usd.read_additions import is_addition
 from stereocell.usd.read_appearances import surface_of
 from stereocell.usd.read_display import is_single, shows_display_color
 from stereocell.usd.read_textures import vertex_values_of
@@ -47,6 +48,8 @@ class Places:
             return ""
         if is_view(prim):
             return "camera"
+        if is_addition(prim):
+            return "addition"
         if path.GetParentPath() == CHANNELS:
             return "channel" if prim.IsA(UsdShade.Material) else ""
         return self._of_shading(prim)

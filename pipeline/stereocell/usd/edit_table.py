@@ -102,6 +102,23 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "clippingRange",
         "@displayName",
     ),
+    "addition": (
+        *_PLACED,
+        *_SHOWN,
+        *_DISPLAYED,
+        "points",
+        "faceVertexCounts",
+        "faceVertexIndices",
+        "orientation",
+        "normals",
+        "primvars:normals*",
+        "curveVertexCounts",
+        "widths",
+        "type",
+        "basis",
+        "wrap",
+        "@displayName",
+    ),
     "material": ("outputs:surface",),
     "UsdPreviewSurface": (
         "info:id",
@@ -135,7 +152,11 @@ DERIVED: dict[str, dict[str, str]] = {
         "stereocell:shapeHash": "points",
     },
     "volume": {"extent": "", "material:binding": ""},
+    "addition": {"extent": ""},
 }
+
+# Values that hold in a bundle whatever a layer says: to state them changes nothing
+ASSUMED: dict[str, object] = {"subdivisionScheme": "none", "doubleSided": True}
 
 # Reasons for opinions that nothing reads, by name; the first that fits is stated
 REASONS: tuple[tuple[str, str], ...] = (
@@ -167,7 +188,6 @@ REASONS: tuple[tuple[str, str], ...] = (
 ADDED: dict[str, str] = {
     "Light": "lights reach specimen.usdz alone, if they are distant or a dome, below "
     "/Specimen/Lights",
-    "Mesh": "it is no surface of a channel in a tile",
     "Volume": "it is no volume of a channel in a tile",
     "Material": "no mesh is bound to it",
     "Shader": "no surface is drawn with it",

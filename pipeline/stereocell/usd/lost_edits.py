@@ -16,13 +16,14 @@ from pxr import Sdf, Sdr, Tf, Usd, UsdGeom, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_places import Places, read_primvars
-from stereocell.usd.edit_table import ADDED, DERIVED, TAKEN, is_taken, reason_of
+from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, TAKEN, is_taken, reason_of
 from stereocell.usd.layer import ROOT
 from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
 from stereocell.usd.read_attributes import over_time
 from stereocell.usd.read_bindings import binding_fault
 
 _BINDING = "material:binding"
+_OWN_BINDING = ("mesh", "addition")  # places whose own binding is the strongest
 _MOST_LINES = 3  # of edits that are alike; the last line counts the others
 _GROUPS = ("Xform", "Scope", "")  # types of prims that only hold others
 _FLAT = (
@@ -183,8 +184,9 @@ class _Finder:
         """Return why an opinion at a place is lost; empty: it is taken over, or changes nothing."""
         name = opinion.name
         if name.startswith(_BINDING):
-            if place in ("specimen", "tiles", "tile", "branch", "mesh"):
-                return binding_fault(prim, prim.GetRelationship(name), is_own=place == "mesh")
+            if place in ("specimen", "tiles", "tile", "branch", *_OWN_BINDING):
+                is_own = place in _OWN_BINDING
+                return binding_fault(prim, prim.GetRelationship(name), is_own=is_own)
         elif self._is_read(place, prim, name):
             return self._weakness(prim, opinion)
         attribute = prim.GetAttribute(name)
@@ -242,7 +244,7 @@ class _Finder:
             for one in attribute.GetPropertyStack(Usd.TimeCode.Default())
             if one.layer in self._built and one.HasDefaultValue()
         ]
-        usual = below[0] if below else _fallback(attribute)
+        usual = ASSUMED.get(attribute.GetName(), below[0] if below else _fallback(attribute))
         return usual is not None and bool(spec.default == usual)
 
 

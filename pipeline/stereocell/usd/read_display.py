@@ -37,7 +37,7 @@ def has_many_display_colors(mesh: Usd.Prim) -> bool:
     return bool(primvar) and bool(primvar.HasValue()) and not is_single(primvar)
 
 
-def display_opacity(mesh: Usd.Prim, channel: Usd.Prim) -> float:
+def display_opacity(mesh: Usd.Prim, channel: Usd.Prim | None) -> float:
     """Return the display opacity of a mesh times that of its channel, 0..1; 1: none is stated.
 
     Raises StageError for values of another type.

@@ -3,7 +3,7 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { isBackground, type Picture, takePicture } from "../support/browser/picture";
+import { hasColor, isBackground, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { askPython, hasPython } from "../support/python";
@@ -83,6 +83,24 @@ describeInChromium("edits of a stage", () => {
     const shown = front.picture.where((pixel) => !isBackground(pixel));
     const high = Math.max(...shown.map(([, y]) => y)) - Math.min(...shown.map(([, y]) => y));
     expect(Math.abs(high / front.picture.height - wanted)).toBeLessThan(0.015);
+  });
+
+  it("shows what a layer adds where the stage has it, and hides it by its name", async () => {
+    const isBlue = hasColor([0, 0, 1]);
+    expect((await look("built")).count(isBlue)).toBe(0);
+    const shown = (await look("added")).where(isBlue);
+    expect(shown.length).toBeGreaterThan(100);
+    // the arrow stands above the sphere's middle, and is as high as the specimen's upper half and 9 um more
+    const middle = shown.reduce((sum, [x]) => sum + x, 0) / shown.length;
+    expect(Math.abs(middle - 160)).toBeLessThan(6);
+    const label = await stand.viewer.page.evaluate(() => {
+      const toggle = document.querySelector<HTMLElement>('[data-control="addition-0"]');
+      toggle?.click();
+      return toggle?.closest("label")?.textContent;
+    });
+    expect(label).toBe("Here");
+    await stand.viewer.settled();
+    expect((await takePicture(stand.viewer.page)).count(isBlue)).toBe(0);
   });
 
   it("adds the light that a channel emits", async () => {
