@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 Outcome = Literal["taken", "refused", "reported"]
 CHANNEL = "/Specimen/Channels/CD31"
@@ -358,6 +358,19 @@ CASES: tuple[EditCase, ...] = (
         lambda stage: define_camera(stage, roll_deg=30),
         "reported",
         "roll of camera 'Close', 30 degrees, is not taken over: the viewer keeps up upright",
+        is_partial=True,
+    ),
+    EditCase(
+        "an added light with a place",
+        lambda stage: UsdLux.SphereLight.Define(stage, "/Specimen/Lights/Lamp"),
+        "reported",
+        "SphereLight /Specimen/Lights/Lamp is not taken over: the viewer has lamps of its own",
+    ),
+    EditCase(
+        "brightness of a light of the stage",
+        _put("/Specimen/Lights/key", "inputs:intensity", _Types.Float, 2.0),
+        "reported",
+        "key.inputs:intensity is not taken over: the viewer has lamps of its own",
         is_partial=True,
     ),
     EditCase(

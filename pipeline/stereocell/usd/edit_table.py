@@ -184,10 +184,13 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("@displayName", "the bundle has no name for this prim"),
 )
 
+OF_LIGHTS = (
+    "the viewer has lamps of its own; distant lights and domes below /Specimen/Lights reach "
+    "specimen.usdz alone"
+)
 # Reasons for prims that a layer adds, by type; the first whose name the type's begins with or is
 ADDED: dict[str, str] = {
-    "Light": "lights reach specimen.usdz alone, if they are distant or a dome, below "
-    "/Specimen/Lights",
+    "Light": OF_LIGHTS,
     "Volume": "it is no volume of a channel in a tile",
     "Material": "no mesh is bound to it",
     "Shader": "no surface is drawn with it",
