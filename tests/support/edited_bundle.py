@@ -55,6 +55,11 @@ def _added(stage: Usd.Stage) -> None:
     define_wire(stage)
 
 
+def _seen_through(stage: Usd.Stage) -> None:
+    _translucent(stage)
+    define_wire(stage)
+
+
 LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
     "built": lambda _: None,
     "translucent": _translucent,
@@ -63,6 +68,7 @@ LAYERS: dict[str, Callable[[Usd.Stage], object]] = {
     "guide": _guide,
     "framed": _framed,
     "added": _added,
+    "seen_through": _seen_through,
 }
 
 

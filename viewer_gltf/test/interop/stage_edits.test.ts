@@ -103,6 +103,18 @@ describeInChromium("edits of a stage", () => {
     expect((await takePicture(stand.viewer.page)).count(isBlue)).toBe(0);
   });
 
+  it("shows what is inside a translucent surface, and not what is inside an opaque one", async () => {
+    const names = ["built", "added", "translucent", "seen_through"] as const;
+    const greens: number[] = [];
+    for (const name of names) {
+      const picture = await look(name);
+      greens.push(linear(picture.at(picture.width / 2 - 8, picture.height / 2)[1]));
+    }
+    const [opaque, wireInOpaque, clear, wireInClear] = greens;
+    expect(Math.abs(wireInOpaque - opaque)).toBeLessThan(0.01);
+    expect(wireInClear - clear).toBeGreaterThan(0.1); // the wire is grey, the sphere red
+  });
+
   it("adds the light that a channel emits", async () => {
     const [dark, bright] = [await look("built"), await look("glowing")];
     const [x, y] = [dark.width / 2 - 8, dark.height / 2 - 8];
