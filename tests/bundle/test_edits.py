@@ -183,6 +183,91 @@ def test_color_of_one_tile_stays_in_that_tile(edit):
     assert factor(edited, "r0_c1") == [0, 1, 0, 1]
 
 
+def drawn(bundle, tile="r0_c0"):
+    """Return the material of a tile's finest surface, as glTF has it."""
+    return read((bundle / f"channels/CD31/{tile}/lod0.glb").read_bytes())[0]["materials"][0]
+
+
+def test_opacity_of_a_channel_reaches_all_its_surfaces_and_the_usdz(bundle, edit):
+    assert "alphaMode" not in drawn(bundle)
+    edited = edit(lambda s: put_new(s, f"{CD31}/surface", "inputs:opacity", "Float", 0.4))
+    for tile in ("r0_c0", "r0_c1"):
+        material = drawn(edited, tile)
+        assert material["alphaMode"] == "BLEND"
+        assert material["pbrMetallicRoughness"]["baseColorFactor"][3] == 0.4
+    small = Usd.Stage.Open(str(edited / "specimen.usdz"))
+    looks = small.GetPrimAtPath("/Specimen/Looks").GetChildren()
+    shaders = [UsdShade.Shader(look.GetChild("surface")) for look in looks]
+    assert {round(shader.GetInput("opacity").Get(), 3) for shader in shaders} == {0.4}
+
+
+def test_opacities_of_shader_channel_and_mesh_are_multiplied(edit):
+    mesh = "/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0"
+
+    def change(stage):
+        put_new(stage, f"{CD31}/surface", "inputs:opacity", "Float", 0.5)
+        put_new(stage, CD31, "primvars:displayOpacity", "FloatArray", [0.5])
+        put_new(stage, mesh, "primvars:displayOpacity", "FloatArray", [0.8])
+
+    edited = edit(change)
+    alphas = [factor(edited, tile)[3] for tile in ("r0_c0", "r0_c1")]
+    assert alphas == pytest.approx([0.2, 0.25])
+
+
+@pytest.mark.parametrize(("opacity", "alpha"), [(0.4, 0), (0.6, 1)])
+def test_a_threshold_makes_an_opacity_all_or_nothing(edit, opacity, alpha):
+    def change(stage):
+        put_new(stage, f"{CD31}/surface", "inputs:opacity", "Float", opacity)
+        put_new(stage, f"{CD31}/surface", "inputs:opacityThreshold", "Float", 0.5)
+
+    assert factor(edit(change))[3] == alpha
+
+
+def test_emission_reaches_the_surfaces_and_one_outside_its_range_is_refused(edit):
+    name = "inputs:emissiveColor"
+    glow = Gf.Vec3f(0, 0.5, 0.25)
+    edited = edit(lambda s: put_new(s, f"{CD31}/surface", name, "Color3f", glow))
+    assert drawn(edited)["emissiveFactor"] == [0, 0.5, 0.25]
+    with pytest.raises(StereoCellError, match=r"inputs:emissiveColor: .*expected three numbers"):
+        edit(lambda s: put_new(s, f"{CD31}/surface", name, "Color3f", Gf.Vec3f(0, 5, 0)))
+
+
+def test_display_color_of_a_mesh_or_a_tile_is_its_surface_s(edit):
+    green, blue = Gf.Vec3f(0, 1, 0), Gf.Vec3f(0, 0, 1)
+    mesh = "/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0"
+
+    def change(stage):
+        put_new(stage, mesh, "primvars:displayColor", "Color3fArray", [green])
+        put_new(stage, "/Specimen/Tiles/r0_c1", "primvars:displayColor", "Color3fArray", [blue])
+
+    edited = edit(change)
+    assert factor(edited) == [0, 1, 0, 1]
+    assert factor(edited, "r0_c1") == [0, 0, 1, 1]
+
+
+def test_display_colors_at_points_are_those_of_the_vertices(edit):
+    def change(stage):
+        mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0"))
+        choose(stage, "r0_c0", lod="lod0")
+        levels = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0").GetVariantSet("lod")
+        with levels.GetVariantEditContext():
+            count = len(mesh.GetPointsAttr().Get())
+            kind = Sdf.ValueTypeNames.Color3fArray
+            colors = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("displayColor", kind, "vertex")
+            colors.Set([Gf.Vec3f(0, k % 2, 1) for k in range(count)])
+
+    edited = edit(change)
+    assert edit.told == []
+    document, _ = read((edited / "channels/CD31/r0_c0/lod0.glb").read_bytes())
+    assert "COLOR_0" in document["meshes"][0]["primitives"][0]["attributes"]
+    assert factor(edited) == [1, 1, 1, 1]
+
+
+def put_new(stage, path, name, kind, value):
+    """Set an attribute that a prim of the stage may lack."""
+    stage.OverridePrim(path).CreateAttribute(name, getattr(Sdf.ValueTypeNames, kind)).Set(value)
+
+
 def bind(stage, where, *, strength="strongerThanDescendants", purpose=""):
     """Bind a green material on a prim; an empty `where` leaves it unbound."""
     material = UsdShade.Material.Define(stage, "/Specimen/Mine")
@@ -221,9 +306,9 @@ def test_a_material_that_reaches_no_surface_is_named(edit, options, told):
     assert factor(edited) == [1.0, 0.2, 0.1, 1]
 
 
-def test_a_material_that_is_bound_nowhere_needs_no_word(edit):
+def test_a_material_that_is_bound_nowhere_is_named(edit):
     edit(lambda s: bind(s, ""))
-    assert edit.told == []
+    assert edit.told == ["Material /Specimen/Mine is not taken over: no mesh is bound to it"]
 
 
 def test_moved_tile_moves_its_boxes_meshes_and_volumes(bundle, edit):

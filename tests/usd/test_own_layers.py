@@ -202,3 +202,37 @@ def test_the_files_of_a_stage_are_all_found(out: Path) -> None:
 
 def _all(out: Path) -> list[Path]:
     return dependencies(out / "stage" / "stage.usda", out / "stage")
+
+
+def test_an_edit_that_is_lost_fails_a_strict_bundle_and_writes_nothing(
+    out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, over = edit_of(out, out.parents[1] / "edits")
+    channel = over.OverridePrim(LOOK)
+    channel.CreateAttribute("inputs:colour", Sdf.ValueTypeNames.Color3f).Set((1, 0, 0))
+    over.GetRootLayer().Save()
+    command = ["bundle", str(out), "--workers", "0", "--stage", str(path)]
+    capsys.readouterr()
+    assert main([*command, "--strict"]) == 1
+    told = capsys.readouterr().err
+    assert "Channel0.inputs:colour is not taken over: no reader knows this name" in told
+    assert "found 1 edit that no bundle takes over, expected none with --strict" in told
+    assert not (out / "bundle").exists()
+    assert main(command) == 0
+    assert "Channel0.inputs:colour is not taken over" in capsys.readouterr().err
+    assert main([*command, "--strict"]) == 1  # the finished bundle is no excuse
+    channel.RemoveProperty("inputs:colour")
+    over.GetRootLayer().Save()
+    assert main([*command, "--strict"]) == 0
+
+
+def test_edits_that_are_alike_share_a_line(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, over = edit_of(out, out.parents[1] / "edits")
+    for k in range(200):
+        over.DefinePrim(f"/Specimen/Sketch/Volume{k}", "Volume")
+    over.GetRootLayer().Save()
+    capsys.readouterr()
+    assert bundle(out, path) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "not taken over" in line]
+    assert len(lines) == 1
+    assert "Volume /Specimen/Sketch/Volume0 (and 199 others alike) is not taken over" in lines[0]

@@ -210,8 +210,12 @@ def run_stage(out: Path, engine: Engine) -> None:
         stage.write_list(stage_dir, files)
 
 
-def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
+def run_bundle(
+    out: Path, engine: Engine, *, stage: Path | None = None, is_strict: bool = False
+) -> None:
     """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
+
+    is_strict  whether an edit that the bundle does not take over is an error
 
     Raises OutputError where the stage is missing, StageError where it can't be read.
     """
@@ -224,6 +228,9 @@ def run_bundle(out: Path, engine: Engine, *, stage: Path | None = None) -> None:
         remove_half_bundle(out_folder)
         if not is_forced():
             require_bundle(out_folder.bundle_dir)  # before the phase is begun
+        if is_strict:  # also where the bundle is finished: another command may have made it
+            with opened_stage(path) as composed:
+                composed.require_all_taken()
         if not phase.is_done(step):
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key

@@ -1,6 +1,6 @@
 """Write what a channel of a bundle has once, and describe channels and bundle for the manifest."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from stereocell.storage.file_list import to_json
 from stereocell.storage.json_files import compact_json, sealed
 from stereocell.transfer.opacity import evaluate
 from stereocell.usd.composed_appearance import ComposedAppearance
+from stereocell.usd.read_views import StageView
 
 
 def describe_bundle(
@@ -24,16 +25,18 @@ def describe_bundle(
     *,
     channels: Sequence[dict[str, Any]],
     index: FileRef,
-    ar: dict[str, Any] | None = None,
+    more: Mapping[str, Any] | None = None,
     unfinished: Collection[str] = (),
+    views: Sequence[StageView] = (),
 ) -> bytes:
     """Return manifest.json, with its hash.
 
     specimen  its name and modality, the fingerprint of its source, and where a patient's sides are
     channels  as `describe_channel` returns them
     index     files.json
-    ar        specimen.usdz, or why there is none; None: the manifest says nothing of it
+    more      specimen.usdz, or why there is none, and what layers add; None: nothing is said of it
     unfinished  IDs of the tiles whose surfaces are not built yet, which volumes stand for
+    views     of the cameras that a layer adds to the stage
     """
     manifest = {
         "format": "stereocell-bundle",
@@ -43,6 +46,7 @@ def describe_bundle(
         "tiles": [
             {
                 "id": tile.id,
+                **({"name": tile.name} if tile.name else {}),
                 "representation": tile.representation,
                 "bounds_um": _bounds([tile]),
                 **({"unfinished": True} if tile.id in unfinished else {}),
@@ -50,10 +54,20 @@ def describe_bundle(
             for tile in tiles
         ],
         "channels": channels,
-        **(ar or {}),
+        **({"views": [_describe_view(view) for view in views]} if views else {}),
+        **(more or {}),
         "files": asdict(index),
     }
     return to_json(sealed(manifest))
+
+
+def _describe_view(view: StageView) -> dict[str, Any]:
+    return {
+        "name": view.name,
+        "position_um": list(view.position),
+        "target_um": list(view.target),
+        "fov_deg": view.fov_deg,
+    }
 
 
 def write_channel(

@@ -87,6 +87,7 @@ class BundleTile:
 
     low      corner (x, y, z) of its box in the world, um
     high     the opposite corner
+    name     for people; empty: the stage has none
     changed  paths of its layers that differ from the stage's list, from the stage's folder
     """
 
@@ -96,6 +97,7 @@ class BundleTile:
     high: WorldPoint
     channels: tuple[TileChannel, ...]
     changed: tuple[str, ...] = ()
+    name: str = ""
 
 
 def write_file(root: Path, path: str, content: bytes) -> FileRef:

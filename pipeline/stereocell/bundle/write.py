@@ -5,6 +5,7 @@
                        transfer2d.json  histogram2d.ktx2
     volumes/<tile>/<channel>.ktx2  <channel>_bricks.ktx2
     luts/<channel>.ktx2
+    additions.glb                                  what a layer adds: see write_additions
     specimen.usdz                                  its surfaces, small: see write_ar
     index.html  assets/                            the viewer
 
@@ -17,6 +18,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pxr import Usd
 
 from stereocell.bundle.copy_viewer import copy_viewer
@@ -24,6 +26,7 @@ from stereocell.bundle.describe import describe_bundle, write_channel
 from stereocell.bundle.gather_table import gather_table
 from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import FileRef, read_part, write_file
+from stereocell.bundle.write_additions import write_additions
 from stereocell.bundle.write_ar import write_ar
 from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import path_from_stage
@@ -33,6 +36,8 @@ from stereocell.storage.file_list import encode
 from stereocell.storage.workspace import move
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.layer_units import note_missing
+from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
+from stereocell.usd.read_additions import notes_on_additions
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_bindings import notes_on_bindings
 from stereocell.usd.read_objects import painter_of, read_columns
@@ -46,6 +51,7 @@ from stereocell.usd.read_stage import (
     specimen_name,
     tile_prims,
 )
+from stereocell.usd.read_views import StageView, notes_on_rolls, read_views
 from stereocell.usd.written_files import CHANGED, REMEDY, AsWritten
 
 
@@ -84,10 +90,23 @@ class Composed:
         return cls(path, stage, appearances, names, step_m, as_written)
 
     def notes(self) -> Iterator[str]:
-        """Yield notes on units that the layer does not state, and on materials above channels."""
+        """Yield notes on units that the layer does not state, on materials above channels, and on
+        each edit that the bundle does not take over. Raises StageError for an edit over time.
+        """
         if note := note_missing(self.stage):
             yield note
         yield from notes_on_bindings(self.stage)
+        yield from notes_on_edits(self.stage)
+        yield from self._notes_on_parts()
+
+    def _notes_on_parts(self) -> Iterator[str]:
+        """Yield a line on each edit of which a part is lost."""
+        yield from notes_on_rolls(views_of(self.stage))
+        yield from notes_on_additions(self.stage)
+
+    def require_all_taken(self) -> None:
+        """Raise StageError where the bundle does not take over an edit."""
+        require_no_lost_edit(self.stage, self._notes_on_parts())
 
 
 def fill_bundle(
@@ -127,6 +146,9 @@ def fill_bundle(
             written += more
         channels.append(entry)
         files += written
+    additions = write_additions(stage, root)
+    if additions is not None:
+        files.append(additions.file)
     usdz, usdz_reason = write_ar(composed.path, root, composed.as_written)
     if usdz is None:
         yield f"no specimen.usdz: {usdz_reason}"
@@ -137,12 +159,26 @@ def fill_bundle(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
-    manifest = describe_bundle(_specimen_of(stage), tiles, channels=channels, index=index, ar=ar)
+    added = {} if additions is None else {"additions": additions.describe()}
+    manifest = describe_bundle(
+        _specimen_of(stage),
+        tiles,
+        channels=channels,
+        index=index,
+        more={**added, **ar},
+        views=views_of(stage),
+    )
     write_file(root, MANIFEST, manifest)
     for tile in tiles:
         for channel in tile.channels:
             if channel.edit:
                 yield f"{tile.id}/{channel.channel_id}: {channel.edit}"
+
+
+def views_of(stage: Usd.Stage) -> list[StageView]:
+    """Return the named views of a stage. Raises StageError."""
+    boxes = np.array([hinted_box(prim) for prim in tile_prims(stage)])
+    return list(read_views(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
 
 
 def _specimen_of(stage: Usd.Stage) -> dict[str, Any]:

@@ -84,7 +84,15 @@ def write_tile(
         ]
         low, high = find_bounds(tile, volumes)
         changed = tuple(sorted(path_from_stage(file, stage_path) for file in as_written.changed))
-        made = BundleTile(part.name, choice.representation, low, high, tuple(channels), changed)
+        made = BundleTile(
+            part.name,
+            choice.representation,
+            low,
+            high,
+            tuple(channels),
+            changed,
+            str(tile.GetDisplayName()),
+        )
         write_record(root, made)
 
 

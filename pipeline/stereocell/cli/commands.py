@@ -214,7 +214,8 @@ def _run_phases(
         elif name == "stage":
             phases.run_stage(out, engine)
         elif name == "bundle":
-            phases.run_bundle(out, engine, stage=getattr(options, "stage", None))
+            edited, is_strict = (getattr(options, name, None) for name in ("stage", "strict"))
+            phases.run_bundle(out, engine, stage=edited, is_strict=bool(is_strict))
         else:
             from stereocell.report import phase  # slow to import: it draws
 

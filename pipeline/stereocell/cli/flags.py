@@ -317,6 +317,11 @@ def declare_bundle(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="write nothing, and fail, where an edit is not taken over",
+    )
 
 
 def declare_check(parser: argparse.ArgumentParser) -> None:

@@ -46,11 +46,32 @@ _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """The appearance of a surface: linear RGB, metallic and roughness, all 0..1."""
+    """The appearance of a surface: linear RGB, metallic, roughness, opacity and emitted light, all
+    0..1.
+    """
 
     color: tuple[float, float, float]
     metallic: float = 0.0
     roughness: float = 0.5
+    opacity: float = 1.0
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def to_gltf(self, name: str) -> dict[str, Any]:
+        """Return the material as glTF describes it; defaults are left out."""
+        described: dict[str, Any] = {
+            "name": name,
+            "doubleSided": True,
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [*self.color, self.opacity],
+                "metallicFactor": self.metallic,
+                "roughnessFactor": self.roughness,
+            },
+        }
+        if self.opacity < 1:
+            described["alphaMode"] = "BLEND"
+        if any(self.emission):
+            described["emissiveFactor"] = list(self.emission)
+        return described
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,15 +170,7 @@ def encode_glb(
         "material": 0,
     }
 
-    drawn: dict[str, Any] = {
-        "name": extras.get("channel", name),
-        "doubleSided": True,
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [*material.color, 1.0],
-            "metallicFactor": material.metallic,
-            "roughnessFactor": material.roughness,
-        },
-    }
+    drawn = material.to_gltf(extras.get("channel", name))
     extensions = ["EXT_meshopt_compression", "KHR_mesh_quantization"]
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": GENERATOR},

@@ -39,6 +39,8 @@ class Drawn:
     step_m       distance between two possible positions of a vertex, metres
     objects      int64 (n,), which object of its tile a vertex is of, or None
     paint        float64 (n,), intensity of the channel that is painted on it, 0..1, or None
+    opacity      of the material, 0..1
+    emission     linear RGB of the light that the material emits, 0..1
     """
 
     positions_m: NDArray[np.float32]
@@ -51,6 +53,8 @@ class Drawn:
     step_m: float
     objects: NDArray[np.int64] | None = None
     paint: NDArray[np.float64] | None = None
+    opacity: float = 1.0
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def read_glb(path: Path) -> Drawn:
@@ -96,7 +100,8 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
         paint = _decode(document, binary, attributes["_PAINT"])[:, 0] / 255.0
     material = document["materials"][primitive["material"]]
     shading = material["pbrMetallicRoughness"]
-    red, green, blue, _ = shading["baseColorFactor"]
+    red, green, blue, opacity = shading["baseColorFactor"]
+    emission = material.get("emissiveFactor", (0.0, 0.0, 0.0))
     return Drawn(
         offsets * scale + translation,
         _decode(document, binary, primitive["indices"]).reshape(-1, 3).astype(np.int64),
@@ -113,6 +118,8 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
         float(scale[0]),
         objects,
         paint,
+        opacity if material.get("alphaMode") == "BLEND" else 1.0,
+        (emission[0], emission[1], emission[2]),
     )
 
 

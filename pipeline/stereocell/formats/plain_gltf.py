@@ -152,7 +152,7 @@ class Document:
             "scenes": [{"name": self._nodes[0]["name"], "nodes": [0]}],
             "nodes": self._nodes,
             "meshes": self._meshes,
-            "materials": [_describe(group, one) for group, one in self._materials],
+            "materials": [one.to_gltf(group) for group, one in self._materials],
         }
         if self._buffers.extensions:
             document["extensionsUsed"] = list(self._buffers.extensions)
@@ -178,18 +178,6 @@ class Document:
                 file.write(struct.pack("<I4s", len(text), b"JSON") + text)
                 file.write(struct.pack("<I4s", size, b"BIN\0"))
                 shutil.copyfileobj(binary, file)
-
-
-def _describe(group: str, material: Material) -> dict[str, Any]:
-    return {
-        "name": group,
-        "doubleSided": True,
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [*material.color, 1.0],
-            "metallicFactor": material.metallic,
-            "roughnessFactor": material.roughness,
-        },
-    }
 
 
 def _text(document: dict[str, Any]) -> bytes:

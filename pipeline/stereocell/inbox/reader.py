@@ -116,7 +116,7 @@ class Reader:
         assert self._look is not None
         plan, dataset = self._look.plan, self._look.dataset
         coarse = self._look.read()
-        shared = plan.shared_volumes
+        shared, first = plan.shared_volumes, replace(plan, labels=()).shown_at_first
         shown, channels = [], []
         for channel in plan.channels:
             appearance, _ = first_appearance(plan, channel, coarse[channel.voxels_id])
@@ -130,7 +130,7 @@ class Reader:
                     "unit": "HU" if plan.modality == "CT" and plan.is_hounsfield else "",
                 }
             )
-            if channel.id not in shared:
+            if channel.id not in shared and channel.id in first:
                 shown.append(ShownChannel(coarse[channel.voxels_id], appearance))
         views = views_of(plan.placement, is_neurological=plan.settings.plan.neurological)
         size_um = [n * step for n, step in zip(plan.region.shape, plan.spacing_um, strict=True)][

@@ -10,6 +10,7 @@ from stereocell.usd.read_attributes import require_still
 from stereocell.usd.typed_values import one_line
 
 _PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
+_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)  # of what a final picture shows
 FARTHEST_UM = 1e12  # um, largest distance from the origin that float32 and browsers still draw
 
 
@@ -27,11 +28,14 @@ def drawn(tile: Usd.Prim, path: object) -> Usd.Prim | None:
 
 
 def is_visible(prim: Usd.Prim) -> bool:
-    """Return whether neither a prim nor one above it is hidden.
+    """Return whether neither a prim nor one above it is hidden, or is a guide or a stand-in.
 
     A channel that does not show at first is none that is hidden: a bundle has it all the same.
     """
-    if UsdGeom.Imageable(prim).ComputeVisibility() != UsdGeom.Tokens.invisible:
+    imageable = UsdGeom.Imageable(prim)
+    if imageable.ComputePurpose() not in _PURPOSES:
+        return False
+    if imageable.ComputeVisibility() != UsdGeom.Tokens.invisible:
         return True
     above = map(prim.GetStage().GetPrimAtPath, prim.GetPath().GetAncestorsRange())
     return not any(map(_is_hidden, above))

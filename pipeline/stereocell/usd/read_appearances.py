@@ -29,7 +29,7 @@ from stereocell.usd.read_shapes2d import read_shapes
 from stereocell.usd.read_textures import feeder
 from stereocell.usd.typed_values import read_as, text_of
 
-WHITE = (1.0, 1.0, 1.0)
+BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 _MAX_POINTS = 10_000  # pairs of a transfer function, which is drawn with 256 values
 _VOLUME_WINDOW = "stereocell:volumeWindow"
 
@@ -66,7 +66,21 @@ def material_of(surface: UsdShade.Shader) -> Material:
             raise StageError(f"{surface.GetPath()}.inputs:diffuseColor: no value")
         color = color_of(diffuse)
     # defaults: the specification of UsdPreviewSurface
-    return Material(color, _share(surface, "metallic", 0.0), _share(surface, "roughness", 0.5))
+    emissive = _source(surface, "emissiveColor")
+    return Material(
+        color,
+        _share(surface, "metallic", 0.0),
+        _share(surface, "roughness", 0.5),
+        _opacity(surface),
+        BLACK if emissive is None or emissive.Get() is None else color_of(emissive),
+    )
+
+
+def _opacity(surface: UsdShade.Shader) -> float:
+    """Return a surface's opacity: 0 or 1 where a threshold is stated."""
+    opacity = _share(surface, "opacity", 1.0)
+    threshold = _share(surface, "opacityThreshold", 0.0)
+    return opacity if threshold == 0 else float(opacity >= threshold)
 
 
 def edited_color(material: Usd.Prim) -> Usd.Attribute | None:

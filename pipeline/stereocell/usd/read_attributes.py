@@ -8,7 +8,7 @@ import numpy as np
 from pxr import Sdf, Usd
 
 from stereocell.model.errors import StageError
-from stereocell.usd.typed_values import read_as
+from stereocell.usd.typed_values import read_as, require_type
 
 Point = tuple[float, float, float]
 
@@ -28,10 +28,15 @@ def require_still(*attributes: Usd.Attribute) -> None:
     """Raise StageError for values over time, as of an animation: those are not looked at."""
     for attribute in attributes:
         if attribute and attribute.GetNumTimeSamples():
-            raise StageError(
-                f"{attribute.GetPath()}: found values over time, expected one without a time: "
-                "nothing moves here, export one frame"
-            )
+            raise StageError(over_time(attribute))
+
+
+def over_time(attribute: Usd.Attribute) -> str:
+    """Return the message for an attribute that has values over time."""
+    return (
+        f"{attribute.GetPath()}: found values over time, expected one without a time: "
+        "nothing moves here, export one frame"
+    )
 
 
 def file_of(attribute: Usd.Attribute) -> Path:
@@ -43,9 +48,15 @@ def file_of(attribute: Usd.Attribute) -> Path:
     return Path(asset.resolvedPath)
 
 
-def color_of(attribute: Usd.Attribute) -> tuple[float, float, float]:
-    """Return a colour, linear RGB. Raises StageError where a part is absent or outside 0..1."""
-    value = read_as(attribute, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
+def color_of(attribute: Usd.Attribute, value: Any = None) -> tuple[float, float, float]:
+    """Return a colour, linear RGB. Raises StageError where a part is absent or outside 0..1.
+
+    value  one of those that the attribute holds; None: it holds the colour alone
+    """
+    if value is None:
+        value = read_as(attribute, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
+    else:
+        require_type(attribute.GetPath(), value, Sdf.ValueTypeNames.Color3f, may_be_nan=True)
     if value is None or not all(0 <= part <= 1 for part in value):
         raise StageError(f"{attribute.GetPath()}: {value}, expected three numbers in 0..1")
     r, g, b = (shortest(part) for part in value)

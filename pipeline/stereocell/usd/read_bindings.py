@@ -1,4 +1,4 @@
-"""Materials that a layer binds above the channels: what a bundle takes of them, in notes.
+"""Which materials that a layer binds above the channels reach the surfaces of a bundle.
 
 The stage binds a material on each mesh. One that is bound on the specimen, the group of tiles or a
 tile reaches the meshes if it is bound as stronger than its descendants. Volumes have transfer
@@ -7,7 +7,7 @@ functions in the place of materials, so they keep the channels' colours.
 
 from collections.abc import Iterator
 
-from pxr import Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from stereocell.usd.layer import CHANNELS, ROOT, TILES
 from stereocell.usd.read_stage import tile_prims
@@ -15,35 +15,44 @@ from stereocell.usd.read_stage import tile_prims
 _BINDING = "material:binding"
 _COLLECTION = "collection"
 _TOKENS = UsdShade.Tokens
+_EDIT = f"inputs:color of {CHANNELS}/NAME changes surfaces and volumes"
 
 
 def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a sentence on each material that is bound above the channels."""
+    """Yield a sentence on each material above the channels that the surfaces take over."""
     groups = (stage.GetPrimAtPath(path) for path in (ROOT, TILES))
     for prim in (*groups, *tile_prims(stage)):
         for relationship in prim.GetRelationships():
             name = relationship.GetName()
-            if name == _BINDING or name.startswith(f"{_BINDING}:"):
-                yield from _notes(prim, relationship)
+            is_binding = name == _BINDING or name.startswith(f"{_BINDING}:")
+            if is_binding and relationship.GetTargets() and not binding_fault(prim, relationship):
+                yield (
+                    f"material {_materials(relationship)[-1]}, bound on {prim.GetPath()}, is taken "
+                    f"over for surfaces; volumes keep the channels' colours: {_EDIT}"
+                )
 
 
-def _notes(prim: Usd.Prim, relationship: Usd.Relationship) -> Iterator[str]:
-    targets = relationship.GetTargets()
-    materials = [path for path in targets if UsdShade.Material.Get(prim.GetStage(), path)]
-    if not targets:
-        return
-    words = f"material {materials[-1] if materials else targets[-1]}, bound on {prim.GetPath()},"
-    edit = f"inputs:color of {CHANNELS}/NAME changes surfaces and volumes"
-    purpose = _purpose(relationship)
+def binding_fault(prim: Usd.Prim, relationship: Usd.Relationship, *, is_own: bool = False) -> str:
+    """Return why a material that is bound on a prim reaches no surface; empty: it reaches those
+    below.
+
+    is_own  whether the prim is a surface's mesh, which has no stronger binding
+    """
+    if not relationship.GetTargets():
+        return ""
+    if not _materials(relationship):
+        return "there is no such material"
+    if purpose := _purpose(relationship):
+        return f"it is bound for the purpose {purpose!r} alone; {_EDIT}"
     strength = UsdShade.MaterialBindingAPI.GetMaterialBindingStrength(relationship)
-    if not materials:
-        yield f"{words} is not taken over: there is no such material"
-    elif purpose:
-        yield f"{words} is not taken over: it is bound for the purpose {purpose!r} alone; {edit}"
-    elif strength != _TOKENS.strongerThanDescendants:
-        yield f"{words} is not taken over: the channels' own materials are stronger; {edit}"
-    else:
-        yield f"{words} is taken over for surfaces; volumes keep the channels' colours: {edit}"
+    if strength != _TOKENS.strongerThanDescendants and not is_own:
+        return f"the channels' own materials are stronger; {_EDIT}"
+    return ""
+
+
+def _materials(relationship: Usd.Relationship) -> list[Sdf.Path]:
+    stage = relationship.GetStage()
+    return [path for path in relationship.GetTargets() if UsdShade.Material.Get(stage, path)]
 
 
 def _purpose(relationship: Usd.Relationship) -> str:

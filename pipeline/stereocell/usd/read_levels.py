@@ -8,23 +8,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.formats.gltf import Material
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.drawn_prims import drawn, to_world
 from stereocell.usd.layer import (
+    CHANNELS,
     DISTANCE,
     LARGEST_DISTANCE,
     SHAPE_HASH,
     hash_shape,
 )
-from stereocell.usd.read_appearances import material_of, surface_of
+from stereocell.usd.read_appearances import WHITE, material_of, surface_of
 from stereocell.usd.read_attributes import (
     numbers_of,
     select_variant,
     shortest,
+)
+from stereocell.usd.read_display import (
+    display_color,
+    display_opacity,
+    has_many_display_colors,
+    shows_display_color,
 )
 from stereocell.usd.read_mesh import LargeFaceError, read_mesh
 from stereocell.usd.read_objects import without_hidden
@@ -87,7 +94,7 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
         shape = hash_shape(UsdGeom.Mesh(prim)) if built else ""
         try:
             surface = surface_of(prim)
-            fed = vertex_values_of(surface)
+            material, fed = _material(prim, surface, channel_id)
             mesh = read_mesh(UsdGeom.Mesh(prim), matrix, shown=fed, is_edited=shape != built)
         except LargeFaceError as error:
             inside = f", inside the variant lod=lod{level}" if levels else ""
@@ -107,7 +114,7 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
             mesh,
             distance,
             largest,
-            material_of(surface),
+            material,
             maps_of(surface),
             matrix,
             shape,
@@ -115,6 +122,20 @@ def read_lods(tile: Usd.Prim, channel_id: str) -> Iterator[ComposedLod]:
             tuple(np.array(own).ravel().tolist()),
         )
         yield lod if shape == built else _without_misfits(lod, prim, fed)
+
+
+def _material(
+    prim: Usd.Prim, surface: UsdShade.Shader, channel_id: str
+) -> tuple[Material, set[str]]:
+    """Return how a mesh is drawn, and the primvars that its vertices' values come from."""
+    material, fed = material_of(surface), vertex_values_of(surface)
+    if shows_display_color(surface):
+        if (color := display_color(prim)) is not None:
+            material = replace(material, color=color)
+        elif has_many_display_colors(prim):
+            material, fed = replace(material, color=WHITE), {*fed, "displayColor"}
+    channel = prim.GetStage().GetPrimAtPath(CHANNELS.AppendChild(channel_id))
+    return replace(material, opacity=material.opacity * display_opacity(prim, channel)), fed
 
 
 def _without_misfits(lod: ComposedLod, prim: Usd.Prim, fed: set[str]) -> ComposedLod:
@@ -142,7 +163,7 @@ def read_local(tile: Usd.Prim, channel_id: str, level: int) -> Mesh:
     prim = mesh_at(tile, channel_id, level)
     found = None
     if prim is not None:
-        fed = vertex_values_of(surface_of(prim))
+        _, fed = _material(prim, surface_of(prim), channel_id)
         found = read_mesh(UsdGeom.Mesh(prim), np.eye(4), shown=fed, is_edited=True)
     if found is None:
         raise StageError(f"{tile.GetPath()}/{channel_id}: lod{level} has no mesh any more")

@@ -55,8 +55,10 @@ from stereocell.usd.write_display import DISPLAY_NAME, write_display
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import STAGE_NAME
 
-__all__ = ["LAYER_SUFFIXES", "TileExtent", "is_layer", "write_stage", "write_tile"]
+__all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
+# of stage.usda, strongest first
+SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
 _NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
 Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
 
@@ -161,7 +163,7 @@ def write_stage(
     layer.documentation = _NOTE
     layer.customLayerData = {"stereocell": {k: _plain(v) for k, v in provenance.items()}}
     del stage  # the sublayers' paths only resolve beside the file
-    layer.subLayerPaths = ["./looks/channels.usda", "./looks/lights.usda"]
+    layer.subLayerPaths = list(SUBLAYERS)
     export(layer, stage_dir / STAGE_NAME)
     size = describe_size(high - low)
     return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"

@@ -223,6 +223,10 @@ def _define_look(
     surface.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*given.color))
     surface.CreateInput("metallic", _Types.Float).Set(given.metallic)
     surface.CreateInput("roughness", _Types.Float).Set(given.roughness)
+    if given.opacity < 1:
+        surface.CreateInput("opacity", _Types.Float).Set(given.opacity)
+    if any(given.emission):
+        surface.CreateInput("emissiveColor", _Types.Color3f).Set(Gf.Vec3f(*given.emission))
     surface.CreateOutput("surface", _Types.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface.GetOutput("surface"))
     for kind in _images(part):

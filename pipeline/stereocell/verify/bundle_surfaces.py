@@ -161,6 +161,13 @@ def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[flo
     away = max(abs(a - b) for a, b in zip(drawn.color, lod.material.color, strict=True))
     if away > COLOR_STEP:
         problems.append(f"drawn in {drawn.color}, the stage's colour is {lod.material.color}")
+    if abs(drawn.opacity - lod.material.opacity) > COLOR_STEP:
+        problems.append(
+            f"drawn with opacity {drawn.opacity:g}, the stage's is {lod.material.opacity:g}"
+        )
+    glow = max(abs(a - b) for a, b in zip(drawn.emission, lod.material.emission, strict=True))
+    if glow > COLOR_STEP:
+        problems.append(f"emits {drawn.emission}, the stage's light is {lod.material.emission}")
     problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
     problems += _compare_maps(drawn, lod, is_last)
     if (drawn.paint is None) != (lod.mesh.paint is None):

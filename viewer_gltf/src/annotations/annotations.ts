@@ -242,8 +242,8 @@ export class Marks {
     const probed = this.options.reading.glance(gaze);
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
-    const { length } = this.options.manifest.tiles;
-    const tile = length > 1 ? tileName(probed.tile) : ""; // of a single one there is nothing to tell
+    const { tiles } = this.state;
+    const tile = tiles.length > 1 ? tileName(probed.tile, tiles) : ""; // of a single one there is nothing to tell
     const text = [tile, channel?.name ?? ""].filter((part) => part !== "").join(" · ");
     return text === "" ? null : { probed, text };
   }

@@ -2,6 +2,7 @@
  * The parts of the viewer, a line each. Without its line, and its folder, a part is gone and the others still work. Only
  * the folder of `share` has to stay, since the page opens by it what its address asks for.
  */
+export { additions } from "../additions/part";
 export { annotations } from "../annotations/part";
 export { bench } from "../bench/part";
 export { capture } from "../capture/part";

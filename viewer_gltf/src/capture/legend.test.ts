@@ -7,7 +7,8 @@ import { legendOf } from "./legend";
 const manifest = sampleManifest(3);
 const [first, ...others] = manifest.channels;
 const file = { path: "objects.json", bytes: 1, sha256: "0".repeat(64) };
-const mapped: Manifest = { ...manifest, channels: [{ ...first, objects: file }, ...others] };
+const hidden = others.map((one) => ({ ...one, opens: false }));
+const mapped: Manifest = { ...manifest, channels: [{ ...first, objects: file }, ...hidden] };
 
 const legend = (of: Manifest, colorsOf: Parameters<typeof legendOf>[2] = () => null) =>
   legendOf(initialState(of), of, colorsOf);

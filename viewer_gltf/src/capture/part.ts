@@ -7,6 +7,7 @@ import { REFUSED } from "../state/refusals";
 import type { Scene } from "./save_picture";
 import { SAVE_COMMANDS, SAVE_KEYS, saveSections } from "./section";
 import { CAPTURE_SETTINGS } from "./settings";
+import { stageViews } from "./stage_views";
 
 const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
 const NEXT_KEPT = "“Next kept view” goes through them.";
@@ -44,8 +45,16 @@ class CapturePart implements Part, PosterMaker {
 
   constructor(private readonly host: PartHost) {}
 
+  /** The views of the stage's cameras are kept from the start, unless the address keeps others. */
+  afterOpening(): void {
+    const { state, bundle } = this.host;
+    const views = stageViews(bundle.manifest);
+    if (state.keptViews.length > 0 || views.length === 0) return;
+    this.host.dispatch({ type: "keep-views", views }, false);
+  }
+
   panel(): readonly PartSection[] {
-    return saveSections(this.host.state, this.filming !== null);
+    return saveSections(this.host.state, this.filming !== null, this.nextView);
   }
 
   async poster(longest_px: number): Promise<Blob> {
@@ -155,7 +164,10 @@ class CapturePart implements Part, PosterMaker {
     if (isInRoom || keptViews.length === 0) return false;
     undo.noteLook();
     const before = viewpoint.lookNow;
-    viewpoint.lookFlatFrom(keptViews[this.nextView++ % keptViews.length]);
+    const { name, ...look } = keptViews[this.nextView++ % keptViews.length];
+    viewpoint.lookFlatFrom(look);
+    if (name !== undefined) this.host.announce(`View: ${name}`);
+    this.host.panel.refresh(); // the button names the view after this one
     if (viewpoint.isAt(before)) this.host.announce(ONLY_VIEW);
     return true;
   }

@@ -7,8 +7,9 @@ import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 import { PICTURE_SIZE } from "./settings";
 
-function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
+function saveItems(state: ViewerState, isFilming: boolean, next: number): readonly Control[] {
   const { length } = state.keptViews;
+  const name = length === 0 ? undefined : state.keptViews[next % length].name;
   const path = length > 1 ? `through ${length} views` : "once round";
   const none = length === 0 ? REFUSED.views : "";
   return [
@@ -16,7 +17,10 @@ function saveItems(state: ViewerState, isFilming: boolean): readonly Control[] {
     command("save-picture", isFilming ? "Cancel" : "Save the picture"),
     command("save-video", isFilming ? "Cancel" : `Save a video, ${path}`),
     command("keep-view", length === 0 ? "Keep this view" : `Keep this view (${length} kept)`),
-    { ...command("next-view", "Next kept view"), refusal: none },
+    {
+      ...command("next-view", name === undefined ? "Next kept view" : `Next kept view: ${name}`),
+      refusal: none,
+    },
     { ...command("forget-views", "Forget the kept views"), refusal: none },
   ];
 }
@@ -35,8 +39,13 @@ declare module "../state/commands" {
   interface CommandNames extends Record<(typeof SAVE_COMMANDS)[number], true> {}
 }
 
-export function saveSections(state: ViewerState, isFilming: boolean): readonly PartSection[] {
-  const items = saveItems(state, isFilming);
+/** @param next index of the kept view that is shown next */
+export function saveSections(
+  state: ViewerState,
+  isFilming: boolean,
+  next: number,
+): readonly PartSection[] {
+  const items = saveItems(state, isFilming, next);
   return [{ id: "save", label: "Pictures and video", rank: 70, items }];
 }
 

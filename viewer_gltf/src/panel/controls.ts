@@ -173,6 +173,9 @@ export type Button = Base &
   }>;
 export type MapTile = Readonly<{
   id: string;
+  name: string;
+  /** Its name where that stands alone. */
+  title: string;
   row: number;
   column: number;
   isFocus: boolean;

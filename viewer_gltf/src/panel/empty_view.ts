@@ -61,7 +61,7 @@ function transparent(shown: readonly ChannelState[]): EmptyView | null {
 }
 
 function cutAway(
-  { clip, isolated }: ViewerState,
+  { clip, isolated, tiles: all }: ViewerState,
   shown: readonly ChannelState[],
   { tiles, outline }: Content,
 ): EmptyView | null {
@@ -76,7 +76,7 @@ function cutAway(
   };
   // An outline covers all tiles, so it can't tell whether a single tile is empty.
   if (!isGone && !(isolated === null && shown.every(hasNothing))) return null;
-  const what = isolated === null ? "the specimen" : tileName(isolated);
+  const what = isolated === null ? "the specimen" : tileName(isolated, all);
   const remove: Action = { type: "set-clip", clip: WHOLE };
   return { text: `The cut leaves nothing of ${what}.`, offer: offerOf("Remove the cut", remove) };
 }
@@ -131,7 +131,7 @@ function emptyTile(
   if (tile === null || shown.some(({ id }) => hasSurface(id, tile))) return null;
   const volumes = shown.map((channel) => channel.volume && hasVolume(channel.id, tile));
   if (volumes.includes(null)) return null;
-  const name = tileName(tile);
+  const name = tileName(tile, state.tiles);
   if (volumes.includes(true)) {
     if (mode === "all" || mode === "traced" || isolated === null) return null;
     return {

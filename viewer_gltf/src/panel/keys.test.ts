@@ -46,6 +46,7 @@ const CONTEXT: KeyContext = {
       channel: "c0",
       transfer2d: { gradient_max: 0.5, functions: {} },
     } as const,
+    { type: "hide-additions", hidden: [], all: ["/Specimen/Arrow"] } as const,
     { type: "set", id: "mode", value: "traced" } as const,
   ].reduce<KeyContext["state"]>(reduce, initialState(sampleManifest(12))),
   view: START_VIEW,

@@ -259,7 +259,7 @@ function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts
   const { samples, isLoading } = facts;
   const isUnfinished = tiles.some((tile) => tile.isUnfinished);
   if (channels.every(({ shown }) => !shown)) return "All channels are hidden";
-  const alone = isolated === null ? "" : `${tileName(isolated)} alone`;
+  const alone = isolated === null ? "" : `${tileName(isolated, tiles)} alone`;
   const unfinished = tiles.some((tile) => !tile.isUnfinished) ? UNFINISHED : STATUS.all;
   const form = isUnfinished && mode !== "all" && mode !== "traced" ? unfinished : STATUS[mode];
   const parts = [channels.some(({ hasObjects }) => !hasObjects) ? form : "Objects", alone];

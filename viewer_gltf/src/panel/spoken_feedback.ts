@@ -89,9 +89,11 @@ function spokenAction(action: Action, state: ViewerState, ranges: Ranges): strin
       if (action.id === TOOL.id && state.tool === "measure") return measuredText(state);
       return parameterOf(action.id).spoken(state);
     case "select":
-      return action.tile === null ? "No tile chosen" : `Tile: ${tileName(action.tile)}`;
+      return action.tile === null
+        ? "No tile chosen"
+        : `Tile: ${tileName(action.tile, state.tiles)}`;
     case "isolate":
-      return action.tile === null ? "All tiles" : `Only ${tileName(action.tile)}`;
+      return action.tile === null ? "All tiles" : `Only ${tileName(action.tile, state.tiles)}`;
     case "measure":
     case "add-point":
       return measuredText(state);

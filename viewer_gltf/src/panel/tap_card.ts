@@ -3,7 +3,7 @@ import { toHex } from "../math/color";
 import { START_OBJECTS } from "../state/objects";
 import { COLOR } from "../state/parameters/channel";
 import { REFUSED } from "../state/refusals";
-import { tileName } from "../state/tile_name";
+import { tileTitle } from "../state/tile_name";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { colourOf } from "./control_templates";
 import type { Button, Control, Wish } from "./controls";
@@ -33,7 +33,7 @@ export function tapCardOf(
   undo: string | null,
 ): TapCardContent {
   const channel = state.channels.find((each) => each.id === id);
-  const place = state.tiles.length > 1 ? `Tile in ${tileName(tile)}` : "";
+  const place = state.tiles.length > 1 ? tileTitle(tile, state.tiles) : "";
   const titles = [object?.name, channel?.name, place].filter((each) => each !== undefined);
   const [title, ...rest] = titles.filter((each) => each !== "");
   const controls = [

@@ -26,8 +26,8 @@ const measure = (): Offer => ({ label: "Measure", to: [setTo(TOOL, "measure")] }
 export type WaysOn = Readonly<Record<string, (now: WayOn) => Offer>>;
 
 const WAYS: WaysOn = {
-  [REFUSED.tile]: ({ state: { middle } }) => ({
-    label: `Only ${tileName(middle)}`,
+  [REFUSED.tile]: ({ state: { middle, tiles } }) => ({
+    label: `Only ${tileName(middle, tiles)}`,
     to: [{ type: "isolate", tile: middle }],
   }),
   [REFUSED.near]: mode("Show a focus disc", "disc"),

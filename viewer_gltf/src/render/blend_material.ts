@@ -145,6 +145,8 @@ export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly twins: readonly Mesh[];
+  /** As the stage has it, 0..1: a surface of a bundle has one material. */
+  private readonly ownOpacity: number;
   private part: SurfacePart | null = null;
   isBlended = false;
   isPane = false;
@@ -167,7 +169,11 @@ export class BlendedSurface {
       both.adopt(material);
       material.forceSinglePass = true; // the depth that is written first sorts both sides
       Object.assign(material, LAID_OVER);
+      // the loader leaves the depth of translucent materials out; here it is written first
+      material.transparent = false;
+      material.depthWrite = true;
     }
+    this.ownOpacity = materials[0]?.opacity ?? 1;
     this.depth = depthMaterial(this.uniforms, both, true);
     // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
     // what lies behind a rim through.
@@ -217,10 +223,11 @@ export class BlendedSurface {
     this.uniforms.uTaken.value = taken;
     this.uniforms.uInDisc.value = isInDisc;
     this.uniforms.uCrosses.value = crosses;
-    this.isBlended = opacity < 1 || taken > 0;
+    const own = opacity * this.ownOpacity; // the shader multiplies both as well
+    this.isBlended = own < 1 || taken > 0;
     this.isPane = this.isBlended && !crosses;
-    this.isSolid = isInDisc && opacity === 1;
-    this.scene.visible = opacity > 0 && (taken < 1 || isInDisc);
+    this.isSolid = isInDisc && own === 1;
+    this.scene.visible = own > 0 && (taken < 1 || isInDisc);
     this.depth.polygonOffsetUnits = rank * UNITS_APART + UNITS_BEHIND;
     for (const material of this.materials) {
       material.polygonOffsetUnits = rank * UNITS_APART;

@@ -26,7 +26,7 @@ describe("a remark", () => {
     const far = MANIFEST.tiles.at(-1)?.id ?? "";
     const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };
     const cut = reduce(START, cutTo);
-    const words = `Only ${tileName(far)}: the cut leaves nothing of it.`;
+    const words = `Only ${tileName(far, START.tiles)}: the cut leaves nothing of it.`;
     expect(announcement(START, cutTo)).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: near })).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: far })).toBe(words);

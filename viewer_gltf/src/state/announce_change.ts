@@ -39,5 +39,5 @@ function nothingLeft(
     return tile !== undefined && isCutAway(tile.bounds_um, state.clip);
   };
   if (!isEmpty(after) || (isolated === before.isolated && isEmpty(before))) return null;
-  return `Only ${tileName(isolated ?? "")}: the cut leaves nothing of it.`;
+  return `Only ${tileName(isolated ?? "", after.tiles)}: the cut leaves nothing of it.`;
 }

@@ -58,6 +58,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     })),
     tiles: manifest.tiles.map((tile) => ({
       id: tile.id,
+      ...(tile.name === undefined ? {} : { name: tile.name }),
       representation: asStaged.has(tile) ? tile.representation : "mesh",
       ...(tile.unfinished ? { isUnfinished: true } : {}),
     })),

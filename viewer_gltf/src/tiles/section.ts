@@ -4,7 +4,7 @@ import { command } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
 import { chosenTile } from "../state/chosen_tile";
 import { REFUSED } from "../state/refusals";
-import { tileName } from "../state/tile_name";
+import { tileName, tileTitle } from "../state/tile_name";
 import type { ViewerState } from "../state/viewer_state";
 import { tileGrid } from "./tile_grid";
 
@@ -22,7 +22,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
         { value: "", label: "by gaze" },
         ...state.tiles.map(({ id }) => ({
           value: id,
-          label: id === focusTile ? `${tileName(id)} (gazed at)` : tileName(id),
+          label: `${tileName(id, state.tiles)}${id === focusTile ? " (gazed at)" : ""}`,
         })),
       ],
       isInline: false,
@@ -37,6 +37,8 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
       columns: grid.columns,
       tiles: grid.cells.map((cell) => ({
         ...cell,
+        name: tileName(cell.id, state.tiles),
+        title: tileTitle(cell.id, state.tiles),
         isFocus: cell.id === focusTile,
         isSelected: cell.id === selected,
         isIsolated: cell.id === isolated,
@@ -49,7 +51,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
     {
       kind: "toggle",
       id: "isolate",
-      label: isolated === null ? "Only this tile" : `Only ${tileName(isolated)}`,
+      label: isolated === null ? "Only this tile" : `Only ${tileName(isolated, state.tiles)}`,
       value: isolated !== null,
       refusal: alone === null ? REFUSED.tile : "",
       to: (value) => ({ type: "isolate", tile: value ? alone : null }),

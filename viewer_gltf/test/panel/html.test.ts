@@ -226,7 +226,7 @@ describeInChromium("the panel", () => {
     }
     await alone(other.id);
     expect((await state()).isolated).toBe(other.id);
-    expect(await said()).toBe(`Only ${tileName(other.id)}: the cut leaves nothing of it.`);
+    expect(await said()).toBe(`Only ${tileName(other.id, [])}: the cut leaves nothing of it.`);
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -292,7 +292,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
     const { isolated } = await state();
     const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(`Only ${tileName(isolated ?? "")}: the cut leaves nothing of it.`);
+    expect(told.at(-1)).toBe(`Only ${tileName(isolated ?? "", [])}: the cut leaves nothing of it.`);
     expect((await state()).notices).toEqual([]);
   });
 

@@ -1,5 +1,5 @@
 /** What the panel on a canvas lets choose from: options, colours, tiles. Pure. */
-import { shortTileName, tileName } from "../../state/tile_name";
+import { shortTileName } from "../../state/tile_name";
 import type { Choice, Colour, TileMap } from "../controls";
 import { nextColour } from "../palettes";
 import {
@@ -155,7 +155,7 @@ export function mapBlock(map: TileMap, width: number): Block {
     const label = tile.isIsolated ? "only" : shortTileName(tile.id);
     const tone = isChosen ? "ink" : "dim";
     marks.push(text(rect, label, { align: "center", size: SMALL, tone }));
-    regions.push(region(`${map.id}=${tile.id}`, tileName(tile.id), rect, () => map.to(tile.id)));
+    regions.push(region(`${map.id}=${tile.id}`, tile.name, rect, () => map.to(tile.id)));
   }
   const height = Math.ceil(cell * map.rows) + GAP;
   const block = { ...one(marks, unlessRefused(map, regions), height), targets: MAP_TARGETS };
@@ -168,7 +168,7 @@ function asChoice({ id, tiles, refusal, to }: TileMap): Choice {
     tiles.find(({ isIsolated }) => isIsolated) ??
     tiles.find(({ isSelected }) => isSelected) ??
     tiles.find(({ isFocus }) => isFocus);
-  const options = tiles.map((tile) => ({ value: tile.id, label: tileName(tile.id) }));
+  const options = tiles.map((tile) => ({ value: tile.id, label: tile.name }));
   const value = now?.id ?? "";
   return { kind: "choice", id, label: "Tile", value, options, isInline: false, refusal, to };
 }

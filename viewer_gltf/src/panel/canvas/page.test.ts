@@ -212,6 +212,8 @@ describe("its pages", () => {
   it("step from tile to tile where a map would be too fine for the gaze", () => {
     const tiles = Array.from({ length: 400 }, (_, i) => ({
       id: `r${Math.floor(i / 20)}_c${i % 20}`,
+      name: `${i}`,
+      title: `Tile ${i}`,
       row: Math.floor(i / 20),
       column: i % 20,
       isFocus: i === 45,

@@ -2,14 +2,14 @@
 
 import { element } from "../../dom/element";
 import { RovingTabindex } from "../../dom/roving_tabindex";
-import { shortTileName, tileName } from "../../state/tile_name";
+import { shortTileName } from "../../state/tile_name";
 import type { MapTile, TileMap } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
-function nameOf({ id, isFocus, isSelected, isIsolated }: MapTile): string {
+function nameOf({ id, title, isFocus, isSelected, isIsolated }: MapTile): string {
   const marks = [isIsolated && "shown alone", isSelected && "chosen", isFocus && "looked at"];
   // people who speak to their computer call a button by the text on it
-  const names = [`Tile in ${tileName(id)}`, ...marks.filter(Boolean), shortTileName(id)];
+  const names = [title, ...marks.filter(Boolean), shortTileName(id)];
   return [...new Set(names)].join(", ");
 }
 

@@ -58,7 +58,8 @@ export type StandOptions = Readonly<{
 }>;
 
 /** The sections of the panel that a reader has opened, whose controls most tests use. */
-const OPEN = "channels objects volumes tiles stereo slices save more view volume-settings light";
+const OPEN =
+  "channels objects additions volumes tiles stereo slices save more view volume-settings light";
 
 /** Opens the sections as on a later visit. It runs in the page before the page's own scripts. */
 function openSections(open: string): void {

@@ -51,7 +51,7 @@ export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layou
   const made = new Map((facts.objects ?? []).map(({ id, items }) => [id, items]));
   return layOutOwn(state, facts, view, [
     ...measureSections(state, values),
-    ...saveSections(state, isFilming),
+    ...saveSections(state, isFilming, 0),
     ...labelMapSections(state, made, facts.isStereo),
     ...channelSections(state, facts, view),
     ...volumeSections(state, facts.discLimit_deg ?? null),

@@ -1,0 +1,208 @@
+"""Which edits of a stage a bundle takes over: one table of places and names.
+
+The readers of a composed stage read these opinions and no others. `find_lost_edits` compares the
+opinions of an artist's layers with the table, and reports every other one. A reader that reads a
+new name adds it here; tests/bundle/test_edit_table.py tries each kind of row.
+
+A name that begins with `@` is a prim's metadata, any other one is a property. Both may have `*`.
+"""
+
+from fnmatch import fnmatchcase
+
+from stereocell.usd.layer import DISPLAY_SCALE, OPENING_CUT, PAINTED_BY, SIDES
+from stereocell.usd.numbers2d import ATTRIBUTES
+from stereocell.usd.write_objects import (
+    COLUMN,
+    COLUMNS,
+    DEFAULT,
+    HIDDEN,
+    LABELS,
+    NAMES,
+    TOUCHING,
+    WALL_UM2,
+)
+
+_PLACED = ("xformOp:*", "xformOpOrder")
+_SHOWN = ("visibility", "purpose", "@active")
+# a display colour or opacity holds for all meshes below
+_DISPLAYED = ("primvars:displayColor*", "primvars:displayOpacity*")
+
+TAKEN: dict[str, tuple[str, ...]] = {
+    "specimen": (
+        *_PLACED,
+        *_SHOWN,
+        *_DISPLAYED,
+        "stereocell:modality",
+        OPENING_CUT,
+        "@displayName",
+    ),
+    "tiles": (*_PLACED, *_SHOWN, *_DISPLAYED, *SIDES.values()),
+    "tile": (*_PLACED, *_SHOWN, *_DISPLAYED, "extentsHint", "@displayName"),
+    "branch": (*_PLACED, *_SHOWN, *_DISPLAYED),
+    "mesh": (
+        *_PLACED,
+        *_SHOWN,
+        "points",
+        "faceVertexCounts",
+        "faceVertexIndices",
+        "orientation",
+        "normals",
+        "primvars:normals*",
+        "primvars:st",
+        "primvars:st:indices",
+        "primvars:tangents*",
+        LABELS,
+        NAMES,
+        TOUCHING,
+        WALL_UM2,
+    ),
+    "volume": (
+        *_PLACED,
+        *_SHOWN,
+        "stereocell:atlas",
+        "stereocell:atlasSize",
+        "stereocell:apron",
+        "stereocell:boundsMin",
+        "stereocell:boundsMax",
+        "field:*",
+    ),
+    "field": ("filePath",),
+    "channel": (
+        "@active",
+        "@displayName",
+        "inputs:color",
+        "outputs:surface",
+        "primvars:displayOpacity",
+        "stereocell:window",
+        "stereocell:volumeWindow",
+        "stereocell:opacityPoints",
+        "stereocell:shape*",
+        "stereocell:isoValue",
+        "stereocell:surfaceVerdict",
+        "stereocell:surfaceReason",
+        "stereocell:levelIso",
+        "stereocell:levelSmoothing",
+        "stereocell:levelBackground",
+        "stereocell:threshold",
+        *ATTRIBUTES.values(),
+        PAINTED_BY,
+        COLUMNS,
+        f"{COLUMN}*",
+        DEFAULT,
+        HIDDEN,
+    ),
+    "shown": ("visibility",),
+    # the window's shape decides what shows at the sides, and nothing is clipped
+    "camera": (
+        *_PLACED,
+        *_SHOWN,
+        "focalLength",
+        "horizontalAperture",
+        "verticalAperture",
+        "clippingRange",
+        "@displayName",
+    ),
+    "addition": (
+        *_PLACED,
+        *_SHOWN,
+        *_DISPLAYED,
+        "points",
+        "faceVertexCounts",
+        "faceVertexIndices",
+        "orientation",
+        "normals",
+        "primvars:normals*",
+        "curveVertexCounts",
+        "widths",
+        "type",
+        "basis",
+        "wrap",
+        "@displayName",
+    ),
+    "material": ("outputs:surface",),
+    "UsdPreviewSurface": (
+        "info:id",
+        "outputs:*",
+        "inputs:diffuseColor",
+        "inputs:metallic",
+        "inputs:roughness",
+        "inputs:opacity",
+        "inputs:opacityThreshold",
+        "inputs:emissiveColor",
+    ),
+    # inputs that are taken over from an image or a primvar alone
+    "UsdPreviewSurface, fed": ("inputs:normal", "inputs:occlusion"),
+    "UsdUVTexture": ("info:id", "outputs:*", "inputs:file", "inputs:st"),
+    "UsdPrimvarReader": ("info:id", "outputs:*", "inputs:varname"),
+}
+
+# The build writes these from other values of the stage, and the bundle makes them anew: place ->
+# name -> what to edit instead; empty: an edit of a mesh rightly brings it along
+DERIVED: dict[str, dict[str, str]] = {
+    "channel": {
+        "stereocell:lut": "stereocell:opacityPoints",
+        "stereocell:isoConfidence": "stereocell:isoValue",
+        "stereocell:levelFile": "stereocell:levelIso",
+    },
+    "mesh": {
+        "extent": "",
+        "stereocell:distance": "points",
+        "stereocell:largestDistance": "points",
+        "stereocell:distanceSamples": "points",
+        "stereocell:shapeHash": "points",
+    },
+    "volume": {"extent": "", "material:binding": ""},
+    "addition": {"extent": ""},
+}
+
+# Values that hold in a bundle whatever a layer says: to state them changes nothing
+ASSUMED: dict[str, object] = {"subdivisionScheme": "none", "doubleSided": True}
+
+# Reasons for opinions that nothing reads, by name; the first that fits is stated
+REASONS: tuple[tuple[str, str], ...] = (
+    (
+        "model:*",
+        "draw modes are stand-ins in other programs; the bundle draws the tile itself",
+    ),
+    ("subdivision*", "surfaces are not subdivided here: apply the subdivision and export points"),
+    ("crease*", "surfaces are not subdivided here: apply the subdivision and export points"),
+    ("corner*", "surfaces are not subdivided here: apply the subdivision and export points"),
+    ("outputs:*", "the viewer draws with its own shaders, and takes a UsdPreviewSurface alone"),
+    (
+        "primvars:displayOpacity*",
+        "one value for the whole mesh is taken over, and this has several",
+    ),
+    ("primvars:displayColor*", "another value feeds the colour of the mesh's material"),
+    ("primvars:*", "no material of the mesh reads this primvar"),
+    (DISPLAY_SCALE, "display.usda and the Blender add-on use it; the viewer has a size of its own"),
+    ("xformOp*", "nothing in the bundle stands at this prim"),
+    ("purpose", "nothing in the bundle is drawn by this prim"),
+    ("visibility", "nothing in the bundle is drawn by this prim"),
+    ("userProperties:*", "properties of the program that wrote the layer stay there"),
+    ("@customData", "custom data stay with the stage"),
+    ("@assetInfo", "asset information stays with the stage"),
+    ("@kind", "the kinds of prims stay with the stage"),
+    ("@displayName", "the bundle has no name for this prim"),
+)
+
+OF_LIGHTS = (
+    "the viewer has lamps of its own; distant lights and domes below /Specimen/Lights reach "
+    "specimen.usdz alone"
+)
+# Reasons for prims that a layer adds, by type; the first whose name the type's begins with or is
+ADDED: dict[str, str] = {
+    "Light": OF_LIGHTS,
+    "Volume": "it is no volume of a channel in a tile",
+    "Material": "no mesh is bound to it",
+    "Shader": "no surface is drawn with it",
+}
+
+
+def is_taken(place: str, name: str) -> bool:
+    """Return whether the bundle takes over an opinion of a name at a place."""
+    return any(fnmatchcase(name, pattern) for pattern in TAKEN.get(place, ()))
+
+
+def reason_of(name: str) -> str:
+    """Return why nothing reads a name; empty: the name is not known at all."""
+    return next((reason for pattern, reason in REASONS if fnmatchcase(name, pattern)), "")

@@ -1,0 +1,172 @@
+"""Walk the opinions that a user's layers add over a built stage.
+
+All layers of a composition count: the layer that was opened, its sublayers, and those that
+references, payloads and inherits bring in. The layers that a build wrote are left out. They are
+known by the stage's own layer, which has the channels' appearances as a sublayer. A flattened stage
+has no such layer: there, edits can't be told from what was built.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Sdf, Usd, UsdUtils
+
+from stereocell.usd.layer import ROOT, TILES
+from stereocell.usd.write_stage import SUBLAYERS
+from stereocell.usd.write_tile import LAYER_NAME
+
+# How prims are composed: USD itself consumes these fields
+_COMPOSITION = frozenset(
+    (
+        "specifier",
+        "typeName",
+        "references",
+        "payload",
+        "inheritPaths",
+        "specializes",
+        "variantSetNames",
+        "variantSelection",
+        "apiSchemas",
+        "instanceable",
+        "relocates",
+        "primOrder",
+        "propertyOrder",
+        "permission",
+    )
+)
+# Notes for those who read the layer, and what its editor shows of it
+_NOTES = frozenset(("documentation", "comment", "hidden", "userDocBrief", "uiHints"))
+# Variant sets of the build: the readers of a stage select each variant
+_ALL_READ = frozenset(("lod", "representation", "transferFunction"))
+
+
+@dataclass(frozen=True, slots=True)
+class Opinion:
+    """An opinion of one layer, where it is composed.
+
+    prim     the path of the composed prim
+    name     of the property, or of the prim's metadata behind an `@`
+    spec     the property or the prim in the layer
+    variant  the variant that holds it, if that one is not selected; else empty
+    """
+
+    prim: Sdf.Path
+    name: str
+    spec: Sdf.Spec
+    variant: str = ""
+
+    @property
+    def source(self) -> tuple[str, str]:
+        """The layer and the place there, with the name of metadata."""
+        return self.spec.layer.identifier, f"{self.spec.path} {self.name}"
+
+
+class BuiltLayers:
+    """Which layers of a stage a build wrote."""
+
+    def __init__(self, stage: Usd.Stage) -> None:
+        self._folders = {
+            Path(layer.realPath).parent
+            for layer in stage.GetUsedLayers()
+            if layer.realPath and SUBLAYERS[0] in layer.subLayerPaths
+        }
+
+    def __bool__(self) -> bool:
+        return bool(self._folders)
+
+    def __contains__(self, layer: Sdf.Layer) -> bool:
+        file = Path(layer.realPath)
+        for folder in self._folders:
+            if file.is_relative_to(folder):
+                inside = file.relative_to(folder)
+                is_look = f"./{inside.as_posix()}" in SUBLAYERS
+                is_tile = inside.name == LAYER_NAME and inside.parts[:1] == ("tiles",)
+                is_stage = len(inside.parts) == 1 and SUBLAYERS[0] in layer.subLayerPaths
+                if is_look or is_tile or is_stage:
+                    return True
+        return False
+
+
+def opinions_of_users(stage: Usd.Stage, built: BuiltLayers) -> Iterator[tuple[Usd.Prim, Opinion]]:
+    """Yield each opinion that a layer adds, with the composed prim, whose tile is then loaded."""
+    if all(layer in built for layer in _layers(stage)):
+        return
+    for prim in _composed_prims(stage, built):
+        for spec in _specs_of_users(prim, built):
+            for opinion in _opinions(spec, prim.GetPath(), prim):
+                yield prim, opinion
+
+
+def _layers(stage: Usd.Stage) -> list[Sdf.Layer]:
+    return [layer for layer in stage.GetUsedLayers() if layer != stage.GetSessionLayer()]
+
+
+def _specs_of_users(prim: Usd.Prim, built: BuiltLayers) -> list[Sdf.PrimSpec]:
+    session = prim.GetStage().GetSessionLayer()
+    return [
+        spec for spec in prim.GetPrimStack() if spec.layer != session and spec.layer not in built
+    ]
+
+
+def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
+    """Yield all prims, of tiles only those that a user's layer touches, loaded one by one."""
+    every = Usd.PrimAllPrimsPredicate
+    for top in stage.GetPseudoRoot().GetFilteredChildren(every):
+        if top.GetPath() != ROOT:
+            yield from Usd.PrimRange(top, every)
+            continue
+        yield top
+        for group in top.GetFilteredChildren(every):
+            if group.GetPath() != TILES:
+                yield from Usd.PrimRange(group, every)
+                continue
+            yield group
+            for path in [child.GetPath() for child in group.GetFilteredChildren(every)]:
+                if _specs_of_users(stage.GetPrimAtPath(path), built):
+                    yield from _loaded_prims(stage, path)
+
+
+def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:
+    is_loaded = path in stage.GetLoadSet() or not stage.GetPrimAtPath(path).IsActive()
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the reader of the tile raises USD's errors
+    if not is_loaded:
+        stage.Load(path)
+    del quiet
+    yield from Usd.PrimRange(stage.GetPrimAtPath(path), Usd.PrimAllPrimsPredicate)
+    if not is_loaded:
+        stage.Unload(path)
+
+
+def _opinions(spec: Sdf.PrimSpec, path: Sdf.Path, prim: Usd.Prim) -> Iterator[Opinion]:
+    yield from _own_opinions(spec, path, "")
+    for set_name, variants in spec.variantSets.items():
+        selected = prim.GetVariantSet(set_name).GetVariantSelection()
+        for variant in variants.variants.values():
+            if variant.name != selected:
+                words = "" if set_name in _ALL_READ else f"{variant.name!r} of {set_name}"
+                yield from _tree_of_variant(variant.primSpec, path, words)
+
+
+def _tree_of_variant(spec: Sdf.PrimSpec, path: Sdf.Path, variant: str) -> Iterator[Opinion]:
+    yield from _own_opinions(spec, path, variant)
+    for child in spec.nameChildren:
+        yield from _tree_of_variant(child, path.AppendChild(child.name), variant)
+
+
+def _own_opinions(spec: Sdf.PrimSpec, path: Sdf.Path, variant: str) -> Iterator[Opinion]:
+    for key in spec.ListInfoKeys():
+        if key not in _COMPOSITION and key not in _NOTES:
+            yield Opinion(path, f"@{key}", spec, variant)
+    for prop in spec.properties:
+        if _states_value(prop):
+            yield Opinion(path, prop.name, prop, variant)
+    if spec.specifier == Sdf.SpecifierDef:
+        yield Opinion(path, "@specifier", spec, variant)
+
+
+def _states_value(prop: Sdf.PropertySpec) -> bool:
+    """Return whether a property has a value, a connection or a target, and is not only declared."""
+    if isinstance(prop, Sdf.RelationshipSpec):
+        return prop.HasInfo("targetPaths")
+    return bool({"default", "timeSamples", "spline", "connectionPaths"} & set(prop.ListInfoKeys()))

@@ -1,0 +1,277 @@
+"""Find the opinions of a user's layers that no bundle takes over, and say why.
+
+The walk (`layer_opinions`) yields all opinions over the built stage, and the table (`edit_table`)
+has those that the readers take over. All others are lost, except an opinion that repeats the
+stage's own value. Values over time of what would be taken over are refused.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from enum import Enum
+from pathlib import Path
+
+from pxr import Sdf, Sdr, Tf, Usd, UsdGeom, UsdShade
+
+from stereocell.model.errors import StageError
+from stereocell.usd.edit_places import Places, read_primvars
+from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, OF_LIGHTS, TAKEN, is_taken, reason_of
+from stereocell.usd.layer import LIGHTS, ROOT
+from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
+from stereocell.usd.read_attributes import over_time
+from stereocell.usd.read_bindings import binding_fault
+
+_BINDING = "material:binding"
+_OWN_BINDING = ("mesh", "addition")  # places whose own binding is the strongest
+_MOST_LINES = 3  # of edits that are alike; the last line counts the others
+_GROUPS = ("Xform", "Scope", "")  # types of prims that only hold others
+_FLAT = (
+    "flattened, so edits that no bundle takes over can't be found: export a layer over stage.usda "
+    "instead"
+)
+_BUILT = "built"  # place of a prim of the build that no reader looks at
+
+
+class _Fate(Enum):
+    """What becomes of an opinion that needs no line."""
+
+    TAKEN = 1
+    COVERED = 2  # by the line on its prim
+
+
+@dataclass(frozen=True, slots=True)
+class LostEdit:
+    """An edit that no bundle takes over.
+
+    what    the prim, with the property or the field
+    name    of the property or the field; edits of one name and reason are alike
+    reason  why it is lost
+    """
+
+    what: str
+    name: str
+    reason: str
+
+
+def describe(lost: Iterable[LostEdit]) -> Iterator[str]:
+    """Yield a line for each edit; edits that are alike share lines where they are many."""
+    groups: dict[tuple[str, str], list[LostEdit]] = defaultdict(list)
+    for edit in lost:
+        groups[edit.name, edit.reason].append(edit)
+    for alike in groups.values():
+        shown = alike if len(alike) <= _MOST_LINES else alike[:1]
+        more = len(alike) - len(shown)
+        others = f" (and {more} others alike)" if more else ""
+        for edit in shown:
+            yield f"{edit.what}{others} is not taken over: {edit.reason}"
+
+
+def notes_on_edits(stage: Usd.Stage) -> Iterator[str]:
+    """Yield a line on each edit that is lost. Raises StageError for an edit over time."""
+    built = BuiltLayers(stage)
+    if built:
+        yield from describe(find_lost_edits(stage, built))
+    else:
+        yield f"{stage.GetRootLayer().realPath}: {_FLAT}"
+
+
+def require_no_lost_edit(stage: Usd.Stage, more: Iterable[str] = ()) -> None:
+    """Raise StageError where an edit is lost, or where that can't be found.
+
+    more  lines on edits that are lost in part
+    """
+    layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)
+    if not built:
+        raise StageError(f"{layer}: {_FLAT}")
+    found = [*describe(find_lost_edits(stage, built)), *more]
+    if found:
+        words = "1 edit" if len(found) == 1 else f"{len(found)} edits"
+        lines = "\n".join(found)
+        raise StageError(
+            f"{lines}\n{layer}: found {words} that no bundle takes over, expected none with "
+            "--strict: nothing is written; remove them or leave --strict out"
+        )
+
+
+def find_lost_edits(stage: Usd.Stage, built: BuiltLayers) -> list[LostEdit]:
+    """Return the edits that are lost, in the stage's order. Raises StageError for one over time."""
+    finder = _Finder(stage, built, _bound_materials(stage, built))
+    for prim, opinion in opinions_of_users(stage, built):
+        finder.add(prim, opinion)
+    return finder.lost()
+
+
+def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
+    return {
+        target
+        for prim, opinion in opinions_of_users(stage, built)
+        if opinion.name.startswith(_BINDING)
+        for target in prim.GetRelationship(opinion.name).GetTargets()
+    }
+
+
+class _Finder:
+    """Collects what becomes of each opinion. One that inherits reach counts once."""
+
+    def __init__(self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path]) -> None:
+        self._built = built
+        self._places = Places(stage, bound)
+        self._found: dict[tuple[str, str], list[LostEdit | _Fate]] = {}
+        self._covered: set[Sdf.Path] = set()
+
+    def add(self, prim: Usd.Prim, opinion: Opinion) -> None:
+        """Judge an opinion at one of the prims that it reaches."""
+        edit = self._judge(prim, opinion)
+        self._found.setdefault(opinion.source, []).append(edit)
+
+    def lost(self) -> list[LostEdit]:
+        """Return the opinions that are lost at each prim which they reach."""
+        kept: dict[LostEdit, None] = {}
+        for fates in self._found.values():
+            edits = [fate for fate in fates if isinstance(fate, LostEdit)]
+            if edits and _Fate.TAKEN not in fates:
+                kept[next((edit for edit in edits if str(ROOT) in edit.what), edits[0])] = None
+        return list(kept)
+
+    def _judge(self, prim: Usd.Prim, opinion: Opinion) -> LostEdit | _Fate:
+        """Return what becomes of an opinion at one of its prims."""
+        path, name = opinion.prim, opinion.name
+        if any(path.HasPrefix(one) for one in self._covered):
+            return _Fate.COVERED
+        place = self._places.of(path) or self._built_place(prim.GetStage().GetPrimAtPath(path))
+        if not place:
+            return self._judge_prim(path, prim)
+        if opinion.variant:
+            return LostEdit(
+                f"variant {opinion.variant} on {prim.GetPath()}",
+                "variant",
+                "it is not selected",
+            )
+        reason = self._fault(place, prim.GetStage().GetPrimAtPath(path), opinion)
+        if name == "@specifier" or not reason:
+            return _Fate.TAKEN
+        return LostEdit(_words_for(prim, path, name), name, reason)
+
+    def _built_place(self, prim: Usd.Prim) -> str:
+        is_built = prim and any(spec.layer in self._built for spec in prim.GetPrimStack())
+        return _BUILT if is_built else ""
+
+    def _judge_prim(self, path: Sdf.Path, prim: Usd.Prim) -> LostEdit | _Fate:
+        """Return how a prim that no reader looks at is lost."""
+        own = prim.GetStage().GetPrimAtPath(path)
+        if own and not own.IsDefined() and not own.IsAbstract():
+            self._covered.add(path)
+            parent = own.GetParent()
+            names = [str(child.GetName()) for child in parent.GetChildren()]
+            return LostEdit(
+                str(path), "prim", f"the stage has no such prim{_hint(path.name, names)}"
+            )
+        kind = str(own.GetTypeName()) if own else ""
+        if kind in _GROUPS and not (own and own.IsAbstract()):
+            return _Fate.COVERED  # by the lines on what it holds
+        self._covered.add(path)
+        if not path.HasPrefix(ROOT):
+            reason = f"it lies outside {ROOT}"
+            return LostEdit(f"{kind or 'prim'} {path}", kind, reason)
+        reason = next(
+            (why for known, why in ADDED.items() if kind == known or kind.endswith(known)),
+            "nothing in the bundle is made of prims of this type",
+        )
+        return LostEdit(f"{kind} {path}", kind, reason)
+
+    def _fault(self, place: str, prim: Usd.Prim, opinion: Opinion) -> str:
+        """Return why an opinion at a place is lost; empty: it is taken over, or changes nothing."""
+        name = opinion.name
+        if name.startswith(_BINDING):
+            if place in ("specimen", "tiles", "tile", "branch", *_OWN_BINDING):
+                is_own = place in _OWN_BINDING
+                return binding_fault(prim, prim.GetRelationship(name), is_own=is_own)
+        elif self._is_read(place, prim, name):
+            return self._weakness(prim, opinion)
+        attribute = prim.GetAttribute(name)
+        if attribute and self._repeats(attribute, opinion.spec):
+            return ""
+        if place == _BUILT and opinion.prim.HasPrefix(LIGHTS):
+            return OF_LIGHTS
+        derived = DERIVED.get(place, {})
+        if name in derived:
+            return derived[name] and f"it follows from other values: edit {derived[name]}"
+        if reason := reason_of(name):
+            return reason
+        if attribute and _fallback(attribute) is not None:
+            return "the bundle does not use it"
+        return f"no reader knows this name{_hint(name, TAKEN.get(place, ()))}"
+
+    def _is_read(self, place: str, prim: Usd.Prim, name: str) -> bool:
+        if is_taken(place, name):
+            return True
+        attribute = prim.GetAttribute(name)
+        if place == "mesh" and name.startswith("primvars:"):
+            return name.split(":")[1] in read_primvars(prim)
+        if name.startswith("inputs:") and place in ("material", "channel"):
+            return bool(attribute) and self._places.feeds_shader(attribute)
+        is_fed = bool(attribute) and attribute.HasAuthoredConnections()
+        return is_fed and is_taken(f"{place}, fed", name)
+
+    def _weakness(self, prim: Usd.Prim, opinion: Opinion) -> str:
+        """Return what makes an opinion of a name that is read count for nothing; else empty."""
+        attribute, spec = prim.GetAttribute(opinion.name), opinion.spec
+        if not attribute or not isinstance(spec, Sdf.AttributeSpec):
+            return ""
+        if {"timeSamples", "spline"} & set(spec.ListInfoKeys()):
+            raise StageError(over_time(attribute))
+        if not spec.HasDefaultValue():
+            return ""
+        if attribute.HasAuthoredConnections() and not spec.HasInfo("connectionPaths"):
+            sources = ", ".join(map(str, attribute.GetConnections()))
+            return f"its value comes from {sources}"
+        stack = attribute.GetPropertyStack(Usd.TimeCode.Default())
+        for stronger in stack[: stack.index(spec)] if spec in stack else ():
+            if stronger.HasDefaultValue() and stronger.layer in self._built:
+                file = Path(stronger.layer.realPath).name
+                return f"the stage's own value, in {file}, is stronger"
+        if opinion.name.startswith("xformOp:"):
+            order = UsdGeom.Xformable(prim).GetXformOpOrderAttr().Get() or ()
+            if opinion.name not in {str(name).removeprefix("!invert!") for name in order}:
+                return "xformOpOrder does not name it"
+        return ""
+
+    def _repeats(self, attribute: Usd.Attribute, spec: Sdf.Spec) -> bool:
+        """Return whether a value is the one that holds without it, or is of the type's own."""
+        if not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
+            return False
+        below = [
+            one.default
+            for one in attribute.GetPropertyStack(Usd.TimeCode.Default())
+            if one.layer in self._built and one.HasDefaultValue()
+        ]
+        usual = ASSUMED.get(attribute.GetName(), below[0] if below else _fallback(attribute))
+        return usual is not None and bool(spec.default == usual)
+
+
+def _words_for(prim: Usd.Prim, path: Sdf.Path, name: str) -> str:
+    if name.startswith("@"):
+        return f"{name[1:]} of {path}"
+    if name.startswith(_BINDING) and (targets := prim.GetRelationship(name).GetTargets()):
+        return f"material {targets[-1]}, bound on {path},"
+    return f"{path}.{name}"
+
+
+def _fallback(attribute: Usd.Attribute) -> object:
+    """Return the value of an attribute that no layer states, by its prim's or its shader's type."""
+    prim, name = attribute.GetPrim(), attribute.GetName()
+    if prim.IsA(UsdShade.Shader) and name.startswith("inputs:"):
+        node = Sdr.Registry().GetShaderNodeByIdentifier(str(UsdShade.Shader(prim).GetShaderId()))
+        given = node.GetShaderInput(name.removeprefix("inputs:")) if node else None
+        return given.GetDefaultValueAsSdfType() if given else None
+    try:
+        return prim.GetPrimDefinition().GetAttributeFallbackValue(name)
+    except Tf.ErrorException:
+        return None
+
+
+def _hint(name: str, known: Iterable[str]) -> str:
+    plain = [one for one in known if not one.startswith("@") and "*" not in one]
+    close = get_close_matches(name, plain, 1, 0.75)
+    return f": did you mean {close[0]}?" if close else ""

@@ -1,0 +1,112 @@
+"""Read the meshes and curves that a layer adds to a specimen: arrows, labels, implants, electrodes.
+
+They may stand anywhere below /Specimen. Each is read in world um, at the default time, with the
+plain values of its material. Without a material it has its display colour. Curves become tubes.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from stereocell.formats.gltf import Material
+from stereocell.meshes.tubes import sweep_tubes
+from stereocell.model.mesh import Mesh
+from stereocell.usd.drawn_prims import is_visible, to_world
+from stereocell.usd.layer import ROOT, TILES
+from stereocell.usd.read_appearances import WHITE, material_of, surface_of
+from stereocell.usd.read_attributes import require_still, value_of
+from stereocell.usd.read_curves import curve_lines
+from stereocell.usd.read_display import display_color, display_opacity, has_many_display_colors
+from stereocell.usd.read_mesh import move_mesh, read_mesh
+from stereocell.usd.read_textures import maps_of
+
+_GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
+_PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract  # loaded or not
+_Types = Sdf.ValueTypeNames
+
+
+@dataclass(frozen=True, slots=True)
+class Addition:
+    """A mesh that a layer adds.
+
+    path  of its prim, which tells it from all others
+    name  for people
+    mesh  in world um
+    """
+
+    path: str
+    name: str
+    mesh: Mesh
+    material: Material
+
+
+def is_addition(prim: Usd.Prim) -> bool:
+    """Return whether a prim is a mesh or curves below /Specimen, and no surface of a channel."""
+    path = prim.GetPath()
+    is_drawn = prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.BasisCurves)
+    return bool(is_drawn) and path.HasPrefix(ROOT) and not _is_surface(path)
+
+
+def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
+    """Yield what layers add, in the stage's order.
+
+    Raises StageError for values that can't be drawn.
+    """
+    for prim in _additions(stage):
+        mesh = _read(prim)
+        if mesh is not None:
+            name = str(prim.GetDisplayName() or prim.GetName())
+            yield Addition(str(prim.GetPath()), name, mesh, _material(prim))
+
+
+def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
+    """Yield a line on each image of an added mesh, which is lost."""
+    for prim in _additions(stage):
+        surface = _surface(prim)
+        for file in maps_of(surface).files if surface else ():
+            yield f"image {file.name} of {prim.GetPath()} is not taken over: added meshes have none"
+
+
+def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), _PREDICATE):
+        if is_addition(prim) and is_visible(prim):
+            yield prim
+
+
+def _is_surface(path: Sdf.Path) -> bool:
+    """Return whether a channel's surface in a tile has this path."""
+    names = str(path.MakeRelativePath(TILES)).split("/") if path.HasPrefix(TILES) else []
+    return len(names) == 3 and names[2] == f"{names[1]}_{names[0]}"
+
+
+def _read(prim: Usd.Prim) -> Mesh | None:
+    matrix = to_world(prim)
+    if prim.IsA(UsdGeom.Mesh):
+        shown = {"displayColor"} if _shows_many_colors(prim) else set()
+        return read_mesh(UsdGeom.Mesh(prim), matrix, shown=shown)
+    curves = UsdGeom.BasisCurves(prim)
+    require_still(curves.GetPointsAttr(), curves.GetWidthsAttr())
+    value_of(prim, "points", _Types.Point3fArray)
+    mesh = sweep_tubes(curve_lines(curves))
+    return None if mesh is None else move_mesh(mesh, matrix)
+
+
+def _surface(prim: Usd.Prim) -> UsdShade.Shader | None:
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    return surface_of(prim) if material else None
+
+
+def _shows_many_colors(prim: Usd.Prim) -> bool:
+    return _surface(prim) is None and has_many_display_colors(prim)
+
+
+def _material(prim: Usd.Prim) -> Material:
+    surface = _surface(prim)
+    if surface is not None:
+        material = material_of(surface)
+    elif _shows_many_colors(prim):
+        material = Material(WHITE)
+    else:
+        material = Material(display_color(prim) or _GREY)
+    return replace(material, opacity=material.opacity * display_opacity(prim, None))

@@ -1,0 +1,61 @@
+"""Read the display colour and opacity of a mesh: primvars of its own, or of a prim above it.
+
+Artists set them on any prim, without a material. A bundle takes a display colour where nothing else
+than a plain value feeds the colour of the mesh's material, and multiplies the opacities.
+"""
+
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from stereocell.usd.read_attributes import color_of, shortest
+from stereocell.usd.read_textures import feeder
+from stereocell.usd.typed_values import read_as
+
+_OPACITY = "displayOpacity"
+_Types = Sdf.ValueTypeNames
+Color = tuple[float, float, float]
+
+
+def shows_display_color(surface: UsdShade.Shader) -> bool:
+    """Return whether a material leaves the colour of its meshes to their display colours."""
+    return feeder(surface, "color") is None
+
+
+def display_color(mesh: Usd.Prim) -> Color | None:
+    """Return the one display colour of a mesh, linear RGB; None: it has none, or several.
+
+    Raises StageError for one outside 0..1.
+    """
+    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("displayColor")
+    if not is_single(primvar):
+        return None
+    return color_of(primvar.GetAttr(), primvar.ComputeFlattened()[0])
+
+
+def has_many_display_colors(mesh: Usd.Prim) -> bool:
+    """Return whether a mesh has display colours of its own at its points or faces."""
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayColor")
+    return bool(primvar) and bool(primvar.HasValue()) and not is_single(primvar)
+
+
+def display_opacity(mesh: Usd.Prim, channel: Usd.Prim | None) -> float:
+    """Return the display opacity of a mesh times that of its channel, 0..1; 1: none is stated.
+
+    Raises StageError for values of another type.
+    """
+    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance(_OPACITY)
+    own = primvar.GetAttr() if is_single(primvar) else None
+    product = 1.0
+    for attribute in (own, channel.GetAttribute(f"primvars:{_OPACITY}") if channel else None):
+        values = read_as(attribute, _Types.FloatArray)
+        if values is not None and len(values) == 1:
+            product *= min(max(shortest(values[0]), 0.0), 1.0)
+    return product
+
+
+def is_single(primvar: UsdGeom.Primvar) -> bool:
+    """Return whether a primvar has one value for the whole mesh."""
+    if not primvar or not primvar.HasValue():
+        return False
+    flat = primvar.ComputeFlattened()
+    is_constant = primvar.GetInterpolation() == UsdGeom.Tokens.constant
+    return flat is not None and is_constant and len(flat) == 1

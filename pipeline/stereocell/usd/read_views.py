@@ -1,0 +1,94 @@
+"""Read the cameras that a user's layers add to a stage: named views of the viewer, in order.
+
+The viewer's camera is upright and turns about a point of its axis, the one nearest to the
+specimen's middle. So a roll is not taken over. The three cameras of the build frame the whole
+specimen, as the viewer does by itself, and are no views.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from stereocell.model.errors import StageError
+from stereocell.usd.drawn_prims import is_visible, to_world
+from stereocell.usd.layer import CAMERAS
+from stereocell.usd.read_attributes import Point, numbers_of
+
+_MAX_ROLL_DEG = 1.0  # degrees; a smaller roll is not seen
+_OF_BUILD = frozenset(CAMERAS.AppendChild(name) for name in ("mono", "left", "right"))
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """A view that a camera shows; lengths are um of the world.
+
+    fov_deg  vertical field of view, degrees
+    roll_deg  turn about its axis, which is not taken over
+    """
+
+    name: str
+    position: Point
+    target: Point
+    fov_deg: float
+    roll_deg: float = 0.0
+
+
+def is_view(prim: Usd.Prim) -> bool:
+    """Return whether a prim is a camera other than those of the build."""
+    return bool(prim.IsA(UsdGeom.Camera)) and prim.GetPath() not in _OF_BUILD
+
+
+def read_views(
+    stage: Usd.Stage, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> Iterator[StageView]:
+    """Yield the views of a stage's visible cameras; low and high bound the specimen (x, y, z), um.
+
+    Raises StageError for a camera without a lens or over time.
+    """
+    middle, longest = (low + high) / 2, float((high - low).max())
+    for prim in stage.Traverse():
+        if is_view(prim) and is_visible(prim):
+            yield _view_of(prim, middle, longest)
+
+
+def _view_of(prim: Usd.Prim, middle: NDArray[np.float64], longest: float) -> StageView:
+    (focal,), (aperture,) = (
+        numbers_of(prim, name, 1) for name in ("focalLength", "verticalAperture")
+    )
+    if not focal > 0 or not aperture > 0:
+        raise StageError(
+            f"{prim.GetPath()}: found focalLength {focal:g} and verticalAperture {aperture:g}, "
+            "expected both above 0"
+        )
+    matrix = to_world(prim)
+    eye = matrix[3, :3]
+    right, forward = _unit(matrix[0, :3]), -_unit(matrix[2, :3])
+    ahead = float((middle - eye) @ forward)
+    target = eye + forward * (ahead if ahead > 0 else longest)
+    fov = 2 * np.degrees(np.arctan(aperture / (2 * focal)))
+    # of an upright camera the axis to the right is level
+    roll = np.degrees(np.arcsin(np.clip(right[1], -1, 1)))
+    name = str(prim.GetDisplayName() or prim.GetName())
+    return StageView(name, _point(eye), _point(target), round(float(fov), 4), float(roll))
+
+
+def notes_on_rolls(views: list[StageView]) -> Iterator[str]:
+    """Yield a line on each camera whose roll is lost."""
+    for view in views:
+        if abs(view.roll_deg) > _MAX_ROLL_DEG:
+            yield (
+                f"roll of camera {view.name!r}, {view.roll_deg:.0f} degrees, is not taken over: "
+                "the viewer keeps up upright"
+            )
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _point(values: NDArray[np.float64]) -> Point:
+    x, y, z = (round(float(value), 4) for value in values)
+    return x, y, z

@@ -1,0 +1,132 @@
+"""Meshes and curves that a layer adds reach the bundle, with place, name and material."""
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+
+from stereocell.model.errors import StageError
+from support.bundles import load
+from support.edit_cases import define_arrow, define_material, define_wire
+
+
+def scene_of(bundle):
+    """Return additions.glb as another library reads it: its meshes in um, by the names of nodes."""
+    scene = trimesh.load(bundle / "additions.glb")
+    return {
+        name: scene.geometry[geometry].copy().apply_transform(matrix).apply_scale(1e6)
+        for name in scene.graph.nodes_geometry
+        for matrix, geometry in [scene.graph[name]]
+    }
+
+
+def test_an_added_mesh_is_a_layer_with_its_place_name_and_color(edit):
+    def change(stage):
+        group = UsdGeom.Xform.Define(stage, "/Specimen/Annotations")
+        UsdGeom.XformCommonAPI(group).SetTranslate((0, 2, 0))
+        define_arrow(stage).GetPrim().SetDisplayName("Here")
+
+    bundle = edit(change)
+    assert edit.told == []
+    added = load(bundle / "manifest.json")["additions"]
+    assert added["layers"] == [{"id": "/Specimen/Annotations/Arrow", "name": "Here"}]
+    assert load(bundle / "files.json")["additions.glb"]["sha256"] == added["file"]["sha256"]
+    (mesh,) = scene_of(bundle).values()
+    assert mesh.bounds == pytest.approx(np.array([(8, 2, 4), (12, 11, 4)]), abs=1e-4)
+    assert len(mesh.faces) == 3
+    color = mesh.visual.material.baseColorFactor
+    assert tuple(color) == (0, 0, 255, 255)
+
+
+def test_an_added_mesh_has_the_material_that_is_bound_to_it(edit):
+    def change(stage):
+        arrow = define_arrow(stage)
+        material = define_material(stage, "/Specimen/Annotations/Gold", (1.0, 0.5, 0.0))
+        shader = UsdShade.Shader(stage.GetPrimAtPath("/Specimen/Annotations/Gold/preview"))
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(0.5)
+        UsdShade.MaterialBindingAPI.Apply(arrow.GetPrim()).Bind(material)
+
+    bundle = edit(change)
+    assert edit.told == []
+    (mesh,) = scene_of(bundle).values()
+    assert mesh.visual.material.alphaMode == "BLEND"
+    assert tuple(mesh.visual.material.baseColorFactor) == (255, 128, 0, 128)
+
+
+def test_curves_are_tubes_as_thick_as_stated(edit):
+    (mesh,) = scene_of(edit(define_wire)).values()
+    assert mesh.is_watertight or trimesh.Trimesh(mesh.vertices, mesh.faces).is_watertight
+    assert mesh.bounds == pytest.approx(np.array([(2, -5.5, 3.5), (18, -4.5, 4.5)]), abs=1e-4)
+
+
+@pytest.mark.parametrize("basis", ["bezier", "bspline", "catmullRom"])
+def test_cubic_curves_pass_where_usd_s_basis_puts_them(edit, basis):
+    vertices = [(0, 0, 0), (2, 4, 0), (6, 4, 0), (8, 0, 0)]
+
+    def change(stage):
+        curves = UsdGeom.BasisCurves.Define(stage, "/Specimen/Wire")
+        curves.CreateTypeAttr("cubic")
+        curves.CreateBasisAttr(basis)
+        curves.CreateCurveVertexCountsAttr([4])
+        curves.CreatePointsAttr([Gf.Vec3f(*vertex) for vertex in vertices])
+        curves.CreateWidthsAttr([0.1])
+
+    (mesh,) = scene_of(edit(change)).values()
+    weights = {
+        "bezier": (1 / 8, 3 / 8, 3 / 8, 1 / 8),
+        "bspline": (1 / 48, 23 / 48, 23 / 48, 1 / 48),
+        "catmullRom": (-1 / 16, 9 / 16, 9 / 16, -1 / 16),
+    }[basis]
+    middle = np.array(weights) @ np.array(vertices)
+    away = np.linalg.norm(mesh.vertices - middle, axis=1)
+    assert away.min() == pytest.approx(0.05, abs=2e-4)
+
+
+def test_hidden_additions_and_guides_are_left_out(edit):
+    def change(stage):
+        UsdGeom.Imageable(define_arrow(stage)).MakeInvisible()
+        define_wire(stage).CreatePurposeAttr("guide")
+
+    bundle = edit(change)
+    assert not (bundle / "additions.glb").exists()
+    assert "additions" not in load(bundle / "manifest.json")
+
+
+def test_an_image_on_an_added_mesh_is_named(edit, tmp_path):
+    (tmp_path / "wood.png").write_bytes(b"")
+
+    def change(stage):
+        arrow = define_arrow(stage)
+        material = define_material(stage, "/Specimen/Wood", (1, 1, 1))
+        texture = UsdShade.Shader.Define(stage, "/Specimen/Wood/image")
+        texture.CreateIdAttr("UsdUVTexture")
+        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set("./wood.png")
+        output = texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+        shader = UsdShade.Shader(stage.GetPrimAtPath("/Specimen/Wood/preview"))
+        shader.GetInput("diffuseColor").ConnectToSource(output)
+        UsdShade.MaterialBindingAPI.Apply(arrow.GetPrim()).Bind(material)
+
+    edit(change)
+    words = (
+        "image wood.png of /Specimen/Annotations/Arrow is not taken over: added meshes have none"
+    )
+    assert words in edit.told
+
+
+def test_curves_whose_numbers_do_not_fit_are_refused(edit):
+    def change(stage):
+        define_wire(stage).GetCurveVertexCountsAttr().Set([3])
+
+    with pytest.raises(StageError, match=r"Wire.curveVertexCounts: found \[3\], expected"):
+        edit(change)
+
+
+def test_an_added_mesh_inside_a_tile_moves_with_it(edit):
+    def change(stage: Usd.Stage):
+        define_arrow(stage, "/Specimen/Tiles/r0_c0/Arrow")
+        UsdGeom.XformCommonAPI(stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")).SetTranslate((0, 0, 9))
+
+    bundle = edit(change)
+    assert edit.told == []
+    (mesh,) = scene_of(bundle).values()
+    assert mesh.bounds[:, 2] == pytest.approx([13, 13])

@@ -1,0 +1,408 @@
+"""Edits of a stage as artists make them, and what becomes of each: taken, refused or reported.
+
+Each edit is made by USD's own API in a layer over the stage of two tiles (`support.bundles`). The
+table in docs/stage.md is printed by `PYTHONPATH=pipeline:tests python tests/support/edit_cases.py`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
+
+Outcome = Literal["taken", "refused", "reported"]
+CHANNEL = "/Specimen/Channels/CD31"
+SURFACE = f"{CHANNEL}/surface"
+TILE = "/Specimen/Tiles/r0_c0"
+BRANCH = f"{TILE}/CD31"
+MESH = f"{BRANCH}/CD31_r0_c0"
+VOLUME = f"{MESH}_volume"
+_Types = Sdf.ValueTypeNames
+
+
+@dataclass(frozen=True, slots=True)
+class EditCase:
+    """One edit.
+
+    what    the edit in words, for the table of the docs
+    change  makes it on a stage whose edit target is the artist's layer
+    words   what the line on it says; of a taken edit, what becomes of it
+    is_partial  whether only a part of it is lost
+    """
+
+    what: str
+    change: Callable[[Usd.Stage], object]
+    outcome: Outcome
+    words: str
+    is_partial: bool = False
+
+
+def _put(
+    path: str, name: str, kind: Sdf.ValueTypeName, value: object, *times: float
+) -> Callable[[Usd.Stage], object]:
+    """Return an edit of one attribute, at the default time or at others."""
+
+    def change(stage: Usd.Stage) -> None:
+        attribute = stage.OverridePrim(path).CreateAttribute(name, kind, custom=False)
+        for time in times or (Usd.TimeCode.Default(),):
+            attribute.Set(value, time)
+
+    return change
+
+
+def _hide(path: str) -> Callable[[Usd.Stage], object]:
+    return lambda stage: UsdGeom.Imageable(stage.OverridePrim(path)).MakeInvisible()
+
+
+def _name(path: str, name: str) -> Callable[[Usd.Stage], object]:
+    return lambda stage: stage.OverridePrim(path).SetDisplayName(name)
+
+
+def _move(path: str, *times: float) -> Callable[[Usd.Stage], object]:
+    def change(stage: Usd.Stage) -> None:
+        op = UsdGeom.Xformable(stage.GetPrimAtPath(path)).AddTranslateOp(opSuffix="mine")
+        for time in times or (Usd.TimeCode.Default(),):
+            op.Set(Gf.Vec3d(0, 5, 0), time)
+
+    return change
+
+
+def define_material(
+    stage: Usd.Stage, path: str, color: tuple[float, float, float]
+) -> UsdShade.Material:
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/preview")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*color))
+    output = shader.CreateOutput("surface", _Types.Token)
+    material.CreateSurfaceOutput().ConnectToSource(output)
+    return material
+
+
+def _bind(where: str, strength: str) -> Callable[[Usd.Stage], object]:
+    def change(stage: Usd.Stage) -> None:
+        material = define_material(stage, "/Specimen/Mine", (0, 1, 0))
+        UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(where)).Bind(material, strength)
+
+    return change
+
+
+def define_camera(stage: Usd.Stage, roll_deg: float = 0) -> None:
+    """Add a camera in front of the sphere, 20 um before its middle."""
+    camera = UsdGeom.Camera.Define(stage, "/Specimen/Cameras/close")
+    camera.GetPrim().SetDisplayName("Close")
+    camera.AddTranslateOp().Set(Gf.Vec3d(10, -5, 24))
+    if roll_deg:
+        camera.AddRotateZOp().Set(roll_deg)
+    camera.CreateFocalLengthAttr(50.0)
+    camera.CreateVerticalApertureAttr(20.0)
+
+
+def define_arrow(stage: Usd.Stage, path: str = "/Specimen/Annotations/Arrow") -> UsdGeom.Mesh:
+    """Add a flat arrow of three triangles that points down at the sphere."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    points = [(10, 0, 4), (8, 4, 4), (12, 4, 4), (9, 4, 4), (11, 4, 4), (11, 9, 4), (9, 9, 4)]
+    mesh.CreatePointsAttr([Gf.Vec3f(*point) for point in points])
+    mesh.CreateFaceVertexCountsAttr([3, 4])
+    mesh.CreateFaceVertexIndicesAttr([0, 2, 1, 3, 4, 5, 6])
+    mesh.CreateSubdivisionSchemeAttr("none")
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(0, 0, 1)])
+    return mesh
+
+
+def define_wire(stage: Usd.Stage) -> UsdGeom.BasisCurves:
+    """Add a straight wire through the sphere's middle, 1 um thick."""
+    curves = UsdGeom.BasisCurves.Define(stage, "/Specimen/Electrode/Wire")
+    curves.CreateTypeAttr("linear")
+    curves.CreateCurveVertexCountsAttr([2])
+    curves.CreatePointsAttr([Gf.Vec3f(2, -5, 4), Gf.Vec3f(18, -5, 4)])
+    curves.CreateWidthsAttr([1.0])
+    return curves
+
+
+def _draw_as_cards(stage: Usd.Stage) -> None:
+    UsdGeom.ModelAPI.Apply(stage.GetPrimAtPath(TILE)).CreateModelDrawModeAttr("cards")
+
+
+def _inherit_color(stage: Usd.Stage) -> None:
+    look = stage.CreateClassPrim("/_red")
+    look.CreateAttribute("inputs:color", _Types.Color3f).Set(Gf.Vec3f(0, 1, 0))
+    stage.GetPrimAtPath(CHANNEL).GetInherits().AddInherit("/_red")
+
+
+def _keep_in_variant(stage: Usd.Stage) -> None:
+    palette = stage.GetPrimAtPath("/Specimen").GetVariantSets().AddVariantSet("palette")
+    for name in ("day", "night"):
+        palette.AddVariant(name)
+    palette.SetVariantSelection("night")
+    with palette.GetVariantEditContext():
+        stage.GetAttributeAtPath(f"{CHANNEL}.stereocell:window").Set(Gf.Vec2f(200, 300))
+    palette.SetVariantSelection("day")
+
+
+def _choose(path: str, name: str, variant: str) -> Callable[[Usd.Stage], object]:
+    return lambda stage: stage.GetPrimAtPath(path).GetVariantSet(name).SetVariantSelection(variant)
+
+
+def _fade(stage: Usd.Stage) -> None:
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(MESH))
+    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "displayOpacity", _Types.FloatArray, UsdGeom.Tokens.vertex
+    )
+    primvar.Set(
+        [k / len(mesh.GetPointsAttr().Get()) for k in range(len(mesh.GetPointsAttr().Get()))]
+    )
+
+
+CASES: tuple[EditCase, ...] = (
+    EditCase(
+        "`inputs:color` of a channel",
+        _put(CHANNEL, "inputs:color", _Types.Color3f, Gf.Vec3f(0, 1, 0)),
+        "taken",
+        "surfaces and volumes of the channel",
+    ),
+    EditCase(
+        "`inputs:colour` of a channel (a typo)",
+        _put(CHANNEL, "inputs:colour", _Types.Color3f, Gf.Vec3f(0, 1, 0)),
+        "reported",
+        "inputs:colour is not taken over: no reader knows this name: did you mean inputs:color",
+    ),
+    EditCase(
+        "`inputs:color` of a channel that is not there",
+        _put("/Specimen/Channels/CD13", "inputs:color", _Types.Color3f, Gf.Vec3f(0, 1, 0)),
+        "reported",
+        "/Specimen/Channels/CD13 is not taken over: the stage has no such prim: did you mean CD31",
+    ),
+    EditCase(
+        "`inputs:color` by a class that a channel inherits",
+        _inherit_color,
+        "reported",
+        "CD31.inputs:color is not taken over: the stage's own value, in channels.usda, is stronger",
+    ),
+    EditCase(
+        "`inputs:color` over time",
+        _put(CHANNEL, "inputs:color", _Types.Color3f, Gf.Vec3f(0, 1, 0), 1, 2),
+        "refused",
+        "CD31.inputs:color: found values over time",
+    ),
+    EditCase(
+        "`inputs:roughness` of a channel's shader",
+        _put(SURFACE, "inputs:roughness", _Types.Float, 0.2),
+        "taken",
+        "roughness of the surfaces",
+    ),
+    EditCase(
+        "`inputs:opacity` of a channel's shader",
+        _put(SURFACE, "inputs:opacity", _Types.Float, 0.4),
+        "taken",
+        "translucent surfaces: `alphaMode` BLEND, in `specimen.usdz` too",
+    ),
+    EditCase(
+        "`inputs:emissiveColor` of a channel's shader",
+        _put(SURFACE, "inputs:emissiveColor", _Types.Color3f, Gf.Vec3f(0, 0.5, 0)),
+        "taken",
+        "surfaces that glow, in `specimen.usdz` too",
+    ),
+    EditCase(
+        "`displayOpacity` of a channel",
+        _put(CHANNEL, "primvars:displayOpacity", _Types.FloatArray, [0.4]),
+        "taken",
+        "translucent surfaces of the channel",
+    ),
+    EditCase(
+        "`displayOpacity` of a mesh",
+        _put(MESH, "primvars:displayOpacity", _Types.FloatArray, [0.4]),
+        "taken",
+        "a translucent surface in that tile",
+    ),
+    EditCase(
+        "`displayOpacity` of a mesh by its points",
+        _fade,
+        "reported",
+        "primvars:displayOpacity is not taken over: one value for the whole mesh is taken over",
+    ),
+    EditCase(
+        "`displayColor` of a mesh",
+        _put(MESH, "primvars:displayColor", _Types.Color3fArray, [Gf.Vec3f(0, 1, 0)]),
+        "taken",
+        "the colour of that tile's surface",
+    ),
+    EditCase(
+        "`inputs:clearcoat` of a channel's shader",
+        _put(SURFACE, "inputs:clearcoat", _Types.Float, 0.5),
+        "reported",
+        "surface.inputs:clearcoat is not taken over: the bundle does not use it",
+    ),
+    EditCase(
+        "`stereocell:window` of a channel",
+        _put(CHANNEL, "stereocell:window", _Types.Float2, Gf.Vec2f(200, 3000)),
+        "taken",
+        "voxels of the volumes",
+    ),
+    EditCase(
+        "`stereocell:lut` of a channel",
+        _put(CHANNEL, "stereocell:lut", _Types.Asset, Sdf.AssetPath("./stage.usda")),
+        "reported",
+        "stereocell:lut is not taken over: it follows from other values: edit stereocell:opacity",
+    ),
+    EditCase("display name of a channel", _name(CHANNEL, "Vessels"), "taken", "its name"),
+    EditCase(
+        "variant `transferFunction` of a channel",
+        _choose(CHANNEL, "transferFunction", "sharp"),
+        "taken",
+        "the function that the viewer opens with",
+    ),
+    EditCase(
+        "an opinion in a variant that is not selected",
+        _keep_in_variant,
+        "reported",
+        "variant 'night' of palette on /Specimen is not taken over: it is not selected",
+    ),
+    EditCase("transform of a tile", _move(TILE), "taken", "surfaces, volumes and boxes move"),
+    EditCase(
+        "transform over time",
+        _move(TILE, 1, 2),
+        "refused",
+        "r0_c0.xformOp:translate:mine: found values over time",
+    ),
+    EditCase("visibility of a tile", _hide(TILE), "taken", "the tile is left out"),
+    EditCase(
+        "visibility of `/Specimen/Shown/CHANNEL`",
+        _hide("/Specimen/Shown/CD31"),
+        "taken",
+        "whether the channel shows at first, in `specimen.usdz` too",
+    ),
+    EditCase(
+        "visibility over time",
+        _put(TILE, "visibility", _Types.Token, "invisible", 1, 2),
+        "refused",
+        "r0_c0.visibility: found values over time",
+    ),
+    EditCase(
+        "`active` of a tile",
+        lambda stage: stage.GetPrimAtPath(TILE).SetActive(False),
+        "taken",
+        "the tile is left out",
+    ),
+    EditCase(
+        "`purpose` of a tile: `guide` or `proxy`",
+        _put(TILE, "purpose", _Types.Token, "guide"),
+        "taken",
+        "the tile is left out, as in other final pictures",
+    ),
+    EditCase(
+        "`purpose` of a mesh: `guide` or `proxy`",
+        _put(MESH, "purpose", _Types.Token, "proxy"),
+        "taken",
+        "the surface is left out",
+    ),
+    EditCase("display name of a tile", _name(TILE, "Left half"), "taken", "its name"),
+    EditCase(
+        "visibility of a channel's material",
+        _put(CHANNEL, "visibility", _Types.Token, "invisible"),
+        "reported",
+        "CD31.visibility is not taken over: nothing in the bundle is drawn by this prim",
+    ),
+    EditCase(
+        "draw mode of a tile",
+        _draw_as_cards,
+        "reported",
+        "r0_c0.model:drawMode is not taken over: draw modes are stand-ins",
+    ),
+    EditCase(
+        "`subdivisionScheme` of a mesh",
+        _put(MESH, "subdivisionScheme", _Types.Token, "catmullClark"),
+        "reported",
+        "CD31_r0_c0.subdivisionScheme is not taken over: surfaces are not subdivided",
+    ),
+    EditCase(
+        "a primvar of one's own on a mesh",
+        _put(MESH, "primvars:mine", _Types.FloatArray, [1.0]),
+        "reported",
+        "primvars:mine is not taken over: no material of the mesh reads this primvar",
+    ),
+    EditCase(
+        "a material bound on the specimen, stronger than its descendants",
+        _bind("/Specimen", "strongerThanDescendants"),
+        "taken",
+        "surfaces below it; a line says that volumes keep their colours",
+    ),
+    EditCase(
+        "a material bound on the specimen, weaker",
+        _bind("/Specimen", "weakerThanDescendants"),
+        "reported",
+        "bound on /Specimen, is not taken over: the channels' own materials are stronger",
+    ),
+    EditCase(
+        "a material that is bound nowhere",
+        lambda stage: define_material(stage, "/Specimen/Mine", (0, 1, 0)),
+        "reported",
+        "Material /Specimen/Mine is not taken over: no mesh is bound to it",
+    ),
+    EditCase("an added mesh", define_arrow, "taken", "a layer of the bundle, shown and hidden"),
+    EditCase("added curves", define_wire, "taken", "a layer of the bundle: tubes"),
+    EditCase(
+        "an added mesh over time",
+        lambda stage: define_arrow(stage).GetPointsAttr().Set([Gf.Vec3f(0)] * 7, 2.0),
+        "refused",
+        "Arrow.points: found values over time",
+    ),
+    EditCase(
+        "an added sphere, cube or other shape without points",
+        lambda stage: UsdGeom.Sphere.Define(stage, "/Specimen/Annotations/Ball"),
+        "reported",
+        "Sphere /Specimen/Annotations/Ball is not taken over: nothing in the bundle is made of",
+    ),
+    EditCase(
+        "a camera",
+        define_camera,
+        "taken",
+        "a named view of the viewer, in order",
+    ),
+    EditCase(
+        "a camera with a roll",
+        lambda stage: define_camera(stage, roll_deg=30),
+        "reported",
+        "roll of camera 'Close', 30 degrees, is not taken over: the viewer keeps up upright",
+        is_partial=True,
+    ),
+    EditCase(
+        "an added light with a place",
+        lambda stage: UsdLux.SphereLight.Define(stage, "/Specimen/Lights/Lamp"),
+        "reported",
+        "SphereLight /Specimen/Lights/Lamp is not taken over: the viewer has lamps of its own",
+    ),
+    EditCase(
+        "brightness of a light of the stage",
+        _put("/Specimen/Lights/key", "inputs:intensity", _Types.Float, 2.0),
+        "reported",
+        "key.inputs:intensity is not taken over: the viewer has lamps of its own",
+        is_partial=True,
+    ),
+    EditCase(
+        "a prim outside `/Specimen`",
+        lambda stage: UsdGeom.Cube.Define(stage, "/Box"),
+        "reported",
+        "Cube /Box is not taken over: it lies outside /Specimen",
+    ),
+)
+
+
+def main() -> None:
+    """Print the table as Markdown."""
+    print("\n".join(markdown()))
+
+
+def markdown() -> list[str]:
+    """Return the lines of the docs' table."""
+    rows = [(case.what, case.outcome, case.words) for case in CASES]
+    order = ("taken", "refused", "reported")
+    lines = ["| edit | is | in the bundle, or the line that is printed |", "|---|---|---|"]
+    for what, outcome, words in sorted(rows, key=lambda row: order.index(row[1])):
+        shown = words if outcome == "taken" else f"`... {words} ...`"
+        lines.append(f"| {what} | {outcome} | {shown} |")
+    return lines
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+/** The panel's section of what a layer adds to the specimen, and its key. Pure. */
+import type { Manifest } from "../bundle/generated/bundle";
+import type { Control, PartSection } from "../panel/controls";
+import { type KeyGroup, key, no } from "../panel/key";
+import type { AdditionSettings } from "./settings";
+
+export function additionSections(
+  { additions }: Manifest,
+  { hiddenAdditions: hidden }: Pick<AdditionSettings, "hiddenAdditions">,
+): readonly PartSection[] {
+  if (additions === undefined) return [];
+  const items = additions.layers.map(
+    ({ id, name }, i): Control => ({
+      kind: "toggle",
+      id: `addition-${i}`,
+      label: name,
+      value: !hidden.includes(id),
+      to: (shown) => ({
+        type: "hide-additions",
+        hidden: shown ? hidden.filter((each) => each !== id) : [...hidden, id],
+      }),
+    }),
+  );
+  return [{ id: "additions", label: "Added", rank: 30, items }];
+}
+
+const NO_ADDITIONS = "Nothing is added to this specimen.";
+
+export const ADDITION_KEYS: readonly KeyGroup[] = [
+  {
+    name: "Added",
+    rank: 75,
+    keys: [
+      key("F7", "Hide what is added to the specimen, or show all of it", ({ state }) => {
+        const { additions, hiddenAdditions } = state;
+        if (additions.length === 0) return no(NO_ADDITIONS);
+        return { type: "hide-additions", hidden: hiddenAdditions.length > 0 ? [] : additions };
+      }),
+    ],
+  },
+];

@@ -1,0 +1,27 @@
+/** The views of the stage's cameras, as the viewer keeps views. Pure. */
+import type { Manifest } from "../bundle/generated/bundle";
+import { FIELD_OF_VIEW_DEG } from "../interaction/named_views";
+import type { Vec3 } from "../math/vec3";
+import { place } from "../render/placement";
+import { type KeptView, MAX_VIEWS } from "../state/kept_views";
+
+const halfTan = (degrees: number) => Math.tan((degrees * Math.PI) / 360);
+
+/**
+ * The views in metres of the room. The viewer's lens is always the same, so it stands nearer or farther than the
+ * stage's camera: as much shows at the target.
+ */
+export function stageViews({ views, specimen }: Manifest): readonly KeptView[] {
+  const { center, scale } = place(specimen.bounds_um);
+  const inRoom = (point: Vec3): Vec3 => [
+    (point[0] - center[0]) * scale,
+    (point[1] - center[1]) * scale,
+    (point[2] - center[2]) * scale,
+  ];
+  return (views ?? []).slice(0, MAX_VIEWS).map(({ name, position_um, target_um, fov_deg }) => {
+    const [eye, target] = [inRoom(position_um), inRoom(target_um)];
+    const nearer = halfTan(fov_deg) / halfTan(FIELD_OF_VIEW_DEG);
+    const along = (i: 0 | 1 | 2) => target[i] + nearer * (eye[i] - target[i]);
+    return { name, target, position: [along(0), along(1), along(2)] };
+  });
+}
