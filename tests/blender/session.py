@@ -29,7 +29,16 @@ import stereocell_import  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
 from stereocell_import.looks import color_of, points_of  # noqa: E402
 
-_FIELDS = ("tiles", "lod", "representation", "transfer_function", "size", "is_lit", "is_stereo")
+_FIELDS = (
+    "tiles",
+    "channels",
+    "lod",
+    "representation",
+    "transfer_function",
+    "size",
+    "is_lit",
+    "is_stereo",
+)
 
 
 def import_stage(arguments):

@@ -26,7 +26,7 @@ from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.blender_session import NEEDS_BLENDER, run
 from support.bundles import load, write_bundle
-from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
+from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, HEAD, NAMES, TILES, leaf, write_whole
 
 pytestmark = NEEDS_BLENDER
 
@@ -215,6 +215,24 @@ def test_the_dialog_offers_the_transfer_functions_that_all_channels_have(
     found = run("import", tmp_path, stage=layer, transfer_function="bone", representation="volume")
     assert np.allclose(found["functions"][F_ID], [(0, 0), (0.75, 0.5)])
     assert run("find_functions", tmp_path, stage=tmp_path / "no.usda") == []
+
+
+def test_an_import_has_the_channels_that_the_stage_shows_or_all(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    layer = tmp_path / "over.usda"
+    hidden = f'over "{F_ID}"\n{{\ntoken visibility = "invisible"\n}}\n'
+    layer.write_text(
+        f'{HEAD}subLayers = [@{stage_path}@])\nover "Specimen" {{ over "Shown" {{ {hidden} }} }}\n'
+    )
+
+    def channels_of(**chosen: str) -> set[str]:
+        found = run("import", tmp_path, stage=layer, **chosen)
+        return {path.split("/")[4] for path in found["meshes"]}
+
+    shown = channels_of()
+    assert F_ID not in shown
+    assert channels_of(channels="ALL") == shown | {F_ID}
 
 
 def test_volumes_have_their_grid_place_and_transfer_function(

@@ -14,7 +14,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from .choice import AS_STAGED, Choice, open_stage, shared_functions
+from .choice import ALL, AS_STAGED, Choice, open_stage, shared_functions
 from .importing import DISPLAY, MICROMETRES, TRUE, describe_size, import_stage
 from .objects import CLASSES
 from .overlay import export_edits
@@ -57,6 +57,13 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
     tiles: StringProperty(
         name="Tiles", description="Names or patterns, with commas: r0_c0, r1_*", default="*"
     )
+    channels: EnumProperty(
+        name="Channels",
+        items=[
+            (AS_STAGED, "As in the stage", "The channels that the stage shows"),
+            (ALL, "All", "Also those that the stage does not show, as many stains at once"),
+        ],
+    )
     lod: EnumProperty(
         name="Level of detail",
         description="lod0 is the finest; a tile with fewer levels shows its coarsest",
@@ -95,7 +102,7 @@ class ImportStereoCellStage(bpy.types.Operator, ImportHelper):
 
     def execute(self, context):
         function = self.transfer_function or AS_STAGED
-        choice = Choice(self.tiles, self.lod, self.representation, function)
+        choice = Choice(self.tiles, self.lod, self.representation, function, self.channels)
         try:
             root = import_stage(
                 context, self.filepath, choice, self.size, self.is_lit, self.is_stereo

@@ -12,6 +12,8 @@ AS_STAGED = "AS_STAGED"
 ROOT = "/Specimen"
 TILES = f"{ROOT}/Tiles"
 CHANNELS = f"{ROOT}/Channels"
+SHOWN = f"{ROOT}/Shown"  # a prim for each channel, whose visibility holds in all tiles
+ALL = "ALL"
 METERS_PER_UNIT = 1e-6
 DISPLAY_SCALE = "stereocell:displayScale"  # on /Specimen: lengths at display size for one of its
 
@@ -27,6 +29,7 @@ class Choice:
     lod: str = AS_STAGED
     representation: str = AS_STAGED
     transfer_function: str = AS_STAGED
+    channels: str = AS_STAGED  # ALL: also those that the stage does not show
 
 
 def open_stage(path):
@@ -90,6 +93,11 @@ def write_choice(stage, choice, file):
             if variant is not None:
                 over.variantSelections[name] = variant
         tile.Unload()
+    if choice.channels == ALL and stage.GetPrimAtPath(SHOWN):
+        for shown in stage.GetPrimAtPath(SHOWN).GetChildren():
+            over = Sdf.CreatePrimInLayer(layer, shown.GetPath())
+            visibility = Sdf.AttributeSpec(over, "visibility", Sdf.ValueTypeNames.Token)
+            visibility.default = "inherited"
     if choice.transfer_function != AS_STAGED:
         for channel in stage.GetPrimAtPath(CHANNELS).GetChildren():
             known = _functions_of(channel)
