@@ -26,7 +26,7 @@ from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.blender_session import NEEDS_BLENDER, run
 from support.bundles import load, write_bundle
-from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, HEAD, NAMES, TILES, leaf, write_whole
+from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
 
 pytestmark = NEEDS_BLENDER
 
@@ -221,10 +221,12 @@ def test_an_import_has_the_channels_that_the_stage_shows_or_all(
     stage_path: Path, tmp_path: Path
 ) -> None:
     layer = tmp_path / "over.usda"
-    hidden = f'over "{F_ID}"\n{{\ntoken visibility = "invisible"\n}}\n'
-    layer.write_text(
-        f'{HEAD}subLayers = [@{stage_path}@])\nover "Specimen" {{ over "Shown" {{ {hidden} }} }}\n'
-    )
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths = [str(stage_path)]
+    stage.SetMetadata("metersPerUnit", 1e-6)
+    stage.SetMetadata("upAxis", "Y")
+    UsdGeom.Imageable(stage.GetPrimAtPath(f"/Specimen/Shown/{F_ID}")).MakeInvisible()
+    stage.Save()
 
     def channels_of(**chosen: str) -> set[str]:
         found = run("import", tmp_path, stage=layer, **chosen)

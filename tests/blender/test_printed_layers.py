@@ -20,7 +20,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("place", LAYERS)
 def test_the_add_on_imports_a_printed_layer(stage_path: Path, tmp_path: Path, place: str) -> None:
     layer = write_layer(LAYERS[place], tmp_path / "edited.usda", stage_path, F_ID)
-    found = run("import", tmp_path, stage=layer)
+    found = run("import", tmp_path, stage=layer, channels="ALL")
     mesh = found["meshes"][leaf("r0_c0", F_ID)]
     height = mesh["high"][1] - mesh["low"][1]
     assert height == pytest.approx(36 * 0.25, rel=0.03)  # um
