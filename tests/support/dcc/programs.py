@@ -11,7 +11,6 @@ from pxr import Sdf, Usd
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.storage.overwriting import forcing
-from stereocell.usd.layer import CHANNELS
 from stereocell.usd.read_stage import hinted_box, tile_prims
 from support.blender_session import PYTHON
 from support.dcc.view import View, fit, view_of, write_camera
@@ -37,11 +36,9 @@ def export_files(stage_path: Path, folder: Path) -> Files:
     view = view_of(stage)
     names = {"flat": "flat.usdc", "usdz": "light.usdz", "glb": "scene.glb"}
     files = {key: folder / name for key, name in names.items()}
-    # by default a .usdz has the label maps alone
-    channels = tuple(prim.GetName() for prim in stage.GetPrimAtPath(CHANNELS).GetChildren())
     with forcing(True):
         for file in files.values():
-            export_stage(stage_path, file, options=ExportOptions(lod=1, channels=channels))
+            export_stage(stage_path, file, options=ExportOptions(lod=1))
     views = {"stage": view, "flat": view, "glb": fit(view, 1e-6, np.zeros(3))}
     boxes = np.array([hinted_box(prim) for prim in tile_prims(stage)])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
