@@ -347,4 +347,4 @@ def test_an_address_is_left_out_of_lines_and_the_forms_that_are_expected_stay(
     line = f"{host}?show=51: another form, expected {host}?show=image-ID or {host}img/ID/"
     expected = f"the address: another form, expected {host}?show=image-ID or {host}img/ID/"
     assert without_identity(item, line) == expected
-    assert without_identity(item, f"{host}0/.zarray: missing") == "the address0/.zarray: missing"
+    assert without_identity(item, f"{host}0/.zarray: missing") == "the address/0/.zarray: missing"

@@ -166,6 +166,15 @@ def test_a_session_that_may_only_look_sees_the_build_and_can_not_command_it(
         assert client.item(item)["doing"] == "failed"
 
 
+def look(client: InboxClient, item: str) -> tuple[dict[str, Any], str, dict[str, str]]:
+    """Return the manifest of an item's look, the path of its bricks, and its first volume."""
+    client.command(item, "look")
+    _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
+    assert headers["Stereocell-Bricks"] == headers["Stereocell-Live"]
+    volume = {"tile": manifest["tiles"][0]["id"], "channel": manifest["channels"][0]["id"]}
+    return manifest, f"/items/{item}/view/{folder_in(headers)}bricks", volume
+
+
 def test_a_tile_that_is_looked_at_gets_the_voxels_of_the_upload_before_any_build(
     tmp_path: Path, head: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,14 +182,10 @@ def test_a_tile_that_is_looked_at_gets_the_voxels_of_the_upload_before_any_build
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         item, other = (hand_in(client, head, name) for name in ("a.nii", "b.nii"))
-        client.command(item, "look")
-        _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
-        folder = folder_in(headers)
-        assert headers["Stereocell-Bricks"] == headers["Stereocell-Live"]
-        volume = {"tile": manifest["tiles"][0]["id"], "channel": manifest["channels"][0]["id"]}
-        asked = f"/items/{item}/view/{folder}bricks", [volume]
+        manifest, bricks, volume = look(client, item)
+        box = tuple(manifest["specimen"]["bounds_um"].values())
         with server.inbox.find(other).reading, server.inbox.reader._busy:  # it reads another item
-            found = sent(server.port, *asked, tuple(manifest["specimen"]["bounds_um"].values()))
+            found = sent(server.port, bricks, [volume], box)
         assert found.done[1]["reason"] == "complete"
         (tree,) = found.trees.values()
         low, high = manifest["channels"][0]["window"]
@@ -199,11 +204,9 @@ def test_an_upload_that_is_damaged_after_the_look_is_an_error_without_its_name(
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         item = hand_in(client, head, "Doe^Jane.nii")
-        client.command(item, "look")
-        _, manifest, headers = client.ask("GET", f"/items/{item}/view/manifest.json")
-        volume = {"tile": manifest["tiles"][0]["id"], "channel": manifest["channels"][0]["id"]}
+        _, bricks, volume = look(client, item)
         next((tmp_path / "box" / item / "upload").rglob("*.nii")).write_bytes(head[:-1000])
-        found = sent(server.port, f"/items/{item}/view/{folder_in(headers)}bricks", [volume])
+        found = sent(server.port, bricks, [volume])
         (error,) = (one for one in found.said if one["type"] == "error")
         assert error["code"] == "damaged"
         assert "Doe" not in str(error)

@@ -443,7 +443,8 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         dest="build_out",
         type=_file,
         metavar="OUT",
-        help="folder of the build (default: NAME.stereocell here, by the specimen's name)",
+        help="folder of the build (default: NAME.stereocell here, by the specimen's name; beside "
+        "the source where that is the working folder)",
     )
     _declare_title(behind)
     declare_how_to_read(parser)

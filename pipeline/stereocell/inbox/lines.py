@@ -41,7 +41,8 @@ def without_identity(item: Item, text: str) -> str:
             text = text.replace(f"{shown}/", "").replace(shown, "the upload")
     if item.upload is not None:
         if address := item.address:
-            places = sorted({address, Location.of(address).shown}, key=len, reverse=True)
+            shown = Location.of(address).shown.rstrip("/")
+            places = sorted({address, shown}, key=len, reverse=True)
             one_of = "|".join(map(re.escape, places))
             # forms of addresses that are expected may begin like it, and have an ID in it
             text = re.sub(rf"(?:{one_of})(?!\S*\bID\b)", "the address", text)

@@ -71,7 +71,7 @@ class ToBuild:
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """What the first view of an item was made of.
+    """The plan, voxels and choices from which the first view of an item was made.
 
     read   the coarse voxels of its channels; see `first_view.read_channels`
     sizes  see `FineTiles.sizes`

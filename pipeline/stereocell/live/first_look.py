@@ -30,7 +30,7 @@ class FirstLook:
         cls, source: str, settings: Settings, choice: Sequence[str], *, title: str = ""
     ) -> "FirstLook":
         """Settle the plan of a source; the arguments are those of `settle`. Raises as it does."""
-        # while the source is read and hashed, which leaves the interpreter to others
+        # The kernels load while the source is read and hashed, which leaves the interpreter idle.
         loading = threading.Thread(target=load_kernels, daemon=True)
         loading.start()
         plan = settle(source, settings, choice, title=title)

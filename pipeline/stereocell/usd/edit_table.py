@@ -24,7 +24,16 @@ from stereocell.usd.write_objects import (
 
 _PLACED = ("xformOp:*", "xformOpOrder")
 _SHOWN = ("visibility", "purpose", "@active")
-# a display colour or opacity holds for all meshes below
+# The shape of a mesh
+_SHAPE = (
+    "points",
+    "faceVertexCounts",
+    "faceVertexIndices",
+    "orientation",
+    "normals",
+    "primvars:normals*",
+)
+# A display colour or opacity holds for all meshes below the prim.
 _DISPLAYED = ("primvars:displayColor*", "primvars:displayOpacity*")
 
 TAKEN: dict[str, tuple[str, ...]] = {
@@ -42,12 +51,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
     "mesh": (
         *_PLACED,
         *_SHOWN,
-        "points",
-        "faceVertexCounts",
-        "faceVertexIndices",
-        "orientation",
-        "normals",
-        "primvars:normals*",
+        *_SHAPE,
         "primvars:st",
         "primvars:st:indices",
         "primvars:tangents*",
@@ -106,12 +110,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
         *_PLACED,
         *_SHOWN,
         *_DISPLAYED,
-        "points",
-        "faceVertexCounts",
-        "faceVertexIndices",
-        "orientation",
-        "normals",
-        "primvars:normals*",
+        *_SHAPE,
         "curveVertexCounts",
         "widths",
         "type",

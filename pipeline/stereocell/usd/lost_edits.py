@@ -34,7 +34,7 @@ _BUILT = "built"  # place of a prim of the build that no reader looks at
 
 
 class _Fate(Enum):
-    """What becomes of an opinion that needs no line."""
+    """The reason why an opinion needs no line."""
 
     TAKEN = 1
     COVERED = 2  # by the line on its prim

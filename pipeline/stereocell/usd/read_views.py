@@ -69,7 +69,7 @@ def _view_of(prim: Usd.Prim, middle: NDArray[np.float64], longest: float) -> Sta
     ahead = float((middle - eye) @ forward)
     target = eye + forward * (ahead if ahead > 0 else longest)
     fov = 2 * np.degrees(np.arctan(aperture / (2 * focal)))
-    # of an upright camera the axis to the right is level
+    # The right-hand axis of an upright camera is level.
     roll = np.degrees(np.arcsin(np.clip(right[1], -1, 1)))
     name = str(prim.GetDisplayName() or prim.GetName())
     return StageView(name, _point(eye), _point(target), round(float(fov), 4), float(roll))

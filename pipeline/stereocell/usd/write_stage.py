@@ -57,7 +57,7 @@ from stereocell.usd.written_files import STAGE_NAME
 
 __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
-# of stage.usda, strongest first
+# The sublayers of stage.usda, the strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
 _NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
 Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""

@@ -1,4 +1,4 @@
-"""What is measured of a picture: light, hue and silhouette.
+"""Measure light, hue and silhouette of a picture.
 
 References
 ----------
@@ -32,7 +32,7 @@ _LAB = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """Of one picture.
+    """The numbers that describe one picture.
 
     luminance   mean over the specimen, of the encoded values, 0 to 1
     white       share of the specimen's pixels that are white in all three colours

@@ -20,7 +20,7 @@ HAIR = 2e-3  # of the distance to the eye: two channels that are as near fight f
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What the view shows.
+    """The channel that each pixel of a view has to show.
 
     channels  their names, and their linear colours: None where a mesh has colours of its own
     shown     (height, width): the channel's number; -1 where there is nothing, -2 where two

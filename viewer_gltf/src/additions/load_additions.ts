@@ -8,7 +8,7 @@ import type { FileRef } from "../bundle/generated/bundle";
 const UM_PER_METRE = 1e6;
 
 export type LoadedAdditions = Readonly<{
-  /** In um, world. */
+  /** The group of all additions, in um of the world. */
   scene: Object3D;
   /** The meshes by the ID of their addition. */
   byId: ReadonlyMap<string, Object3D>;
@@ -17,7 +17,7 @@ export type LoadedAdditions = Readonly<{
   dispose: () => void;
 }>;
 
-/** Throws BundleError. */
+/** Loads the additions of a bundle. Throws BundleError. */
 export async function loadAdditions(base: string, file: FileRef): Promise<LoadedAdditions> {
   const bytes = await fetchFile(base, file);
   const { scene } = await new GLTFLoader()

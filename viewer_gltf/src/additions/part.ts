@@ -1,4 +1,4 @@
-/** What a layer over the stage adds to the specimen, as a part of the viewer: arrows, labels, implants, electrodes. */
+/** This part shows arrows, labels, implants and electrodes that a layer over the stage adds to the specimen. */
 import { Group } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { FileRef } from "../bundle/generated/bundle";

@@ -37,8 +37,8 @@ export type Item = Readonly<{
 }>;
 
 /**
- * The limits of one item, in bytes and files. A request has at most `piece` bytes. An unfinished upload is kept for
- * so many `hours`.
+ * The limits of one item, in bytes and files. A request has at most `piece` bytes. The server keeps an unfinished
+ * upload for this number of `hours`.
  */
 export type Limits = Readonly<{
   bytes: number;

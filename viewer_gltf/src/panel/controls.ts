@@ -174,7 +174,7 @@ export type Button = Base &
 export type MapTile = Readonly<{
   id: string;
   name: string;
-  /** Its name where that stands alone. */
+  /** The tile's name, as it is written where it stands alone. */
   title: string;
   row: number;
   column: number;

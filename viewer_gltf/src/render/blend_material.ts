@@ -145,7 +145,7 @@ export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly twins: readonly Mesh[];
-  /** As the stage has it, 0..1: a surface of a bundle has one material. */
+  /** The opacity that the stage gives the surface, 0..1; each surface of a bundle has one material. */
   private readonly ownOpacity: number;
   private part: SurfacePart | null = null;
   isBlended = false;

@@ -5,7 +5,7 @@ import type { Vec3 } from "../math/vec3";
 export type KeptView = Readonly<{
   position: Vec3;
   target: Vec3;
-  /** Of the stage's camera that it is; absent: the user has kept it. */
+  /** The name of the stage's camera whose view this is; absent: the user has kept the view. */
   name?: string;
 }>;
 

@@ -1,6 +1,6 @@
 /** A tile's name for people. Pure. */
 
-/** What is known of a tile's name. */
+/** The parts of a tile from which its name for people is made. */
 export type NamedTile = Readonly<{ id: string; name?: string }>;
 
 /**
@@ -11,7 +11,7 @@ export function tileName(id: string, tiles: readonly NamedTile[]): string {
   return tiles.find((tile) => tile.id === id)?.name ?? placeInGrid(id);
 }
 
-/** The same where it stands alone. */
+/** The same name with a capital letter, for places where it stands alone. */
 export function tileTitle(id: string, tiles: readonly NamedTile[]): string {
   return tiles.find((tile) => tile.id === id)?.name ?? `Tile in ${placeInGrid(id)}`;
 }

@@ -42,7 +42,7 @@ export type Representation = Manifest["tiles"][number]["representation"];
 /** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
 export type TileState = Readonly<{
   id: string;
-  /** That the stage gives it; absent: it has none. */
+  /** The name that the stage gives the tile; absent: it has none. */
   name?: string;
   representation: Representation;
   /** Its surfaces are not built yet; absent: they are. */

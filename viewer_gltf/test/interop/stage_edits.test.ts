@@ -1,4 +1,4 @@
-/** What an artist adds in a layer over the stage is what the viewer shows: tests/support/edited_bundle.py. */
+/** The viewer shows the edits that an artist makes in a layer over the stage; tests/support/edited_bundle.py makes them. */
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
