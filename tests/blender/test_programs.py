@@ -22,9 +22,8 @@ SAMPLES = dict(one.split("=") for one in os.environ.get("STEREOCELL_DCC", "").sp
 SHEET = os.environ.get("STEREOCELL_DCC_SHEET")
 SIZE = (640, 360) if SAMPLES else (240, 135)
 LUMINANCE = (0.15, 0.7)  # of encoded values from 0 to 1
-# A .glb brings no light, and Blender's default scene has one lamp, seven units away: a dark red
-# specimen has .08 there
-DIMMER = {"Blender, glb": 0.07}
+# A .glb brings no light, and Blender's default scene has one lamp, seven units away
+DIMMER = {"Blender, glb": 0.1}
 HUE_DEGREES = 10
 OVERLAP = 0.95
 HAS_CHROMIUM = Path(os.environ.get("CHROMIUM") or "/usr/bin/chromium").exists()
