@@ -6,7 +6,6 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import date, timedelta
@@ -14,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from support.server.timeouts import PATIENCE_S
+from support.clusters import wait_for_scheduler
 
 PAGE = (Path(__file__).parents[2] / "docs" / "cluster.md").read_text("utf-8")
 _CALL = (
@@ -54,9 +53,7 @@ def scheduler_of_the_page(folder: Path) -> Iterator[str]:
         stderr=subprocess.DEVNULL,
     )
     try:
-        end = time.monotonic() + PATIENCE_S
-        while not (folder / "scheduler.json").exists() and time.monotonic() < end:
-            time.sleep(0.02)
+        wait_for_scheduler(folder / "scheduler.json")
         yield str(file)
     finally:
         process.kill()

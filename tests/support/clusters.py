@@ -1,11 +1,12 @@
 """A Dask cluster for tests: it listens on loopback only, and refuses clients without its key."""
 
+import json
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,6 +51,18 @@ def as_variables(settings: Mapping[str, object]) -> dict[str, str]:
     }
 
 
+def wait_for_scheduler(file: Path) -> None:
+    """Wait until a scheduler has written the whole of its scheduler file, at most PATIENCE_S."""
+    end = time.monotonic() + PATIENCE_S
+    # Dask opens the file before it writes it, so that a file which is there may still be empty.
+    while time.monotonic() < end:
+        with suppress(FileNotFoundError, ValueError):
+            json.loads(file.read_text("utf-8"))
+            return
+        time.sleep(0.02)
+    pytest.fail(f"{file.name} is not complete after {PATIENCE_S:.0f} s")
+
+
 @contextmanager
 def running_cluster(
     folder: Path, workers: int, environment: Mapping[str, str] | None = None
@@ -74,9 +87,7 @@ def running_cluster(
                 # without a nanny, which would start a killed worker again
                 lone = ("worker", "--nthreads", "1", "--no-nanny")
                 processes += [_start(folder, given, *lone) for _ in range(workers)]
-                end = time.monotonic() + PATIENCE_S
-                while not file.exists() and time.monotonic() < end:
-                    time.sleep(0.02)
+                wait_for_scheduler(file)
                 yield Cluster(str(file), processes[0], processes[1:])
             finally:
                 for process in reversed(processes):
