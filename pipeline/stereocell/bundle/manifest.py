@@ -20,7 +20,7 @@ SCHEMA = "bundle.schema.json"
 REMEDY = "run `stereocell bundle OUT`"
 # paths of the files that bundles have, where no list says which: its own, and those of the viewer
 _PATHS = re.compile(
-    r"(channels|volumes|luts|assets|environments)/.*|manifest\.json|files\.json|specimen\.usdz|additions\.glb"
+    r"(channels|volumes|luts|assets|environments)/.*|manifest\.json|files\.json|specimen\.usdz|additions\.glb|room\.exr"
     r"|(index\.html|sw\.js)(\.br|\.gz)?|app\.webmanifest|icon[\w-]*\.(png|svg)"
 )
 

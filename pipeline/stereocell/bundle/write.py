@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.bundle.copy_viewer import copy_viewer
@@ -28,6 +29,7 @@ from stereocell.bundle.manifest import FILES, MANIFEST
 from stereocell.bundle.tile_part import FileRef, read_part, write_file
 from stereocell.bundle.write_additions import write_additions
 from stereocell.bundle.write_ar import write_ar
+from stereocell.bundle.write_lights import write_lights
 from stereocell.bundle.write_objects import write_objects
 from stereocell.bundle.write_tile import path_from_stage
 from stereocell.formats.gltf import choose_step
@@ -40,6 +42,12 @@ from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
 from stereocell.usd.read_additions import notes_on_additions
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_bindings import notes_on_bindings
+from stereocell.usd.read_lights import (
+    StageLights,
+    notes_on_lights,
+    read_lights,
+    visible_lights,
+)
 from stereocell.usd.read_objects import painter_of, read_columns
 from stereocell.usd.read_provenance import fingerprint_of
 from stereocell.usd.read_stage import (
@@ -97,12 +105,15 @@ class Composed:
             yield note
         yield from notes_on_bindings(self.stage)
         yield from notes_on_edits(self.stage)
+        if next(visible_lights(self.stage), None) is None:
+            yield f"{self.path}: the stage has no light of its own: the viewer keeps its lamps"
         yield from self._notes_on_parts()
 
     def _notes_on_parts(self) -> Iterator[str]:
         """Yield a line on each edit of which a part is lost."""
         yield from notes_on_rolls(views_of(self.stage))
         yield from notes_on_additions(self.stage)
+        yield from notes_on_lights(lights_of(self))
 
     def require_all_taken(self) -> None:
         """Raise StageError where the bundle does not take over an edit."""
@@ -146,9 +157,8 @@ def fill_bundle(
             written += more
         channels.append(entry)
         files += written
-    additions = write_additions(stage, root)
-    if additions is not None:
-        files.append(additions.file)
+    added, written = _write_added(composed, root)
+    files += written
     usdz, usdz_reason = write_ar(composed.path, root, composed.as_written)
     if usdz is None:
         yield f"no specimen.usdz: {usdz_reason}"
@@ -159,7 +169,6 @@ def fill_bundle(
     listed = {ref.path: {"bytes": ref.bytes, "sha256": ref.sha256} for ref in files}
     index = write_file(root, FILES, encode(listed))
     ar = {"usdz": usdz, "usdz_reason": usdz_reason}
-    added = {} if additions is None else {"additions": additions.describe()}
     manifest = describe_bundle(
         _specimen_of(stage),
         tiles,
@@ -175,10 +184,42 @@ def fill_bundle(
                 yield f"{tile.id}/{channel.channel_id}: {channel.edit}"
 
 
+def _write_added(composed: Composed, root: Path) -> tuple[dict[str, Any], list[FileRef]]:
+    """Write what layers add beside the tiles: meshes, curves and lights.
+
+    Returns what the manifest says of them, and the files. Raises StageError and OutputError.
+    """
+    described: dict[str, Any] = {}
+    files: list[FileRef] = []
+    additions = write_additions(composed.stage, root)
+    if additions is not None:
+        described["additions"] = additions.describe()
+        files.append(additions.file)
+    lights = lights_of(composed)
+    if lights is not None:
+        described["lights"], written = write_lights(lights, root)
+        files += written
+    return described, files
+
+
 def views_of(stage: Usd.Stage) -> list[StageView]:
     """Return the named views of a stage. Raises StageError."""
+    return list(read_views(stage, *_box_of(stage)))
+
+
+def lights_of(composed: Composed) -> StageLights | None:
+    """Return the light that a user's layers give the stage; None: they give none.
+
+    Raises StageError.
+    """
+    require = composed.as_written.require
+    return read_lights(composed.stage, *_box_of(composed.stage), require)
+
+
+def _box_of(stage: Usd.Stage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest corner (x, y, z) of all tiles, um."""
     boxes = np.array([hinted_box(prim) for prim in tile_prims(stage)])
-    return list(read_views(stage, boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)))
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
 
 def _specimen_of(stage: Usd.Stage) -> dict[str, Any]:

@@ -186,6 +186,15 @@ def write_lut(path: Path, points: OpacityPoints) -> None:
     _write(path, {"RGBA": table}, {})
 
 
+def write_rgb(path: Path, image: NDArray[np.float32]) -> None:
+    """Write colours, linear (height, width, 3), as half floats, 65504 at most.
+
+    Raises OutputError if the file can't be written.
+    """
+    largest = np.finfo(np.float16).max
+    _write(path, {"RGB": image.clip(0, largest).astype(np.float16)}, {})
+
+
 def _write(
     path: Path, channels: dict[str, NDArray[np.float16]], attributes: dict[str, object]
 ) -> None:

@@ -7,11 +7,12 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_table import is_taken
-from stereocell.usd.layer import CHANNELS, ROOT, SHOWN, TILES
+from stereocell.usd.layer import CHANNELS, LIGHTS, ROOT, SHOWN, TILES
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 from stereocell.usd.read_additions import is_addition
 from stereocell.usd.read_appearances import surface_of
 from stereocell.usd.read_display import is_single, shows_display_color
+from stereocell.usd.read_lights import is_light
 from stereocell.usd.read_textures import vertex_values_of
 from stereocell.usd.read_views import is_view
 from stereocell.usd.write_objects import COLUMNS, LABELS
@@ -38,6 +39,8 @@ class Places:
             return "specimen"
         if path == CHANNELS:
             return "channels"
+        if path == LIGHTS:
+            return "lights"
         if path.GetParentPath() == SHOWN:
             return "shown" if path.name in self._channels else ""
         names = str(path).split("/")[2:]
@@ -50,6 +53,8 @@ class Places:
             return ""
         if is_view(prim):
             return "camera"
+        if is_light(prim):
+            return "light"
         if is_addition(prim):
             return "addition"
         if path.GetParentPath() == CHANNELS:

@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 
 from stereocell.usd.layer import DISPLAY_SCALE, OPENING_CUT, PAINTED_BY, SIDES
 from stereocell.usd.numbers2d import ATTRIBUTES
+from stereocell.usd.read_lights import INPUTS
 from stereocell.usd.write_objects import (
     COLUMN,
     COLUMNS,
@@ -106,6 +107,8 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "clippingRange",
         "@displayName",
     ),
+    "light": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
+    "lights": (*_PLACED, *_SHOWN),
     "addition": (
         *_PLACED,
         *_SHOWN,
@@ -184,13 +187,9 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("@displayName", "the bundle has no name for this prim"),
 )
 
-OF_LIGHTS = (
-    "the viewer has lamps of its own; distant lights and domes below /Specimen/Lights reach "
-    "specimen.usdz alone"
-)
 # Reasons for prims that a layer adds, by type; the first whose name the type's begins with or is
 ADDED: dict[str, str] = {
-    "Light": OF_LIGHTS,
+    "Light": "the viewer's lamps are distant lights, spheres and domes",
     "Volume": "it is no volume of a channel in a tile",
     "Material": "no mesh is bound to it",
     "Shader": "no surface is drawn with it",

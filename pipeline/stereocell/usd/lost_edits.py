@@ -16,8 +16,8 @@ from pxr import Sdf, Sdr, Tf, Usd, UsdGeom, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_places import Places, read_primvars
-from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, OF_LIGHTS, TAKEN, is_taken, reason_of
-from stereocell.usd.layer import LIGHTS, ROOT
+from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, TAKEN, is_taken, reason_of
+from stereocell.usd.layer import ROOT
 from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
 from stereocell.usd.read_attributes import over_time
 from stereocell.usd.read_bindings import binding_fault
@@ -192,8 +192,6 @@ class _Finder:
         attribute = prim.GetAttribute(name)
         if attribute and self._repeats(attribute, opinion.spec):
             return ""
-        if place == _BUILT and opinion.prim.HasPrefix(LIGHTS):
-            return OF_LIGHTS
         derived = DERIVED.get(place, {})
         if name in derived:
             return derived[name] and f"it follows from other values: edit {derived[name]}"

@@ -21,6 +21,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 from stereocell.formats.exr import read_rgb
 from stereocell.usd.layer import LIGHTS
 from stereocell.usd.read_attributes import file_of
+from stereocell.usd.read_lights import visible_lights
 from stereocell.usd.typed_values import read_as
 from stereocell.usd.written_files import AsWritten
 
@@ -34,19 +35,20 @@ def copy_lights(composed: Usd.Stage, small: Usd.Stage, as_written: AsWritten) ->
     Returns the images of the lights by their names in the archive. Raises StageError for a damaged
     image.
     """
-    group = composed.GetPrimAtPath(LIGHTS)
     images: dict[str, bytes] = {}
-    for light in group.GetChildren() if group else ():
-        is_distant = light.IsA(UsdLux.DistantLight) or light.IsA(UsdLux.DomeLight)
-        visibility = UsdGeom.Imageable(light).ComputeVisibility()
-        if is_distant and visibility != UsdGeom.Tokens.invisible:
+    for light in visible_lights(composed):
+        if not light.IsA(UsdLux.SphereLight):
             images |= _copy_light(light, small, as_written)
     return images
 
 
 def _copy_light(light: Usd.Prim, small: Usd.Stage, as_written: AsWritten) -> dict[str, bytes]:
     UsdGeom.Scope.Define(small, LIGHTS)
-    copy = small.DefinePrim(LIGHTS.AppendChild(light.GetName()), light.GetTypeName())
+    path, number = LIGHTS.AppendChild(light.GetName()), 1
+    while small.GetPrimAtPath(path):  # another group of the stage has a light of this name
+        number += 1
+        path = LIGHTS.AppendChild(f"{light.GetName()}_{number}")
+    copy = small.DefinePrim(path, light.GetTypeName())
     world = UsdGeom.XformCache().GetLocalToWorldTransform(light)
     turn = Gf.Matrix4d(world.ExtractRotationMatrix().GetOrthonormalized(), Gf.Vec3d(0))
     if turn != Gf.Matrix4d(1):
@@ -60,7 +62,7 @@ def _copy_light(light: Usd.Prim, small: Usd.Stage, as_written: AsWritten) -> dic
             if not value.path or Path(value.path).suffix.lower() not in _IMAGES:
                 continue
             suffix, content, factor = _pack_image(as_written.require(file_of(attribute)))
-            name = f"textures/{light.GetName()}{suffix}"
+            name = f"textures/{path.name}{suffix}"
             images[name] = content
             value = Sdf.AssetPath(name)
         if value is not None:
