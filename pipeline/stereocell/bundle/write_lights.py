@@ -25,14 +25,10 @@ def write_lights(lights: StageLights, root: Path) -> tuple[dict[str, Any], list[
 
 
 def _describe_lamp(lamp: StageLamp) -> dict[str, Any]:
-    place = (
-        {"position_um": list(lamp.position)}
-        if lamp.position is not None
-        else {"towards": list(lamp.towards or ())}
-    )
     return {
         "name": lamp.name,
         "color": list(lamp.color),
         "strength": min(lamp.strength, MAX_STRENGTH),
-        **place,
+        "towards": lamp.towards and list(lamp.towards),
+        "position_um": lamp.position and list(lamp.position),
     }

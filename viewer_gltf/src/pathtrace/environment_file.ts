@@ -1,7 +1,8 @@
 /** Light from all around, out of a file: a built-in one, or the user's .hdr or .exr. */
 import { FloatType } from "three";
 import { BundleError } from "../bundle/errors";
-import { fileAddress, readBody, request } from "../bundle/fetch";
+import { fetchFile, fileAddress, readBody, request } from "../bundle/fetch";
+import type { FileRef } from "../bundle/generated/bundle";
 import {
   asBrightAs,
   type EnvironmentTables,
@@ -19,6 +20,12 @@ export async function loadEnvironment(base: string, name: string): Promise<Envir
   const path = `environments/${name}.hdr`;
   const response = await request(fileAddress(base, path), path);
   return environmentTables(await parseHdr(await readBody(response, path), path));
+}
+
+/** The light of the stage's domes, a file of the bundle. Throws BundleError. */
+export async function loadStageRoom(base: string, file: FileRef): Promise<EnvironmentTables> {
+  const bytes = await fetchFile(base, file);
+  return environmentTables(await parseExr(bytes, file.path));
 }
 
 /**

@@ -1,11 +1,17 @@
 /** The environment that lights what is traced: a built-in one or the user's, loaded when it is first wanted. */
 import { viewerAddress } from "../bundle/address";
 import { BundleError, TemporaryError } from "../bundle/errors";
+import type { FileRef } from "../bundle/generated/bundle";
 import type { EnvironmentTables } from "./environment_sampling";
 
 export const PATHS_NOT_LOADED = "The part of the page that follows light could not be had.";
 /** The name of an environment out of a file of the user's. */
 const OWN = "own";
+/** The name of the light of the stage's domes. */
+const STAGE = "stage";
+
+/** Where the image of a stage's domes is. */
+export type StageRoom = Readonly<{ base: string; file: FileRef }>;
 
 export class EnvironmentLight {
   /** The name of the environment that was asked for last; "": none. */
@@ -14,6 +20,8 @@ export class EnvironmentLight {
   isLoading = false;
 
   constructor(
+    /** The image of the stage's domes; null: it has none. */
+    private readonly stageRoom: StageRoom | null,
     private readonly onTables: (tables: EnvironmentTables) => void,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -45,8 +53,12 @@ export class EnvironmentLight {
     this.hasFailed = false;
     this.isLoading = true;
     try {
-      const { loadEnvironment } = await loadLightReader();
-      const tables = await loadEnvironment(viewerAddress(), name);
+      const { loadEnvironment, loadStageRoom } = await loadLightReader();
+      const { stageRoom } = this;
+      const tables =
+        name === STAGE && stageRoom !== null
+          ? await loadStageRoom(stageRoom.base, stageRoom.file)
+          : await loadEnvironment(viewerAddress(), name);
       if (this.name === name) this.onTables(tables);
     } catch (error) {
       if (!(error instanceof BundleError)) throw error;

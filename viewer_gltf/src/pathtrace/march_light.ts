@@ -2,8 +2,8 @@
  * The lamps and the room's light of the traced picture, as the march has them that stands in for it. The march
  * knows two lamps without shadows, a sky and a ground; LightProbe then makes it as bright as the traced picture.
  */
-import { type Matrix4, Vector3 } from "three";
-import { GLOSS } from "../gpu/room_light";
+import type { Matrix4, Vector3 } from "three";
+import { asOneLamp, GLOSS } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import { type Lamp, MEDIUM_NUMBERS, type TraceSettings } from "../state/path_trace_settings";
 import type { MarchLight } from "../voxels/march_frame";
@@ -51,14 +51,8 @@ export function lightMarch(
   place(march.uFill.value, march.uFillLight.value, others, toEye);
 }
 
-/** Lamps as one, from where most of their light comes. */
 function place(towards: Vector3, light: Vector3, lamps: readonly Lamp[], toEye: Matrix4): void {
-  towards.set(0, 0, 0);
-  light.set(0, 0, 0);
-  for (const { x, y, z, strength, color } of lamps) {
-    towards.addScaledVector(new Vector3(x, y, z).normalize(), strength);
-    light.addScaledVector(new Vector3(...color), strength);
-  }
-  if (towards.lengthSq() === 0) towards.set(0, 0, 1);
-  towards.transformDirection(toEye);
+  const one = asOneLamp(lamps.map((lamp) => ({ ...lamp, towards: [lamp.x, lamp.y, lamp.z] })));
+  towards.set(...one.towards).transformDirection(toEye);
+  light.set(...one.light);
 }

@@ -25,10 +25,21 @@ class PathTracePart implements Part, Form {
       return;
     }
     const { sceneDepth } = host.frame;
+    const { base, manifest } = host.bundle;
+    const image = manifest.lights?.room?.image;
+    const stageRoom = image === undefined ? null : { base, file: image };
     const onChange = () => host.display.requestFrame();
     const onError = (error: unknown) => host.report(error);
     const { bricks, limits } = texels;
-    this.volume = new TracedVolume(volumes, bricks, limits, sceneDepth, onChange, onError);
+    this.volume = new TracedVolume(
+      volumes,
+      bricks,
+      limits,
+      sceneDepth,
+      stageRoom,
+      onChange,
+      onError,
+    );
     host.frame.add(this.volume.group);
   }
 

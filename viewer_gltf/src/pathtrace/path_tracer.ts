@@ -6,7 +6,7 @@
 import type { Matrix4, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
 import type { Eyes } from "../gpu/eyes";
-import { GROUND, SKY } from "../gpu/room_light";
+import { OWN_LIGHT } from "../gpu/room_light";
 import { ScreenPass } from "../gpu/screen_pass";
 import type { MarchedFrame, TraceScene } from "../render/drawn_forms";
 import { ENOUGH_SAMPLES, type TraceSettings } from "../state/path_trace_settings";
@@ -63,7 +63,7 @@ export class Tracer {
   private readonly probe = new LightProbe();
   private readonly denoiseAndTone = new DenoiseAndTone(this.probe);
   private roomLight: readonly [number, number, number] = [0, 0, 0];
-  private hemispheres: Hemispheres = { sky: SKY, ground: GROUND };
+  private hemispheres: Hemispheres = OWN_LIGHT;
   private texels: MediumTexels | null = null;
   /** From where paths begin: where the eyes were, as long as they only tremble. */
   private anchors: readonly TraceView[] = [];

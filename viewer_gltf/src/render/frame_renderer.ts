@@ -19,7 +19,6 @@ import { EncodePass } from "../gpu/encode_pass";
 import { Eyes } from "../gpu/eyes";
 import { drawWhole } from "../gpu/float_targets";
 import { linearTarget } from "../gpu/linear_target";
-import { KEY_AT, towards } from "../gpu/room_light";
 import type { Clip } from "../math/clip";
 import { lightByRoom, makeFrame, REST_STEPS } from "../voxels/march_frame";
 import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_material";
@@ -108,6 +107,7 @@ export class FrameRenderer {
   private readonly lamp = new Vector3();
   private readonly corner = new Vector3();
   private readonly toSpecimen = new Matrix4();
+  private readonly toEye = new Matrix4();
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -146,7 +146,7 @@ export class FrameRenderer {
     const marches = volumes?.marches ?? null;
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
-    room.light(head);
+    room.aimLamps(head);
     room.isFlat = this.eyes.all.length === 1;
     this.both.takeIn(room.scene);
     this.cuts.follow(clip, specimen);
@@ -171,9 +171,11 @@ export class FrameRenderer {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
       marches.placeAs(specimen);
-      const lamp = this.lamp.set(...towards(KEY_AT)).transformDirection(head);
+      const axes = room.lampAxes(head);
+      const lamp = this.lamp.set(...room.light.key.towards).transformDirection(axes);
       lamp.transformDirection(toSpecimen);
-      if (tracer === null) lightByRoom(this.marchFrame);
+      const toEye = this.toEye.copy(head).invert().multiply(axes);
+      if (tracer === null) lightByRoom(this.marchFrame, room.light, toEye);
       else tracer.lightMarch(this.marchFrame, specimen, head);
       const { apex_um: apex, axis_um: axis } = hybrid;
       volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });

@@ -11,9 +11,10 @@ import {
   Scene,
 } from "three";
 import type { Bounds, Manifest } from "../bundle/generated/bundle";
-import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SHINES_AT, SKY } from "../gpu/room_light";
+import type { FarLamp, RoomLight } from "../gpu/room_light";
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
+import { roomLightOf } from "../state/stage_light";
 import type { Backdrop } from "./backdrop";
 import { Specimen } from "./specimen_pose";
 import { FAR, type Theme } from "./theme";
@@ -23,8 +24,10 @@ const OUTLINE = 0x5b6678;
 export class Room {
   readonly scene = new Scene();
   readonly specimen: Specimen;
-  private readonly key = new DirectionalLight(colorOf(KEY), Math.PI);
-  private readonly fill = new DirectionalLight(colorOf(FILL), Math.PI);
+  /** The light of what paths of light do not draw. */
+  readonly light: RoomLight;
+  private readonly key: DirectionalLight;
+  private readonly fill: DirectionalLight;
   private readonly outline: Box3Helper;
   private readonly dark = new Color(FAR.dark);
   private readonly flat = new Color(FAR.dark);
@@ -37,7 +40,11 @@ export class Room {
     this.specimen = new Specimen(manifest.specimen.bounds_um);
     const { group } = this.specimen;
     this.scene.background = this.dark;
-    this.scene.add(new HemisphereLight(colorOf(SKY), colorOf(GROUND), Math.PI));
+    this.light = roomLightOf(manifest);
+    const { key, fill, sky, ground } = this.light;
+    this.key = new DirectionalLight(colorOf(key.light), Math.PI);
+    this.fill = new DirectionalLight(colorOf(fill.light), Math.PI);
+    this.scene.add(new HemisphereLight(colorOf(sky), colorOf(ground), Math.PI));
     this.scene.add(this.key, this.key.target, this.fill, this.fill.target, group);
     this.outline = new Box3Helper(new Box3(), OUTLINE);
     const material = this.outline.material as LineBasicMaterial;
@@ -76,10 +83,20 @@ export class Room {
     this.backdrop?.standUnder(points);
   }
 
-  /** The lamp hangs over the viewer's left shoulder, wherever the viewer goes. */
-  light(eye: Matrix4): void {
-    aim(this.key, eye, KEY_AT);
-    aim(this.fill, eye, FILL_AT);
+  /**
+   * The axes that the lamps' directions are in, in the room: the viewer's own lamps go wherever the viewer goes.
+   *
+   * @param head the viewer's pose in the room
+   */
+  lampAxes(head: Matrix4): Matrix4 {
+    return this.light.standsWith === "eye" ? head : this.specimen.group.matrixWorld;
+  }
+
+  /** @param head the viewer's pose in the room */
+  aimLamps(head: Matrix4): void {
+    const axes = this.lampAxes(head);
+    aim(this.key, axes, this.light.key);
+    aim(this.fill, axes, this.light.fill);
   }
 
   /** Returns a tile's bounds (um, world), or null if there is no such tile. */
@@ -108,7 +125,7 @@ function colorOf([r, g, b]: Rgb): Color {
   return new Color().setRGB(r, g, b);
 }
 
-function aim(light: DirectionalLight, eye: Matrix4, at: Vec3): void {
-  light.position.set(...at).applyMatrix4(eye);
-  light.target.position.set(...SHINES_AT).applyMatrix4(eye);
+/** A directional light shines from its place to its target, which stays in the room's middle. */
+function aim(light: DirectionalLight, axes: Matrix4, { towards }: FarLamp): void {
+  light.position.set(...towards).transformDirection(axes);
 }

@@ -5,6 +5,7 @@ import { START_CHANNEL } from "./parameters/channel";
 import { START_SETTINGS } from "./parameters/settings";
 import type { Mode } from "./parameters/volumes";
 import { startOfParts } from "./part_settings";
+import { traceLitBy } from "./stage_light";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /** Most tiles that open as volumes; of a larger specimen the chosen tile does. */
@@ -37,6 +38,8 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
   return {
     ...START_SETTINGS,
     ...startOfParts(),
+    trace: traceLitBy(manifest.lights, manifest.specimen.bounds_um),
+    hasStageRoom: manifest.lights?.room !== undefined,
     channels: manifest.channels.map((channel, index) => ({
       id: channel.id,
       name: channel.name,

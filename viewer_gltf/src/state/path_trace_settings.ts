@@ -15,7 +15,7 @@ export type Lamp = Readonly<{
   strength: number;
 }>;
 
-export const ENVIRONMENTS = ["studio", "sky", "own"] as const;
+export const ENVIRONMENTS = ["studio", "sky", "stage", "own"] as const;
 export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;

@@ -3,6 +3,7 @@ import {
   type Data3DTexture,
   DataTexture,
   type DepthTexture,
+  Matrix4,
   NearestFilter,
   RedFormat,
   RepeatWrapping,
@@ -13,7 +14,7 @@ import {
   Vector4,
 } from "three";
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
-import { FILL, FILL_AT, GLOSS, GROUND, KEY, KEY_AT, SKY, towards } from "../gpu/room_light";
+import { GLOSS, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
 
 /** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
 export const MAX_STEPS = 100;
@@ -35,14 +36,22 @@ export function marchLight() {
   };
 }
 
-/** The room's own light, which surfaces have too. */
-export function lightByRoom(light: MarchLight): void {
-  light.uLight.value.set(...towards(KEY_AT)).normalize();
-  light.uFill.value.set(...towards(FILL_AT)).normalize();
-  light.uKeyLight.value.set(...KEY);
-  light.uFillLight.value.set(...FILL);
-  light.uSkyLight.value.set(...SKY);
-  light.uGroundLight.value.set(...GROUND);
+/**
+ * The room's light, which surfaces have too.
+ *
+ * @param toEye from the axes that the lamps stand in to those of the eye
+ */
+export function lightByRoom(
+  light: MarchLight,
+  { key, fill, sky, ground }: RoomLight,
+  toEye: Matrix4,
+): void {
+  light.uLight.value.set(...key.towards).transformDirection(toEye);
+  light.uFill.value.set(...fill.towards).transformDirection(toEye);
+  light.uKeyLight.value.set(...key.light);
+  light.uFillLight.value.set(...fill.light);
+  light.uSkyLight.value.set(...sky);
+  light.uGroundLight.value.set(...ground);
   light.uGloss.value = GLOSS;
 }
 
@@ -82,7 +91,7 @@ export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
   noise.minFilter = noise.magFilter = NearestFilter;
   noise.needsUpdate = true;
   const light = marchLight();
-  lightByRoom(light);
+  lightByRoom(light, OWN_LIGHT, new Matrix4());
   return {
     ...light,
     uSceneDepth: { value: depth },

@@ -27,6 +27,8 @@ import { isTraced, type VolumeSettings } from "./volumes";
 export const START_LIGHT = {
   /** How the picture of the mode `traced` is made. */
   trace: START_TRACE,
+  /** Whether the stage has a room, the light of its domes. */
+  hasStageRoom: false,
   /** Whether its lamps can be seen, and taken hold of. */
   areLampsShown: false,
 };
@@ -113,17 +115,23 @@ const MULTIPLE: SwitchParameter<Light> = {
   spoken: ({ trace }) => `Scattered ${trace.isMultiple ? "many times" : "once"}`,
 };
 
+const environmentOf = ofTrace("environment");
+
 export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
   kind: "choice",
   id: "trace-room",
   label: "Room",
   link: "room",
   refusal,
-  ...ofTrace("environment"),
+  get: environmentOf.get,
+  set: (on, value) => (value === "stage" && !on.hasStageRoom ? on : environmentOf.set(on, value)),
   values: ENVIRONMENTS,
-  names: { studio: "Studio", sky: "Sky", own: "Own" },
-  options: ({ trace }) =>
-    ENVIRONMENTS.filter((name) => name !== "own" || trace.environment === "own"),
+  names: { studio: "Studio", sky: "Sky", stage: "Stage", own: "Own" },
+  options: ({ trace, hasStageRoom }) =>
+    ENVIRONMENTS.filter(
+      (name) =>
+        (name !== "own" || trace.environment === "own") && (name !== "stage" || hasStageRoom),
+    ),
   ownValue: "own",
   key: ["I", "Next room"],
   spoken: ({ trace }) => `Room: ${trace.environment}`,

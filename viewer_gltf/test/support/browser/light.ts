@@ -1,5 +1,5 @@
 /** The light of pixels, and that of the room on what faces the eye. */
-import { FILL, FILL_AT, GROUND, KEY, KEY_AT, SKY, towards } from "../../../src/gpu/room_light";
+import { type FarLamp, OWN_LIGHT } from "../../../src/gpu/room_light";
 import { fromHex } from "../../../src/math/color";
 import type { Vec3 } from "../../../src/math/vec3";
 import { FIELD_OF_VIEW_RAD } from "./camera";
@@ -26,9 +26,10 @@ export function lightFacing(
 ): number {
   const slope = Math.tan(FIELD_OF_VIEW_RAD / 2) / (height / 2);
   const normal = unit([(width / 2 - x) * slope, (y - height / 2) * slope, 1]);
-  const lamp = (light: number, at: Vec3) => light * Math.max(0, dot(normal, unit(towards(at))));
+  const { key, fill, sky: above, ground: below } = OWN_LIGHT;
+  const lamp = ({ light, towards }: FarLamp) => light[0] * Math.max(0, dot(normal, unit(towards)));
   const sky = 0.5 + 0.5 * normal[1];
-  return lamp(KEY[0], KEY_AT) + lamp(FILL[0], FILL_AT) + GROUND[0] * (1 - sky) + SKY[0] * sky;
+  return lamp(key) + lamp(fill) + below[0] * (1 - sky) + above[0] * sky;
 }
 
 function unit(v: Vec3): Vec3 {

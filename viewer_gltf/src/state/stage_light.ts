@@ -1,0 +1,59 @@
+/** The light that a layer over the stage gives the specimen, for path tracing and for all other pictures. Pure. */
+import type { Lights, Manifest, StageLamp } from "../bundle/generated/bundle";
+import { asOneLamp, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
+import type { Vec3 } from "../math/vec3";
+import { LAMP_REACH, type Lamp, START_TRACE, type TraceSettings } from "./path_trace_settings";
+
+type Bounds = Manifest["specimen"]["bounds_um"];
+
+const DARK = [0, 0, 0] as const;
+
+/** The light of a bundle's pictures, paths of light aside. */
+export function roomLightOf({ lights, specimen: { bounds_um } }: Manifest): RoomLight {
+  if (lights === undefined) return OWN_LIGHT;
+  const [key, ...others] = lights.lamps.map((lamp) => ({
+    ...lamp,
+    towards: asideOf(lamp, bounds_um),
+  }));
+  return {
+    key: asOneLamp(key === undefined ? [] : [key]),
+    fill: asOneLamp(others),
+    sky: lights.room?.sky ?? DARK,
+    ground: lights.room?.ground ?? DARK,
+    standsWith: "specimen",
+  };
+}
+
+/** What paths of light start with. The light of a stage needs no other exposure than surfaces have. */
+export function traceLitBy(lights: Lights | undefined, bounds: Bounds): TraceSettings {
+  if (lights === undefined) return START_TRACE;
+  const off = START_TRACE.lamps.map((lamp): Lamp => ({ ...lamp, isOn: false }));
+  const lamps = off.map((lamp, i) => {
+    const given = lights.lamps[i];
+    return given === undefined ? lamp : lampOf(given, bounds);
+  });
+  return {
+    ...START_TRACE,
+    lamps,
+    exposure: 0,
+    environment: lights.room === undefined ? START_TRACE.environment : "stage",
+    environmentLight: lights.room === undefined ? 0 : 1,
+  };
+}
+
+/** A lamp that is farther away than a hand reaches stands nearer, and is as bright in the middle. */
+function lampOf(lamp: StageLamp, bounds: Bounds): Lamp {
+  const aside = asideOf(lamp, bounds);
+  const largest = Math.max(...aside.map(Math.abs));
+  const share = lamp.position_um === null || largest > LAMP_REACH ? LAMP_REACH / largest : 1;
+  const [x, y, z] = aside.map((v) => v * share);
+  return { isOn: true, x, y, z, color: lamp.color, strength: lamp.strength };
+}
+
+/** To a lamp from the specimen's middle: in its longest edges, or, of a far lamp, a direction. */
+function asideOf({ towards, position_um }: StageLamp, { min, max }: Bounds): Vec3 {
+  if (position_um === null) return towards ?? [0, 0, 1];
+  const edge = Math.max(...max.map((v, k) => v - min[k]));
+  const [x, y, z] = position_um.map((v, k) => (v - (min[k] + max[k]) / 2) / edge);
+  return [x, y, z];
+}
