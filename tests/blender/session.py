@@ -7,6 +7,7 @@ all of them, which takes longer than most steps do.
 """
 
 import json
+import math
 import os
 import sys
 import traceback
@@ -26,6 +27,7 @@ sys.path.append(str(Path(__file__).parents[2] / "usd_assets" / "blender"))
 
 import bmesh  # noqa: E402  (bpy brings it)
 import stereocell_import  # noqa: E402
+from mathutils import Matrix  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
 from stereocell_import.looks import color_of, points_of  # noqa: E402
 
@@ -302,6 +304,14 @@ def add_new(_root):
     bpy.context.scene.collection.objects.link(block)
 
 
+def add_a_probe(_root):
+    bpy.ops.object.lightprobe_add(type="SPHERE")
+
+
+def add_a_spot(_root):
+    bpy.ops.object.light_add(type="SPOT")
+
+
 def smooth_by_modifier(root):
     a_mesh(root).modifiers.new("Smooth", "SMOOTH")
 
@@ -326,8 +336,10 @@ def move_a_camera(_root):
     by_prim("/Specimen/Cameras/mono").location.x += 5
 
 
-def move_a_light(_root):
-    by_prim("/Specimen/Lights/key").location.x += 5
+def change_the_world(_root):
+    tree = bpy.context.scene.world.node_tree
+    node = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground" and not n.label)
+    node.inputs["Strength"].default_value += 1
 
 
 def take_out(root):
@@ -357,11 +369,72 @@ def work_in_edit_mode(root):
     bmesh.update_edit_mesh(block.data)
 
 
+def gold():
+    """Return a translucent material with plain values."""
+    material = bpy.data.materials.new("gold")
+    material.use_nodes = True
+    (shader,) = [n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"]
+    shader.inputs["Base Color"].default_value = (1.0, 0.5, 0.0, 1.0)
+    shader.inputs["Metallic"].default_value = 1.0
+    shader.inputs["Roughness"].default_value = 0.25
+    shader.inputs["Alpha"].default_value = 0.5
+    return material
+
+
+def decorate(root):
+    """Add an arrow, a mirrored box, a text, a wire, a camera and lamps, as an artist does."""
+    at_stage = root.matrix_world
+
+    def add(block, place):
+        block.matrix_world = at_stage @ place
+        return block
+
+    arrow = bpy.data.meshes.new("arrow")
+    arrow.from_pydata([(0, 0, 0), (2, 4, 0), (-2, 4, 0)], [], [(0, 1, 2)])
+    block = bpy.data.objects.new("arrow: here", arrow)
+    bpy.context.scene.collection.objects.link(block)
+    block.data.materials.append(gold())
+    add(block, Matrix.Translation((10, -5, 20)))
+    bpy.ops.mesh.primitive_cube_add(size=2)
+    box = bpy.context.active_object
+    box.name = "box"
+    add(box, Matrix.Translation((40, -5, 4)) @ Matrix.Diagonal((-3, 2, 1, 1)))
+    bpy.ops.object.text_add()
+    text = bpy.context.active_object
+    text.name, text.data.body = "label", "CD8"
+    add(text, Matrix.Translation((0, 5, 10)) @ Matrix.Scale(4, 4))
+    bpy.ops.curve.primitive_bezier_circle_add(radius=1)
+    wire = bpy.context.active_object
+    wire.name, wire.data.bevel_depth = "wire", 0.1
+    add(wire, Matrix.Translation((10, -5, 4)) @ Matrix.Scale(8, 4))
+    bpy.ops.object.camera_add()
+    camera = bpy.context.active_object
+    camera.name, camera.data.lens = "Close", 50
+    camera.data.sensor_fit, camera.data.sensor_height = "VERTICAL", 20
+    add(camera, Matrix.Translation((10, -5, 60)))
+    bpy.ops.object.light_add(type="SUN")
+    sun = bpy.context.active_object
+    sun.name, sun.data.energy, sun.data.color = "Evening", 2.0, (1, 0.5, 0.25)
+    add(sun, Matrix.Rotation(math.pi / 2, 4, "Y"))  # it shines along -x
+    bpy.ops.object.light_add(type="POINT")
+    lamp = bpy.context.active_object
+    lamp.name, lamp.data.energy = "Bulb", 2e4 * math.pi**2 * at_stage.to_scale().x ** 2
+    add(lamp, Matrix.Translation((20, 95, 4)))
+    by_prim("/Specimen/Lights/key").data.energy *= 2
+    by_prim("/Specimen/Lights/fill").hide_render = True
+    for key in list(root.keys()):
+        if key.startswith(COLOR):
+            (value,) = [n for n in root[key].nodes if n.bl_idname == "ShaderNodeValue"]
+            value.outputs[0].default_value = 0.4
+            break
+
+
 _ODD = {
     one.__name__: one
-    for one in (drop_a_face, add_a_vertex, rename, copy, add_new, smooth_by_modifier,
-                rewire_a_material, replace_a_material, color_a_ramp, move_a_camera, move_a_light,
-                take_out, add_shape_keys, animate, paint_other_uvs, work_in_edit_mode)
+    for one in (drop_a_face, add_a_vertex, rename, copy, add_new, add_a_probe, add_a_spot,
+                smooth_by_modifier, rewire_a_material, replace_a_material, color_a_ramp,
+                move_a_camera, change_the_world, take_out, add_shape_keys, animate,
+                paint_other_uvs, work_in_edit_mode, decorate)
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
 
@@ -25,7 +26,8 @@ from stereocell.samples.cells import table_beside, write_cells
 from stereocell.storage.overwriting import forcing
 from stereocell.usd.validate import validate_stage
 from support.blender_session import NEEDS_BLENDER, run
-from support.bundles import load, write_bundle
+from support.bundles import load, write, write_bundle
+from support.glbs import read
 from support.stages import BALL_ID, COLORS, F_ID, FUNCTIONS, NAMES, TILES, leaf, write_whole
 
 pytestmark = NEEDS_BLENDER
@@ -452,21 +454,22 @@ NAME = "CD3_x3b5__r0_c0"
 @pytest.mark.parametrize(
     ("odd", "words"),
     [
-        ("drop_a_face", f"{NAME}: topology changed"),
-        ("add_a_vertex", f"{NAME}: topology changed"),
-        ("rename", f"{NAME}: renamed to it's mine"),
-        ("copy", f"{NAME}.001: a copy, or new"),
-        ("add_new", "arrow: a copy, or new"),
-        ("smooth_by_modifier", f"{NAME}: modifier Smooth, not applied"),
-        ("rewire_a_material", f"material {NAME}_look: its nodes changed"),
-        ("replace_a_material", f"{NAME}: another material"),
-        ("color_a_ramp", "volume: its nodes changed"),
-        ("move_a_camera", "mono: moved"),
-        ("move_a_light", "key: moved"),
-        ("take_out", f"{NAME}: taken out of the specimen"),
-        ("add_shape_keys", f"{NAME}: shape keys"),
-        ("animate", f"{NAME}: animation"),
-        ("paint_other_uvs", f"{NAME}: UVs changed"),
+        ("drop_a_face", f"topology of {NAME} is not taken over: its vertices"),
+        ("add_a_vertex", f"topology of {NAME} is not taken over: its vertices"),
+        ("rename", f'name "it\'s mine" of {NAME} is not taken over: the stage names its prims'),
+        ("add_new", "arrow is not taken over: it has no faces"),
+        ("add_a_probe", "is not taken over: nothing in the bundle is made of objects of this type"),
+        ("add_a_spot", "spot light Spot is not taken over: the viewer's lamps are suns and points"),
+        ("smooth_by_modifier", f"modifier Smooth of {NAME} is not taken over: apply it"),
+        ("rewire_a_material", f"material {NAME}_look is not taken over, whose nodes changed"),
+        ("replace_a_material", f"material of {NAME} is not taken over"),
+        ("color_a_ramp", "volume is not taken over, whose nodes changed"),
+        ("move_a_camera", "the place of mono is not taken over: add a camera of your own"),
+        ("change_the_world", "the world is not taken over"),
+        ("take_out", f"{NAME} is not taken over where it is: it was taken out of the specimen"),
+        ("add_shape_keys", f"shape key of {NAME} is not taken over: apply it"),
+        ("animate", f"animation of {NAME} is not taken over but for this frame"),
+        ("paint_other_uvs", f"a change of UVs of {NAME} is not taken over"),
     ],
 )
 def test_an_edit_that_no_layer_carries_is_named(
@@ -482,6 +485,80 @@ def test_an_edit_that_no_layer_carries_is_named(
     assert words in lost
     assert lost.count("; ") == 0, lost
     assert "points" not in carried
+
+
+def additions_of(bundle: Path) -> dict[str, Any]:
+    """Return the meshes of additions.glb as another library reads it, in um, by their paths."""
+    scene = trimesh.load(bundle / "additions.glb")
+    return {
+        name: scene.geometry[geometry].copy().apply_transform(matrix).apply_scale(1e6)
+        for name in scene.graph.nodes_geometry
+        for matrix, geometry in [scene.graph[name]]
+    }
+
+
+@pytest.mark.parametrize("size", ["MICROMETRES", "TRUE"])
+def test_what_an_artist_adds_reaches_the_bundle(
+    stage_path: Path, tmp_path: Path, size: str
+) -> None:
+    overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
+    found = run("edit", tmp_path, stage=stage_path, overlay=overlay, size=size, odd=["decorate"])
+    ((kind, told),) = found["told"]
+    assert kind == "Info", told
+    assert validate_stage(overlay) == []
+    assert [line for line in write(overlay, bundle) if "is not taken over" in line] == []
+    manifest = load(bundle / "manifest.json")
+    names = [layer["name"] for layer in manifest["additions"]["layers"]]
+    assert names == ["arrow: here", "box", "label", "wire"]
+    meshes = additions_of(bundle)
+    arrow, box, label, wire = (meshes[path] for path in sorted(meshes))
+    assert arrow.bounds == pytest.approx(np.array([(8, -5, 20), (12, -1, 20)]), abs=1e-3)
+    assert tuple(arrow.visual.material.baseColorFactor) == (255, 128, 0, 128)
+    assert arrow.visual.material.metallicFactor == 1
+    assert arrow.visual.material.roughnessFactor == pytest.approx(0.25)
+    assert box.bounds == pytest.approx(np.array([(37, -7, 3), (43, -3, 5)]), abs=1e-3)
+    outwards = np.einsum("ij,ij->i", box.vertex_normals, box.vertices - (40, -5, 4))
+    assert (outwards > 0).all()  # although its object is mirrored
+    solid = trimesh.Trimesh(box.vertices, box.faces)
+    assert solid.volume == pytest.approx(48, rel=1e-3)
+    assert label.bounds[0][:2] == pytest.approx([0, 5], abs=0.5)
+    assert 5 < label.extents[0] < 12
+    assert wire.bounds == pytest.approx(np.array([(1.2, -13.8, 3.2), (18.8, 3.8, 4.8)]), abs=0.05)
+    (view,) = manifest["views"]
+    assert view["name"] == "Close"
+    assert view["position_um"] == pytest.approx([10, -5, 60], abs=1e-3)
+    assert view["target_um"][:2] == pytest.approx([10, -5], abs=1e-3)
+    assert view["fov_deg"] == pytest.approx(np.degrees(2 * np.arctan(0.2)), abs=1e-3)
+    lamps = {lamp["name"]: lamp for lamp in manifest["lights"]["lamps"]}
+    assert set(lamps) == {"Bulb", "Evening", "key"}
+    assert lamps["Evening"]["towards"] == pytest.approx([1, 0, 0], abs=1e-4)
+    assert lamps["Evening"]["color"] == pytest.approx([1, 0.5, 0.25], abs=1e-4)
+    assert lamps["Evening"]["strength"] == pytest.approx(2 / np.pi, rel=1e-4)
+    assert lamps["Bulb"]["position_um"] == pytest.approx([20, 95, 4], abs=1e-2)
+    middle = np.mean([manifest["specimen"]["bounds_um"][end] for end in ("min", "max")], axis=0)
+    distance = np.linalg.norm(middle - (20, 95, 4))
+    # P / (4 pi d^2) on a surface that faces it; a white one sends on 1 / pi of that
+    assert lamps["Bulb"]["strength"] == pytest.approx(0.5 * (100 / distance) ** 2, rel=1e-3)
+    assert lamps["key"]["strength"] == pytest.approx(1 / np.pi, rel=1e-4)
+    glb = next((bundle / "channels" / manifest["channels"][0]["id"]).rglob("*.glb"))
+    document, _ = read(glb.read_bytes())
+    assert document["materials"][0]["alphaMode"] == "BLEND"
+    assert document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][3] == pytest.approx(
+        0.4
+    )
+
+
+def test_a_copy_of_a_surface_is_an_addition_of_its_color(stage_path: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "edit.usda"
+    run("edit", tmp_path, stage=stage_path, overlay=overlay, tiles="r0_c0", odd=["copy"])
+    write_bundle(overlay, tmp_path / "bundle", None, engine=Engine(0))
+    manifest = load(tmp_path / "bundle" / "manifest.json")
+    (layer,) = manifest["additions"]["layers"]
+    assert layer["name"] == f"{NAME}.001"
+    (mesh,) = additions_of(tmp_path / "bundle").values()
+    (channel,) = [one for one in manifest["channels"] if one["id"] in NAME]
+    found = np.array(mesh.visual.material.baseColorFactor[:3]) / 255
+    assert found == pytest.approx(channel["color"], abs=1 / 255)
 
 
 def test_a_picture_shows_mesh_volume_and_the_new_colour(stage_path: Path, tmp_path: Path) -> None:

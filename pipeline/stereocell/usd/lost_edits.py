@@ -270,6 +270,6 @@ def _fallback(attribute: Usd.Attribute) -> object:
 
 
 def _hint(name: str, known: Iterable[str]) -> str:
-    plain = [one for one in known if not one.startswith("@") and "*" not in one]
-    close = get_close_matches(name, plain, 1, 0.75)
-    return f": did you mean {close[0]}?" if close else ""
+    plain = {one.lower(): one for one in known if not one.startswith("@") and "*" not in one}
+    close = get_close_matches(name.lower(), plain, 1, 0.75)
+    return f": did you mean {plain[close[0]]}?" if close else ""

@@ -14,11 +14,11 @@ from pxr import Usd, UsdGeom
 
 from .cameras import pair_cameras
 from .choice import CHANNELS, DISPLAY_SCALE, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
-from .lighting import begin_world, end_world, light_scene
+from .lighting import begin_world, end_world, light_scene, light_values
 from .looks import color_surface, glow_of, make_color_group, make_volume_material, set_surface_color
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
-from .snapshot import take_materials, take_snapshot
+from .snapshot import digest_nodes, take_materials, take_snapshot
 
 MICROMETRES, TRUE, DISPLAY = "MICROMETRES", "TRUE", "DISPLAY"  # sizes of an import
 STATE = "stereocell"
@@ -60,7 +60,15 @@ def import_stage(context, path, choice, size=MICROMETRES, is_lit=True, is_stereo
     def keep(composed, prim_map):
         made["state"] = _finish(context, composed, prim_map, scale, is_stereo)
         if is_lit:
-            light_scene(context.scene, composed, _objects_of(prim_map), world)
+            objects, state = _objects_of(prim_map), made["state"][1]
+            light_scene(context.scene, composed, objects, world)
+            state["lights"] = {
+                path: light_values(block)
+                for path, block in objects.items()
+                if block.type == "LIGHT"
+            }
+            if context.scene.world != world:
+                state["world"] = digest_nodes(context.scene.world.node_tree)
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "choice.usda"
@@ -146,7 +154,7 @@ def _finish(context, stage, prim_map, scale, is_stereo):
     for prim in stage.GetPrimAtPath(CHANNELS).GetChildren():
         look = _read_look(prim) | {"objects": read_columns(prim)}
         channels[prim.GetName()] = look
-        group = make_color_group(prim.GetName(), look["color"])
+        group = make_color_group(prim.GetName(), look["color"], look["opacity"])
         root[COLOR + prim.GetName()] = group
         _color_surfaces(stage, prim.GetName(), look, group, materials)
         _shade_volumes(stage, root, prim.GetName(), look, group, objects)
@@ -166,6 +174,8 @@ def _finish(context, stage, prim_map, scale, is_stereo):
         "matrices": {p: matrix_of(p, objects) for p in objects if p != ROOT},
         "snapshots": {p: take_snapshot(block) for p, block in objects.items()},
         "materials": take_materials(objects[path] for path in leaves),
+        "lights": {},
+        "world": "",
         "others": [block.name for block in context.scene.objects if block not in own],
     }
 
@@ -208,8 +218,16 @@ def _read_look(prim):
         "color": list(value("inputs:color")),
         "points": [list(pair) for pair in value("stereocell:opacityPoints")],
         "windows": [window, window if stored is None else tuple(stored)],
+        "opacity": _opacity_of(prim),
         "function": prim.GetVariantSet("transferFunction").GetVariantSelection(),
     }
+
+
+def _opacity_of(channel):
+    """Return the opacity that a channel's shader states."""
+    shader = channel.GetStage().GetPrimAtPath(channel.GetPath().AppendChild("surface"))
+    value = shader.GetAttribute("inputs:opacity").Get() if shader else None
+    return 1.0 if value is None else float(value)
 
 
 def _color_surfaces(stage, channel, look, group, materials):

@@ -58,6 +58,17 @@ def _set_strengths(stage, objects):
         block.data.energy = prim.GetAttribute("inputs:intensity").Get() * 2**exposure
 
 
+def light_values(block):
+    """Return a light's strength and its colour, to be compared with those of the import."""
+    return [block.data.energy, *block.data.color]
+
+
+def intensity_of(prim, energy, before):
+    """Return the intensity of a light in the stage whose strength in Blender was `before`."""
+    known = prim.GetAttribute("inputs:intensity").Get()
+    return known * energy / before if before > 0 else energy
+
+
 def _separate_backdrop(world):
     """Show the camera a plain backdrop instead of the dome."""
     tree = world.node_tree

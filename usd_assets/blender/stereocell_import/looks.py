@@ -25,16 +25,22 @@ _MAX_POINTS = 32  # a ramp of Blender's holds no more
 _MIN_PASSED = 0.001  # what light always passes of a voxel: an opacity of 1 has no logarithm
 
 
-def make_color_group(channel, color):
-    """Return a node group whose output is a channel's linear colour."""
+def make_color_group(channel, color, opacity=1.0):
+    """Return a node group whose outputs are a channel's linear colour and its surfaces' opacity."""
     group = bpy.data.node_groups.new(f"{channel} colour", "ShaderNodeTree")
     group.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
     rgb = group.nodes.new("ShaderNodeRGB")
     rgb.label = channel
     rgb.outputs[0].default_value = (*color, 1.0)
+    group.interface.new_socket("Opacity", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    value = group.nodes.new("ShaderNodeValue")
+    value.label = "opacity"
+    value.location.y = -200
+    value.outputs[0].default_value = opacity
     output = group.nodes.new("NodeGroupOutput")
     output.location.x = 200
     group.links.new(rgb.outputs[0], output.inputs[0])
+    group.links.new(value.outputs[0], output.inputs[1])
     return group
 
 
@@ -46,11 +52,56 @@ def color_of(group):
     raise StageProblem(f"node group {group.name!r} has no RGB node, expected its channel's colour")
 
 
+def opacity_of(group):
+    """Return the opacity of a group that `make_color_group` made, 0..1. Raises StageProblem."""
+    for node in group.nodes:
+        if node.bl_idname == "ShaderNodeValue":
+            return min(1.0, max(0.0, node.outputs[0].default_value))
+    raise StageProblem(f"node group {group.name!r} has no Value node, expected its opacity")
+
+
+def plain_values(material):
+    """Return the values of a material as inputs of a UsdPreviewSurface, and which have an image.
+
+    Colours are linear RGB, 0..1.
+    """
+    found = {"diffuseColor": tuple(material.diffuse_color)[:3], "roughness": material.roughness}
+    found["metallic"] = material.metallic
+    images = []
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    surface = next((n for n in nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"), None)
+    if surface is None:
+        return found, images
+    for name, socket in (
+        ("diffuseColor", surface.inputs["Base Color"]),
+        ("metallic", surface.inputs["Metallic"]),
+        ("roughness", surface.inputs["Roughness"]),
+        ("opacity", surface.inputs["Alpha"]),
+    ):
+        source = socket.links[0].from_node if socket.links else None
+        group = getattr(source, "node_tree", None)
+        if group is not None and name == "diffuseColor":
+            found[name] = color_of(group)  # a channel's, of a copied surface
+        elif group is not None and name == "opacity":
+            found[name] = opacity_of(group)
+        elif source is not None:
+            images.append(socket.name)
+        else:
+            value = socket.default_value
+            found[name] = value if isinstance(value, float) else tuple(value)[:3]
+    strength = surface.inputs["Emission Strength"].default_value
+    glow = [min(1.0, strength * part) for part in surface.inputs["Emission Color"].default_value]
+    if max(glow[:3]) > 0:
+        found["emissiveColor"] = tuple(glow[:3])
+    return found, images
+
+
 def color_surface(material, group):
     """Feed a channel's colour to a material that Blender made of a UsdPreviewSurface."""
     tree = material.node_tree
     for surface in [node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled"]:
-        _feed(tree, group, surface, "Base Color")
+        node = _feed(tree, group, surface, "Base Color")
+        tree.links.new(node.outputs["Opacity"], surface.inputs["Alpha"])
     material.diffuse_color = (*color_of(group), 1.0)  # what a viewport without shading shows
 
 
@@ -137,6 +188,7 @@ def _feed(tree, group, shader, *inputs):
     node.location = (shader.location.x - 250, shader.location.y + 150)
     for name in inputs:
         tree.links.new(node.outputs[0], shader.inputs[name])
+    return node
 
 
 def _node(tree, kind, x):

@@ -1,8 +1,8 @@
 """Write what an artist changed as a layer over the stage: `stereocell bundle OUT --stage LAYER`.
 
 Colours (in a channel's colour group), opacities (in a volume material's ramp), objects hidden or
-deleted, tiles, meshes and volumes moved, points of meshes moved, variants chosen at the import, and
-what objects.py keeps of label maps.
+deleted, tiles, meshes and volumes moved, points of meshes moved, lights, variants chosen at the
+import, what objects.py keeps of label maps, and what was added (additions.py).
 Whatever else was done to the specimen is lost, and named. Where the whole of it stands in the scene
 is the scene's own affair.
 """
@@ -16,14 +16,18 @@ import bpy
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
+from .additions import LIGHTS, write_additions
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage
 from .importing import COLOR, PRIM, STATE, VOLUME, matrix_of
-from .looks import color_of, points_of
+from .layer_values import set_value
+from .lighting import intensity_of, light_values
+from .looks import color_of, opacity_of, points_of
 from .objects import CHANNEL, LABELS, as_staged, kept
 from .problem import StageProblem
 from .shapes import cut_fans, group_seams, turn_with
 from .snapshot import digest_nodes, find_losses, points_of_mesh, take_snapshot
 
+_IN_GROUP = "a channel's colour and opacity are values of its node group"
 _MOVED = 1e-4  # of the longest translation and of 1: floats of 32 bits, through a scale of 1e-6
 
 
@@ -56,7 +60,7 @@ def export_edits(context, path):
     layer.subLayerPaths = [_name_of(stage_path, path)]
     Sdf.CreatePrimInLayer(layer, ROOT)  # the default prim, also where nothing was edited
     objects, strangers = _find_objects(context, root, state)
-    lost = [f"{block.name}: a copy, or new" for block in strangers]
+    lost = []
     edits = [
         *_write_looks(layer, stage, root, state),
         *_write_variants(layer, state),
@@ -64,6 +68,8 @@ def export_edits(context, path):
         *_write_moved(layer, state, root, objects, lost),
         *_write_points(layer, stage, state, objects, lost),
         *_write_objects(layer, stage, root, objects),
+        *_write_lights(layer, stage, state, objects),
+        *write_additions(context, layer, stage, root, strangers, lost),
     ]
     _write_hints(layer, stage, state, root, objects)
     with as_staged(context, root):
@@ -119,15 +125,25 @@ def _find_losses(context, state, objects):
         elif path in state["leaves"] and any(
             one.get(PRIM) == path for one in context.scene.objects
         ):
-            lost.append(f"{before['name']}: taken out of the specimen, which leaves it out")
-        elif path.rpartition("/")[0] != TILES and path not in state["leaves"]:
-            lost.append(f"{before['name']}: deleted")
+            lost.append(
+                f"{before['name']} is not taken over where it is: it was taken out of the "
+                "specimen, which leaves it out"
+            )
+        elif (
+            path.rpartition("/")[0] != TILES
+            and path not in state["leaves"]
+            and path not in state["lights"]
+        ):
+            lost.append(f"the removal of {before['name']} is not taken over: hide or remove tiles")
     for name, before in state["materials"].items():
         material = bpy.data.materials.get(name)
         if material is None:
-            lost.append(f"material {name}: renamed or deleted")
+            lost.append(f"the removal or name of material {name} is not taken over: {_IN_GROUP}")
         elif digest_nodes(material.node_tree) != before:
-            lost.append(f"material {name}: its nodes changed")
+            lost.append(f"material {name} is not taken over, whose nodes changed: {_IN_GROUP}")
+    world = context.scene.world
+    if state["world"] and (world is None or digest_nodes(world.node_tree) != state["world"]):
+        lost.append("the world is not taken over: edit the dome of the stage in a layer of USD")
     return lost
 
 
@@ -153,8 +169,13 @@ def _write_looks(layer, stage, root, state):
         group, material = root.get(COLOR + channel), root.get(VOLUME + channel)
         color = look["color"] if group is None else color_of(group)
         if _differ([color], [look["color"]]):
-            _set(layer, path, "inputs:color", Sdf.ValueTypeNames.Color3f, Gf.Vec3f(*color))
+            set_value(layer, path, "inputs:color", Sdf.ValueTypeNames.Color3f, Gf.Vec3f(*color))
             yield f"{channel}: colour"
+        opacity = look["opacity"] if group is None else opacity_of(group)
+        if _differ([[opacity]], [[look["opacity"]]]):
+            surface = f"{path}/surface"
+            set_value(layer, surface, "inputs:opacity", Sdf.ValueTypeNames.Float, opacity)
+            yield f"{channel}: opacity"
         prim = stage.GetPrimAtPath(path)
         function = prim.GetVariantSet("transferFunction").GetVariantSelection()
         if look["function"] != function:
@@ -171,7 +192,7 @@ def _write_looks(layer, stage, root, state):
                 )
                 place = variant.primSpec.path
             kind = Sdf.ValueTypeNames.Float2Array
-            _set(layer, place, "stereocell:opacityPoints", kind, pairs)
+            set_value(layer, place, "stereocell:opacityPoints", kind, pairs)
             yield f"{channel}: opacities"
 
 
@@ -203,7 +224,7 @@ def _is_hidden(block):
 
 
 def _hide(layer, path):
-    _set(layer, path, "visibility", Sdf.ValueTypeNames.Token, "invisible")
+    set_value(layer, path, "visibility", Sdf.ValueTypeNames.Token, "invisible")
 
 
 def _write_moved(layer, state, root, objects, lost):
@@ -215,15 +236,42 @@ def _write_moved(layer, state, root, objects, lost):
             continue
         name = path.rpartition("/")[2]
         is_field = path.rpartition("/")[0] in state["leaves"]  # of a volume: drawn as that is
-        if is_field or not f"{path}/".startswith(f"{TILES}/"):
-            lost.append(f"{name}: moved")
+        if is_field or not f"{path}/".startswith((f"{TILES}/", f"{LIGHTS}/")):
+            lost.append(f"the place of {name} is not taken over: {_why_it_stays(path, is_field)}")
             continue
         rows = [[round(float(v), 6) for v in row] for row in zip(*matrix, strict=True)]
         kind = Sdf.ValueTypeNames
-        _set(layer, path, "xformOp:transform", kind.Matrix4d, Gf.Matrix4d(rows))
+        set_value(layer, path, "xformOp:transform", kind.Matrix4d, Gf.Matrix4d(rows))
         order = Vt.TokenArray(["xformOp:transform"])
-        _set(layer, path, "xformOpOrder", kind.TokenArray, order, is_uniform=True)
+        set_value(layer, path, "xformOpOrder", kind.TokenArray, order, is_uniform=True)
         yield f"{name}: moved"
+
+
+def _why_it_stays(path, is_field):
+    if is_field:
+        return "move its volume"
+    is_camera = path.startswith(f"{ROOT}/Cameras/")
+    return "add a camera of your own" if is_camera else "nothing in the bundle stands there"
+
+
+def _write_lights(layer, stage, state, objects):
+    """Yield what was done to the strengths and colours of the stage's lights."""
+    for path, before in state["lights"].items():
+        block = objects.get(path)
+        name = path.rpartition("/")[2]
+        if _is_hidden(block):
+            _hide(layer, path)
+            yield f"{name}: hidden"
+            continue
+        now = light_values(block)
+        if _differ([now[1:]], [before[1:]]):
+            kind = Sdf.ValueTypeNames.Color3f
+            set_value(layer, path, "inputs:color", kind, Gf.Vec3f(*now[1:]))
+            yield f"{name}: colour"
+        if _differ([now[:1]], [before[:1]]):
+            intensity = intensity_of(stage.GetPrimAtPath(path), now[0], before[0])
+            set_value(layer, path, "inputs:intensity", Sdf.ValueTypeNames.Float, intensity)
+            yield f"{name}: strength"
 
 
 def _write_points(layer, stage, state, objects, lost):
@@ -240,7 +288,9 @@ def _write_points(layer, stage, state, objects, lost):
         mesh = UsdGeom.Mesh(_as_staged(stage, f"{TILES}/{tile}", lod, path) or Usd.Prim())
         points = points_of_mesh(block.data)
         if not mesh or len(mesh.GetPointsAttr().Get() or []) != len(points):
-            lost.append(f"{before['name']}: points moved, and the stage has others by now")
+            lost.append(
+                f"the shape of {before['name']} is not taken over: the stage has other points now"
+            )
             continue
         if lod:
             Sdf.CreateVariantInLayer(layer, f"{TILES}/{tile}", "lod", lod)
@@ -258,15 +308,15 @@ def _write_objects(layer, stage, root, objects):
         prim = stage.GetPrimAtPath(path)
         default = meant.get("default")
         if default is not None and default != prim.GetAttribute("stereocell:defaultColumn").Get():
-            _set(layer, path, "stereocell:defaultColumn", kind.Token, default)
+            set_value(layer, path, "stereocell:defaultColumn", kind.Token, default)
             yield f"{channel}: coloured by {default or 'the objects alone'}"
         if hidden := meant.get("hidden"):
             labels = Vt.UInt64Array([int(label) for label in hidden])
-            _set(layer, path, "stereocell:hiddenObjects", kind.UInt64Array, labels)
+            set_value(layer, path, "stereocell:hiddenObjects", kind.UInt64Array, labels)
             yield f"{channel}: {len(hidden)} objects hidden"
         for column, names in meant.get("classes", {}).items():
             name = f"stereocell:column:{column}"
-            _set(layer, path, name, kind.String, prim.GetAttribute(name).Get())
+            set_value(layer, path, name, kind.String, prim.GetAttribute(name).Get())
             spec = layer.GetAttributeAtPath(f"{path}.{name}")
             spec.customData = {"categories": Vt.StringArray(names)}
             yield f"{channel}: names of {column}"
@@ -291,7 +341,7 @@ def _write_colors(layer, stage, channel, colors, objects):
         for place, color in own.items():
             values[place] = color
         array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values))
-        _set(layer, path, name, Sdf.ValueTypeNames.Color3fArray, array)
+        set_value(layer, path, name, Sdf.ValueTypeNames.Color3fArray, array)
         yield f"{block.name}: colours of {len(own)} objects"
 
 
@@ -325,7 +375,7 @@ def _write_hints(layer, stage, state, root, objects):
         low, high = np.array(boxes)[:, 0].min(axis=0), np.array(boxes)[:, 1].max(axis=0)
         if len(boxes) > 1 and not np.allclose([low, high], boxes[0], atol=0):
             box = Vt.Vec3fArray.FromNumpy(np.array([low, high], np.float32))
-            _set(layer, path, "extentsHint", Sdf.ValueTypeNames.Float3Array, box)
+            set_value(layer, path, "extentsHint", Sdf.ValueTypeNames.Float3Array, box)
 
 
 def _extents(stage, tile, path):
@@ -364,9 +414,9 @@ def _write_shape(layer, place, mesh, points):
     kind = Sdf.ValueTypeNames
     before = np.array(mesh.GetPointsAttr().Get(), np.float32)
     array = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points))
-    _set(layer, place, "points", kind.Point3fArray, array)
+    set_value(layer, place, "points", kind.Point3fArray, array)
     extent = UsdGeom.PointBased.ComputeExtent(array)
-    _set(layer, place, "extent", kind.Float3Array, extent)
+    set_value(layer, place, "extent", kind.Float3Array, extent)
     counts, indices = (
         np.array(attribute.Get() or [], np.int64)
         for attribute in (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
@@ -381,19 +431,13 @@ def _write_shape(layer, place, mesh, points):
     if is_known:
         turned = turn_with(normals, before, points, triangles, groups)
         name = "normals" if primvar is None else "primvars:normals"
-        _set(layer, place, name, kind.Normal3fArray, Vt.Vec3fArray.FromNumpy(turned))
+        set_value(layer, place, name, kind.Normal3fArray, Vt.Vec3fArray.FromNumpy(turned))
     tangents = np.array(prim.GetAttribute("primvars:tangents").Get() or [], np.float32)
     if tangents.shape == (len(points), 4):
         turned = turn_with(tangents[:, :3], before, points, triangles, groups)
         turned = np.ascontiguousarray(np.concatenate([turned, tangents[:, 3:]], axis=1))
         array = Vt.Vec4fArray.FromNumpy(turned)
-        _set(layer, place, "primvars:tangents", kind.Float4Array, array)
-
-
-def _set(layer, path, name, kind, value, is_uniform=False):
-    prim = layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
-    variability = Sdf.VariabilityUniform if is_uniform else Sdf.VariabilityVarying
-    Sdf.AttributeSpec(prim, name, kind, variability).default = value
+        set_value(layer, place, "primvars:tangents", kind.Float4Array, array)
 
 
 def _differ(rows, others, tolerance=1e-5):

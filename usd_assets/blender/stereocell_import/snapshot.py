@@ -11,6 +11,7 @@ import numpy as np
 
 from .objects import HIDDEN
 
+OF_CHANNEL = "a tile's surface has the colour of its channel"
 _LAYOUT = {
     *("name", "label", "width", "height", "hide", "select", "mute", "parent", "show_options"),
     *("show_preview", "show_texture", "use_custom_color", "warning_propagation"),
@@ -52,30 +53,33 @@ def points_of_mesh(mesh):
 
 
 def find_losses(block, before):
-    """Yield what was done to an object that no layer carries; `before`: its snapshot."""
+    """Yield what was done to an object that no layer carries; `before`: its snapshot.
+
+    The words are those of `stereocell bundle`.
+    """
     now, name = take_snapshot(block), before["name"]
     if now["name"] != name:
-        yield f"{name}: renamed to {now['name']}"
+        yield f"name {now['name']!r} of {name} is not taken over: the stage names its prims"
     for modifier in now["modifiers"]:
         if modifier not in before["modifiers"]:
-            yield f"{name}: modifier {modifier}, not applied"
+            yield f"modifier {modifier} of {name} is not taken over: apply it"
     if now.get("materials") != before.get("materials"):
-        yield f"{name}: another material"
+        yield f"material of {name} is not taken over: {OF_CHANNEL}"
     if block.type == "MESH":
         if now["faces"] != before["faces"]:
-            yield f"{name}: topology changed (other vertices, edges or faces)"
+            yield f"topology of {name} is not taken over: its vertices, edges or faces are others"
         elif now["uvs"] != before["uvs"]:
-            yield f"{name}: UVs changed"
+            yield f"a change of UVs of {name} is not taken over: textures follow those of the build"
         if block.data.shape_keys is not None:
-            yield f"{name}: shape keys"
+            yield f"shape key of {name} is not taken over: apply it"
     moving = [one.animation_data for one in (block, block.data) if one is not None]
     if any(one is not None and (one.action or one.drivers) for one in moving):
-        yield f"{name}: animation, of which this frame's place is taken"
+        yield f"animation of {name} is not taken over but for this frame: nothing moves here"
 
 
 def digest_nodes(tree):
-    """Return a digest of a shader's nodes but for what a layer carries: a channel's colour, and
-    the positions and opacities of its ramp."""
+    """Return a digest of a shader's nodes but for what a layer carries: a channel's colour and
+    opacity, and the positions and opacities of its ramp."""
     return _hash(_describe_nodes(tree))
 
 
@@ -88,7 +92,7 @@ def _describe_nodes(tree):
             node.bl_idname,
             {key: _plain(getattr(node, key)) for key in _properties(node)},
             [_plain(getattr(one, "default_value", None)) for one in node.inputs],
-            [] if _is_channel_color(tree, node) else
+            [] if _is_of_channel(tree, node) else
             [_plain(getattr(one, "default_value", None)) for one in node.outputs],
             _describe_nodes(getattr(node, "node_tree", None)),
             _describe_ramp(getattr(node, "color_ramp", None)),
@@ -104,8 +108,9 @@ def _describe_nodes(tree):
     return [sorted(nodes, key=lambda node: node[0]), sorted(links)]
 
 
-def _is_channel_color(tree, node):
-    return node.bl_idname == "ShaderNodeRGB" and not isinstance(tree.id_data, bpy.types.Material)
+def _is_of_channel(tree, node):
+    is_value = node.bl_idname in ("ShaderNodeRGB", "ShaderNodeValue")
+    return is_value and isinstance(tree.id_data, bpy.types.NodeTree)
 
 
 def _describe_ramp(ramp):
