@@ -130,3 +130,26 @@ def test_an_added_mesh_inside_a_tile_moves_with_it(edit):
     assert edit.told == []
     (mesh,) = scene_of(bundle).values()
     assert mesh.bounds[:, 2] == pytest.approx([13, 13])
+
+
+def test_the_usdz_has_an_added_mesh_beside_the_specimen(stage, edit):
+    """Its place among the specimen's meshes is that of the stage, by USD's own boxes."""
+    bundle = edit(define_arrow)
+    purposes = [UsdGeom.Tokens.default_]
+    small = Usd.Stage.Open(str(bundle / "specimen.usdz"))
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes)
+    mesh = small.GetPrimAtPath("/Specimen/Annotations/addition0")
+    assert mesh.GetDisplayName() == "Arrow"
+    found = boxes.ComputeWorldBound(mesh).ComputeAlignedRange()
+    ball = boxes.ComputeWorldBound(small.GetPrimAtPath("/Specimen/r0_c0")).ComputeAlignedRange()
+    scale = small.GetRootLayer().customLayerData["stereocell"]["scale"] * 1e-6
+    whole = Usd.Stage.Open(str(bundle.parent / "edited.usda"))
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes)
+    arrow = boxes.ComputeWorldBound(whole.GetPrimAtPath("/Specimen/Annotations/Arrow"))
+    leaf = whole.GetPrimAtPath("/Specimen/Tiles/r0_c0/CD31/CD31_r0_c0")
+    surface = boxes.ComputeWorldBound(leaf).ComputeAlignedRange()
+    expected = (arrow.ComputeAlignedRange().GetMin() - surface.GetMin()) * scale
+    assert found.GetMin() - ball.GetMin() == pytest.approx(expected, abs=1e-3 * scale * 20)
+    material = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
+    surface = material.ComputeSurfaceSource()[0]
+    assert tuple(surface.GetInput("diffuseColor").Get()) == (0, 0, 1)

@@ -7,7 +7,8 @@ level of detail of at most MAX_TRIANGLES triangles (the coarsest, if none is tha
 layer's customLayerData states `stereocell:scale`, metres in the file for one metre of the specimen,
 and `size`. It has the channels that the stage shows, if any of them is drawn.
 
-Volumes are left out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
+Meshes and curves that layers add come along, unless only some tiles are written. Volumes are left
+out: usdz allows no .vdb. The archive holds one .usdc without variants or payloads,
 which comes first, the baked maps of that level, and the stage's lights with the image of the dome.
 The same stage gives the same bytes.
 
@@ -27,8 +28,10 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
+from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing
 from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.read_additions import Addition, read_additions
 from stereocell.usd.read_appearances import shows_at_first
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
@@ -95,7 +98,11 @@ def write_usdz(
     longest_um = float((high - low).max())
     size_m = SIZE_M if scale is None else longest_um * METERS_PER_UNIT * scale
     flat = _new_stage(specimen_name(stage), longest_um, size_m, shown)
-    _define_parts(flat, found, low, high, size_m)
+    additions = [] if tiles else list(read_additions(stage))
+    lowest = min([low[1], *(float(one.mesh.positions[:, 1].min()) for one in additions)])
+    foot = np.array([(low[0] + high[0]) / 2, lowest, (low[2] + high[2]) / 2])
+    _define_parts(flat, found, foot, size_m / longest_um)
+    _define_additions(flat, additions, foot, size_m / longest_um)
     images = {
         _texture_name(part, kind): file for part in found for kind, file in _images(part).items()
     }
@@ -169,18 +176,16 @@ def _new_stage(name: str, longest_um: float, size_m: float, level: int) -> Usd.S
 def _define_parts(
     stage: Usd.Stage,
     parts: list[_Part],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    size_m: float,
+    foot: NDArray[np.float64],
+    scale: float,
 ) -> None:
-    """Define the meshes, tile by tile; `low` and `high` bound the specimen, (x, y, z), world um.
+    """Define the meshes, tile by tile.
 
-    size_m  the specimen's longest edge in the file
+    foot   the point (x, y, z) that comes to the origin, world um
+    scale  metres in the file for a um
 
     A channel's meshes share one material, except those with a normal map or a look of their own.
     """
-    foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    scale = size_m / float((high - low).max())
     looks = UsdGeom.Scope.Define(stage, ROOT.AppendChild("Looks")).GetPath()
     usual: dict[str, Material] = {}
     for part in parts:
@@ -192,34 +197,61 @@ def _define_parts(
         look = looks.AppendChild(f"{leaf if is_own else part.channel}_look")
         mesh = UsdGeom.Mesh.Define(stage, branch.AppendChild(leaf))
         material = _define_look(stage, look, part, mesh)
-        _fill_mesh(mesh, part.lod, (part.lod.mesh.positions - foot) * scale)
+        _fill_mesh(mesh, part.lod.mesh, (part.lod.mesh.positions - foot) * scale)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def _fill_mesh(mesh: UsdGeom.Mesh, lod: ComposedLod, positions: NDArray[np.float64]) -> None:
-    points, triangles = vec3f(positions), lod.mesh.triangles.astype(np.int32)
+def _define_additions(
+    stage: Usd.Stage, additions: list[Addition], foot: NDArray[np.float64], scale: float
+) -> None:
+    """Define the meshes that layers add, each with a material of its own."""
+    for number, addition in enumerate(additions):
+        name = f"addition{number}"
+        mesh = UsdGeom.Mesh.Define(stage, ROOT.AppendPath(f"Annotations/{name}"))
+        mesh.GetPrim().SetDisplayName(addition.name)
+        _fill_mesh(mesh, addition.mesh, (addition.mesh.positions - foot) * scale)
+        look = ROOT.AppendPath(f"Looks/{name}_look")
+        material = _define_surface(stage, look, addition.material)
+        if addition.mesh.colors is not None:
+            feed_vertices(mesh, look, "color", addition.mesh.colors)
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _fill_mesh(mesh: UsdGeom.Mesh, shape: Mesh, positions: NDArray[np.float64]) -> None:
+    points, triangles = vec3f(positions), shape.triangles.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)  # the tile's end cuts the surface open
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
-    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals))
+    mesh.CreateNormalsAttr(vec3f(shape.normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    if lod.mesh.uvs is not None:
+    if shape.uvs is not None:
         primvars = UsdGeom.PrimvarsAPI(mesh)
         st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, UsdGeom.Tokens.vertex)
-        uvs = np.ascontiguousarray(lod.mesh.uvs, dtype=np.float32)
+        uvs = np.ascontiguousarray(shape.uvs, dtype=np.float32)
         st.Set(Vt.Vec2fArray.FromNumpy(uvs))
 
 
 def _define_look(
     stage: Usd.Stage, path: Sdf.Path, part: _Part, mesh: UsdGeom.Mesh
 ) -> UsdShade.Material:
+    material = _define_surface(stage, path, part.lod.material)
+    for kind in _images(part):
+        feed_image(stage, path, kind, _texture_name(part, kind))
+    if part.lod.mesh.openness is not None:
+        feed_vertices(mesh, path, "occlusion", part.lod.mesh.openness)
+    if part.lod.mesh.colors is not None:
+        feed_vertices(mesh, path, "color", part.lod.mesh.colors)
+    return material
+
+
+def _define_surface(stage: Usd.Stage, path: Sdf.Path, given: Material) -> UsdShade.Material:
+    """Define a material of plain values."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, path.AppendChild("surface"))
     surface.CreateIdAttr("UsdPreviewSurface")
-    given = part.lod.material
     surface.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*given.color))
     surface.CreateInput("metallic", _Types.Float).Set(given.metallic)
     surface.CreateInput("roughness", _Types.Float).Set(given.roughness)
@@ -229,12 +261,6 @@ def _define_look(
         surface.CreateInput("emissiveColor", _Types.Color3f).Set(Gf.Vec3f(*given.emission))
     surface.CreateOutput("surface", _Types.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface.GetOutput("surface"))
-    for kind in _images(part):
-        feed_image(stage, path, kind, _texture_name(part, kind))
-    if part.lod.mesh.openness is not None:
-        feed_vertices(mesh, path, "occlusion", part.lod.mesh.openness)
-    if part.lod.mesh.colors is not None:
-        feed_vertices(mesh, path, "color", part.lod.mesh.colors)
     return material
 
 
