@@ -1,7 +1,8 @@
 /**
  * Surfaces that give way to their volume: inside the disc, or as a whole, and surfaces that are
  * made translucent. Depth is written first, without colour, so that of a translucent surface only
- * what lies in front shows. Where a solid is cut open, or ends at the tile that is a volume, its inside
+ * what lies in front shows. Translucent channels are drawn one after another, farthest first, each with a depth of
+ * its own, so that they show through one another. Where a solid is cut open, or ends at the tile that is a volume, its inside
  * is drawn as the plane there: flat, and lit as that.
  */
 import {
@@ -126,8 +127,8 @@ export function depthMaterial(
   return material;
 }
 
-/** Before the depth of surfaces without a share, after all opaque ones. */
-const AFTER_OPAQUE = 1;
+/** Of the render order, between the depth of a channel's surfaces and their colour. */
+const DEPTH_AHEAD = 0.5;
 
 /** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */
 export const PANES = 3;
@@ -144,6 +145,7 @@ const LAID_OVER = {
 export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
+  private readonly meshes: readonly Mesh[];
   private readonly twins: readonly Mesh[];
   /** The opacity that the stage gives the surface, 0..1; each surface of a bundle has one material. */
   private readonly ownOpacity: number;
@@ -185,9 +187,11 @@ export class BlendedSurface {
     scene.traverse((object) => {
       if (object instanceof Mesh) meshes.push(object);
     });
+    this.meshes = meshes;
+    this.depth.transparent = true; // in one order with the colours
     this.twins = meshes.map((mesh) => {
       const twin = new Mesh(mesh.geometry, this.depth);
-      twin.renderOrder = AFTER_OPAQUE;
+      twin.renderOrder = -DEPTH_AHEAD;
       twin.visible = false;
       mesh.add(twin);
       return twin;
@@ -227,6 +231,7 @@ export class BlendedSurface {
     this.isBlended = own < 1 || taken > 0;
     this.isPane = this.isBlended && !crosses;
     this.isSolid = isInDisc && own === 1;
+    if (!this.isTranslucent) this.take(0);
     this.scene.visible = own > 0 && (taken < 1 || isInDisc);
     this.depth.polygonOffsetUnits = rank * UNITS_APART + UNITS_BEHIND;
     for (const material of this.materials) {
@@ -242,6 +247,18 @@ export class BlendedSurface {
       if (this.isPane) twin.layers.enable(PANES);
       else twin.layers.disable(PANES);
     }
+  }
+
+  /** Whether other translucent surfaces show through it, and not only a volume in its place. */
+  get isTranslucent(): boolean {
+    return this.isBlended && this.uniforms.uOpacity.value * this.ownOpacity < 1;
+  }
+
+  /** Place a translucent surface among all others: the lowest turn is drawn first. */
+  take(turn: number): void {
+    const order = this.isTranslucent ? 1 + turn : 0;
+    for (const mesh of this.meshes) mesh.renderOrder = order;
+    for (const twin of this.twins) twin.renderOrder = order - DEPTH_AHEAD;
   }
 
   dispose(): void {

@@ -1,5 +1,5 @@
 /** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
-import { type Camera, Group, Mesh, ShaderMaterial } from "three";
+import { type Camera, Group, Matrix4, Mesh, ShaderMaterial, Vector3 } from "three";
 import type { Bundle } from "../bundle/load";
 import type { MemoryBudget } from "../gpu/memory_budget";
 import { ERROR_TARGET_PX } from "../host/form";
@@ -19,6 +19,7 @@ import {
 } from "../state/representation";
 import { Signal } from "../state/signal";
 import type { ViewerState } from "../state/viewer_state";
+import { turnsOf } from "./draw_order";
 import type { SurfaceLoader } from "./gltf_loader";
 import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
 import { type Face, faceTowards } from "./thin_rests";
@@ -46,6 +47,8 @@ export class SurfaceSet implements Surfaces {
   /** In um, world. */
   readonly group = new Group();
   private readonly tilesets = new Map<string, SurfaceTileset>();
+  private readonly toWorld = new Matrix4();
+  private readonly eye = new Vector3();
   private state: ViewerState | null = null;
   private focusTiles: FocusTiles = NO_FOCUS;
   /** The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour. */
@@ -166,6 +169,22 @@ export class SurfaceSet implements Surfaces {
       if (!this.hasBegun && !overview([tileset.progress]).isComplete) break;
     }
     this.hasBegun ||= isComplete;
+    this.order(camera);
+  }
+
+  /** Draw translucent channels from the farthest to the nearest. */
+  private order(camera: Camera): void {
+    const blended = this.shown().filter(([, { surfaces }]) =>
+      [...surfaces.values()].some(({ blend }) => blend.isTranslucent),
+    );
+    if (blended.length === 0) return;
+    const toWorld = this.toWorld.copy(this.group.matrixWorld).invert();
+    const [x, y, z] = this.eye.setFromMatrixPosition(camera.matrixWorld).applyMatrix4(toWorld);
+    const outlines = blended.map(([, { outline }]) => outline ?? []);
+    const turns = turnsOf([x, y, z], outlines);
+    for (const [i, [, { surfaces }]] of blended.entries()) {
+      for (const { blend } of surfaces.values()) blend.take(turns[i]);
+    }
   }
 
   private shown(): [string, SurfaceTileset][] {

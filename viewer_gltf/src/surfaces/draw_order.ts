@@ -1,0 +1,25 @@
+/** The order in which translucent channels are drawn. Pure. */
+import type { Vec3 } from "../math/vec3";
+
+/**
+ * Orders channels by how far the nearest point of their boxes is, farthest first: of a channel inside another one the box
+ * begins farther away. Where boxes begin equally far, the channel that comes first is drawn last, over the others.
+ *
+ * @param outlines points of each channel, of which the box is taken
+ * @returns the turn of each channel, 0 for the one that is drawn first
+ */
+export function turnsOf(eye: Vec3, outlines: readonly (readonly Vec3[])[]): readonly number[] {
+  const distances = outlines.map((points) => distanceToBox(eye, points));
+  const order = outlines.map((_, i) => i).sort((a, b) => distances[b] - distances[a] || b - a);
+  const turns = outlines.map(() => 0);
+  for (const [turn, i] of order.entries()) turns[i] = turn;
+  return turns;
+}
+
+function distanceToBox(eye: Vec3, points: readonly Vec3[]): number {
+  const aside = eye.map((v, k) => {
+    const along = points.map((point) => point[k]);
+    return Math.max(Math.min(...along) - v, 0, v - Math.max(...along));
+  });
+  return points.length === 0 ? Infinity : Math.hypot(...aside);
+}
