@@ -34,6 +34,7 @@ def test_an_added_mesh_is_a_layer_with_its_place_name_and_color(edit):
     (mesh,) = scene_of(bundle).values()
     assert mesh.bounds == pytest.approx(np.array([(8, 2, 4), (12, 11, 4)]), abs=1e-4)
     assert len(mesh.faces) == 3
+    assert added["bounds_um"] == {"min": [8, 2, 4], "max": [12, 11, 4]}
     color = mesh.visual.material.baseColorFactor
     assert tuple(color) == (0, 0, 255, 255)
 

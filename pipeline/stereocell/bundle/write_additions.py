@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd
 
 from stereocell.bundle.tile_part import FileRef
@@ -21,33 +23,48 @@ ADDITIONS = "additions.glb"
 
 @dataclass(frozen=True, slots=True)
 class WrittenAdditions:
-    """The file, and the additions that are in it, in the stage's order: their IDs and names."""
+    """The file, and the additions that are in it.
+
+    layers     their IDs and names, in the stage's order
+    low, high  the corners (x, y, z) of the box around them, um
+    """
 
     file: FileRef
     layers: tuple[dict[str, str], ...]
+    low: list[float]
+    high: list[float]
 
     def describe(self) -> dict[str, Any]:
         """Return what the manifest says of the additions."""
         file = {"path": self.file.path, "bytes": self.file.bytes, "sha256": self.file.sha256}
-        return {"file": file, "layers": list(self.layers)}
+        bounds = {"min": self.low, "max": self.high}
+        return {"file": file, "layers": list(self.layers), "bounds_um": bounds}
 
 
 def write_additions(stage: Usd.Stage, root: Path) -> WrittenAdditions | None:
     """Write the additions of a stage; None: it has none. Raises StageError and OutputError."""
     layers: list[dict[str, str]] = []
+    corners: list[NDArray[np.float64]] = []
     with tempfile.TemporaryFile(dir=root) as file:
         document = Document("additions", PlainBuffers(file), {})
         for addition in read_additions(stage):
             layers.append({"id": addition.path, "name": addition.name})
+            positions = addition.mesh.positions.astype(float)
+            corners += [positions.min(axis=0), positions.max(axis=0)]
             document.add(
                 addition.name,
                 addition.path,
                 addition.mesh,
-                addition.mesh.positions.astype(float) * METERS_PER_UNIT,
+                positions * METERS_PER_UNIT,
                 addition.material,
                 {"addition": addition.path},
             )
         if not layers:
             return None
         document.write(root / ADDITIONS)
-    return WrittenAdditions(FileRef(ADDITIONS, **measure(root / ADDITIONS)), tuple(layers))
+    low, high = (
+        [round(float(v), 4) for v in end]
+        for end in (np.min(corners, axis=0), np.max(corners, axis=0))
+    )
+    file_ref = FileRef(ADDITIONS, **measure(root / ADDITIONS))
+    return WrittenAdditions(file_ref, tuple(layers), low, high)

@@ -79,7 +79,8 @@ export class Forms {
     this.isOutlined = this.hasOverview;
     if (points.length === 0) return null;
     const { plane } = state.clip;
-    return extremePoints(plane === null ? points : behindPlane(points, plane));
+    const kept = plane === null ? points : behindPlane(points, plane);
+    return extremePoints([...kept, ...addedCorners(this.manifest)]);
   }
 
   /**
@@ -155,4 +156,24 @@ export class Forms {
   stream(view: StreamView): void {
     for (const form of this.all) form.stream?.(view);
   }
+}
+
+/** How far from the specimen what is added widens the view, in its longest edges. */
+const WIDEST = 0.5;
+
+/** Corners of the box round what a layer adds, um, world, as far as it lies beside the specimen. */
+function addedCorners({ additions, specimen: { bounds_um } }: Manifest): readonly Vec3[] {
+  if (additions === undefined) return [];
+  const longest = Math.max(...bounds_um.max.map((v, k) => v - bounds_um.min[k]));
+  const within = (corner: readonly number[]): Vec3 => {
+    const [x, y, z] = corner.map((v, k) =>
+      Math.min(
+        Math.max(v, bounds_um.min[k] - WIDEST * longest),
+        bounds_um.max[k] + WIDEST * longest,
+      ),
+    );
+    return [x, y, z];
+  };
+  const { min, max } = additions.bounds_um;
+  return cornersOf({ min: within(min), max: within(max) });
 }
