@@ -64,7 +64,8 @@ def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
 
 
 def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Path) -> None:
-    line = export_stage(stage, tmp_path / "o.3mf", options=ExportOptions(scale=1000, wall_mm=2.5))
+    options = ExportOptions(scale=1000, wall_mm=2.5, components=True)
+    line = export_stage(stage, tmp_path / "o.3mf", options=options)
     bodies = trimesh.load(tmp_path / "o.3mf").geometry
     assert set(bodies) == set(NAMES)
     assert all(body.is_watertight for body in bodies.values())

@@ -488,6 +488,12 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
         "--compress", choices=["meshopt", "draco"], help=".glb of a fifth, for fewer programs"
     )
     surfaces.add_argument(
+        "--components",
+        action="store_const",
+        const=True,
+        help="bodies of a .3mf stay objects, for mesh programs; PrusaSlicer moves them apart",
+    )
+    surfaces.add_argument(
         "--occlusion",
         action="store_const",
         const=True,

@@ -29,6 +29,7 @@ class ExportOptions:
     units          of the numbers in formats that state none
     scale          lengths in the file for a length of the specimen
     compress       meshopt or draco
+    components     a .3mf has an object a body, joined by components
     occlusion      darken vertices by ambient occlusion
     bits           of a voxel
     unity          one channel, as UnityVolumeRendering's importers read it
@@ -47,6 +48,7 @@ class ExportOptions:
     units: str | None = None
     scale: float | None = None
     compress: str | None = None
+    components: bool | None = None
     occlusion: bool | None = None
     bits: int | None = None
     unity: bool | None = None

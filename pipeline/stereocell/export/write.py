@@ -4,7 +4,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -72,6 +72,7 @@ FORMATS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
     **dict.fromkeys(PRINT_ENDINGS, _PRINT),
+    ".3mf": replace(_PRINT, takes=_PRINT.takes | {"components"}),
     ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
     ".usdc": Format(write_flattened, _USD, names_files=True),
     ".usda": Format(write_flattened, _USD, names_files=True),
