@@ -20,8 +20,7 @@ from stereocell.export.options import UNITS_M, ExportOptions
 from stereocell.export.thin_walls import describe_thin
 from stereocell.export.unite import Corners, cut_to, to_mesh, to_solid, unite, weld
 from stereocell.formats.body import Body
-from stereocell.formats.obj import write_obj
-from stereocell.formats.ply import write_ply
+from stereocell.formats.mesh_files import write_obj, write_ply
 from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
 from stereocell.model.color import to_srgb8
