@@ -71,7 +71,6 @@ _WRITERS: dict[str, Callable[[Path, Sequence[Body], str, ExportOptions], None]] 
     ".ply": lambda path, bodies, _, asked: write_ply(path, bodies, unit=asked.units or UNIT),
     ".obj": lambda path, bodies, _, asked: write_obj(path, bodies, unit=asked.units or UNIT),
 }
-PRINT_ENDINGS = tuple(_WRITERS)
 
 
 def write_print(chosen: Chosen, path: Path, level: int) -> str:

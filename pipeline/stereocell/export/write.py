@@ -4,14 +4,18 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+
+from pxr import Usd
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer
 from stereocell.building.sealed_documents import require_documents
+from stereocell.export import format_edits as edits
 from stereocell.export.chosen import Chosen, Report
+from stereocell.export.format_edits import Lack
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.neuroglancer import write_precomputed
 from stereocell.export.options import ExportOptions
@@ -21,7 +25,7 @@ from stereocell.export.pictures import (
     write_picture,
     write_turntable,
 )
-from stereocell.export.print_solids import PRINT_ENDINGS, write_print
+from stereocell.export.print_solids import write_print
 from stereocell.export.scene import MAX_MB, write_scene
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
@@ -30,6 +34,7 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
+from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
@@ -46,6 +51,7 @@ class Format:
     write        is given the level of detail, 0 where the format has none; returns a line about the
                  file
     triangles    the most that are wanted if nothing is said; a coarsest level of more is taken
+    lacks        the kinds of edits that it leaves out; None: it has all that the stage composes
     is_seen      made to be looked at: without --channels it has those that the viewer opens with
     names_files  names files of OUT by their paths, so OUT has to be a folder
     beside       returns the paths of what goes with the file
@@ -53,6 +59,7 @@ class Format:
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
+    lacks: tuple[Lack, ...] | None
     triangles: int | None = None
     is_seen: bool = False
     names_files: bool = False
@@ -66,26 +73,33 @@ class Format:
 _USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "scale"})
 _PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
 _VOLUME = frozenset({"tiles", "region", "units", "bits"})
-_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, is_seen=True)
-_PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
+_SOLID = _LEVELS | {"wall_mm", "units"}
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, edits.SHINY, is_seen=True)
 FORMATS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    **dict.fromkeys(PRINT_ENDINGS, _PRINT),
-    ".3mf": replace(_PRINT, takes=_PRINT.takes | {"components"}),
-    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
-    ".usdc": Format(write_flattened, _USD, names_files=True),
-    ".usda": Format(write_flattened, _USD, names_files=True),
-    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES, is_seen=True),
-    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
-    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
-    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
+    ".stl": Format(write_print, _SOLID, edits.SHAPES),
+    ".3mf": Format(write_print, _SOLID | {"components"}, edits.COLORED),
+    ".ply": Format(write_print, _SOLID, edits.NAMELESS),
+    ".obj": Format(write_print, _SOLID, edits.COLORED),
+    ".usdz": Format(write_light_copy, _USD, edits.LIGHT_COPY, MAX_TRIANGLES, is_seen=True),
+    ".usdc": Format(write_flattened, _USD, None, names_files=True),
+    ".usda": Format(write_flattened, _USD, None, names_files=True),
+    ".png": Format(write_picture, _PICTURE, edits.DRAWN, PICTURE_TRIANGLES, is_seen=True),
+    ".mp4": Format(write_turntable, _PICTURE, edits.DRAWN, VIDEO_TRIANGLES, is_seen=True),
+    ".webm": Format(write_turntable, _PICTURE, edits.DRAWN, VIDEO_TRIANGLES, is_seen=True),
+    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}, edits.VOXELS),
     ".raw": Format(
-        write_raw, _VOLUME | {"unity"}, beside=lambda file, options: [described_by(file, options)]
+        write_raw,
+        _VOLUME | {"unity"},
+        edits.VOXELS,
+        beside=lambda file, options: [described_by(file, options)],
     ),
-    ".nii.gz": Format(write_nifti, _VOLUME),
-    ".nii": Format(write_nifti, _VOLUME),
-    ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
+    ".nii.gz": Format(write_nifti, _VOLUME, edits.VOXELS),
+    ".nii": Format(write_nifti, _VOLUME, edits.VOXELS),
+    ".precomputed": Format(
+        write_precomputed, frozenset({"tiles", "region", "bits"}), edits.SEGMENTS
+    ),
 }
 PAGE = ".html"  # of the bundle, where all others are of the stage
 PAGE_TAKES = frozenset({"max_mb", "view"})
@@ -98,15 +112,23 @@ def export(
     *,
     options: ExportOptions,
     stage: Path | None = None,
+    is_strict: bool = False,
     report: Report = lambda _: None,
 ) -> str:
     """Write `file` from OUT's composed stage, or a layer over it; return a line about it.
+
+    is_strict  whether an edit that the file does not have is an error
 
     Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
     read, OutputError where the file can't be written.
     """
     out_folder = OutFolder(out)
     if find_ending(file) == PAGE:
+        if is_strict:
+            raise UsageError(
+                f"--strict can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
+                "--strict` first, and export without it"
+            )
         line, made = _export_page(out_folder, file, options, is_staged=stage is not None)
         remember(out, made)
         return line
@@ -122,19 +144,33 @@ def export(
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)
-    line, made = _export(path, file, options=options, report=report, is_ours=ours)
+    line, made = _export(
+        path, file, options=options, report=report, is_ours=ours, is_strict=is_strict
+    )
     remember(out, made)
     return line
 
 
 def export_stage(
-    stage_path: Path, file: Path, *, options: ExportOptions, report: Report = lambda _: None
+    stage_path: Path,
+    file: Path,
+    *,
+    options: ExportOptions,
+    is_strict: bool = False,
+    report: Report = lambda _: None,
 ) -> str:
     """Write `file` from a stage; return a line about it, and more of what is to be known.
 
     The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
     """
-    return _export(stage_path, file, options=options, report=report, is_ours=lambda _: False)[0]
+    return _export(
+        stage_path,
+        file,
+        options=options,
+        report=report,
+        is_ours=lambda _: False,
+        is_strict=is_strict,
+    )[0]
 
 
 def _export(
@@ -144,6 +180,7 @@ def _export(
     options: ExportOptions,
     report: Report,
     is_ours: Callable[[Path], bool],
+    is_strict: bool,
 ) -> tuple[str, list[Path]]:
     """Write `file` and the files that go with it; return a line about it, and all paths.
 
@@ -159,6 +196,8 @@ def _export(
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
     with usd_boundary(stage_path):
         chosen = Chosen(stage_path, options, report)
+        if way.lacks is not None:
+            _report_edits(chosen.stage, way.lacks, f"{ending} leaves out", report, is_strict)
         if way.is_seen:
             chosen.show_as_viewer()
     with usd_boundary(stage_path), _folder_beside(file) as beside:
@@ -167,6 +206,18 @@ def _export(
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
     return line, places
+
+
+def _report_edits(
+    stage: Usd.Stage, lacks: tuple[Lack, ...], taker: str, report: Report, is_strict: bool
+) -> None:
+    """Report each edit that the file won't have. Raises StageError for one, if `is_strict`."""
+    lost = partial(edits.left_out, lacks)
+    more = list(edits.notes_on_functions(stage, lacks))
+    if is_strict:
+        require_no_lost_edit(stage, more, left_out=lost, taker=taker)
+    for line in (*notes_on_edits(stage, lost), *more):
+        report(line)
 
 
 def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:
