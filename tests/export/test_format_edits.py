@@ -105,9 +105,9 @@ def test_strict_writes_nothing_where_an_edit_is_left_out(
     stage = edited(case_of("`inputs:color` of a channel").change)
     file = tmp_path / "s.stl"
     with pytest.raises(StageError, match=r"found 1 edit that \.stl leaves out, expected none with"):
-        export_stage(stage, file, options=ExportOptions(), is_strict=True)
+        export_stage(stage, file, options=ExportOptions(strict=True))
     assert not file.exists()
-    export_stage(stage, tmp_path / "s.glb", options=ExportOptions(), is_strict=True)
+    export_stage(stage, tmp_path / "s.glb", options=ExportOptions(strict=True))
 
 
 def test_edits_over_time_are_refused(edited: Callable[..., Path], tmp_path: Path) -> None:

@@ -359,7 +359,6 @@ def export(options: argparse.Namespace) -> Answer:
         options.file,
         options=ExportOptions(**given),
         stage=options.stage,
-        is_strict=options.strict,
         report=lambda line: console.print(f"export: {line}", markup=False),
     )
     print_unless_json(options, f"wrote {options.file}: {about}")

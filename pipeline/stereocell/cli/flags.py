@@ -461,7 +461,10 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--region", metavar="x0:x1,y0:y1,z0:z1", help="in um, as the stage has it")
     parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
     parser.add_argument(
-        "--strict", action="store_true", help="write nothing, and fail, where an edit is left out"
+        "--strict",
+        action="store_const",
+        const=True,
+        help="write nothing, and fail, where an edit is left out",
     )
     surfaces = parser.add_argument_group("surfaces")
     surfaces.add_argument("--lod", type=_count, help="level of detail (default 0: the finest)")

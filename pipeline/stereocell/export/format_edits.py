@@ -59,8 +59,8 @@ _VOLUMES = {
     "field": ("*",),
 }
 
-# What no file has but USD and a bundle
-_VIEWER = (
+# Kinds that only USD and a bundle have
+_NOWHERE = (
     Lack("the file has no cameras", {"camera": (WHOLE,)}),
     Lack("the file has the channels' surfaces and volumes alone", {"addition": (WHOLE,)}),
     Lack("the file has no names of tiles", {"tile": ("@displayName",)}),
@@ -82,7 +82,7 @@ _NO_SHOWN = Lack("--channels chooses the channels of this file", {"shown": ("vis
 _NO_VOLUMES = Lack("the file has no volumes", _VOLUMES)
 _NO_COLORS = Lack("the file has no colours", _COLORS)
 _NO_SHADING = Lack("of a material the file has its colour alone", _SHADING)
-_NO_SHADING_EITHER = Lack("the file has no materials", _SHADING)
+_NO_MATERIALS = Lack("the file has no materials", _SHADING)
 _NO_SURFACES = Lack("the file has no surfaces", {"mesh": ("*",)})
 _NO_NAMES = Lack(
     "the file has no names", {"channel": ("@displayName",), "specimen": ("@displayName",)}
@@ -92,20 +92,20 @@ _NO_FUNCTIONS = Lack(
     {"channel": tuple(name for name in _VOLUMES["channel"] if name != "stereocell:window")},
 )
 
-SHINY = (*_VIEWER, _NO_VOLUMES)
-LIGHT_COPY = (*SHINY, _NO_NAMES)
-DRAWN = (*SHINY, _NO_SHADING, _NO_NAMES)
-COLORED = (*SHINY, _NO_SHADING, _NO_SHOWN)
-NAMELESS = (*COLORED, _NO_NAMES)
-SHAPES = (*SHINY, _NO_SHADING_EITHER, _NO_COLORS, _NO_SHOWN, _NO_NAMES)
-VOXELS = (*_VIEWER, _NO_SURFACES, _NO_SHADING_EITHER, _NO_COLORS, _NO_SHOWN, _NO_FUNCTIONS)
-SEGMENTS = (*_VIEWER, _NO_SHADING_EITHER, _NO_COLORS, _NO_SHOWN, _NO_FUNCTIONS)
+OF_GLTF = (*_NOWHERE, _NO_VOLUMES)
+OF_USDZ = (*OF_GLTF, _NO_NAMES)
+OF_PICTURES = (*OF_GLTF, _NO_SHADING, _NO_NAMES)
+OF_SOLIDS = (*OF_GLTF, _NO_SHADING, _NO_SHOWN)
+OF_PLY = (*OF_SOLIDS, _NO_NAMES)
+OF_STL = (*OF_GLTF, _NO_MATERIALS, _NO_COLORS, _NO_SHOWN, _NO_NAMES)
+OF_VOXELS = (*_NOWHERE, _NO_SURFACES, _NO_MATERIALS, _NO_COLORS, _NO_SHOWN, _NO_FUNCTIONS)
+OF_PRECOMPUTED = (*_NOWHERE, _NO_MATERIALS, _NO_COLORS, _NO_SHOWN, _NO_FUNCTIONS)
 
 
 def left_out(lacks: tuple[Lack, ...], place: str, name: str) -> str:
     """Return why a format leaves out an edit of a name at a place; empty: it has it.
 
-    `@specifier` stands for the whole prim, which no pattern means by the way.
+    `@specifier` stands for the whole prim: it has to be named, and `*` does not fit it.
     """
     for lack in lacks:
         patterns = lack.names.get(place, ())

@@ -36,6 +36,7 @@ class ExportOptions:
     wall_mm        what is thinner in print is named
     width          pixels of a picture
     max_mb         the most that a page in one file takes, millions of bytes
+    strict         an edit that the file does not have is an error
     view           a link of the viewer: the view that a page opens with
     """
 
@@ -55,6 +56,7 @@ class ExportOptions:
     wall_mm: float | None = None
     width: int | None = None
     max_mb: float | None = None
+    strict: bool | None = None
     view: str | None = None
 
     def __post_init__(self) -> None:

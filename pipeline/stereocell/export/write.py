@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from pxr import Usd
-
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer
 from stereocell.building.sealed_documents import require_documents
@@ -41,7 +39,7 @@ from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
 _EXPECTED = "nothing or an earlier export of this build, as it was written"
-_LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
+_LEVELS = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,35 +68,35 @@ class Format:
         return "lod" in self.takes
 
 
-_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "scale"})
-_PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
-_VOLUME = frozenset({"tiles", "region", "units", "bits"})
+_USD = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "scale"})
+_PICTURE = frozenset({"strict", "tiles", "lod", "max_triangles", "region", "occlusion", "width"})
+_VOLUME = frozenset({"strict", "tiles", "region", "units", "bits"})
 _SOLID = _LEVELS | {"wall_mm", "units"}
-_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, edits.SHINY, is_seen=True)
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, edits.OF_GLTF, is_seen=True)
 FORMATS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    ".stl": Format(write_print, _SOLID, edits.SHAPES),
-    ".3mf": Format(write_print, _SOLID | {"components"}, edits.COLORED),
-    ".ply": Format(write_print, _SOLID, edits.NAMELESS),
-    ".obj": Format(write_print, _SOLID, edits.COLORED),
-    ".usdz": Format(write_light_copy, _USD, edits.LIGHT_COPY, MAX_TRIANGLES, is_seen=True),
+    ".stl": Format(write_print, _SOLID, edits.OF_STL),
+    ".3mf": Format(write_print, _SOLID | {"components"}, edits.OF_SOLIDS),
+    ".ply": Format(write_print, _SOLID, edits.OF_PLY),
+    ".obj": Format(write_print, _SOLID, edits.OF_SOLIDS),
+    ".usdz": Format(write_light_copy, _USD, edits.OF_USDZ, MAX_TRIANGLES, is_seen=True),
     ".usdc": Format(write_flattened, _USD, None, names_files=True),
     ".usda": Format(write_flattened, _USD, None, names_files=True),
-    ".png": Format(write_picture, _PICTURE, edits.DRAWN, PICTURE_TRIANGLES, is_seen=True),
-    ".mp4": Format(write_turntable, _PICTURE, edits.DRAWN, VIDEO_TRIANGLES, is_seen=True),
-    ".webm": Format(write_turntable, _PICTURE, edits.DRAWN, VIDEO_TRIANGLES, is_seen=True),
-    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}, edits.VOXELS),
+    ".png": Format(write_picture, _PICTURE, edits.OF_PICTURES, PICTURE_TRIANGLES, is_seen=True),
+    ".mp4": Format(write_turntable, _PICTURE, edits.OF_PICTURES, VIDEO_TRIANGLES, is_seen=True),
+    ".webm": Format(write_turntable, _PICTURE, edits.OF_PICTURES, VIDEO_TRIANGLES, is_seen=True),
+    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}, edits.OF_VOXELS),
     ".raw": Format(
         write_raw,
         _VOLUME | {"unity"},
-        edits.VOXELS,
+        edits.OF_VOXELS,
         beside=lambda file, options: [described_by(file, options)],
     ),
-    ".nii.gz": Format(write_nifti, _VOLUME, edits.VOXELS),
-    ".nii": Format(write_nifti, _VOLUME, edits.VOXELS),
+    ".nii.gz": Format(write_nifti, _VOLUME, edits.OF_VOXELS),
+    ".nii": Format(write_nifti, _VOLUME, edits.OF_VOXELS),
     ".precomputed": Format(
-        write_precomputed, frozenset({"tiles", "region", "bits"}), edits.SEGMENTS
+        write_precomputed, frozenset({"strict", "tiles", "region", "bits"}), edits.OF_PRECOMPUTED
     ),
 }
 PAGE = ".html"  # of the bundle, where all others are of the stage
@@ -112,23 +110,15 @@ def export(
     *,
     options: ExportOptions,
     stage: Path | None = None,
-    is_strict: bool = False,
     report: Report = lambda _: None,
 ) -> str:
     """Write `file` from OUT's composed stage, or a layer over it; return a line about it.
-
-    is_strict  whether an edit that the file does not have is an error
 
     Raises UsageError for an ending or an option that can't be, StageError for a stage that can't be
     read, OutputError where the file can't be written.
     """
     out_folder = OutFolder(out)
     if find_ending(file) == PAGE:
-        if is_strict:
-            raise UsageError(
-                f"--strict can't be for {PAGE}, which holds the bundle: run `stereocell bundle OUT "
-                "--strict` first, and export without it"
-            )
         line, made = _export_page(out_folder, file, options, is_staged=stage is not None)
         remember(out, made)
         return line
@@ -144,33 +134,19 @@ def export(
     files = dependencies(path, out_folder.stage_dir)  # refuses foreign files
     _require_outside(file, out_folder, files)
     ours = partial(is_own, out)
-    line, made = _export(
-        path, file, options=options, report=report, is_ours=ours, is_strict=is_strict
-    )
+    line, made = _export(path, file, options=options, report=report, is_ours=ours)
     remember(out, made)
     return line
 
 
 def export_stage(
-    stage_path: Path,
-    file: Path,
-    *,
-    options: ExportOptions,
-    is_strict: bool = False,
-    report: Report = lambda _: None,
+    stage_path: Path, file: Path, *, options: ExportOptions, report: Report = lambda _: None
 ) -> str:
     """Write `file` from a stage; return a line about it, and more of what is to be known.
 
     The file is written whole or not at all, and has the same bytes each time. Raises as `export`.
     """
-    return _export(
-        stage_path,
-        file,
-        options=options,
-        report=report,
-        is_ours=lambda _: False,
-        is_strict=is_strict,
-    )[0]
+    return _export(stage_path, file, options=options, report=report, is_ours=lambda _: False)[0]
 
 
 def _export(
@@ -180,7 +156,6 @@ def _export(
     options: ExportOptions,
     report: Report,
     is_ours: Callable[[Path], bool],
-    is_strict: bool,
 ) -> tuple[str, list[Path]]:
     """Write `file` and the files that go with it; return a line about it, and all paths.
 
@@ -197,7 +172,7 @@ def _export(
     with usd_boundary(stage_path):
         chosen = Chosen(stage_path, options, report)
         if way.lacks is not None:
-            _report_edits(chosen.stage, way.lacks, f"{ending} leaves out", report, is_strict)
+            _report_edits(chosen, way.lacks, ending)
         if way.is_seen:
             chosen.show_as_viewer()
     with usd_boundary(stage_path), _folder_beside(file) as beside:
@@ -208,16 +183,14 @@ def _export(
     return line, places
 
 
-def _report_edits(
-    stage: Usd.Stage, lacks: tuple[Lack, ...], taker: str, report: Report, is_strict: bool
-) -> None:
-    """Report each edit that the file won't have. Raises StageError for one, if `is_strict`."""
-    lost = partial(edits.left_out, lacks)
+def _report_edits(chosen: Chosen, lacks: tuple[Lack, ...], ending: str) -> None:
+    """Report each edit that the file won't have. Raises StageError for one, with --strict."""
+    stage, lost = chosen.stage, partial(edits.left_out, lacks)
     more = list(edits.notes_on_functions(stage, lacks))
-    if is_strict:
-        require_no_lost_edit(stage, more, left_out=lost, taker=taker)
+    if chosen.options.strict:
+        require_no_lost_edit(stage, more, left_out=lost, taker=f"{ending} leaves out")
     for line in (*notes_on_edits(stage, lost), *more):
-        report(line)
+        chosen.report(line)
 
 
 def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:
