@@ -5,7 +5,9 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pymeshlab
 import pytest
+import pyvista
 import trimesh
 
 from stereocell.export import gltf_scene, print_solids
@@ -64,7 +66,8 @@ def test_of_very_many_objects_a_tile_is_one_mesh_in_their_colours(
 
 
 def test_bodies_of_a_3mf_are_objects_closed_and_whole(stage: Path, tmp_path: Path) -> None:
-    line = export_stage(stage, tmp_path / "o.3mf", options=ExportOptions(scale=1000, wall_mm=2.5))
+    options = ExportOptions(scale=1000, wall_mm=2.5, components=True)
+    line = export_stage(stage, tmp_path / "o.3mf", options=options)
     bodies = trimesh.load(tmp_path / "o.3mf").geometry
     assert set(bodies) == set(NAMES)
     assert all(body.is_watertight for body in bodies.values())
@@ -92,14 +95,46 @@ def test_a_label_map_has_no_volume_and_that_is_told(stage: Path, tmp_path: Path)
 
 def test_ply_has_their_colours_and_stl_is_one_solid(stage: Path, tmp_path: Path) -> None:
     export_stage(stage, tmp_path / "o.ply", options=ExportOptions(scale=1000))
-    mesh = trimesh.load(tmp_path / "o.ply")
-    seen = {tuple(color[:3].tolist()) for color in mesh.visual.vertex_colors}
-    assert seen == {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
+    wanted = {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
+    assert {
+        tuple(color[:3].tolist()) for color in pyvista.read(tmp_path / "o.ply")["RGBA"]
+    } == wanted
     export_stage(stage, tmp_path / "o.stl", options=ExportOptions(scale=1000))
     solid = trimesh.load(tmp_path / "o.stl")
     assert solid.is_watertight
     assert len(solid.split()) == 3
     assert solid.volume == pytest.approx(2 * BALL_UM3 + BEAM_UM3, rel=0.03)
+
+
+def test_an_obj_has_their_names_and_colours(stage: Path, tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        export_stage(stage, tmp_path / folder / "o.obj", options=ExportOptions(scale=1000))
+    for name in ("o.obj", "o.mtl"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    lines = (tmp_path / "one" / "o.obj").read_text("utf-8").splitlines()
+    named = [line[2:] for line in lines if line.startswith("o ")]
+    assert named == ["left", "cells_x20_12", "beam"]
+    assert lines[0].endswith(", unit mm")
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(tmp_path / "one" / "o.obj"))
+    colors = np.rint(255 * meshes.current_mesh().face_color_matrix()[:, :3]).astype(int)
+    wanted = {tuple(to_srgb8(np.array(color, np.float32)).tolist()) for color in COLORS}
+    assert set(map(tuple, colors.tolist())) == wanted
+
+
+@pytest.mark.parametrize(("scale", "units"), [(1.0, "m"), (1e6, "um")])
+def test_places_of_an_obj_keep_the_digits_of_a_float(
+    stage: Path, tmp_path: Path, scale: float, units: str
+) -> None:
+    options = ExportOptions(scale=scale, units=units)
+    export_stage(stage, tmp_path / "o.obj", options=options)
+    export_stage(stage, tmp_path / "o.ply", options=options)
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(tmp_path / "o.obj"))
+    exact = pyvista.read(tmp_path / "o.ply").points
+    found = meshes.current_mesh().vertex_matrix()
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 
 def test_neuroglancer_has_them_by_label(stage: Path, tmp_path: Path) -> None:

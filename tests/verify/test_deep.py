@@ -420,7 +420,7 @@ def test_a_fault_of_the_stage_is_named_when_the_bundle_has_it_too(
 
 @pytest.mark.slow
 def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
-    out: Path, tmp_path: Path
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     layer = tmp_path / "edit.usda"
     stage = Usd.Stage.CreateNew(str(layer))
@@ -434,6 +434,7 @@ def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
         points = Vt.Vec2fArray([(0, 0), (1, 0.5)])
         prim.GetAttribute("stereocell:opacityPoints").Set(points)
     variants.SetVariantSelection(chosen)
+    prim.CreateAttribute("inputs:colour", Sdf.ValueTypeNames.Color3f).Set((0, 1, 0))
     stage.GetRootLayer().Save()
     told = ["--stage", str(layer)]
     assert main(["bundle", str(out), *told, "--workers", "0"]) == 0
@@ -442,7 +443,12 @@ def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
     assert "F: transfer_functions is ['default', 'mine'" in found[MANIFEST]
     remedy = f"; the bundle is of {layer.name}: check it with --stage LAYER"
     assert found[MANIFEST].endswith(remedy)
+    capsys.readouterr()
     assert main(["check", str(out), "--deep", "--workers", "0", *told]) == 0
+    line = (
+        "ok   edits of the stage: /Specimen/Channels/F.inputs:colour is not taken over: no reader"
+    )
+    assert line in capsys.readouterr().out
 
 
 def push_the_finest(stage: Usd.Stage) -> None:

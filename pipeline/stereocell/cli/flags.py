@@ -460,6 +460,12 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--region", metavar="x0:x1,y0:y1,z0:z1", help="in um, as the stage has it")
     parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
+    parser.add_argument(
+        "--strict",
+        action="store_const",
+        const=True,
+        help="write nothing, and fail, where an edit is left out",
+    )
     surfaces = parser.add_argument_group("surfaces")
     surfaces.add_argument("--lod", type=_count, help="level of detail (default 0: the finest)")
     surfaces.add_argument(
@@ -486,6 +492,12 @@ def declare_export(parser: argparse.ArgumentParser) -> None:
     )
     surfaces.add_argument(
         "--compress", choices=["meshopt", "draco"], help=".glb of a fifth, for fewer programs"
+    )
+    surfaces.add_argument(
+        "--components",
+        action="store_const",
+        const=True,
+        help="bodies of a .3mf stay objects, for mesh programs; PrusaSlicer moves them apart",
     )
     surfaces.add_argument(
         "--occlusion",

@@ -1,7 +1,8 @@
 """The whole specimen as one glTF file, metres, y up: a node a channel, below it one a tile.
 
 Of a label map each object is a node of its own, with its name, up to MAX_NODES of them; beyond
-that a tile's objects are one mesh, in their colours.
+that a tile's objects are one mesh, in their colours. Meshes and curves that layers add have a node
+of their own, unless only some tiles are written.
 """
 
 import tempfile
@@ -21,9 +22,11 @@ from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_additions import read_additions
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import specimen_name
 
+_ADDED = "Added"  # node of the meshes and curves that layers add
 MAX_NODES = 5000  # objects; more of them take programs minutes to open
 
 
@@ -57,6 +60,13 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
                 triangles += len(mesh.triangles)
         if not count:
             raise chosen.nothing("surface")
+        for addition in [] if options.tiles else read_additions(chosen.stage):
+            mesh, material = _of_one_color(addition.mesh, addition.material)
+            positions = mesh.positions.astype(np.float64) * scale
+            where = {"addition": addition.path}
+            document.add(_ADDED, addition.name, mesh, positions, material, where)
+            count += 1
+            triangles += len(mesh.triangles)
         document.write(path)
     meshes = f"{counted(count, 'mesh', 'meshes')}, {triangles:,} triangles at lod{level}"
     return f"{meshes}, in metres; {chosen.describe_scale(options.scale or 1.0)}"

@@ -29,12 +29,14 @@ class ExportOptions:
     units          of the numbers in formats that state none
     scale          lengths in the file for a length of the specimen
     compress       meshopt or draco
+    components     a .3mf has an object a body, joined by components
     occlusion      darken vertices by ambient occlusion
     bits           of a voxel
     unity          one channel, as UnityVolumeRendering's importers read it
     wall_mm        what is thinner in print is named
     width          pixels of a picture
     max_mb         the most that a page in one file takes, millions of bytes
+    strict         an edit that the file does not have is an error
     view           a link of the viewer: the view that a page opens with
     """
 
@@ -47,12 +49,14 @@ class ExportOptions:
     units: str | None = None
     scale: float | None = None
     compress: str | None = None
+    components: bool | None = None
     occlusion: bool | None = None
     bits: int | None = None
     unity: bool | None = None
     wall_mm: float | None = None
     width: int | None = None
     max_mb: float | None = None
+    strict: bool | None = None
     view: str | None = None
 
     def __post_init__(self) -> None:

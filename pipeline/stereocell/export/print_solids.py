@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from stereocell.export.cap import close_cuts
 from stereocell.export.chosen import Chosen, Piece
-from stereocell.export.options import UNITS_M
+from stereocell.export.options import UNITS_M, ExportOptions
 from stereocell.export.thin_walls import describe_thin
 from stereocell.export.unite import Corners, cut_to, to_mesh, to_solid, unite, weld
 from stereocell.formats.body import Body
-from stereocell.formats.obj import write_obj
-from stereocell.formats.ply import write_ply
+from stereocell.formats.mesh_files import write_obj, write_ply
 from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
 from stereocell.model.color import to_srgb8
@@ -32,6 +31,7 @@ from stereocell.usd.layer import METERS_PER_UNIT
 from stereocell.usd.read_stage import specimen_name
 
 HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
+UNIT = "mm"  # what slicers take numbers for that have no unit
 WALL_MM = 0.8  # two lines of the usual nozzle of 0.4 mm
 _MAX_TOLD = 8  # parts with thin bodies: of a label map there may be thousands
 Color = tuple[float, float, float]
@@ -53,30 +53,36 @@ class _Surface:
 class _Part:
     """What becomes one body. `color`: linear RGB. Surfaces by label and by how tiles were moved."""
 
+    channel: str
     name: str
     color: Color
     surfaces: dict[tuple[int | None, tuple[float, ...]], _Surface] = field(default_factory=dict)
 
 
-# Writers of bodies by ending, given the name of the specimen and the unit; a new format is a line
-_WRITERS: dict[str, Callable[[Path, Sequence[Body], str, str], None]] = {
-    ".stl": lambda path, bodies, _, unit: write_stl_file(path, bodies, unit=unit),
-    ".3mf": lambda path, bodies, title, unit: write_3mf(path, bodies, title=title, unit=unit),
-    ".ply": lambda path, bodies, _, unit: write_ply(path, bodies, unit=unit),
-    ".obj": lambda path, bodies, _, unit: write_obj(path, bodies, unit=unit),
+def _write_3mf(path: Path, bodies: Sequence[Body], title: str, options: ExportOptions) -> None:
+    unit, components = options.units or UNIT, bool(options.components)
+    write_3mf(path, bodies, title=title, unit=unit, components=components)
+
+
+# Writers of bodies by ending, given the name of the specimen; a new format is a line
+_WRITERS: dict[str, Callable[[Path, Sequence[Body], str, ExportOptions], None]] = {
+    ".stl": lambda path, bodies, _, asked: write_stl_file(path, bodies, unit=asked.units or UNIT),
+    ".3mf": _write_3mf,
+    ".ply": lambda path, bodies, _, asked: write_ply(path, bodies, unit=asked.units or UNIT),
+    ".obj": lambda path, bodies, _, asked: write_obj(path, bodies, unit=asked.units or UNIT),
 }
-PRINT_ENDINGS = tuple(_WRITERS)
 
 
 def write_print(chosen: Chosen, path: Path, level: int) -> str:
     """Write the solids; return a line about them. Raises StageError and OutputError."""
     options = chosen.options
     scale = options.scale or _handy(chosen)
-    unit = options.units or "mm"
+    unit = options.units or UNIT
     factor = scale * METERS_PER_UNIT / UNITS_M[unit]
     wall = options.wall_mm if options.wall_mm is not None else WALL_MM
     ending = path.suffix.lower()
-    bodies: list[Body] = []
+    sized: list[tuple[float, Body]] = []
+    filaments: dict[str, int] = {}
     thin: list[str] = []
     for part, solid in _solids(chosen, level, is_one=ending == ".stl"):
         thin += describe_thin(
@@ -89,10 +95,14 @@ def write_print(chosen: Chosen, path: Path, level: int) -> str:
         places, triangles = to_mesh(solid)
         red, green, blue = to_srgb8(np.array(part.color, np.float32)).tolist()
         positions = (places.astype(np.float64) * factor).astype(np.float32)
-        bodies.append(Body(part.name, (red, green, blue), positions, triangles))
-    if not bodies:
+        filament = filaments.setdefault(part.channel, len(filaments) + 1)
+        body = Body(part.name, (red, green, blue), positions, triangles, filament)
+        sized.append((solid.volume(), body))
+    if not sized:
         raise chosen.nothing("surface")
-    _WRITERS[ending](path, bodies, specimen_name(chosen.stage), unit)
+    # Where two bodies overlap, slicers print the later one, so the enclosing one comes first.
+    bodies = [body for _, body in sorted(sized, key=lambda one: -one[0])]
+    _WRITERS[ending](path, bodies, specimen_name(chosen.stage), options)
     x, y, z = np.ptp(np.concatenate([body.positions for body in bodies]), axis=0).tolist()
     count = sum(len(body.triangles) for body in bodies)
     low, high = chosen.box
@@ -149,7 +159,7 @@ def _parts(chosen: Chosen, level: int, is_one: bool) -> Iterator[_Part]:
                 key = None if is_one else label
                 if key is None:
                     name, color = channel.name, _color_of(piece)
-                part = parts.setdefault(key, _Part(name, color))
+                part = parts.setdefault(key, _Part(channel.id, name, color))
                 same = label, piece.moved
                 surface = part.surfaces.setdefault(same, _Surface(piece.moved))
                 surface.meshes.append(mesh)

@@ -11,7 +11,9 @@ from pathlib import Path
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.own_parts import no_layer
 from stereocell.building.sealed_documents import require_documents
+from stereocell.export import format_edits as edits
 from stereocell.export.chosen import Chosen, Report
+from stereocell.export.format_edits import Lack
 from stereocell.export.gltf_scene import write_gltf
 from stereocell.export.neuroglancer import write_precomputed
 from stereocell.export.options import ExportOptions
@@ -21,7 +23,7 @@ from stereocell.export.pictures import (
     write_picture,
     write_turntable,
 )
-from stereocell.export.print_solids import PRINT_ENDINGS, write_print
+from stereocell.export.print_solids import write_print
 from stereocell.export.scene import MAX_MB, write_scene
 from stereocell.export.usd_files import write_flattened, write_light_copy
 from stereocell.export.volume_files import described_by, write_nifti, write_nrrd, write_raw
@@ -30,13 +32,14 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
+from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
 from stereocell.usd.written_files import CHANGED
 
 _EXPECTED = "nothing or an earlier export of this build, as it was written"
-_LEVELS = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
+_LEVELS = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "region", "scale"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,7 @@ class Format:
     write        is given the level of detail, 0 where the format has none; returns a line about the
                  file
     triangles    the most that are wanted if nothing is said; a coarsest level of more is taken
+    lacks        the kinds of edits that it leaves out; None: it has all that the stage composes
     is_seen      made to be looked at: without --channels it has those that the viewer opens with
     names_files  names files of OUT by their paths, so OUT has to be a folder
     beside       returns the paths of what goes with the file
@@ -53,6 +57,7 @@ class Format:
 
     write: Callable[[Chosen, Path, int], str]
     takes: frozenset[str]
+    lacks: tuple[Lack, ...] | None
     triangles: int | None = None
     is_seen: bool = False
     names_files: bool = False
@@ -63,28 +68,36 @@ class Format:
         return "lod" in self.takes
 
 
-_USD = frozenset({"tiles", "lod", "max_triangles", "max_bytes", "scale"})
-_PICTURE = frozenset({"tiles", "lod", "max_triangles", "region", "occlusion", "width"})
-_VOLUME = frozenset({"tiles", "region", "units", "bits"})
-_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, is_seen=True)
-_PRINT = Format(write_print, _LEVELS | {"wall_mm", "units"})
+_USD = frozenset({"strict", "tiles", "lod", "max_triangles", "max_bytes", "scale"})
+_PICTURE = frozenset({"strict", "tiles", "lod", "max_triangles", "region", "occlusion", "width"})
+_VOLUME = frozenset({"strict", "tiles", "region", "units", "bits"})
+_SOLID = _LEVELS | {"wall_mm", "units"}
+_GLTF = Format(write_gltf, _LEVELS | {"compress", "occlusion"}, edits.OF_GLTF, is_seen=True)
 FORMATS = {
     ".glb": _GLTF,
     ".gltf": _GLTF,
-    **dict.fromkeys(PRINT_ENDINGS, _PRINT),
-    ".usdz": Format(write_light_copy, _USD, MAX_TRIANGLES, is_seen=True),
-    ".usdc": Format(write_flattened, _USD, names_files=True),
-    ".usda": Format(write_flattened, _USD, names_files=True),
-    ".png": Format(write_picture, _PICTURE, PICTURE_TRIANGLES, is_seen=True),
-    ".mp4": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
-    ".webm": Format(write_turntable, _PICTURE, VIDEO_TRIANGLES, is_seen=True),
-    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}),
+    ".stl": Format(write_print, _SOLID, edits.OF_STL),
+    ".3mf": Format(write_print, _SOLID | {"components"}, edits.OF_SOLIDS),
+    ".ply": Format(write_print, _SOLID, edits.OF_PLY),
+    ".obj": Format(write_print, _SOLID, edits.OF_SOLIDS),
+    ".usdz": Format(write_light_copy, _USD, edits.OF_USDZ, MAX_TRIANGLES, is_seen=True),
+    ".usdc": Format(write_flattened, _USD, None, names_files=True),
+    ".usda": Format(write_flattened, _USD, None, names_files=True),
+    ".png": Format(write_picture, _PICTURE, edits.OF_PICTURES, PICTURE_TRIANGLES, is_seen=True),
+    ".mp4": Format(write_turntable, _PICTURE, edits.OF_PICTURES, VIDEO_TRIANGLES, is_seen=True),
+    ".webm": Format(write_turntable, _PICTURE, edits.OF_PICTURES, VIDEO_TRIANGLES, is_seen=True),
+    ".nrrd": Format(write_nrrd, _VOLUME | {"unity"}, edits.OF_VOXELS),
     ".raw": Format(
-        write_raw, _VOLUME | {"unity"}, beside=lambda file, options: [described_by(file, options)]
+        write_raw,
+        _VOLUME | {"unity"},
+        edits.OF_VOXELS,
+        beside=lambda file, options: [described_by(file, options)],
     ),
-    ".nii.gz": Format(write_nifti, _VOLUME),
-    ".nii": Format(write_nifti, _VOLUME),
-    ".precomputed": Format(write_precomputed, frozenset({"tiles", "region", "bits"})),
+    ".nii.gz": Format(write_nifti, _VOLUME, edits.OF_VOXELS),
+    ".nii": Format(write_nifti, _VOLUME, edits.OF_VOXELS),
+    ".precomputed": Format(
+        write_precomputed, frozenset({"strict", "tiles", "region", "bits"}), edits.OF_PRECOMPUTED
+    ),
 }
 PAGE = ".html"  # of the bundle, where all others are of the stage
 PAGE_TAKES = frozenset({"max_mb", "view"})
@@ -158,6 +171,8 @@ def _export(
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
     with usd_boundary(stage_path):
         chosen = Chosen(stage_path, options, report)
+        if way.lacks is not None:
+            _report_edits(chosen, way.lacks, ending)
         if way.is_seen:
             chosen.show_as_viewer()
     with usd_boundary(stage_path), _folder_beside(file) as beside:
@@ -166,6 +181,16 @@ def _export(
     for layer in sorted(chosen.as_written.changed):
         report(f"{layer}: {CHANGED}: taken as it is")
     return line, places
+
+
+def _report_edits(chosen: Chosen, lacks: tuple[Lack, ...], ending: str) -> None:
+    """Report each edit that the file won't have. Raises StageError for one, with --strict."""
+    stage, lost = chosen.stage, partial(edits.left_out, lacks)
+    more = list(edits.notes_on_functions(stage, lacks))
+    if chosen.options.strict:
+        require_no_lost_edit(stage, more, left_out=lost, taker=f"{ending} leaves out")
+    for line in (*notes_on_edits(stage, lost), *more):
+        chosen.report(line)
 
 
 def _put_all_in_place(file: Path, beside: Path, is_ours: Callable[[Path], bool]) -> list[Path]:

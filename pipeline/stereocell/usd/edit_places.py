@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import suppress
 
-from pxr import Sdf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_table import is_taken
@@ -54,7 +54,7 @@ class Places:
         if is_view(prim):
             return "camera"
         if is_light(prim):
-            return "light"
+            return "sphere" if prim.IsA(UsdLux.SphereLight) else "light"
         if is_addition(prim):
             return "addition"
         if path.GetParentPath() == CHANNELS:

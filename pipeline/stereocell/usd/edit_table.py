@@ -108,6 +108,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
         "@displayName",
     ),
     "light": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
+    "sphere": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
     "lights": (*_PLACED, *_SHOWN),
     "addition": (
         *_PLACED,

@@ -3,10 +3,12 @@
 The walk (`layer_opinions`) yields all opinions over the built stage, and the table (`edit_table`)
 has those that the readers take over. All others are lost, except an opinion that repeats the
 stage's own value. Values over time of what would be taken over are refused.
+
+A file for other programs has less than a bundle. Its format states what more is lost: `LeftOut`.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import Enum
@@ -31,6 +33,15 @@ _FLAT = (
     "instead"
 )
 _BUILT = "built"  # place of a prim of the build that no reader looks at
+
+
+WHOLE = "@specifier"  # stands for a prim as a whole
+# Given a place and a name of `edit_table`, why a file has no such thing; empty: it has it
+LeftOut = Callable[[str, str], str]
+
+
+def _nothing(_place: str, _name: str) -> str:
+    return ""
 
 
 class _Fate(Enum):
@@ -67,36 +78,45 @@ def describe(lost: Iterable[LostEdit]) -> Iterator[str]:
             yield f"{edit.what}{others} is not taken over: {edit.reason}"
 
 
-def notes_on_edits(stage: Usd.Stage) -> Iterator[str]:
+def notes_on_edits(stage: Usd.Stage, left_out: LeftOut = _nothing) -> Iterator[str]:
     """Yield a line on each edit that is lost. Raises StageError for an edit over time."""
     built = BuiltLayers(stage)
     if built:
-        yield from describe(find_lost_edits(stage, built))
+        yield from describe(find_lost_edits(stage, built, left_out))
     else:
         yield f"{stage.GetRootLayer().realPath}: {_FLAT}"
 
 
-def require_no_lost_edit(stage: Usd.Stage, more: Iterable[str] = ()) -> None:
+def require_no_lost_edit(
+    stage: Usd.Stage,
+    more: Iterable[str] = (),
+    *,
+    left_out: LeftOut = _nothing,
+    taker: str = "no bundle takes over",
+) -> None:
     """Raise StageError where an edit is lost, or where that can't be found.
 
-    more  lines on edits that are lost in part
+    more   lines on edits that are lost in part
+    taker  ends "edits that ..."
     """
     layer, built = Path(stage.GetRootLayer().realPath), BuiltLayers(stage)
     if not built:
         raise StageError(f"{layer}: {_FLAT}")
-    found = [*describe(find_lost_edits(stage, built)), *more]
+    found = [*describe(find_lost_edits(stage, built, left_out)), *more]
     if found:
         words = "1 edit" if len(found) == 1 else f"{len(found)} edits"
         lines = "\n".join(found)
         raise StageError(
-            f"{lines}\n{layer}: found {words} that no bundle takes over, expected none with "
-            "--strict: nothing is written; remove them or leave --strict out"
+            f"{lines}\n{layer}: found {words} that {taker}, expected none with --strict: nothing "
+            "is written; remove them or leave --strict out"
         )
 
 
-def find_lost_edits(stage: Usd.Stage, built: BuiltLayers) -> list[LostEdit]:
+def find_lost_edits(
+    stage: Usd.Stage, built: BuiltLayers, left_out: LeftOut = _nothing
+) -> list[LostEdit]:
     """Return the edits that are lost, in the stage's order. Raises StageError for one over time."""
-    finder = _Finder(stage, built, _bound_materials(stage, built))
+    finder = _Finder(stage, built, _bound_materials(stage, built), left_out)
     for prim, opinion in opinions_of_users(stage, built):
         finder.add(prim, opinion)
     return finder.lost()
@@ -114,8 +134,10 @@ def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
 class _Finder:
     """Collects what becomes of each opinion. One that inherits reach counts once."""
 
-    def __init__(self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path]) -> None:
-        self._built = built
+    def __init__(
+        self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path], left_out: LeftOut
+    ) -> None:
+        self._built, self._left_out = built, left_out
         self._places = Places(stage, bound)
         self._found: dict[tuple[str, str], list[LostEdit | _Fate]] = {}
         self._covered: set[Sdf.Path] = set()
@@ -148,8 +170,14 @@ class _Finder:
                 "variant",
                 "it is not selected",
             )
-        reason = self._fault(place, prim.GetStage().GetPrimAtPath(path), opinion)
-        if name == "@specifier" or not reason:
+        own = prim.GetStage().GetPrimAtPath(path)
+        if reason := self._left_out(place, WHOLE):
+            self._covered.add(path)
+            return LostEdit(f"{own.GetTypeName()} {path}", str(own.GetTypeName()), reason)
+        reason = self._fault(place, own, opinion)
+        if not reason and (left_out := self._left_out(place, name)):
+            reason = "" if self._repeats(own.GetAttribute(name), opinion.spec) else left_out
+        if name == WHOLE or not reason:
             return _Fate.TAKEN
         return LostEdit(_words_for(prim, path, name), name, reason)
 
@@ -237,7 +265,7 @@ class _Finder:
 
     def _repeats(self, attribute: Usd.Attribute, spec: Sdf.Spec) -> bool:
         """Return whether a value is the one that holds without it, or is of the type's own."""
-        if not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
+        if not attribute or not isinstance(spec, Sdf.AttributeSpec) or not spec.HasDefaultValue():
             return False
         below = [
             one.default

@@ -1,6 +1,7 @@
 """`stereocell check OUT --deep`: compare stage with source and bundle with stage, as a table."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from stereocell.model.unit import Cover
 from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
 from stereocell.planning.unit_steps import unit_steps
+from stereocell.steps.write_bundle import opened_stage
 from stereocell.usd.read_appearances import read_appearances
 from stereocell.usd.read_attributes import shortest
 from stereocell.usd.read_stage import open_stage, tile_prims
@@ -79,10 +81,18 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
                 f"{labels.name} against source",
                 partial(compare_objects, out_folder, plan, labels, engine),
             )
+    yield from _edit_lines(exported)
     of_layer = "" if stage else out_folder.phases().get("bundle", {}).get("about", "")
     remedy = of_layer and f"; the bundle is {of_layer}: check it with --stage LAYER"
     yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle), remedy)
     yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine), remedy)
+
+
+def _edit_lines(stage: Path) -> Iterator[CheckLine]:
+    """Yield a line on each edit that no bundle takes over, which is no fault of the bundle."""
+    with suppress(StereoCellError), opened_stage(stage) as composed:  # other lines state the error
+        for note in list(composed.notes()):
+            yield CheckLine("edits of the stage", True, note)
 
 
 def _line(name: str, run: Callable[[], str], remedy: str = "") -> CheckLine:
