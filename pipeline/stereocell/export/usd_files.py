@@ -38,7 +38,7 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
         path,
         as_written=chosen.as_written,
         level=level,
-        tiles=tiles,
+        tiles=chosen.options.tiles,
         channels=channels,
         scale=scale,
     )
