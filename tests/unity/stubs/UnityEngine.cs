@@ -11,13 +11,20 @@ namespace UnityEngine
     {
         bool isDestroyed;
         public virtual string name { get; set; }
-        public static void DestroyImmediate(Object obj) { obj.isDestroyed = true; }
+        public HideFlags hideFlags { get; set; }
+        public static void DestroyImmediate(Object obj) { obj.isDestroyed = true; obj.OnGone(); }
+        public static void Destroy(Object obj) { DestroyImmediate(obj); }
+        internal virtual void OnGone() { }
+        public static T[] FindObjectsByType<T>(FindObjectsSortMode sortMode) where T : Object { return GameObject.All.SelectMany(each => each.GetComponents<T>()).ToArray(); }
         public static bool operator ==(Object x, Object y) { return IsNull(x) ? IsNull(y) : ReferenceEquals(x, y); }
         public static bool operator !=(Object x, Object y) { return !(x == y); }
         public override bool Equals(object other) { return ReferenceEquals(this, other); }
         public override int GetHashCode() { return base.GetHashCode(); }
         static bool IsNull(Object x) { return ReferenceEquals(x, null) || x.isDestroyed; }
     }
+
+    public enum FindObjectsSortMode { None, InstanceID }
+    [Flags] public enum HideFlags { None = 0, HideInHierarchy = 1, HideInInspector = 2, DontSaveInEditor = 4, NotEditable = 8, DontSaveInBuild = 16, DontUnloadUnusedAsset = 32, DontSave = 52, HideAndDontSave = 61 }
 
     public class Component : Object
     {
@@ -27,7 +34,8 @@ namespace UnityEngine
         public T GetComponent<T>() { return gameObject.GetComponent<T>(); }
         public T[] GetComponentsInChildren<T>() { return GetComponentsInChildren<T>(false); }
         public T[] GetComponentsInChildren<T>(bool includeInactive) { return gameObject.GetComponentsInChildren<T>(includeInactive); }
-        public T GetComponentInParent<T>()
+        public T GetComponentInParent<T>() { return GetComponentInParent<T>(false); }
+        public T GetComponentInParent<T>(bool includeInactive)
         {
             for (var at = transform; at != null; at = at.parent)
             {
@@ -47,11 +55,13 @@ namespace UnityEngine
 
     public sealed class GameObject : Object
     {
+        public static readonly List<GameObject> All = new List<GameObject>();  // of the stub
         readonly List<Component> components = new List<Component>();
         public GameObject(string name)
         {
             this.name = name;
             activeSelf = true;
+            All.Add(this);
             transform = AddComponent<Transform>();
         }
         public Transform transform { get; private set; }
@@ -59,11 +69,22 @@ namespace UnityEngine
         public void SetActive(bool value) { activeSelf = value; }
         public T AddComponent<T>() where T : Component
         {
-            var made = (T)Activator.CreateInstance(typeof(T), true);
+            foreach (RequireComponent needed in typeof(T).GetCustomAttributes(typeof(RequireComponent), true))
+            {
+                foreach (var type in needed.Types) if (!components.Any(type.IsInstanceOfType)) Add(type);
+            }
+            return (T)Add(typeof(T));
+        }
+        Component Add(Type type)
+        {
+            var made = (Component)Activator.CreateInstance(type, true);
             made.gameObject = this;
             components.Add(made);
             return made;
         }
+        public string tag { get; set; }
+        public T GetComponentInParent<T>(bool includeInactive) { return transform.GetComponentInParent<T>(includeInactive); }
+        public IEnumerable<T> GetComponents<T>() { return components.OfType<T>(); }  // Unity returns an array
         public T GetComponent<T>() { return components.OfType<T>().FirstOrDefault(); }
         public T[] GetComponentsInChildren<T>() { return GetComponentsInChildren<T>(false); }
         public T[] GetComponentsInChildren<T>(bool includeInactive)
@@ -89,14 +110,17 @@ namespace UnityEngine
         public Vector3 localScale { get; set; }
         public Vector3 position { get { return parent == null ? localPosition : parent.TransformPoint(localPosition); } set { localPosition = value; } }
         public Vector3 forward { get; set; }
+        public Quaternion rotation { get; set; }
+        public Quaternion localRotation { get; set; }
         public int childCount { get { return children.Count; } }
         public Transform GetChild(int index) { return children[index]; }
         public void SetParent(Transform p) { SetParent(p, true); }
         public void SetParent(Transform parent, bool worldPositionStays)
         {
             if (worldPositionStays) throw new NotSupportedException();
+            if (this.parent != null) this.parent.children.Remove(this);
             this.parent = parent;
-            parent.children.Add(this);
+            if (parent != null) parent.children.Add(this);
         }
         public Vector3 InverseTransformPoint(Vector3 position)
         {
@@ -127,6 +151,19 @@ namespace UnityEngine
         public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
         public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
         public static Vector3 operator *(Vector3 a, float d) { return new Vector3(a.x * d, a.y * d, a.z * d); }
+    }
+
+    public struct Vector2 : IEquatable<Vector2>
+    {
+        public float x, y;
+        public Vector2(float x, float y) { this.x = x; this.y = y; }
+        public bool Equals(Vector2 other) { return x == other.x && y == other.y; }
+    }
+
+    public struct Quaternion
+    {
+        public float x, y, z, w;
+        public static Quaternion Euler(float x, float y, float z) { return new Quaternion(); }
     }
 
     public struct Vector4
@@ -173,6 +210,7 @@ namespace UnityEngine
     public struct Color
     {
         public float r, g, b, a;
+        public static Color black { get { return new Color(0, 0, 0, 1); } }
         public static Color white { get { return new Color(1, 1, 1, 1); } }
         public static bool operator ==(Color lhs, Color rhs) { return lhs.r == rhs.r && lhs.g == rhs.g && lhs.b == rhs.b && lhs.a == rhs.a; }
         public static bool operator !=(Color lhs, Color rhs) { return !(lhs == rhs); }
@@ -191,54 +229,24 @@ namespace UnityEngine
         public float y { get; set; }
         public float width { get; set; }
         public float height { get; set; }
+        public Rect(float x, float y, float width, float height) : this() { this.x = x; this.y = y; this.width = width; this.height = height; }
     }
 
     public class GUIContent
     {
         public static GUIContent none = new GUIContent();
+        public GUIContent() { }
+        public GUIContent(string text) { }
     }
 
     public struct Mathf
     {
+        public const float PI = (float)Math.PI;
         public static float Max(float a, float b) { return Math.Max(a, b); }
-    }
-
-    public class Texture : Object
-    {
-        public virtual int width { get; set; }
-        public virtual int height { get; set; }
-        public TextureWrapMode wrapMode { get; set; }
-        public FilterMode filterMode { get; set; }
-        public Array Data;  // of the stub: what was set
-        public string Format;
-    }
-
-    public class Texture2D : Texture
-    {
-        public bool IsLinear;
-        public Texture2D(int width, int height, TextureFormat textureFormat, bool mipChain, bool linear)
-        {
-            this.width = width;
-            this.height = height;
-            Format = textureFormat.ToString();
-            IsLinear = linear;
-        }
-        public void SetPixelData<T>(T[] data, int mipLevel, int sourceDataStartIndex = 0) { Data = data; }
-        public void Apply(bool updateMipmaps, bool makeNoLongerReadable) { }
-    }
-
-    public sealed class Texture3D : Texture
-    {
-        public Texture3D(int width, int height, int depth, TextureFormat textureFormat, bool mipChain)
-        {
-            this.width = width;
-            this.height = height;
-            this.depth = depth;
-            Format = textureFormat.ToString();
-        }
-        public int depth { get; private set; }
-        public void SetPixelData<T>(T[] data, int mipLevel, int sourceDataStartIndex = 0) { Data = data; }
-        public void Apply(bool updateMipmaps, bool makeNoLongerReadable) { }
+        public static float Clamp01(float value) { return Math.Min(Math.Max(value, 0), 1); }
+        public static float Sin(float f) { return (float)Math.Sin(f); }
+        public static float Cos(float f) { return (float)Math.Cos(f); }
+        public static int RoundToInt(float f) { return (int)Math.Round(f); }
     }
 
     public enum TextureFormat { RGBA32 = 4, RG16 = 62, R8 = 63 }
@@ -262,25 +270,29 @@ namespace UnityEngine
     public class Material : Object
     {
         public readonly SortedDictionary<string, object> Values = new SortedDictionary<string, object>();
-        public readonly HashSet<string> Keywords = new HashSet<string>();
         public Material(Shader shader) { }
+        public Material(Material source)
+        {
+            name = source.name;
+            foreach (var pair in source.Values) Values.Add(pair.Key, pair.Value);
+        }
         public void SetTexture(string name, Texture value) { Values[name] = value; }
         public void SetVector(string name, Vector4 value) { Values[name] = value; }
-        public Vector4 GetVector(int nameID) { return (Vector4)Values[Shader.Names[nameID]]; }
         public void SetFloat(string name, float value) { Values[name] = value; }
-        public void EnableKeyword(string keyword) { Keywords.Add(keyword); }
-        public void DisableKeyword(string keyword) { Keywords.Remove(keyword); }
-        public bool IsKeywordEnabled(string keyword) { return Keywords.Contains(keyword); }
+        public void SetTexture(int nameID, Texture value) { Values[Shader.Names[nameID]] = value; }
+        public void SetVector(int nameID, Vector4 value) { Values[Shader.Names[nameID]] = value; }
+        public void SetFloat(int nameID, float value) { Values[Shader.Names[nameID]] = value; }
+        public void SetColor(int nameID, Color value) { Values[Shader.Names[nameID]] = value; }
+        public Vector4 GetVector(int nameID) { return (Vector4)Values[Shader.Names[nameID]]; }
     }
 
     public sealed class MaterialPropertyBlock
     {
         public SortedDictionary<string, object> Values = new SortedDictionary<string, object>();
-        public void Clear() { Values = new SortedDictionary<string, object>(); }
-        public void SetFloat(string name, float value) { Values[name] = value; }
-        public void SetVector(string name, Vector4 value) { Values[name] = value; }
-        public void SetColor(string name, Color value) { Values[name] = value; }
-        public void SetVectorArray(string name, Vector4[] values) { Values[name] = values; }
+        public void SetTexture(int nameID, Texture value) { Values[Shader.Names[nameID]] = value; }
+        public void SetFloat(int nameID, float value) { Values[Shader.Names[nameID]] = value; }
+        public void SetVector(int nameID, Vector4 value) { Values[Shader.Names[nameID]] = value; }
+        public void SetColor(int nameID, Color value) { Values[Shader.Names[nameID]] = value; }
     }
 
     public sealed class Mesh : Object
@@ -288,6 +300,10 @@ namespace UnityEngine
         public Vector3[] vertices { get; set; }
         public int[] triangles { get; set; }
         public void RecalculateBounds() { }
+        public void SetTriangles(int[] triangles, int trianglesStart, int trianglesLength, int submesh, bool calculateBounds = true, int baseVertex = 0)
+        {
+            this.triangles = triangles.Skip(trianglesStart).Take(trianglesLength).ToArray();
+        }
     }
 
     public sealed class MeshFilter : Component
@@ -312,7 +328,16 @@ namespace UnityEngine
         public int sortingOrder { get; set; }
         public Rendering.ShadowCastingMode shadowCastingMode { get; set; }
         public Material sharedMaterial { get; set; }
-        public void SetPropertyBlock(MaterialPropertyBlock properties) { Block = properties == null ? null : properties.Values; }
+        Material instance;
+        public Material material  // an instance of the renderer's own, as Unity makes one
+        {
+            get
+            {
+                if (ReferenceEquals(instance, null)) sharedMaterial = instance = new Material(sharedMaterial);
+                return instance;
+            }
+        }
+        public void SetPropertyBlock(MaterialPropertyBlock properties) { Block = properties == null ? null : new SortedDictionary<string, object>(properties.Values); }
     }
 
     public class MeshRenderer : Renderer { }
@@ -376,7 +401,15 @@ namespace UnityEngine
     {
         public static Camera main { get; set; }
         public DepthTextureMode depthTextureMode { get; set; }
+        public float nearClipPlane { get; set; }
+        public CameraClearFlags clearFlags { get; set; }
+        public Color backgroundColor { get; set; }
     }
+
+    public enum CameraClearFlags { Skybox = 1, SolidColor = 2, Depth = 3, Nothing = 4 }
+    public enum LightType { Spot, Directional, Point }
+    public sealed class Light : Behaviour { public LightType type { get; set; } }
+    public sealed class AudioListener : Behaviour { }
 
     public class Time
     {
@@ -392,10 +425,11 @@ namespace UnityEngine
     public sealed class ExecuteAlways : Attribute { }
     [AttributeUsage(AttributeTargets.Class)] public sealed class DisallowMultipleComponent : Attribute { }
     public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string menuName) { } }
-    [AttributeUsage(AttributeTargets.Class, AllowMultiple = true)] public sealed class RequireComponent : Attribute { public RequireComponent(Type requiredComponent) { } }
-}
-
-namespace UnityEngine.Rendering
-{
-    public enum ShadowCastingMode { Off, On, TwoSided, ShadowsOnly }
+    [AttributeUsage(AttributeTargets.Class, AllowMultiple = true)] public sealed class RequireComponent : Attribute
+    {
+        public readonly Type[] Types;  // of the stub
+        public RequireComponent(Type requiredComponent) { Types = new[] { requiredComponent }; }
+        public RequireComponent(Type requiredComponent, Type requiredComponent2) { Types = new[] { requiredComponent, requiredComponent2 }; }
+    }
+    [AttributeUsage(AttributeTargets.Field)] public sealed class SerializeField : Attribute { }
 }
