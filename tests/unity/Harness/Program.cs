@@ -46,6 +46,8 @@ static class Program
             case "level": return Volumes.LevelFor(JObject.Parse(args[1]));
             case "residency": return Volumes.Residents(JArray.Parse(args[1]));
             case "place": return Volumes.Place(args[1], args[2]);
+            case "points": return Functions.Points(JArray.Parse(Console.In.ReadToEnd()));
+            case "layer": return Functions.Layer(args[1], args[2], args[3], JArray.Parse(args[4]));
             default: throw new ArgumentException(args[0]);
         }
     }
