@@ -15,7 +15,10 @@ ZIP = "System.IO.Compression.FileSystem.dll"  # of Mono; Debian has it in a pack
 ENGINE = ("UnityEngine",)
 EDITOR = (*ENGINE, "UnityEditor", NEWTONSOFT.stem)
 ASSEMBLIES: dict[str, tuple[list[Path], tuple[str, ...]]] = {
-    "UnityEngine": ([STUBS / f"Unity{name}.cs" for name in ("Engine", "Textures", "Modules")], ()),
+    "UnityEngine": (
+        [STUBS / f"Unity{name}.cs" for name in ("Engine", "Math", "Textures", "Modules")],
+        (),
+    ),
     "UnityEditor": ([STUBS / "UnityEditor.cs", STUBS / "UnityAssets.cs"], ENGINE),
     "glTFast": ([STUBS / "GltFast.cs"], (*ENGINE, NEWTONSOFT.stem)),
     "Google.XR.Cardboard": ([STUBS / "Cardboard.cs"], ENGINE),

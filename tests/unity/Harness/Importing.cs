@@ -108,10 +108,10 @@ static class Importing
         var own = new Material((Shader)null) { name = "my own" };
         AssetImporter.GetAtPath(Asset).AddRemap(SpecimenImporter.MaterialOf("CD31"), own);
         AssetImporter.GetAtPath(Asset).SaveAndReimport();
-        EditorApplication.Focus();
+        ComeBack();
         var days = new JArray(Day());
         AssetDatabase.Log.Clear();
-        EditorApplication.Focus();
+        ComeBack();
         days.Add(Day());
         Directory.Delete("linked", true);
         CopyFolder(other, "linked");
@@ -120,13 +120,20 @@ static class Importing
             File.Delete(Asset);
             System.IO.Compression.ZipFile.CreateFromDirectory("linked", Asset);
         }
-        EditorApplication.Focus();
+        ComeBack();
         days.Add(Day());
         File.WriteAllText("linked/manifest.json", "{");
         if (isCopy) File.WriteAllText(Asset, "{");
-        EditorApplication.Focus();
+        ComeBack();
         days.Add(Day());
         return days;
+    }
+
+    /// <summary>Come to the front: Unity looks at the project's files, and the package at its bundles.</summary>
+    static void ComeBack()
+    {
+        AssetDatabase.Refresh();
+        EditorApplication.Focus();
     }
 
     static JObject Day()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-using System;
+using System.Collections.Generic;
 using System.IO;
 using UnityEditor;
 using UnityEngine;
@@ -9,13 +9,16 @@ namespace StereoCell.Editor
 {
     /// <summary>
     /// Has specimens imported again whose bundle was built anew: a linked folder lies outside the project, so Unity does
-    /// not see its changes. manifest.json names the hash of every other file, so its own hash stands for them all.
+    /// not see its changes. manifest.json holds the hash of the list of all files, so a change of any file changes it.
     /// Bundles are looked at when the editor starts, and whenever it comes to the front.
     /// </summary>
     [InitializeOnLoad]
     public static class BundleWatcher
     {
         public const string PipelineName = "StereoCell/pipeline";
+
+        /// <summary>What was registered since the scripts were loaded.</summary>
+        static readonly Dictionary<string, Hash128> registered = new Dictionary<string, Hash128>();
 
         static BundleWatcher()
         {
@@ -32,31 +35,40 @@ namespace StereoCell.Editor
             return "StereoCell/bundle/" + Path.GetFullPath(folder).Replace('\\', '/');
         }
 
-        /// <summary>Note what linked bundles hold now. Unity then imports the specimens for which it has changed.</summary>
+        /// <summary>Note what linked bundles hold now, and have Unity import the specimens for which that has changed.</summary>
         public static void Look()
         {
             var pipeline = GraphicsSettings.currentRenderPipeline;
-            AssetDatabase.RegisterCustomDependency(PipelineName, Hash128.Compute(pipeline == null ? "built-in" : pipeline.GetType().Name));
+            var isNew = Register(PipelineName, pipeline == null ? "built-in" : pipeline.GetType().Name);
             foreach (var asset in Directory.GetFiles("Assets", "*." + SpecimenImporter.Ending, SearchOption.AllDirectories))
             {
                 try
                 {
                     var folder = BundleFiles.LinkedFolder(asset);
-                    if (folder != null) Register(folder);
+                    if (folder != null) isNew |= Register(folder);
                 }
                 catch (IOException)
                 {
                     // The import of this asset says what is wrong with it.
                 }
             }
-            AssetDatabase.Refresh();
+            if (isNew) AssetDatabase.Refresh();
         }
 
-        public static void Register(string folder)
+        /// <summary>Note what a linked folder holds. Returns whether it is something new.</summary>
+        public static bool Register(string folder)
         {
             var manifest = Path.Combine(folder, "manifest.json");
-            var text = File.Exists(manifest) ? File.ReadAllText(manifest) : "";
-            AssetDatabase.RegisterCustomDependency(NameOf(folder), Hash128.Compute(text));
+            return Register(NameOf(folder), File.Exists(manifest) ? File.ReadAllText(manifest) : "");
+        }
+
+        static bool Register(string name, string content)
+        {
+            Hash128 before, now = Hash128.Compute(content);
+            if (registered.TryGetValue(name, out before) && before.Equals(now)) return false;
+            registered[name] = now;
+            AssetDatabase.RegisterCustomDependency(name, now);
+            return true;
         }
     }
 }

@@ -163,7 +163,7 @@ namespace StereoCell
 
         void OnValidate()
         {
-            Apply();
+            if (isActiveAndEnabled) Apply();  // the asset itself is in no scene, and draws nothing
         }
 
         void Update()
