@@ -92,6 +92,7 @@ def test_tiles_stay_while_they_fit(run: Run, channels: int) -> None:
     found = ask(run, "tour", json.dumps(asked))
     stride = {1: 1, 2: 2, 3: 4, 4: 4}[channels]
     assert [len(step["showing"]) for step in found["steps"]] == [1, 2, 3, 4]
+    assert found["reloaded"]  # after the GPU has lost a texture
     assert found["steps"][-1]["held"] == 4 * stride * 40 * 30 * 20
     assert found["sums"] == [((4 + c) if c < channels else 0) * 24000 for c in range(stride)]
 

@@ -42,7 +42,8 @@ static class Gazing
 
     /// <summary>
     /// Look at each tile of a specimen until it shows its volume. Sizes and budget are asked for; the files hold a pattern.
-    /// Returns what shows after each tile, the most memory of textures, and the most bytes that a frame uploads.
+    /// Returns what shows after each tile, the most memory of textures, the most bytes that a frame uploads, and whether
+    /// a texture that the GPU has lost is loaded again.
     /// </summary>
     public static JToken Tour(JObject asked)
     {
@@ -82,13 +83,32 @@ static class Gazing
                 new JProperty("held", Texture.HeldBytes),
                 new JProperty("mostInFrame", mostInFrame)));
         }
-        var last = (Texture)tiles.Last().GetComponentsInChildren<Renderer>(true)[0].sharedMaterial.Values["_Volume"];
+        var last = TextureOf(tiles.Last());
+        var reloaded = false;
+        if (last is RenderTexture)
+        {
+            ((RenderTexture)last).Release();  // as a phone's GPU does while the program is in the background
+            for (var frame = 0; frame < 100000 && !reloaded; frame++)
+            {
+                Program.Send(specimen, "Update");
+                var now = TextureOf(tiles.Last());
+                reloaded = now != null && !ReferenceEquals(now, last);
+                Thread.Sleep(1);
+            }
+            last = TextureOf(tiles.Last());
+        }
         return new JObject(
             new JProperty("steps", steps),
             new JProperty("peak", tiles[0].PeakBytes),
             new JProperty("most", Texture.MostBytes),
             new JProperty("errors", new JArray(Debug.Errors)),
+            new JProperty("reloaded", reloaded),
             new JProperty("sums", new JArray(Enumerable.Range(0, VolumeFile.ComponentsOf(channels)).Select(c => SumOf(last.Data, c, VolumeFile.ComponentsOf(channels))))));
+    }
+
+    static Texture TextureOf(Tile tile)
+    {
+        return (Texture)tile.GetComponentsInChildren<Renderer>(true)[0].sharedMaterial.Values["_Volume"];
     }
 
     static long SumOf(byte[] texels, int component, int stride)
