@@ -120,10 +120,11 @@ browser: ## Install Debian's chromium and Mesa's drawing by software for the bro
 
 # after the browser: dpkg lets one install at a time
 mono: browser ## Install Debian's Mono and shader compilers for the Unity package's tests, if we may
-	@if [ -e /usr/lib/cli/Newtonsoft.Json-5.0 ] && (for each in mcs mono glslangValidator spirv-cross; do command -v $$each >/dev/null || exit 1; done); then :; \
+	@if [ -e /usr/lib/cli/Newtonsoft.Json-5.0 ] && [ -e /usr/lib/mono/4.5/System.IO.Compression.FileSystem.dll ] && (for each in mcs mono glslangValidator spirv-cross; do command -v $$each >/dev/null || exit 1; done); then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-	    mono-mcs mono-runtime libnewtonsoft-json5.0-cil glslang-tools spirv-cross >/dev/null; } \
+	    mono-mcs mono-runtime libnewtonsoft-json5.0-cil libmono-system-io-compression-filesystem4.0-cil \
+	    glslang-tools spirv-cross >/dev/null; } \
 	  || echo "mono: can't be installed here, so tests of the Unity package are skipped" >&2; \
 	else echo "mono: no Mono or shader compilers, so tests of the Unity package are skipped; on Debian get them by: sudo make mono"; fi
 

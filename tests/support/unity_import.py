@@ -24,7 +24,8 @@ def child(of: Any, *names: str) -> Any:
 def boxes(root: Any) -> Iterator[tuple[str, Any]]:
     for tile in root["children"]:
         for box in child(tile, "volume").get("children", []):
-            yield tile["name"], box
+            # a property block is stronger than the material
+            yield tile["name"], {**box, "material": {**box["material"], **box.get("block", {})}}
 
 
 def world_of(root: Any, bundle: Path, places_um: NDArray[np.float64]) -> NDArray[np.float64]:

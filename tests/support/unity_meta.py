@@ -10,13 +10,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[2] / "usd_assets" / "unity"
+SAMPLES = PACKAGE / "Samples~"
 
 
 def assets() -> Iterator[Path]:
-    """Yield the files and folders that Unity imports: not `.hidden` ones, nor `Documentation~`."""
+    """Yield the files and folders that Unity imports: not `.hidden` ones, nor `Documentation~`.
+
+    Unity imports a sample once its user has copied it into the project, so files of `Samples~`
+    count.
+    """
     for path in sorted(PACKAGE.rglob("*")):
         parts = path.relative_to(PACKAGE).parts
-        if path.suffix != ".meta" and not any(p.startswith(".") or p.endswith("~") for p in parts):
+        if parts[0] == SAMPLES.name:
+            parts = parts[1:]
+        is_hidden = any(p.startswith(".") or p.endswith("~") for p in parts)
+        if path.suffix != ".meta" and parts and not is_hidden:
             yield path
 
 

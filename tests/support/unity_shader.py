@@ -22,6 +22,7 @@ TESTS = Path(__file__).parents[1] / "unity"
 VIEWER = Path(__file__).parents[2] / "viewer_gltf"
 SHADER = PACKAGE / "Runtime" / "Shaders" / "StereoCellVolume.shader"
 STAGES = ("vert", "frag")
+MARKS = {"builtin": ("CGPROGRAM", "ENDCG"), "universal": ("HLSLPROGRAM", "ENDHLSL")}
 
 
 def has_compiler() -> bool:
@@ -35,16 +36,22 @@ def chromium() -> str | None:
     return found if tools and (VIEWER / "node_modules" / "playwright-core").is_dir() else None
 
 
-def program() -> str:
-    """Return the shader's HLSL, without Unity's own pragmas."""
-    (found,) = re.findall(r"CGPROGRAM\n(.*?)ENDCG", SHADER.read_text("utf-8"), re.DOTALL)
+def program(pipeline: str = "builtin", shader: Path = SHADER) -> str:
+    """Return a sub-shader's HLSL, without Unity's own pragmas.
+
+    pipeline  "builtin" or "universal"
+    """
+    first, last = MARKS[pipeline]
+    (found,) = re.findall(rf"{first}\n(.*?){last}", shader.read_text("utf-8"), re.DOTALL)
     return re.sub(r"^ *#pragma.*\n", "", found, flags=re.MULTILINE)
 
 
-def compile_stage(stage: str, folder: Path, *defines: str) -> Path:
+def compile_stage(
+    stage: str, folder: Path, *defines: str, pipeline: str = "builtin", shader: Path = SHADER
+) -> Path:
     """Return the SPIR-V of a stage. Raises CalledProcessError with the compiler's words."""
-    source, out = folder / "volume.hlsl", folder / f"{stage}.spv"
-    source.write_text(program())
+    source, out = folder / f"pass_of_{pipeline}.hlsl", folder / f"{pipeline}_{stage}.spv"
+    source.write_text(program(pipeline, shader))
     subprocess.run(
         [
             *("glslangValidator", "-D", "-V", "--auto-map-bindings", "--auto-map-locations"),
@@ -53,6 +60,7 @@ def compile_stage(stage: str, folder: Path, *defines: str) -> Path:
         ],
         check=True,
         capture_output=True,
+        timeout=60,
     )
     return out
 
@@ -85,61 +93,74 @@ def view_of(camera: Camera, middle: NDArray[np.float64], scale: float) -> dict[s
         "unity_MatrixVP": projection @ view,
         "_WorldSpaceCameraPos": eye,
         "_ProjectionParams": [1, near, far, 1 / far],
+        "_ScaledScreenParams": [width, height, 1 + 1 / width, 1 + 1 / height],
     }
 
 
+def uniform_blocks(fragment: Path) -> list[dict[str, Any]]:
+    """Return the uniform blocks of a stage: name, bytes, and the members' names, types, offsets."""
+    reflected = json.loads(cross(fragment, "--reflect"))
+    return [
+        {
+            "name": ubo["name"],
+            "bytes": ubo["block_size"],
+            "members": reflected["types"][ubo["type"]]["members"],
+        }
+        for ubo in reflected["ubos"]
+    ]
+
+
+def filled(block: dict[str, Any], values: dict[str, Any]) -> str:
+    """Return the bytes of a uniform block, in base 64."""
+    data = bytearray(block["bytes"] + 16)
+    for member in block["members"]:
+        value = np.array(values.get(member["name"], 0.0), np.float32)
+        if member["type"] == "mat4":
+            value = value.T  # column by column
+        found = value.tobytes()
+        data[member["offset"] : member["offset"] + len(found)] = found
+    return base64.b64encode(data).decode()
+
+
 def draw(
-    boxes: list[dict[str, Any]], camera: Camera, folder: Path, *defines: str
+    boxes: list[dict[str, Any]],
+    camera: Camera,
+    folder: Path,
+    *defines: str,
+    pipeline: str = "builtin",
 ) -> NDArray[np.float64]:
     """Return a picture (height, width, 4), linear and premultiplied, top row first.
 
     boxes: from the farthest; each has `values` (uniforms by name), `volume`, `table` (as the
         harness prints textures), `vertices` and `triangles`
     """
-    spirv = {stage: compile_stage(stage, folder, *defines) for stage in STAGES}
+    spirv = {stage: compile_stage(stage, folder, *defines, pipeline=pipeline) for stage in STAGES}
     glsl = {stage: cross(path, "--es", "--version", "300") for stage, path in spirv.items()}
     # stages of WebGL agree by names
     for out, into in re.findall(r"out \w+ (_\w+?_(\w+));", glsl["vert"]):
         glsl["vert"] = re.sub(rf"\b{out}\b", f"v_{into}", glsl["vert"])
         glsl["frag"] = re.sub(rf"\bi_{into}\b", f"v_{into}", glsl["frag"])
-    reflected = json.loads(cross(spirv["frag"], "--reflect"))
-    (ubo,) = reflected["ubos"]
-    members = reflected["types"][ubo["type"]]["members"]
-    block = re.search(r"uniform (\w+)\s*\{", glsl["frag"])
-    assert block is not None
-    names = [
-        "_Volume",
-        "_Table",
-        *(["_CameraDepthTexture"] if "STEREOCELL_SCENE_DEPTH" in defines else []),
-    ]
+    blocks = uniform_blocks(spirv["frag"])
     samplers = {
         name: re.search(rf"uniform .*sampler[23]D (\w*{name}\w*);", glsl["frag"])[1]  # type: ignore[index]
-        for name in names
+        for name in ("_Volume", "_Table", "_CameraDepthTexture")
     }
     width, height = camera.size_px
     asked = {
         "vertex": glsl["vert"],
         "fragment": glsl["frag"],
-        "block": block[1],
+        "blocks": [block["name"].replace("$", "_") for block in blocks],
         "samplers": samplers,
         "width": width,
         "height": height,
-        "boxes": [],
-    }
-    for box in boxes:
-        data = bytearray(ubo["block_size"] + 16)
-        for member in members:
-            value = np.array(box["values"].get(member["name"], 0.0), np.float32)
-            if member["type"] == "mat4":
-                value = value.T  # column by column
-            found = value.tobytes()
-            data[member["offset"] : member["offset"] + len(found)] = found
-        asked["boxes"].append(
+        "boxes": [
             {
-                "uniforms": base64.b64encode(data).decode(),
+                "uniforms": [filled(block, box["values"]) for block in blocks],
                 **{key: box[key] for key in ("volume", "table", "vertices", "triangles")},
             }
-        )
+            for box in boxes
+        ],
+    }
     path = chromium()
     assert path is not None
     script = (TESTS / "picture.mjs").read_text("utf-8")

@@ -11,50 +11,36 @@ import pytest
 
 from stereocell.engine.run import Engine
 from support.bundles import write_bundle, write_tiles
-from support.unity_meta import PACKAGE
+from support.unity_assemblies import ASSEMBLIES, NEWTONSOFT, ZIP, compile_assembly
 
-HERE = Path(__file__).parent
-NEWTONSOFT = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")  # Debian's
 Run = Callable[..., subprocess.CompletedProcess[bytes]]
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run Harness.cs: its arguments, and what it reads."""
-    if not (shutil.which("mcs") and shutil.which("mono") and NEWTONSOFT.exists()):
+def assemblies(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of all assemblies, and of the harness that runs them."""
+    has_zip = any(Path("/usr/lib/mono").glob(f"*/{ZIP}"))
+    if not (shutil.which("mcs") and shutil.which("mono") and NEWTONSOFT.exists() and has_zip):
         pytest.skip("needs Mono and Newtonsoft.Json: run `make mono`")
     folder = tmp_path_factory.mktemp("assemblies")
     shutil.copy(NEWTONSOFT, folder)
-    stubs = HERE / "stubs"
-    parts: list[tuple[str, Path, str]] = [
-        ("UnityEngine.dll", stubs, "UnityEngine.cs"),
-        ("UnityEditor.dll", stubs, "UnityEditor.cs"),
-        ("nunit.framework.dll", stubs, "NUnit.cs"),
-        ("StereoCell.dll", PACKAGE / "Runtime", "*.cs"),
-        ("StereoCell.Editor.dll", PACKAGE / "Editor", "*.cs"),
-        ("StereoCell.Tests.dll", PACKAGE / "Tests", "*.cs"),
-        ("harness.exe", HERE, "Harness.cs"),
-    ]
-    before = [f"-r:{folder / NEWTONSOFT.name}"]
-    for name, source, pattern in parts:
-        # the package's own assemblies see no more than their .asmdef lets them
-        seen = [r for r in before if "Runtime" not in str(source) or r.endswith("UnityEngine.dll")]
-        kind = "exe" if name.endswith(".exe") else "library"
-        # Unity 2022.3 takes C# 9; Mono's compiler knows 7
-        done = subprocess.run(
-            [
-                *("mcs", "-langversion:7", "-warnaserror", f"-target:{kind}"),
-                *(f"-out:{folder / name}", *seen, *sorted(map(str, source.rglob(pattern)))),
-            ],
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        before.append(f"-r:{folder / name}")
+    for name in ASSEMBLIES:
+        compile_assembly(folder, name, "STEREOCELL_CARDBOARD", "ENABLE_LEGACY_INPUT_MANAGER")
+    compile_assembly(folder, "harness", kind="exe")
+    return folder
 
-    def run_harness(*args: object, data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
-        command = ["mono", "--debug", str(folder / "harness.exe"), *map(str, args)]
-        return subprocess.run(command, input=data, capture_output=True, timeout=120, cwd=folder)
+
+@pytest.fixture(scope="session")
+def run(assemblies: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Run the harness with arguments and input. Each run has a Unity project of its own."""
+
+    def run_harness(
+        *args: object, data: bytes = b"", project: Path | None = None
+    ) -> subprocess.CompletedProcess[bytes]:
+        where = project or tmp_path_factory.mktemp("project")
+        (where / "Assets").mkdir(exist_ok=True)
+        command = ["mono", "--debug", str(assemblies / "harness.exe"), *map(str, args)]
+        return subprocess.run(command, input=data, capture_output=True, timeout=120, cwd=where)
 
     return run_harness
 
@@ -73,11 +59,11 @@ def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def imported(run: Run, tmp_path: Path) -> Callable[..., Any]:
+def imported(run: Run) -> Callable[..., Any]:
     """Import a bundle and return what the harness prints of it."""
 
     def import_bundle(bundle: Path, **how: Any) -> Any:
-        done = run("import", bundle, tmp_path / "Assets" / "Mine", json.dumps(how))
+        done = run("import", bundle, json.dumps(how))
         assert done.returncode == 0, done.stderr.decode()
         return json.loads(done.stdout)
 

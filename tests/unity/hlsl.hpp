@@ -64,5 +64,7 @@ inline float smoothstep(float low, float high, float a) {
 }
 inline float pow(float a, float b) { return std::pow(a, b); }
 
+#define CBUFFER_START(name)
+#define CBUFFER_END
 #define UNITY_LOOP
 #define UNITY_UNROLL

@@ -61,7 +61,7 @@ int main() {
     get(tables.data(), tables.size());
     _Size = vector(), _TexLow = vector(), _TexHigh = vector(), _AllLow = vector(), _AllHigh = vector();
     _Shown = vector();
-    for (int c = 0; c < CHANNELS; c++) _Colors[c] = vector();
+    _Color0 = vector(), _Color1 = vector(), _Color2 = vector(), _Color3 = vector();
     float4 numbers = vector();
     _Voxel = numbers.x, _MinStep = numbers.y, _Steps = numbers.z, _Spare = numbers.w;
     numbers = vector();

@@ -11,7 +11,7 @@ const browser = await chromium.launch({ executablePath: path, args: [...args, "-
 const page = await browser.newPage();
 page.on("console", (message) => console.error(message.text()));
 const found = await page.evaluate((asked) => {
-  const { vertex, fragment, block, samplers, width, height, boxes } = JSON.parse(asked);
+  const { vertex, fragment, blocks, samplers, width, height, boxes } = JSON.parse(asked);
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const canvas = document.createElement("canvas");
   const gl = canvas.getContext("webgl2");
@@ -29,10 +29,12 @@ const found = await page.evaluate((asked) => {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   gl.useProgram(program);
-  gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, block), 0);
+  blocks.forEach((name, i) => {
+    gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, name), i);
+  });
   gl.uniform1i(gl.getUniformLocation(program, samplers._Volume), 0);
   gl.uniform1i(gl.getUniformLocation(program, samplers._Table), 1);
-  if (samplers._CameraDepthTexture) gl.uniform1i(gl.getUniformLocation(program, samplers._CameraDepthTexture), 2);
+  gl.uniform1i(gl.getUniformLocation(program, samplers._CameraDepthTexture), 2);
 
   gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
@@ -64,8 +66,10 @@ const found = await page.evaluate((asked) => {
   for (const { uniforms, volume, table, vertices, triangles } of boxes) {
     upload(0, 3, volume);
     upload(1, 2, table);
-    gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
-    gl.bufferData(gl.UNIFORM_BUFFER, bytes(uniforms), gl.STATIC_DRAW);
+    uniforms.forEach((data, i) => {
+      gl.bindBufferBase(gl.UNIFORM_BUFFER, i, gl.createBuffer());
+      gl.bufferData(gl.UNIFORM_BUFFER, bytes(data), gl.STATIC_DRAW);
+    });
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(vertices.flat()), gl.STATIC_DRAW);
     gl.enableVertexAttribArray(0);

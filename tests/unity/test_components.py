@@ -33,25 +33,30 @@ def test_transfer_functions_are_rows_of_one_table(bundle: Path, imported: Import
         assert made["functions"][made["function"]] == channel["transfer_function"]
     for _, box in boxes(found["root"]):
         for place, c in enumerate(box["channels"]):
-            made, block = found["channels"][c], box["block"]
+            made, block = found["channels"][c], box["material"]
             row = made["firstRow"] + made["function"] + 0.5
             assert block["_Rows"][place] == pytest.approx(row / table["size"][1])
-            assert block["_Colors"][place][:3] == pytest.approx(channels[c]["color"], abs=1e-6)
+            color = block[f"_Color{place}"][:3]
+            assert color == pytest.approx(channels[c]["color"], abs=1e-6)
             assert block["_Shown"][place] == 1
         assert block["_Shown"][len(box["channels"]) :] == [0] * (4 - len(box["channels"]))
         assert block["_Steps"] == 100
-        assert box["keywords"] == []
+
+
+CALLS = [
+    {"name": "SetVisible", "args": ["Hoechst 33342", False]},
+    {"name": "SetFunction", "args": ["CD31", "sharp"]},
+    {"name": "SetColor", "args": ["CD31", [0.5, 1.0, 0.0]]},
+    {"name": "endsAtSurfaces", "args": []},
+]
 
 
 @pytest.mark.slow
-def test_channels_are_shown_coloured_and_classified_by_name(bundle: Path, imported: Import) -> None:
-    calls = [
-        {"name": "SetVisible", "args": ["Hoechst 33342", False]},
-        {"name": "SetFunction", "args": ["CD31", "sharp"]},
-        {"name": "SetColor", "args": ["CD31", [0.5, 1.0, 0.0]]},
-        {"name": "endsAtSurfaces", "args": []},
-    ]
-    found = imported(bundle, calls=calls, camera=True)
+@pytest.mark.parametrize("plays", [False, True])
+def test_channels_are_shown_coloured_and_classified_by_name(
+    bundle: Path, imported: Import, plays: bool
+) -> None:
+    found = imported(bundle, calls=CALLS, camera=True, **({"play": True} if plays else {}))
     by_id = {c["id"]: i for i, c in enumerate(found["channels"])}
     red = by_id["CD31"]
     for _, box in boxes(found["root"]):
@@ -59,19 +64,34 @@ def test_channels_are_shown_coloured_and_classified_by_name(bundle: Path, import
         row = (
             found["channels"][red]["functions"].index("sharp") + found["channels"][red]["firstRow"]
         )
-        assert box["block"]["_Rows"][place] == pytest.approx(
-            (row + 0.5) / found["table"]["size"][1]
-        )
-        assert box["block"]["_Colors"][place] == pytest.approx([0.21404114, 1, 0, 1])
-        assert box["block"]["_Shown"][1 - place] == 0
+        material = box["material"]
+        assert material["_Rows"][place] == pytest.approx((row + 0.5) / found["table"]["size"][1])
+        assert material[f"_Color{place}"] == pytest.approx([0.21404114, 1, 0, 1])
+        assert material["_Shown"][1 - place] == 0
         assert box["enabled"]
-        assert box["keywords"] == ["STEREOCELL_SCENE_DEPTH"]
-        assert (box["material"]["_ZTest"], box["material"]["_SceneDepth"]) == (8, 1)
+        # what the pass's state needs is in a material, and so in play mode alone
+        assert material.get("_ZTest") == (8 if plays else None)
+        assert material.get("_SceneDepth") == (1 if plays else None)
     assert found["depth"] == "Depth"
     for tile in found["root"]["children"]:
         for level in child(tile, "surfaces", "CD31")["children"]:
-            assert level["block"]["baseColorFactor"] == pytest.approx([0.5, 1, 0, 1], abs=1e-5)
+            values = level["material"] if plays else level["block"]
+            assert values["baseColorFactor"] == pytest.approx([0.5, 1, 0, 1], abs=1e-5)
             assert level["enabled"]
+
+
+@pytest.mark.slow
+def test_a_player_has_no_property_blocks_which_would_break_batches(
+    bundle: Path, imported: Import
+) -> None:
+    """The scriptable pipelines batch renderers without property blocks alone."""
+
+    def blocks(made: Any) -> list[str]:
+        own = [made["name"]] if "block" in made else []
+        return own + [name for each in made.get("children", []) for name in blocks(each)]
+
+    assert blocks(imported(bundle, calls=CALLS, camera=True, play=True)["root"]) == []
+    assert len(blocks(imported(bundle, calls=CALLS, camera=True)["root"])) > 4
 
 
 @pytest.mark.slow

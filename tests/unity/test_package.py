@@ -2,14 +2,21 @@
 
 import json
 import re
+from collections.abc import Iterator
 from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
-from support.unity_meta import PACKAGE, assets, guid_of, meta_of
+import yaml
+
+from support.unity_assemblies import ASSEMBLIES, compile_assembly
+from support.unity_meta import PACKAGE, SAMPLES, assets, guid_of, meta_of
 
 ROOT = PACKAGE.parents[1]
 VIEWER = ROOT / "viewer_gltf" / "src"
-MARCH = PACKAGE / "Runtime" / "Shaders" / "march.hlsl"
-SHADER = PACKAGE / "Runtime" / "Shaders" / "StereoCellVolume.shader"
+SHADERS = PACKAGE / "Runtime" / "Shaders"
+MARCH = SHADERS / "march.hlsl"
+SHADER = SHADERS / "StereoCellVolume.shader"
 
 
 def test_its_version_is_the_product_s() -> None:
@@ -50,35 +57,127 @@ def test_assemblies_refer_to_what_is_there() -> None:
         names[assembly["name"]] = assembly
     assert names["StereoCell"]["references"] == []
     editor = names["StereoCell.Editor"]
-    assert editor["references"] == ["StereoCell"]
-    assert editor["includePlatforms"] == ["Editor"]  # so that no game carries it
+    assert editor["references"] == ["StereoCell", "glTFast"]
     tests = names["StereoCell.Tests"]
     assert {"StereoCell", "StereoCell.Editor"} < set(tests["references"])
-    assert tests["includePlatforms"] == ["Editor"]
     assert tests["defineConstraints"] == ["UNITY_INCLUDE_TESTS"]
-    for script in (PACKAGE / "Runtime").rglob("*.cs"):
-        assert "UnityEditor" not in script.read_text("utf-8")
+    for path in PACKAGE.rglob("*.asmdef"):
+        is_editors = "Editor" in path.relative_to(PACKAGE).parts
+        platforms = json.loads(path.read_text("utf-8")).get("includePlatforms", [])
+        assert platforms == (["Editor"] if is_editors else [])  # so that no game carries it
+    for script in PACKAGE.rglob("*.cs"):
+        if "Editor" not in script.relative_to(PACKAGE).parts:
+            assert "UnityEditor" not in script.read_text("utf-8")
+
+
+def test_assemblies_of_the_tests_see_what_those_of_the_package_see() -> None:
+    """The compiler's references in conftest.py are those of the .asmdef files."""
+    for path in PACKAGE.rglob("*.asmdef"):
+        assembly = json.loads(path.read_text("utf-8"))
+        named = {*assembly["references"], *assembly.get("precompiledReferences", [])}
+        _, seen = ASSEMBLIES[assembly["name"]]
+        own = {name.removesuffix(".dll") for name in named if "TestRunner" not in name}
+        assert set(seen) - {"UnityEngine", "UnityEditor"} <= own | {"Newtonsoft.Json"}
+        assert own <= set(seen)
+
+
+def test_the_sample_compiles_without_the_cardboard_plug_in(assemblies: Path) -> None:
+    """Its symbol is defined where the plug-in's package is, and no code asks for it elsewhere."""
+    path = SAMPLES / "Cardboard" / "StereoCell.Samples.Cardboard.asmdef"
+    (symbol,) = json.loads(path.read_text("utf-8"))["versionDefines"]
+    assert symbol["name"] == "com.google.xr.cardboard"
+    assert symbol["define"] == "STEREOCELL_CARDBOARD"
+    compile_assembly(assemblies, "StereoCell.Samples.Cardboard", blind=("Google.XR.Cardboard",))
+    compile_assembly(
+        assemblies,
+        "StereoCell.Samples.Cardboard",
+        "STEREOCELL_CARDBOARD",
+        "ENABLE_LEGACY_INPUT_MANAGER",
+    )
+
+
+def test_samples_are_declared() -> None:
+    package = json.loads((PACKAGE / "package.json").read_text("utf-8"))
+    declared = {sample["path"] for sample in package["samples"]}
+    assert declared == {f"Samples~/{each.name}" for each in SAMPLES.iterdir() if each.is_dir()}
+
+
+def documents(asset: Path) -> list[tuple[int, int, dict[str, Any]]]:
+    """Return an asset's objects, as Unity writes them: class, number in the file, fields."""
+    text = asset.read_text("utf-8")
+    assert text.startswith("%YAML 1.1\n%TAG !u! tag:unity3d.com,2011:\n")
+    parts = re.split(r"^--- !u!(\d+) &(\d+)\n", text, flags=re.MULTILINE)[1:]
+    return [
+        (int(kind), int(number), yaml.safe_load(content))
+        for kind, number, content in zip(parts[::3], parts[1::3], parts[2::3], strict=True)
+    ]
+
+
+def references(value: Any) -> Iterator[dict[str, Any]]:
+    if isinstance(value, dict):
+        if "fileID" in value:
+            yield value
+        for each in value.values():
+            yield from references(each)
+    if isinstance(value, list):
+        for each in value:
+            yield from references(each)
+
+
+def test_written_assets_refer_to_what_is_there() -> None:
+    """Assets as Unity's YAML: well formed, and every GUID and number in them has its object."""
+    guids = {guid_of(asset): asset for asset in assets()}
+    written = [
+        asset for asset in assets() if asset.suffix in (".mat", ".asset", ".unity", ".prefab")
+    ]
+    assert [asset.name for asset in written] == ["Reticle.mat"]
+    for asset in written:
+        objects = documents(asset)
+        numbers = {number for _, number, _ in objects}
+        for _, _, fields in objects:
+            for reference in references(fields):
+                if "guid" in reference:
+                    assert reference["guid"] in guids
+                else:
+                    assert reference["fileID"] in numbers | {0}
+    ((kind, _, fields),) = documents(SAMPLES / "Cardboard" / "Reticle.mat")
+    assert kind == 21
+    shader = guids[fields["Material"]["m_Shader"]["guid"]].read_text("utf-8")
+    (colors,) = fields["Material"]["m_SavedProperties"]["m_Colors"]
+    assert set(colors) == set(re.findall(r"^ *(_\w+) \(\".*Color\)", shader, re.MULTILINE))
+    scene = (SAMPLES / "Cardboard" / "Editor" / "CardboardScene.cs").read_text("utf-8")
+    named = re.findall(r'"([0-9a-f]{32})"', scene)
+    assert [guids[guid].name for guid in named] == ["Reticle.mat"]
+
+
+def names_in(file: str) -> set[str]:
+    """Return the shader's properties that a script names; `_ToBox` and the like are numbered."""
+    text = (PACKAGE / file).read_text("utf-8")
+    found = set(re.findall(r"\"(_\w+)\"", text))
+    for prefix, count in (("_ToBox", 3), ("_Color", 4)):
+        if prefix in found:
+            found = found - {prefix} | {f"{prefix}{i}" for i in range(count)}
+    return found
 
 
 def test_scripts_set_only_what_the_shader_has() -> None:
-    shader, march = SHADER.read_text("utf-8"), MARCH.read_text("utf-8")
+    shader = SHADER.read_text("utf-8")
+    block = (SHADERS / "volume_material.hlsl").read_text("utf-8")
     properties = set(re.findall(r"^\s*(?:\[.*\] )?(_\w+) \(\"", shader, re.MULTILINE))
-    uniforms = set(re.findall(r"^\s*float4? (_\w+)(?:\[\w+\])?;", march + shader, re.MULTILINE))
-    importer = (PACKAGE / "Editor" / "BundleImporter.cs").read_text("utf-8")
-    in_material = set(re.findall(r"material\.Set\w+\(\"(_\w+?)\"[,)]", importer))
-    in_material |= {f"_ToBox{row}" for row in range(3)}
-    assert '"_ToBox" + row' in importer
+    uniforms = set(re.findall(r"^float4? (_\w+);", block, re.MULTILINE))
+    assert uniforms | {"_Volume", "_Table"} == properties
     # a material keeps only what is among its properties: the rest would be lost with the asset
-    assert in_material < properties
-    specimen = (PACKAGE / "Runtime" / "Specimen.cs").read_text("utf-8")
-    in_block = set(re.findall(r"block\.Set\w+\(\"(_\w+)\"", specimen))
-    assert in_block <= uniforms | properties
-    textures = {"_Volume", "_Table"}
-    unset = uniforms - in_block - in_material - textures - {"_Grain"}
-    assert unset == set()
-    name = re.search(r'ShaderName = "(.*)"', importer)
+    imported = names_in("Editor/VolumeBuilder.cs")
+    chosen = names_in("Runtime/VolumeBox.cs")
+    assert imported <= properties
+    assert chosen <= properties
+    assert properties - imported - chosen == {"_Grain"}
+    builder = (PACKAGE / "Editor" / "SpecimenBuilder.cs").read_text("utf-8")
+    name = re.search(r'ShaderName = "(.*)"', builder)
+    path = re.search(r'ShaderPath = "Packages/org.stereocell.bundle/(.*)"', builder)
     assert name is not None
-    assert shader.startswith("//")
+    assert path is not None
+    assert PACKAGE / path[1] == SHADER
     assert f'Shader "{name[1]}"' in shader
 
 
@@ -105,7 +204,7 @@ def test_light_and_steps_are_the_viewer_s() -> None:
     ):
         theirs = (VIEWER / file).read_text("utf-8")
         assert constant(name, march) == constant(name, theirs)
-    shader = SHADER.read_text("utf-8")
+    shader = (SHADERS / "volume_pass.hlsl").read_text("utf-8")
     for lamp, name in (("key", "KEY_AT"), ("fill", "FILL_AT")):
         x, y, z = constant(name, room)
         at = re.search(rf"room\.{lamp} = lampInBox\(float3\((.*)\)\)", shader)

@@ -1,10 +1,8 @@
-// Of UnityEditor what the package uses, likewise. Assets are remembered by their paths. What glTFast does with a
-// .glb is imitated: an object of the file's node, mirrored in x, with a renderer.
+// Of UnityEditor what the package uses, likewise: drawing of fields, selection, prefabs, scenes, builds. The asset
+// database is in UnityAssets.cs.
 using System;
 using System.Collections.Generic;
-using System.IO;
-using System.Text;
-using Newtonsoft.Json.Linq;
+using System.Linq;
 using UnityEngine;
 using Object = UnityEngine.Object;
 
@@ -12,6 +10,8 @@ namespace UnityEditor
 {
     public sealed class MenuItem : Attribute
     {
+        public MenuItem(string itemName) { }
+        public MenuItem(string itemName, bool isValidateFunction) { }
         public MenuItem(string itemName, bool isValidateFunction, int priority) { }
     }
 
@@ -51,6 +51,15 @@ namespace UnityEditor
         public static readonly List<string> Drawn = new List<string>();  // of the stub
         public static GUIContent BeginProperty(Rect totalPosition, GUIContent label, SerializedProperty property) { return label; }
         public static void EndProperty() { }
+        static readonly Stack<bool> changes = new Stack<bool>();
+        internal static void Change() { changes.Pop(); changes.Push(true); }
+        public static void BeginChangeCheck() { changes.Push(false); }
+        public static bool EndChangeCheck()
+        {
+            var changed = changes.Pop();
+            if (changed && changes.Count > 0) Change();
+            return changed;
+        }
         public static bool ToggleLeft(Rect position, string label, bool value) { Drawn.Add(position.x + "+" + position.width + " " + label); return !value; }
         public static bool PropertyField(Rect position, SerializedProperty property, GUIContent label) { Drawn.Add(position.x + "+" + position.width); return property == null; }
         public static int Popup(Rect position, int selectedIndex, string[] displayedOptions)
@@ -60,55 +69,51 @@ namespace UnityEditor
         }
     }
 
+    /// <summary>Fields of a window. A test says which of them a person changes, by their labels, and to what.</summary>
+    public sealed class EditorGUILayout
+    {
+        public static readonly List<string> Drawn = new List<string>();  // of the stub
+        public static readonly Dictionary<string, object> Changes = new Dictionary<string, object>();  // of the stub
+
+        static T Field<T>(string label, T value)
+        {
+            Drawn.Add(label);
+            object change;
+            if (!Changes.TryGetValue(label, out change)) return value;
+            Changes.Remove(label);
+            EditorGUI.Change();
+            var edit = change as Func<T, T>;
+            return edit != null ? edit(value) : (T)change;
+        }
+        public static Object ObjectField(string label, Object obj, Type objType, bool allowSceneObjects, params GUILayoutOption[] options) { return Field(label, obj); }
+        public static bool ToggleLeft(string label, bool value, params GUILayoutOption[] options) { return Field(label, value); }
+        public static int Popup(string label, int selectedIndex, string[] displayedOptions, params GUILayoutOption[] options) { return Field(label, selectedIndex); }
+        public static AnimationCurve CurveField(string label, AnimationCurve value, Color color, Rect ranges, params GUILayoutOption[] options) { return Field(label, value); }
+        public static Gradient GradientField(string label, Gradient value, params GUILayoutOption[] options) { return Field(label, value); }
+        public static bool PropertyField(SerializedProperty property, GUIContent label, bool includeChildren, params GUILayoutOption[] options) { return false; }
+        public static void LabelField(string label, params GUILayoutOption[] options) { Drawn.Add(label); }
+        public static void HelpBox(string message, MessageType type) { Drawn.Add(message); }
+        public static Vector2 BeginScrollView(Vector2 scrollPosition, params GUILayoutOption[] options) { return scrollPosition; }
+        public static void EndScrollView() { }
+    }
+
+    public enum MessageType { None, Info, Warning, Error }
+
+    public class EditorWindow : ScriptableObject
+    {
+        public static T GetWindow<T>(string title) where T : EditorWindow { return (T)Activator.CreateInstance(typeof(T)); }
+    }
+
+    public sealed class Undo
+    {
+        public static void RecordObject(Object objectToUndo, string name) { }
+    }
+
     public sealed class Selection
     {
         public static Object activeObject { get; set; }
-    }
-
-    public class AssetDatabase
-    {
-        public static readonly SortedDictionary<string, List<Object>> Assets = new SortedDictionary<string, List<Object>>();
-        public static bool HasGltf = true;  // whether glTFast is in the project
-        public static float MirrorX = -1;  // 1: what another importer might do
-
-        public static void Refresh() { }
-        public static void SaveAssets() { }
-        public static bool DeleteAsset(string path) { return true; }
-        public static void CreateAsset(Object asset, string path)
-        {
-            if (!Directory.Exists(Path.GetDirectoryName(path))) throw new ArgumentException("no folder for " + path);
-            Assets[path] = new List<Object> { asset };
-        }
-        public static void AddObjectToAsset(Object objectToAdd, Object assetObject)
-        {
-            foreach (var each in Assets.Values)
-            {
-                if (each[0] == assetObject) { each.Add(objectToAdd); return; }
-            }
-            throw new ArgumentException("no asset " + assetObject.name);
-        }
-        public static T LoadAssetAtPath<T>(string assetPath) where T : Object
-        {
-            if (assetPath.EndsWith(".glb", StringComparison.Ordinal)) return HasGltf && File.Exists(assetPath) ? (T)(Object)Gltf(assetPath) : null;
-            return Assets.ContainsKey(assetPath) ? (T)Assets[assetPath][0] : null;
-        }
-
-        static GameObject Gltf(string path)
-        {
-            var data = File.ReadAllBytes(path);
-            var json = JObject.Parse(Encoding.UTF8.GetString(data, 20, BitConverter.ToInt32(data, 12)));
-            var node = json["nodes"][0];
-            var made = new GameObject((string)node["name"]);
-            var at = node["translation"] == null ? new float[3] : node["translation"].ToObject<float[]>();
-            var scale = node["scale"] == null ? new float[] { 1, 1, 1 } : node["scale"].ToObject<float[]>();
-            made.transform.localPosition = new Vector3(MirrorX * at[0], at[1], at[2]);
-            made.transform.localScale = new Vector3(scale[0], scale[1], scale[2]);
-            float[] min = json["accessors"][0]["min"].ToObject<float[]>(), max = json["accessors"][0]["max"].ToObject<float[]>();
-            var mesh = new Mesh { vertices = new[] { new Vector3(MirrorX * max[0], min[1], min[2]), new Vector3(MirrorX * min[0], max[1], max[2]) } };
-            made.AddComponent<MeshFilter>().sharedMesh = mesh;
-            made.AddComponent<MeshRenderer>();
-            return made;
-        }
+        public static GameObject activeGameObject { get { return activeObject as GameObject; } }
+        public static Object[] objects { get { return activeObject == null ? new Object[0] : new[] { activeObject }; } }
     }
 
     public sealed class ShaderUtil
@@ -118,27 +123,77 @@ namespace UnityEditor
 
     public sealed class PrefabUtility
     {
-        public static readonly List<string> Saved = new List<string>();
-        public static Object InstantiatePrefab(Object assetComponentOrGameObject, Transform parent)
-        {
-            var made = (GameObject)assetComponentOrGameObject;  // loaded anew each time
-            made.transform.SetParent(parent, false);
-            return made;
-        }
         public static Object InstantiatePrefab(Object assetComponentOrGameObject) { return assetComponentOrGameObject; }
-        public static GameObject SaveAsPrefabAsset(GameObject instanceRoot, string assetPath)
-        {
-            Saved.Add(assetPath);
-            return instanceRoot;
-        }
     }
 
     public class EditorUtility
     {
-        public static int ShownBars;
         public static string OpenFolderPanel(string title, string folder, string defaultName) { return ""; }
-        public static bool DisplayCancelableProgressBar(string title, string info, float progress) { ShownBars = 1; return false; }
-        public static void ClearProgressBar() { ShownBars = 0; }
+        public static string OpenFilePanel(string title, string directory, string extension) { return ""; }
+        public static string SaveFilePanel(string title, string directory, string defaultName, string extension) { return ""; }
         public static bool DisplayDialog(string title, string message, string ok) { return true; }
+        public static void SetDirty(Object target) { }
+    }
+
+    public sealed class InitializeOnLoad : Attribute { }
+
+    public sealed class EditorApplication
+    {
+        public delegate void CallbackFunction();
+        public static CallbackFunction delayCall;
+        public static event Action<bool> focusChanged;
+        public static void Focus() { if (focusChanged != null) focusChanged(true); }  // of the stub: a person comes back
+    }
+
+    public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
+
+    public class Editor : ScriptableObject
+    {
+        public Object target { get; set; }
+        public SerializedObject serializedObject { get { return new SerializedObject(); } }
+        public virtual void OnInspectorGUI() { }
+    }
+
+    public class SerializedObject
+    {
+        public void Update() { }
+        public bool ApplyModifiedProperties() { return false; }
+        public SerializedProperty FindProperty(string propertyPath) { return null; }
+    }
+
+    public struct BuildPlayerOptions
+    {
+        public string[] scenes { get; set; }
+    }
+}
+
+namespace UnityEditor.Build
+{
+    public class BuildFailedException : Exception { public BuildFailedException(string message) : base(message) { } }
+
+    public sealed class BuildPlayerContext
+    {
+        public readonly List<string> Added = new List<string>();  // of the stub
+        public BuildPlayerOptions BuildPlayerOptions { get; set; }
+        public void AddAdditionalPathToStreamingAssets(string directoryOrFile, string pathInStreamingAssets = null) { Added.Add(pathInStreamingAssets); }
+    }
+
+    public abstract class BuildPlayerProcessor
+    {
+        public virtual int callbackOrder { get { return 0; } }
+        public abstract void PrepareForBuild(BuildPlayerContext buildPlayerContext);
+    }
+}
+
+namespace UnityEditor.SceneManagement
+{
+    public enum NewSceneSetup { EmptyScene, DefaultGameObjects }
+    public enum NewSceneMode { Single, Additive }
+    public struct Scene { }  // UnityEngine.SceneManagement in Unity
+    public sealed class EditorSceneManager
+    {
+        public static bool SaveCurrentModifiedScenesIfUserWantsTo() { return true; }
+        public static Scene NewScene(NewSceneSetup setup, NewSceneMode mode) { return new Scene(); }
+        public static bool SaveScene(Scene scene, string dstScenePath) { return true; }
     }
 }

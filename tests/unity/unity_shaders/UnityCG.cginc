@@ -1,5 +1,8 @@
-// What the package's shader takes of Unity's own include, by the same names, to compile it without Unity.
+// The names that the package's shaders take of Unity's own include, to compile them without Unity.
 // The matrices are the mono ones; with UNITY_STEREO_INSTANCING_ENABLED those of an eye, by instance.
+#define CBUFFER_START(name) cbuffer name {
+#define CBUFFER_END };
+#define UNITY_BRANCH [branch]
 #define UNITY_LOOP [loop]
 #define UNITY_UNROLL [unroll]
 #define UNITY_DECLARE_TEX3D(tex) Texture3D tex; SamplerState sampler##tex

@@ -10,12 +10,6 @@ using Newtonsoft.Json.Linq;
 
 namespace StereoCell.Editor
 {
-    /// <summary>What is wrong with a bundle, in a line, for people.</summary>
-    public sealed class BundleException : Exception
-    {
-        public BundleException(string message) : base(message) { }
-    }
-
     /// <summary>A box along the specimen's axes (x right, y up, z towards the viewer), um.</summary>
     public struct Box
     {
@@ -60,8 +54,8 @@ namespace StereoCell.Editor
         public string[] Functions;
         public string Table;
 
-        /// <summary>Its surfaces are objects, each closed.</summary>
-        public bool IsLabelMap;
+        /// <summary>Whether it shows when the bundle is opened.</summary>
+        public bool Opens;
 
         /// <summary>By tile, finest first.</summary>
         public Dictionary<string, List<Level>> Surfaces = new Dictionary<string, List<Level>>();
@@ -69,7 +63,7 @@ namespace StereoCell.Editor
         public Dictionary<string, VolumeEntry> Volumes = new Dictionary<string, VolumeEntry>();
     }
 
-    /// <summary>A bundle on disk. Each file is compared with the size and the SHA-256 that files.json gives.</summary>
+    /// <summary>The contents of a bundle. Each file is compared with the size and the SHA-256 that files.json gives.</summary>
     public sealed class Bundle
     {
         const int Version = 1;
@@ -78,10 +72,10 @@ namespace StereoCell.Editor
         public readonly List<TileEntry> Tiles = new List<TileEntry>();
         public readonly List<ChannelEntry> Channels = new List<ChannelEntry>();
 
-        readonly string folder;
+        readonly BundleFiles folder;
         readonly JObject files;
 
-        public Bundle(string folder)
+        public Bundle(BundleFiles folder)
         {
             this.folder = folder;
             var manifest = Parse("manifest.json", ReadFile("manifest.json"));
@@ -113,6 +107,14 @@ namespace StereoCell.Editor
             return Checked(path, entry);
         }
 
+        /// <summary>The SHA-256 of a file, in hexadecimal digits, as files.json has it.</summary>
+        public string HashOf(string path)
+        {
+            var entry = files[path] as JObject;
+            if (entry == null) throw new BundleException(path + " is not in files.json");
+            return (string)entry["sha256"];
+        }
+
         byte[] Checked(string path, JObject entry)
         {
             var data = ReadFile(path);
@@ -129,14 +131,7 @@ namespace StereoCell.Editor
         {
             var isOutside = Path.IsPathRooted(path) || path.Contains("\\") || Array.IndexOf(path.Split('/'), "..") >= 0;
             if (isOutside) throw new BundleException(path + " leads out of the bundle");
-            try
-            {
-                return File.ReadAllBytes(Path.Combine(folder, path));
-            }
-            catch (IOException)
-            {
-                throw new BundleException(path + " is missing in " + folder);
-            }
+            return folder.Read(path);
         }
 
         static JObject Parse(string path, byte[] data)
@@ -176,7 +171,7 @@ namespace StereoCell.Editor
                 Function = (string)Member(channel, "transfer_function"),
                 Functions = Member(channel, "transfer_functions").ToObject<string[]>(),
                 Table = (string)Member(Member(channel, "lut"), "path"),
-                IsLabelMap = channel["objects"] is JObject,
+                Opens = channel["opens"] == null || (bool)channel["opens"],
             };
             if (Member(channel, "tileset") is JObject tileset) AddSurfaces(entry, (string)tileset["path"]);
             var path = (string)Member(Member(channel, "volumes"), "path");

@@ -139,16 +139,6 @@ namespace StereoCell.Editor
             return heights;
         }
 
-        /// <summary>The finest level whose longest edge is at most so many texels; the coarsest, if none is.</summary>
-        public static int LevelWithin(int[][] levels, int mostTexels)
-        {
-            for (var i = 0; i < levels.Length; i++)
-            {
-                if (Math.Max(levels[i][0], Math.Max(levels[i][1], levels[i][2])) <= mostTexels) return i;
-            }
-            return levels.Length - 1;
-        }
-
         static Vector3 ToVector(double x, double y, double z)
         {
             return new Vector3((float)x, (float)y, (float)z);

@@ -60,6 +60,20 @@ namespace StereoCell
             get { return state.Progress(dwell); }
         }
 
+        /// <summary>The tile that is looked at; null if there is none.</summary>
+        public Tile Target
+        {
+            get { return state.Target as Tile; }
+        }
+
+        /// <summary>Switch the tile that is looked at now, for a button; the dwell is then done with it.</summary>
+        public void Press()
+        {
+            if (Target == null) return;
+            state.HasFired = true;
+            Target.Switch();
+        }
+
         void Update()
         {
             var eye = viewer != null ? viewer : Camera.main;
@@ -76,7 +90,7 @@ namespace StereoCell
                 return null;
             }
             var tile = hit.collider.GetComponentInParent<Tile>();
-            return tile == null ? null : tile;  // what Unity destroyed is null
+            return tile == null ? null : tile;  // an object that Unity has destroyed equals null
         }
     }
 }

@@ -14,8 +14,10 @@ namespace StereoCell
 
         public Color color = Color.white;
 
-        /// <summary>As it was imported: then its surfaces keep their materials as they are.</summary>
+        // as imported: surfaces of this colour keep their materials as they are, and an edit is what differs from these
         [HideInInspector] public Color importedColor;
+        [HideInInspector] public bool importedVisible = true;
+        [HideInInspector] public int importedFunction;
 
         public bool isVisible = true;
 
@@ -31,12 +33,13 @@ namespace StereoCell
         [HideInInspector] public List<GameObject> surfaces = new List<GameObject>();
     }
 
-    /// <summary>The whole: shows and hides channels, and chooses colours and transfer functions.</summary>
+    /// <summary>The whole: shows and hides channels, chooses colours and transfer functions, and keeps the voxels of
+    /// the tiles that were looked at last in memory.</summary>
     [ExecuteAlways, DisallowMultipleComponent, AddComponentMenu("StereoCell/Specimen")]
     public sealed class Specimen : MonoBehaviour
     {
-        const string SceneDepth = "STEREOCELL_SCENE_DEPTH";
-        const float LessEqual = 4, Always = 8;  // UnityEngine.Rendering.CompareFunction, as a material stores it
+        /// <summary>Bytes that are uploaded in a frame: about 2 ms on a phone.</summary>
+        const long UploadBytes = 2 << 20;
 
         public List<Channel> channels = new List<Channel>();
 
@@ -49,10 +52,15 @@ namespace StereoCell
         [Range(0, 1), Tooltip("By how much volumes are lit")]
         public float shading = 1;
 
-        [Tooltip("Rays end at surfaces: wants the camera's depth texture")]
+        [Tooltip("Rays end at surfaces, in play mode: needs the camera's depth texture")]
         public bool endsAtSurfaces;
 
-        MaterialPropertyBlock block;
+        [Min(1), Tooltip("Most memory of volumes, MB: the tiles that were looked at last stay, as many as fit")]
+        public float budget = 40;
+
+        readonly Residency<Tile> residency = new Residency<Tile>();
+        Texture2D ownTable;  // the table with the functions that were changed here
+        SurfaceColors colors;
         VolumeBox[] boxes;  // kept, so that a frame allocates nothing
         float[] nearness;
 
@@ -83,37 +91,129 @@ namespace StereoCell
             Apply();
         }
 
+        /// <summary>Change a transfer function until the scene is closed: the imported table stays.</summary>
+        /// <param name="opacity">0 to 255, for 256 intensities.</param>
+        public void SetOpacity(string channel, string function, byte[] opacity)
+        {
+            var known = Known(channel);
+            var index = Array.IndexOf(known.functions, function);
+            if (index < 0) throw new ArgumentException(channel + " has no transfer function " + function);
+            if (opacity.Length != table.width) throw new ArgumentException("found " + opacity.Length + " opacities, expected " + table.width);
+            var texels = Table.GetRawTextureData();
+            for (var i = 0; i < opacity.Length; i++) texels[4 * (table.width * (known.firstRow + index) + i) + 3] = opacity[i];
+            if (ownTable == null)
+            {
+                ownTable = new Texture2D(table.width, table.height, TextureFormat.RGBA32, false, true)
+                {
+                    wrapMode = TextureWrapMode.Clamp,
+                    filterMode = FilterMode.Bilinear,
+                    hideFlags = HideFlags.HideAndDontSave,
+                };
+            }
+            ownTable.LoadRawTextureData(texels);
+            ownTable.Apply(false, false);
+            Apply();
+        }
+
+        /// <summary>The transfer functions that are drawn.</summary>
+        public Texture2D Table
+        {
+            get { return ownTable != null ? ownTable : table; }
+        }
+
+        /// <summary>The most memory that volumes take now, bytes.</summary>
+        public long VolumeBytes
+        {
+            get { return residency.Bytes; }
+        }
+
+        /// <summary>Load the voxels of a tile. Tiles that were wanted longest ago are unloaded first, where they do not fit
+        /// together.</summary>
+        public void Load(Tile tile)
+        {
+            residency.Budget = (long)(budget * 1e6f);
+            foreach (var leaving in residency.Admit(tile, tile.PeakBytes))
+            {
+                if (leaving != null) leaving.Unload();
+            }
+            if (!Application.isPlaying) tile.Advance(long.MaxValue);
+        }
+
         void OnEnable()
         {
             Apply();
+            OpenTiles();
+        }
+
+        void OnDisable()
+        {
+            foreach (var tile in new List<Tile>(residency.Items))
+            {
+                residency.Remove(tile);
+                if (tile == null) continue;
+                foreach (var box in tile.GetComponentsInChildren<VolumeBox>(true)) box.Unload();
+            }
+        }
+
+        void OnDestroy()
+        {
+            if (colors != null) colors.Destroy();
+            VolumeTexture.Discard(ownTable);
         }
 
         void OnValidate()
         {
-            Apply();
+            if (isActiveAndEnabled) Apply();  // the asset itself is in no scene, and draws nothing
+        }
+
+        void Update()
+        {
+            var items = residency.Items;
+            for (var i = 0; i < items.Count; i++)
+            {
+                if (items[i] != null) items[i].Advance(UploadBytes);
+            }
+        }
+
+        /// <summary>Load the tiles that are to be shown as volumes, in their order, while they fit.</summary>
+        void OpenTiles()
+        {
+            long bytes = 0;
+            foreach (var tile in GetComponentsInChildren<Tile>(true))
+            {
+                if (!tile.ShowsVolume) continue;
+                var peak = tile.PeakBytes;
+                var fits = bytes == 0 || bytes + peak <= (long)(budget * 1e6f);
+                if (fits)
+                {
+                    bytes += peak;
+                    var hasSurfaces = tile.surfaces != null && tile.surfaces.activeSelf;
+                    if (Application.isPlaying) tile.volume.SetActive(false);
+                    tile.Show(hasSurfaces, true);
+                }
+                else if (Application.isPlaying) tile.Show(true, false);
+            }
         }
 
         /// <summary>Carry to the renderers what was changed in the fields.</summary>
         public void Apply()
         {
-            if (block == null) block = new MaterialPropertyBlock();
+            if (colors == null) colors = new SurfaceColors();
             foreach (var channel in channels)
             {
-                block.Clear();
-                block.SetColor("baseColorFactor", channel.color);  // of glTFast's materials; Unity makes it linear
                 foreach (var surface in channel.surfaces)
                 {
                     if (surface == null) continue;
                     foreach (var renderer in surface.GetComponentsInChildren<Renderer>(true))
                     {
                         renderer.enabled = channel.isVisible;  // not SetActive: this may run in OnValidate
-                        renderer.SetPropertyBlock(channel.color == channel.importedColor ? null : block);
+                        colors.Apply(renderer, channel);
                     }
                 }
             }
             boxes = GetComponentsInChildren<VolumeBox>(true);
             nearness = new float[boxes.Length];
-            foreach (var box in boxes) Apply(box);
+            foreach (var box in boxes) box.Apply(this);
             if (endsAtSurfaces && Camera.main != null) Camera.main.depthTextureMode |= DepthTextureMode.Depth;
         }
 
@@ -128,37 +228,8 @@ namespace StereoCell
             if (boxes == null || Array.Exists(boxes, box => box == null)) Apply();  // some were removed
             for (var i = 0; i < boxes.Length; i++) nearness[i] = -boxes[i].DistanceFrom(eye);
             Array.Sort(nearness, boxes);
-            // up to 0, so that what else is transparent is blended after them
+            // up to 0, so that other transparent objects are blended after them
             for (var i = 0; i < boxes.Length; i++) boxes[i].GetComponent<Renderer>().sortingOrder = i + 1 - boxes.Length;
-        }
-
-        void Apply(VolumeBox box)
-        {
-            var colors = new Vector4[4];
-            Vector4 rows = Vector4.zero, shown = Vector4.zero;
-            for (var i = 0; i < box.channels.Length; i++)
-            {
-                var channel = channels[box.channels[i]];
-                var linear = channel.color.linear;
-                colors[i] = new Vector4(linear.r, linear.g, linear.b, 1);
-                rows[i] = table == null ? 0 : (channel.firstRow + channel.function + 0.5f) / table.height;
-                shown[i] = channel.isVisible ? 1 : 0;
-            }
-            block.Clear();
-            block.SetVectorArray("_Colors", colors);
-            block.SetVector("_Rows", rows);
-            block.SetVector("_Shown", shown);
-            block.SetFloat("_Steps", steps);
-            block.SetFloat("_Shading", shading);
-            var renderer = box.GetComponent<Renderer>();
-            renderer.SetPropertyBlock(block);
-            renderer.enabled = shown != Vector4.zero;
-            var material = renderer.sharedMaterial;
-            if (material == null || material.IsKeywordEnabled(SceneDepth) == endsAtSurfaces) return;
-            if (endsAtSurfaces) material.EnableKeyword(SceneDepth);
-            else material.DisableKeyword(SceneDepth);
-            material.SetFloat("_SceneDepth", endsAtSurfaces ? 1 : 0);
-            material.SetFloat("_ZTest", endsAtSurfaces ? Always : LessEqual);
         }
 
         Channel Known(string idOrName)

@@ -1,28 +1,17 @@
 // March the volume of one tile, up to four channels together, front to back. Functions and numbers alone:
-// the includer says how to sample, float4 sampleIntensities(float3) and float4 lookUp(int, float).
+// the file that includes it defines float4 sampleIntensities(float3) and float4 lookUp(int, float).
 // Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care. Unity's space is
 // left-handed: x is mirrored to the specimen's, as glTFast mirrors it, and the texture coordinates with it.
 // After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
-// Only what HLSL and C++ share is used (no out, no swizzle but xyz and rgb): the tests compile it as C++.
+// The text keeps to what HLSL and C++ share (no out, no swizzle but xyz and rgb): the tests compile it as C++.
 #ifndef STEREOCELL_MARCH
 #define STEREOCELL_MARCH
+
+#include "volume_material.hlsl"
 
 #define CHANNELS 4
 #define MAX_STEPS 100  // of a ray, for any size of the volume and any number of tiles
 static const float OPAQUE = 0.99;  // opacity at which a ray ends
-
-float4 _Size;  // um, edges of the box
-float4 _TexLow;  // texture coordinates at the box's low corner ...
-float4 _TexHigh;  // ... and at its high corner
-float4 _AllLow;  // um, the same space: the box around all tiles, which share a ray's steps by length
-float4 _AllHigh;
-float _Voxel;  // um: the opacities of the transfer functions hold for a path this long
-float _MinStep;  // um
-float _Steps;  // for the whole ray, at most MAX_STEPS
-float _Spare;  // of these, one for each other tile
-float _Shading;  // 0..1: by how much the room's light counts
-float4 _Shown;  // 0..1 of each channel
-float4 _Colors[CHANNELS];  // linear RGB of each channel
 
 // The room's light, the same as in StereoCell's viewer: what a white surface sends on that faces the lamp,
 // the weaker lamp, the sky and the ground.
@@ -46,6 +35,11 @@ struct Seen
     float4 color;
     float4 shares;
 };
+
+float3 colorOf(int c)
+{
+    return c == 0 ? _Color0.rgb : c == 1 ? _Color1.rgb : c == 2 ? _Color2.rgb : _Color3.rgb;
+}
 
 float awayFromZero(float x)
 {
@@ -86,7 +80,7 @@ Seen classify(float4 intensity, float voxels)
     {
         float4 look = lookUp(c, intensity[c]);
         float a = opacityOf(look.a, voxels * _Shown[c]);
-        color += look.rgb * _Colors[c].rgb * a;
+        color += look.rgb * colorOf(c) * a;
         weight += a;
         seen.shares[c] = a;
         transparency *= 1.0 - a;

@@ -10,12 +10,12 @@ using Object = UnityEngine.Object;
 namespace StereoCell.Tests
 {
     /// <summary>
-    /// What only the editor can tell: that its compilers take the shader, and that what glTFast imports lies where
-    /// the volumes are. For the second, the environment's STEREOCELL_BUNDLE names a bundle's folder.
+    /// These tests need the editor: its compilers take the shader, and surfaces that glTFast imports lie where the volumes
+    /// are. For the second one, the environment's STEREOCELL_BUNDLE names a bundle's folder.
     /// </summary>
     public sealed class InEditorTests
     {
-        const string Target = "Assets/StereoCell test";
+        const string Target = "Assets/StereoCell test.stereocell";
 
         [Test]
         public void TheShaderCompiles()
@@ -34,12 +34,13 @@ namespace StereoCell.Tests
             GameObject made = null;
             try
             {
-                made = (GameObject)PrefabUtility.InstantiatePrefab(BundleImporter.Import(bundle, Target));
+                made = (GameObject)PrefabUtility.InstantiatePrefab(BundleMenu.Link(bundle, Target));
                 var tiles = made.GetComponentsInChildren<Tile>(true);
                 Assert.IsTrue(tiles.Length > 0, "there are no tiles");
                 foreach (var tile in tiles)
                 {
                     tile.Show(true, true);
+                    Assert.IsTrue(tile.ShowsVolume, tile.name + ": its voxels were not loaded");
                     var boxes = tile.volume.GetComponentsInChildren<Renderer>().Select(renderer => renderer.bounds).ToArray();
                     if (boxes.Length == 0) continue;
                     var whole = boxes[0];

@@ -1,0 +1,68 @@
+"""Assemblies of the Unity package, and of what stands in for Unity's own, compiled by Mono."""
+
+import subprocess
+from pathlib import Path
+
+from support.unity_meta import PACKAGE, SAMPLES
+
+HERE = Path(__file__).parents[1] / "unity"
+STUBS = HERE / "stubs"
+NEWTONSOFT = Path("/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll")  # Debian's
+ZIP = "System.IO.Compression.FileSystem.dll"  # of Mono; Debian has it in a package of its own
+
+# Assembly: its scripts, and the assemblies that it sees. Those of the package see what their
+# .asmdef names.
+ENGINE = ("UnityEngine",)
+EDITOR = (*ENGINE, "UnityEditor", NEWTONSOFT.stem)
+ASSEMBLIES: dict[str, tuple[list[Path], tuple[str, ...]]] = {
+    "UnityEngine": (
+        [STUBS / f"Unity{name}.cs" for name in ("Engine", "Math", "Textures", "Modules")],
+        (),
+    ),
+    "UnityEditor": ([STUBS / "UnityEditor.cs", STUBS / "UnityAssets.cs"], ENGINE),
+    "glTFast": ([STUBS / "GltFast.cs"], (*ENGINE, NEWTONSOFT.stem)),
+    "Google.XR.Cardboard": ([STUBS / "Cardboard.cs"], ENGINE),
+    "nunit.framework": ([STUBS / "NUnit.cs"], ()),
+    "StereoCell": ([PACKAGE / "Runtime"], ENGINE),
+    "StereoCell.Editor": ([PACKAGE / "Editor"], (*EDITOR, "glTFast", "StereoCell")),
+    "StereoCell.Tests": (
+        [PACKAGE / "Tests"],
+        (*EDITOR, "nunit.framework", "StereoCell", "StereoCell.Editor"),
+    ),
+    "StereoCell.Samples.Cardboard": (
+        sorted((SAMPLES / "Cardboard").glob("*.cs")),
+        (*ENGINE, "StereoCell", "Google.XR.Cardboard"),
+    ),
+    "StereoCell.Samples.Cardboard.Editor": (
+        [SAMPLES / "Cardboard" / "Editor"],
+        (*EDITOR, "StereoCell", "StereoCell.Samples.Cardboard"),
+    ),
+}
+
+
+def compile_assembly(
+    folder: Path, name: str, *defines: str, kind: str = "library", blind: tuple[str, ...] = ()
+) -> None:
+    """Compile an assembly into a folder where those that it sees are already.
+
+    blind  assemblies that it is kept from seeing
+    """
+    sources, seen = ASSEMBLIES.get(name, ([HERE / "Harness"], (*ASSEMBLIES, NEWTONSOFT.stem)))
+    seen = tuple(each for each in seen if each not in blind)
+    files = [
+        f for source in sources for f in (source.rglob("*.cs") if source.is_dir() else [source])
+    ]
+    out = folder / f"{name}.{'exe' if kind == 'exe' else 'dll'}"
+    # Unity 2022.3 takes C# 9; Mono's compiler knows 7
+    done = subprocess.run(
+        [
+            *("mcs", "-langversion:7", "-warnaserror", f"-target:{kind}", f"-out:{out}"),
+            *(f"-d:{define}" for define in defines),
+            *("-r:System.IO.Compression.dll", f"-r:{ZIP}"),
+            *(f"-r:{folder / each}.dll" for each in seen),
+            *sorted(map(str, files)),
+        ],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.IO;
+using System.IO.Compression;
+using System.Linq;
+using System.Text;
+using Newtonsoft.Json;
+using Newtonsoft.Json.Linq;
+
+namespace StereoCell.Editor
+{
+    /// <summary>What is wrong with a bundle, in a line, for people.</summary>
+    public sealed class BundleException : IOException
+    {
+        public BundleException(string message) : base(message) { }
+    }
+
+    /// <summary>
+    /// The files behind a `.stereocell` asset. The asset is either a zip file of the bundle's folder, or a link: the JSON
+    /// object {"bundle": "folder"}, with a path that starts at the asset's own folder unless it is absolute.
+    /// </summary>
+    public sealed class BundleFiles : IDisposable
+    {
+        const string First = "manifest.json";
+        const int MostOfLink = 64 << 10;  // bytes
+
+        readonly ZipArchive zip;
+        readonly string prefix = "";
+
+        BundleFiles(string folder)
+        {
+            Folder = folder;
+        }
+
+        BundleFiles(ZipArchive zip, string prefix)
+        {
+            this.zip = zip;
+            this.prefix = prefix;
+        }
+
+        /// <summary>The bundle's folder; null if it is a zip file.</summary>
+        public string Folder { get; private set; }
+
+        public static BundleFiles Open(string asset)
+        {
+            var folder = LinkedFolder(asset);
+            if (folder != null) return new BundleFiles(folder);
+            ZipArchive zip;
+            try
+            {
+                zip = ZipFile.OpenRead(asset);
+            }
+            catch (InvalidDataException error)
+            {
+                throw new BundleException(asset + " is a damaged zip file: " + error.Message);
+            }
+            var found = zip.Entries.Where(entry => entry.Name == First).OrderBy(entry => entry.FullName.Length).FirstOrDefault();
+            if (found != null) return new BundleFiles(zip, found.FullName.Substring(0, found.FullName.Length - First.Length));
+            zip.Dispose();
+            throw new BundleException(asset + ": expected a zip file of a bundle, found no manifest.json in it");
+        }
+
+        public static BundleFiles OpenFolder(string folder)
+        {
+            return new BundleFiles(folder);
+        }
+
+        /// <summary>The folder that a link names; null if the asset is a zip file.</summary>
+        public static string LinkedFolder(string asset)
+        {
+            using (var stream = File.OpenRead(asset))
+            {
+                if (stream.ReadByte() == 'P' && stream.ReadByte() == 'K') return null;
+                if (stream.Length > MostOfLink) throw new BundleException(asset + ": expected a zip file of a bundle, or a link to its folder");
+            }
+            try
+            {
+                var named = (string)JObject.Parse(File.ReadAllText(asset, Encoding.UTF8))["bundle"];
+                if (string.IsNullOrEmpty(named)) throw new BundleException(asset + ": expected {\"bundle\": \"the bundle's folder\"}");
+                return Path.GetFullPath(Path.Combine(Path.GetDirectoryName(Path.GetFullPath(asset)), named));
+            }
+            catch (JsonException)
+            {
+                throw new BundleException(asset + ": expected a zip file of a bundle, or {\"bundle\": \"the bundle's folder\"}");
+            }
+        }
+
+        /// <summary>The link's text. A folder in the project is named from the asset's folder, as both move with it.</summary>
+        public static string LinkTo(string folder, string asset)
+        {
+            var whole = Path.GetFullPath(folder).Replace('\\', '/');
+            var project = Path.GetFullPath(".").Replace('\\', '/') + "/";
+            var named = whole.StartsWith(project, StringComparison.Ordinal) ? RelativePath(asset, whole) : whole;
+            return new JObject(new JProperty("bundle", named)).ToString() + "\n";
+        }
+
+        /// <summary>The path of a file or folder from the folder in which another file lies, with slashes.</summary>
+        public static string RelativePath(string file, string path)
+        {
+            var from = Path.GetFullPath(file).Replace('\\', '/').Split('/');
+            var to = Path.GetFullPath(path).Replace('\\', '/').Split('/');
+            var same = 0;
+            while (same < from.Length - 1 && same < to.Length - 1 && from[same] == to[same]) same++;
+            if (same == 0) return string.Join("/", to);  // on another drive
+            var up = Enumerable.Repeat("..", from.Length - 1 - same).Concat(to.Skip(same)).ToArray();
+            return (up[0] == ".." ? "" : "./") + string.Join("/", up);
+        }
+
+        public byte[] Read(string path)
+        {
+            if (zip != null) return ReadEntry(path);
+            try
+            {
+                return File.ReadAllBytes(Path.Combine(Folder, path));
+            }
+            catch (Exception error) when (error is FileNotFoundException || error is DirectoryNotFoundException)
+            {
+                throw new BundleException(path + " is missing in " + Folder);
+            }
+        }
+
+        public void Dispose()
+        {
+            if (zip != null) zip.Dispose();
+        }
+
+        byte[] ReadEntry(string path)
+        {
+            var entry = zip.GetEntry(prefix + path);
+            if (entry == null) throw new BundleException(path + " is missing in the zip file");
+            using (var stream = entry.Open())
+            using (var memory = new MemoryStream())
+            {
+                stream.CopyTo(memory);
+                return memory.ToArray();
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.IO;
+using System.IO.Compression;
+using UnityEditor;
+using UnityEngine;
+
+namespace StereoCell.Editor
+{
+    /// <summary>Brings a bundle into the project, as a link to its folder or as a copy in one file.</summary>
+    public static class BundleMenu
+    {
+        [MenuItem("Assets/StereoCell/Link Bundle...", false, 30)]
+        static void ChooseLink()
+        {
+            Choose(Link);
+        }
+
+        [MenuItem("Assets/StereoCell/Copy Bundle...", false, 31)]
+        static void ChooseCopy()
+        {
+            Choose(Copy);
+        }
+
+        static void Choose(Func<string, string, GameObject> bring)
+        {
+            var folder = EditorUtility.OpenFolderPanel("The bundle's folder, which holds manifest.json", "", "");
+            if (string.IsNullOrEmpty(folder)) return;
+            try
+            {
+                var root = new DirectoryInfo(folder);
+                var name = root.Name == "bundle" && root.Parent != null ? root.Parent.Name : root.Name;
+                Selection.activeObject = bring(folder, "Assets/" + name + "." + SpecimenImporter.Ending);
+            }
+            catch (IOException error)
+            {
+                EditorUtility.DisplayDialog("StereoCell", error.Message, "OK");
+            }
+        }
+
+        /// <summary>Import a bundle where it lies. When it is built anew, the specimen is imported again.</summary>
+        /// <param name="asset">The file to write, as "Assets/half.stereocell". A file that is there and differs stays,
+        /// and the new one gets a number.</param>
+        public static GameObject Link(string folder, string asset)
+        {
+            CheckBundle(folder);
+            var text = BundleFiles.LinkTo(folder, asset);
+            if (!File.Exists(asset) || File.ReadAllText(asset) != text)
+            {
+                asset = FreePath(asset);  // in the same folder, so the text stays
+                File.WriteAllText(asset, text);
+            }
+            BundleWatcher.Register(folder);
+            return Imported(asset);
+        }
+
+        /// <summary>Import a copy of a bundle, one zip file that goes with the project.</summary>
+        /// <param name="asset">As for a link.</param>
+        public static GameObject Copy(string folder, string asset)
+        {
+            CheckBundle(folder);
+            asset = FreePath(asset);
+            // the files are packed already, each in its own way
+            ZipFile.CreateFromDirectory(folder, asset, CompressionLevel.NoCompression, false);
+            return Imported(asset);
+        }
+
+        static void CheckBundle(string folder)
+        {
+            using (var files = BundleFiles.OpenFolder(folder)) new Bundle(files);
+        }
+
+        static string FreePath(string asset)
+        {
+            Directory.CreateDirectory(Path.GetDirectoryName(asset));
+            return File.Exists(asset) ? AssetDatabase.GenerateUniqueAssetPath(asset) : asset;
+        }
+
+        static GameObject Imported(string asset)
+        {
+            AssetDatabase.ImportAsset(asset);
+            var made = AssetDatabase.LoadAssetAtPath<GameObject>(asset);
+            if (made == null) throw new BundleException(asset + " was not imported: the console says why");
+            return made;
+        }
+    }
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Collections.Generic;
+using UnityEngine;
+
+namespace StereoCell.Editor
+{
+    [Serializable]
+    public sealed class ImportOptions
+    {
+        [Min(0.001f), Tooltip("Longest edge of the specimen in the scene, units: its root is scaled to it")]
+        public float longestEdge = 0.5f;
+
+        [Min(8), Tooltip("Most texels along an edge of a tile's volume: a coarser level is taken where it has more")]
+        public int mostTexels = 256;
+
+        [Min(1), Tooltip("Most memory of a tile's volumes while it is loaded, MB: a coarser level is taken where it needs more")]
+        public float budget = 40;
+
+        [Min(0.1f), Tooltip("Error that a level of detail may show, in pixels")]
+        public float errorPixels = 2;
+
+        [Min(1), Tooltip("Height of the screen or eye, in pixels")]
+        public int screenPixels = 1080;
+
+        const int MostOfUnity = 2048;  // texels along an edge of a 3D texture
+
+        /// <summary>
+        /// The finest level at which every box of a tile has few enough texels along its edges and all boxes together
+        /// fit into the budget; the coarsest one, if none does.
+        /// </summary>
+        /// <param name="boxes">Levels of each box, finest first, and how many channels it has.</param>
+        public int LevelFor(IList<KeyValuePair<int[][], int>> boxes)
+        {
+            var levels = int.MaxValue;
+            foreach (var box in boxes) levels = Math.Min(levels, box.Key.Length);
+            for (var level = 0; level < levels; level++)
+            {
+                var sizes = new List<KeyValuePair<int[], int>>();
+                var edge = 0;
+                foreach (var box in boxes)
+                {
+                    var size = box.Key[level];
+                    sizes.Add(new KeyValuePair<int[], int>(size, box.Value));
+                    edge = Math.Max(edge, Math.Max(size[0], Math.Max(size[1], size[2])));
+                }
+                if (edge <= Math.Min(mostTexels, MostOfUnity) && VolumeMemory.PeakBytes(sizes) <= budget * 1e6) return level;
+            }
+            return levels - 1;
+        }
+    }
+}

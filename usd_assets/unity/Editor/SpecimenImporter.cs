@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.IO;
+using UnityEditor;
+using UnityEditor.AssetImporters;
+using UnityEngine;
+using Object = UnityEngine.Object;
+
+namespace StereoCell.Editor
+{
+    /// <summary>
+    /// Imports a `.stereocell` file, a link to a bundle's folder or a zip file of it, as a prefab. The import is made anew
+    /// when the bundle changes; it writes no file, and changes none of the project's own materials, variants and scenes.
+    /// </summary>
+    [ScriptedImporter(1, Ending)]
+    public sealed class SpecimenImporter : ScriptedImporter
+    {
+        public const string Ending = "stereocell";
+
+        public ImportOptions options = new ImportOptions();
+
+        public override void OnImportAsset(AssetImportContext ctx)
+        {
+            ctx.DependsOnSourceAsset(SpecimenBuilder.ShaderPath);
+            ctx.DependsOnCustomDependency(BundleWatcher.PipelineName);  // glTFast's materials are those of a pipeline
+            GameObject root = null;
+            try
+            {
+                var folder = BundleFiles.LinkedFolder(ctx.assetPath);
+                if (folder != null) ctx.DependsOnCustomDependency(BundleWatcher.NameOf(folder));
+                using (var files = BundleFiles.Open(ctx.assetPath))
+                {
+                    var bundle = new Bundle(files);
+                    root = new GameObject(bundle.Name);
+                    var guid = AssetDatabase.AssetPathToGUID(ctx.assetPath);
+                    new SpecimenBuilder(bundle, options, guid, OwnMaterial, ctx.AddObjectToAsset).Build(root);
+                }
+                ctx.AddObjectToAsset("specimen", root);
+                ctx.SetMainObject(root);
+            }
+            catch (Exception error) when (error is IOException || error is InvalidDataException)
+            {
+                if (root != null) Object.DestroyImmediate(root);
+                ctx.LogImportError(ctx.assetPath + ": " + error.Message);
+            }
+        }
+
+        /// <summary>What a channel's surfaces are called in <see cref="AssetImporter.AddRemap"/>.</summary>
+        public static SourceAssetIdentifier MaterialOf(string channel)
+        {
+            return new SourceAssetIdentifier(typeof(Material), channel);
+        }
+
+        Material OwnMaterial(string channel)
+        {
+            Object found;
+            return GetExternalObjectMap().TryGetValue(MaterialOf(channel), out found) ? found as Material : null;
+        }
+    }
+}

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.Collections.Generic;
+using System.IO;
+using System.Linq;
+using UnityEditor;
+using UnityEngine;
+
+namespace StereoCell.Editor
+{
+    /// <summary>
+    /// Edits a specimen's transfer functions, as a curve of opacity and as a gradient of colour and opacity. The scene shows
+    /// each change at once. *Write layer...* writes the edits of colour, opacity, visibility and choice as a USD layer.
+    /// </summary>
+    public sealed class TransferFunctionWindow : EditorWindow
+    {
+        static readonly Rect Unit = new Rect(0, 0, 1, 1);
+
+        [SerializeField] Specimen specimen;
+        [SerializeField] string note = "";
+
+        /// <summary>Points that were changed: by channel, then by function.</summary>
+        readonly Dictionary<string, Dictionary<string, List<Vector2>>> edited = new Dictionary<string, Dictionary<string, List<Vector2>>>();
+        Vector2 scroll;
+
+        [MenuItem("Window/StereoCell/Transfer Functions")]
+        public static void Open()
+        {
+            var window = GetWindow<TransferFunctionWindow>("Transfer functions");
+            if (Selection.activeGameObject != null) window.Edit(Selection.activeGameObject.GetComponentInParent<Specimen>(true));
+        }
+
+        public void Edit(Specimen chosen)
+        {
+            if (chosen == specimen) return;
+            specimen = chosen;
+            edited.Clear();
+            note = "";
+        }
+
+        void OnGUI()
+        {
+            Edit((Specimen)EditorGUILayout.ObjectField("Specimen", specimen, typeof(Specimen), true));
+            if (specimen == null || specimen.table == null)
+            {
+                EditorGUILayout.HelpBox("Choose a specimen of the scene.", MessageType.Info);
+                return;
+            }
+            scroll = EditorGUILayout.BeginScrollView(scroll);
+            foreach (var channel in specimen.channels) Draw(channel);
+            EditorGUILayout.EndScrollView();
+            if (GUILayout.Button("Write layer...")) ChooseLayer();
+            if (note != "") EditorGUILayout.HelpBox(note, MessageType.Info);
+        }
+
+        void Draw(Channel channel)
+        {
+            Undo.RecordObject(specimen, "Edit transfer function");
+            EditorGUI.BeginChangeCheck();
+            channel.isVisible = EditorGUILayout.ToggleLeft(channel.name, channel.isVisible);
+            channel.function = EditorGUILayout.Popup("Function", channel.function, channel.functions);
+            var points = PointsOf(channel);
+
+            var curve = OpacityPoints.ToCurve(points);
+            EditorGUI.BeginChangeCheck();
+            curve = EditorGUILayout.CurveField("Opacity", curve, channel.color, Unit);
+            if (EditorGUI.EndChangeCheck()) Set(channel, OpacityPoints.OfCurve(curve));
+
+            var offered = OpacityPoints.ToGradient(PointsOf(channel), channel.color);
+            EditorGUI.BeginChangeCheck();
+            var gradient = EditorGUILayout.GradientField("Colour and opacity", OpacityPoints.ToGradient(PointsOf(channel), channel.color));
+            if (EditorGUI.EndChangeCheck()) Set(channel, offered, gradient);
+
+            if (!EditorGUI.EndChangeCheck()) return;
+            EditorUtility.SetDirty(specimen);
+            specimen.Apply();
+        }
+
+        void Set(Channel channel, Gradient offered, Gradient gradient)
+        {
+            try
+            {
+                channel.color = OpacityPoints.ColorOf(gradient);
+                // a gradient has eight keys at most, so a function of more points stays where only the colour is new
+                var points = OpacityPoints.OfGradient(gradient);
+                if (!OpacityPoints.OfGradient(offered).SequenceEqual(points)) Set(channel, points);
+                note = "";
+            }
+            catch (ArgumentException error)
+            {
+                note = channel.name + ": " + error.Message;
+            }
+        }
+
+        void Set(Channel channel, List<Vector2> points)
+        {
+            if (!edited.ContainsKey(channel.id)) edited.Add(channel.id, new Dictionary<string, List<Vector2>>());
+            edited[channel.id][channel.functions[channel.function]] = points;
+            specimen.SetOpacity(channel.id, channel.functions[channel.function], OpacityPoints.Row(points));
+        }
+
+        List<Vector2> PointsOf(Channel channel)
+        {
+            Dictionary<string, List<Vector2>> functions;
+            List<Vector2> points;
+            if (edited.TryGetValue(channel.id, out functions) && functions.TryGetValue(channel.functions[channel.function], out points)) return points;
+            return OpacityPoints.OfRow(specimen.table.GetRawTextureData(), 4 * OpacityPoints.Samples * (channel.firstRow + channel.function));
+        }
+
+        void ChooseLayer()
+        {
+            var stage = StageOf(specimen);
+            if (stage == null) stage = EditorUtility.OpenFilePanel("The stage that the bundle was made of: stage.usda", "", "usda");
+            if (string.IsNullOrEmpty(stage)) return;
+            var layer = EditorUtility.SaveFilePanel("Write the edits as a layer", Path.GetDirectoryName(Path.GetDirectoryName(stage)), "from_unity", "usda");
+            if (string.IsNullOrEmpty(layer)) return;
+            note = WriteLayer(layer, stage);
+        }
+
+        /// <summary>Returns the line that says what was written, and what to do with it.</summary>
+        public string WriteLayer(string layer, string stage)
+        {
+            var edits = Edits();
+            if (edits.Count == 0) return "Nothing was edited, so no layer was written.";
+            if (Path.GetFullPath(layer) == Path.GetFullPath(stage)) return layer + " is the stage itself: choose another name.";
+            File.WriteAllText(layer, StageLayer.Text(layer, stage, edits));
+            return "Wrote " + layer + ". Next: stereocell bundle OUT --stage " + layer;
+        }
+
+        public List<ChannelEdit> Edits()
+        {
+            return specimen.channels.Select(EditOf).Where(edit => !edit.IsEmpty).ToList();
+        }
+
+        ChannelEdit EditOf(Channel channel)
+        {
+            var edit = new ChannelEdit { Id = channel.id };
+            if (channel.color != channel.importedColor) edit.Color = channel.color.linear;
+            if (channel.isVisible != channel.importedVisible) edit.IsVisible = channel.isVisible;
+            if (channel.function != channel.importedFunction) edit.Function = channel.functions[channel.function];
+            if (edited.ContainsKey(channel.id)) edit.Points = edited[channel.id];
+            return edit;
+        }
+
+        /// <summary>The stage beside a linked bundle: OUT/bundle was made of OUT/stage. Null if there is none.</summary>
+        static string StageOf(Specimen specimen)
+        {
+            var box = specimen.GetComponentsInChildren<VolumeBox>(true).FirstOrDefault();
+            var asset = box == null ? "" : AssetDatabase.GUIDToAssetPath(box.specimenGuid);
+            var folder = string.IsNullOrEmpty(asset) ? null : BundleFiles.LinkedFolder(asset);
+            if (folder == null) return null;
+            var stage = Path.Combine(Path.GetDirectoryName(folder), "stage", "stage.usda");
+            return File.Exists(stage) ? stage : null;
+        }
+    }
+}

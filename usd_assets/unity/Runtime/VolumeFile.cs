@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+using System;
+using System.IO;
+using System.IO.Compression;
+using System.Text;
+
+namespace StereoCell
+{
+    /// <summary>
+    /// The file of one box of voxels, read slice by slice. It starts with "SCV1" and four little-endian int32: texels
+    /// across, rows, slices, and channels (1 to 4). A DEFLATE stream follows: for each slice the plane of each channel.
+    /// Unity brings a decoder for DEFLATE on every platform, and reading takes no more memory than two slices.
+    /// </summary>
+    public sealed class VolumeFile : IDisposable
+    {
+        public const int HeadBytes = 20;
+        const string Magic = "SCV1";
+
+        public readonly int Width;
+        public readonly int Height;
+        public readonly int Depth;
+        public readonly int Channels;
+
+        readonly Stream inner;
+        readonly DeflateStream packed;
+        readonly byte[] planes;
+        int slicesRead;
+
+        /// <summary>Takes over the stream, and closes it with itself.</summary>
+        public VolumeFile(Stream stream)
+        {
+            inner = stream;
+            var head = new byte[HeadBytes];
+            if (ReadFully(stream, head) < HeadBytes || Encoding.ASCII.GetString(head, 0, 4) != Magic)
+            {
+                throw new InvalidDataException("expected a volume of the StereoCell package, found another file");
+            }
+            Width = BitConverter.ToInt32(head, 4);
+            Height = BitConverter.ToInt32(head, 8);
+            Depth = BitConverter.ToInt32(head, 12);
+            Channels = BitConverter.ToInt32(head, 16);
+            var isSound = Width > 0 && Height > 0 && Depth > 0 && Channels > 0 && Channels <= 4 && (long)Width * Height <= 1 << 22;
+            if (!isSound) throw new InvalidDataException("the volume's size is damaged");
+            packed = new DeflateStream(stream, CompressionMode.Decompress);
+            planes = new byte[Width * Height * Channels];
+        }
+
+        /// <summary>Components of a texel: textures have 1, 2 or 4 of them.</summary>
+        public static int ComponentsOf(int channels)
+        {
+            return channels > 2 ? 4 : channels;
+        }
+
+        /// <summary>Fill the next slice's texels, components side by side.</summary>
+        public void ReadSlice(byte[] texels)
+        {
+            if (ReadFully(packed, planes) < planes.Length)
+            {
+                throw new InvalidDataException("the volume ends after slice " + slicesRead + " of " + Depth);
+            }
+            slicesRead++;
+            int plane = Width * Height, stride = ComponentsOf(Channels);
+            for (var channel = 0; channel < Channels; channel++)
+            {
+                var from = channel * plane;
+                for (int i = 0, to = channel; i < plane; i++, to += stride) texels[to] = planes[from + i];
+            }
+        }
+
+        /// <param name="volumes">The texels of each channel: x fastest, then rows, then slices.</param>
+        public static void Write(Stream stream, int width, int height, int depth, byte[][] volumes)
+        {
+            stream.Write(Encoding.ASCII.GetBytes(Magic), 0, 4);
+            foreach (var number in new[] { width, height, depth, volumes.Length }) stream.Write(BitConverter.GetBytes(number), 0, 4);
+            using (var packed = new DeflateStream(stream, CompressionLevel.Fastest, true))
+            {
+                for (var slice = 0; slice < depth; slice++)
+                {
+                    foreach (var volume in volumes) packed.Write(volume, slice * width * height, width * height);
+                }
+            }
+        }
+
+        public void Dispose()
+        {
+            if (packed != null) packed.Dispose();
+            inner.Dispose();
+        }
+
+        static int ReadFully(Stream stream, byte[] into)
+        {
+            var done = 0;
+            while (done < into.Length)
+            {
+                var count = stream.Read(into, done, into.Length - done);
+                if (count == 0) break;
+                done += count;
+            }
+            return done;
+        }
+    }
+}
