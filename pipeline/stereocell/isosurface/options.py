@@ -171,6 +171,12 @@ class SurfaceOptions:
         "carry the channel's surface",
         bounds=COUNT,
     )
+    max_share: float = setting(
+        0.5,
+        "share of the specimen that a channel's surface may hold beside smaller ones of others; "
+        "beyond it the channel is a volume alone; 1: each has its surface",
+        bounds=Bounds(0, 1),
+    )
     body_um: float = setting(
         0.0,
         "size of the least bodies that matter, which presets state; counts up to a twentieth of "
