@@ -216,6 +216,14 @@ class SurfaceOptions:
             "also a closed STL of every tile and channel, for printing and booleans",
         ),
     )
+    caps: bool = setting(
+        True,
+        "whether flat caps close surfaces at the block's faces; without, they are open there",
+        flag=Flag(
+            "--caps",
+            "flat caps close surfaces at the block's faces (default); --no-caps leaves them open",
+        ),
+    )
     keep_holder: bool = setting(
         False,
         "whether a CT's table, head holder, pads and cables, apart from the body, are built too",
