@@ -3,8 +3,10 @@
 It runs in Blender's Python. Its argument is a file with a list of jobs:
     file     what is opened
     by       "blender", by its own importer into the default scene, or "add-on"
-    view     the camera, in the numbers of the file; null: the file's own camera `mono`
+    view     the camera, in the numbers of the file; null: the file's own camera `mono`;
+             "default": Blender's own, drawn back until it has all in view
     choices  of the add-on's import
+    engine   "CYCLES" if nothing else is named
     pixels, samples, picture
 
 A picture's alpha is the silhouette of what is drawn. Jobs share the process, but no scene. Unlike
@@ -17,6 +19,7 @@ import sys
 from pathlib import Path
 
 import bpy
+import mathutils
 
 LOCAL = Path(bpy.utils.resource_path("LOCAL"))
 sys.path += [str(path) for path in LOCAL.glob("python/lib/python3*/site-packages")]
@@ -34,6 +37,9 @@ def open_plainly(job):
     else:
         assert bpy.ops.wm.usd_import(filepath=file) == {"FINISHED"}
     scene, view = bpy.context.scene, job["view"]
+    if view == "default":
+        frame_by_default_camera(scene)
+        return
     scene.camera = bpy.data.objects["mono"] if view is None else add_camera(scene, view)
 
 
@@ -50,6 +56,23 @@ def add_camera(scene, view):
     return block
 
 
+def frame_by_default_camera(scene):
+    """Move the default scene's camera along its own direction, until all meshes are in view."""
+    bpy.context.view_layer.update()
+    boxes = [
+        block.matrix_world @ mathutils.Vector(corner)
+        for block in scene.objects
+        if block.type == "MESH"
+        for corner in block.bound_box
+    ]
+    low, high = (mathutils.Vector(map(end, zip(*boxes, strict=True))) for end in (min, max))
+    camera = scene.camera
+    away = (high - low).length / 2 / math.sin(camera.data.angle_y / 2)
+    backwards = camera.matrix_world.to_3x3() @ mathutils.Vector((0, 0, 1))
+    camera.location = (low + high) / 2 + away * backwards
+    camera.data.clip_start, camera.data.clip_end = away / 100, away * 10
+
+
 def import_by_the_addon(job):
     """Import a stage by the add-on into the default scene, as its menu does."""
     stereocell_import.register()
@@ -59,13 +82,18 @@ def import_by_the_addon(job):
 
 
 def render(job):
-    """Write a picture with few samples by Cycles: Blender's other renderers need a GPU."""
+    """Write a picture with few samples.
+
+    EEVEE needs OpenGL 4.3 without a window; with Mesa's drawing by software, the first picture of a
+    process takes minutes, in which its shaders are compiled.
+    """
     scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
+    scene.render.engine = job.get("engine", "CYCLES")
     scene.render.use_multiview = False
     scene.cycles.device = "CPU"
     scene.cycles.samples = job.get("samples", 16)
     scene.cycles.use_denoising = False
+    scene.eevee.taa_render_samples = job.get("samples", 16)
     scene.render.film_transparent = True
     scene.render.resolution_x, scene.render.resolution_y = job["pixels"]
     scene.render.resolution_percentage = 100

@@ -31,6 +31,7 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--neurological": ([], "plan", "neurological", True),
     "--iso-criterion": (["adaptive"], "isovalue", "criterion", "adaptive"),
     "--wrap": (["alpha-wrap"], "surface", "wrap", "alpha-wrap"),
+    "--caps": ([], "surface", "caps", True),
     "--closed-tiles": ([], "surface", "closed_tiles", True),
     "--iso-value": (["a=b=400"], "iso_values", "a=b", 400.0),
     "--window": (["CT=-160:240"], "windows", "CT", "-160:240"),

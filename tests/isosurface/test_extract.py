@@ -1,5 +1,7 @@
 """Surfaces against analytic bodies, and across tiles."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from stereocell.filters.denoise import SMOOTHING_REACH, smooth
 from stereocell.isosurface.distance_field import gradient_magnitude, signed_distance
 from stereocell.isosurface.extract import extract_surface
 from stereocell.isosurface.repair import RepairOptions, repair
+from stereocell.meshes.validity import find_defects
 from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, cut
@@ -69,6 +72,19 @@ def test_body_at_the_data_s_end_is_capped() -> None:
     rim = np.linalg.norm(mesh.positions[:, :2] - [3.2, -3.2], axis=1) > 1.6
     assert (cap & ~rim).sum() > 100
     assert mesh.normals[cap & ~rim, 2].max() < -0.99  # it faces away from the body
+
+
+def test_a_cavity_that_the_block_s_face_opens_is_sound_without_a_cap() -> None:
+    """The solid around it fills the block, and has no surface of its own."""
+    hole = 3 - np.linalg.norm(
+        np.indices((12, 16, 16)) - np.reshape([11, 8, 8], (3, 1, 1, 1)), axis=0
+    )
+    box = Box((0, 0, 0), hole.shape)  # type: ignore[arg-type]
+    lattice = replace(Lattice.of_whole(box, (1.0, 1.0, 1.0)), cap=None)
+    mesh = extract_surface(np.clip(-hole, -2, 2).astype(np.float32), lattice)
+    assert len(mesh.triangles) > 50
+    assert open_edges(mesh) > 10
+    assert find_defects(mesh, planes=lattice.cut_planes()).total == 0
 
 
 @pytest.mark.slow

@@ -18,10 +18,12 @@ def test_long_diagonal_flips() -> None:
     triangles = np.array([[0, 1, 3], [1, 0, 2]], np.int32)
     narrow = KITE * [1, 12, 1]  # its short diagonal is the better one only if it is shorter
     wide = KITE * [0.05, 1, 1]
-    assert flip_edges(wide, triangles, FREE, NO_PLANES, ERRORS, SHARP) == 0
-    assert flip_edges(narrow, CUT.copy(), FREE, NO_PLANES, ERRORS, SHARP) == 0  # no sharp triangle
+    assert flip_edges(wide, triangles, FREE, NO_PLANES, NO_PLANES, ERRORS, SHARP) == 0
+    assert (
+        flip_edges(narrow, CUT.copy(), FREE, NO_PLANES, NO_PLANES, ERRORS, SHARP) == 0
+    )  # no sharp triangle
     flat = CUT.copy()
-    assert flip_edges(KITE, flat, FREE, NO_PLANES, ERRORS, SHARP) == 1
+    assert flip_edges(KITE, flat, FREE, NO_PLANES, NO_PLANES, ERRORS, SHARP) == 1
     assert sorted(map(sorted, flat.tolist())) == [[0, 2, 3], [1, 2, 3]]
     twins = match_twins(flat, 4)
     assert (twins >= 0).sum() == 2  # wound alike still
@@ -30,12 +32,12 @@ def test_long_diagonal_flips() -> None:
 def test_edge_stays_where_the_surface_would_move_or_lie_in_a_cut() -> None:
     bent = KITE.copy()
     bent[2:, 2] = 0.2
-    assert flip_edges(bent, CUT.copy(), FREE, NO_PLANES, ERRORS, SHARP) == 0
+    assert flip_edges(bent, CUT.copy(), FREE, NO_PLANES, NO_PLANES, ERRORS, SHARP) == 0
     planes = np.array([1, 0, 1, 1], np.uint8)  # 0, 2 and 3 lie in a cut plane
-    assert flip_edges(KITE, CUT.copy(), FREE, planes, ERRORS, SHARP) == 0
+    assert flip_edges(KITE, CUT.copy(), FREE, planes, NO_PLANES, ERRORS, SHARP) == 0
 
 
 def test_edge_stays_beside_a_vertex_that_is_locked() -> None:
     for vertex in range(4):
         locked = np.arange(4) == vertex
-        assert flip_edges(KITE, CUT.copy(), locked, NO_PLANES, ERRORS, SHARP) == 0
+        assert flip_edges(KITE, CUT.copy(), locked, NO_PLANES, NO_PLANES, ERRORS, SHARP) == 0

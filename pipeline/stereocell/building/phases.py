@@ -35,6 +35,7 @@ from stereocell.planning.channel_survey import (
     notes_on_survey,
     survey_channel,
 )
+from stereocell.planning.covering_channels import leave_out_covering
 from stereocell.planning.input_files import require_table
 from stereocell.planning.label_numbers import notes_on_objects
 from stereocell.planning.level_choice import find_level
@@ -157,6 +158,7 @@ def _survey(passes: Passes, phase: Phase) -> Survey:
         id_: choose_level_of(plan, one, evidence[id_], [level[id_] for level in components])
         for id_, one in found.items()
     }
+    chosen = leave_out_covering(plan, chosen)
     survey = {
         one.id: survey_channel(plan, one, chosen[one.id], files[one.id]) for one in plan.channels
     }

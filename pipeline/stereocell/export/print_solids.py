@@ -23,11 +23,14 @@ from stereocell.formats.body import Body
 from stereocell.formats.mesh_files import write_obj, write_ply
 from stereocell.formats.stl import write_stl_file
 from stereocell.formats.threemf import write_3mf
+from stereocell.meshes.validity import border
 from stereocell.model.color import to_srgb8
 from stereocell.model.counted import counted
+from stereocell.model.errors import StageError
 from stereocell.model.physical_size import describe_size
 from stereocell.objects.split import split_objects
 from stereocell.usd.layer import METERS_PER_UNIT
+from stereocell.usd.read_provenance import has_caps
 from stereocell.usd.read_stage import specimen_name
 
 HAND_M = 0.1  # longest edge of a specimen in print, if no --scale is given
@@ -126,10 +129,10 @@ def _solids(
     chosen: Chosen, level: int, *, is_one: bool
 ) -> Iterator[tuple[_Part, manifold3d.Manifold]]:
     """Yield the bodies; `is_one`: one of all."""
-    boxes = _boxes(chosen)
+    boxes, is_capped = _boxes(chosen), has_caps(chosen.stage)
     found = []
     for part in _parts(chosen, level, is_one):
-        solid = unite([_close(one, part.name) for one in part.surfaces.values()])
+        solid = unite([_close(one, part.name, is_capped) for one in part.surfaces.values()])
         if boxes:
             solid = cut_to(solid, boxes)
         if solid.is_empty():
@@ -143,8 +146,13 @@ def _solids(
         yield replace(found[0][0], name=name), unite([solid for _, solid in found])
 
 
-def _close(surface: _Surface, name: str) -> manifold3d.Manifold:
+def _close(surface: _Surface, name: str, is_capped: bool) -> manifold3d.Manifold:
     positions, triangles = weld(surface.meshes)
+    if not is_capped and len(border(triangles)):
+        raise StageError(
+            f"{name}: its surface is open at the block's faces, as --no-caps built it, and no "
+            "solid: build with --caps, or export .glb or .usdz, which may be open"
+        )
     back = np.linalg.inv(np.array(surface.moved).reshape(4, 4))
     own = positions.astype(np.float64) @ back[:3, :3] + back[3, :3]
     return to_solid(positions, close_cuts(own, triangles, sorted(surface.cuts)), name)

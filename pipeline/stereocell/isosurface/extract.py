@@ -42,8 +42,9 @@ def extract_surface(
               follows that lattice there
     result    positions float32 (n, 3) in world um (x, y, z), triangles, normals
 
-    The mesh is open where another tile follows, and closed by a cap, within one voxel, where the
-    region ends. Normals come from the field's gradient; halos make them continuous across tiles.
+    The mesh is open where another tile follows. Where the region ends, flat caps close it,
+    `lattice.cap` spacings past the outermost points; without a cap it is open there, too. Normals
+    come from the field's gradient; halos make them continuous across tiles. A cap's are its own.
 
     >>> from stereocell.model.tiling import Box
     >>> z, y, x = np.mgrid[:9, :9, :9]
@@ -58,7 +59,7 @@ def extract_surface(
     distance = distance[window.slices_in(lattice.window)]
     limit = np.float32(2 * max(lattice.spacing_um))
     cap = [
-        (int(a == low), int(b == high))
+        (int(lattice.cap is not None and a == low), int(lattice.cap is not None and b == high))
         for a, b, low, high in zip(own.start, own.stop, region.start, region.stop, strict=True)
     ]
     # where the lattice ends with the region, the window does too: both get the same margin
@@ -80,11 +81,32 @@ def extract_surface(
 
     steps, origin = np.asarray(lattice.spacing_um), np.asarray(lattice.origin_um)
     lattice_zyx = points[:, ::-1].astype(np.float64) + (np.asarray(own.start) - margin)
+    outwards = _flatten_caps(lattice_zyx, lattice)
     positions = zyx_to_xyz(lattice_zyx * steps + origin).astype(np.float32)
     at = lattice_zyx - np.asarray(window.start) + margin
-    normals = zyx_to_xyz(find_downhill(distance, at, steps)).astype(np.float32)
+    on_cap = (outwards != 0).any(axis=1, keepdims=True)
+    downhill = np.where(on_cap, outwards, find_downhill(distance, at, steps))
+    normals = zyx_to_xyz(downhill).astype(np.float32)
     # VTK winds by the image's axes; the world mirrors y, so every triangle is turned over
     return Mesh(positions, np.ascontiguousarray(triangles[:, ::-1]), normals)
+
+
+def _flatten_caps(points: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
+    """Move the points of caps onto planes, in place; return their normals, (n, 3), else zeros.
+
+    A vertex past the outermost points lies between one of these and the padding. It stays on its
+    edge of the lattice, so the triangles stay sound.
+
+    points  float64 (n, 3), (z, y, x) in lattice units
+    """
+    outwards = np.zeros_like(points)
+    for axis, place in lattice.ends():
+        is_low = place < lattice.own.start[axis]
+        along = points[:, axis]
+        past = along < lattice.own.start[axis] if is_low else along > lattice.own.stop[axis] - 1
+        along[past] = place
+        outwards[past, axis] = -1.0 if is_low else 1.0
+    return outwards
 
 
 def _snapped(

@@ -171,6 +171,12 @@ class SurfaceOptions:
         "carry the channel's surface",
         bounds=COUNT,
     )
+    max_share: float = setting(
+        0.5,
+        "share of the specimen that a channel's surface may hold beside smaller ones of others; "
+        "beyond it the channel is a volume alone; 1: each has its surface",
+        bounds=Bounds(0, 1),
+    )
     body_um: float = setting(
         0.0,
         "size of the least bodies that matter, which presets state; counts up to a twentieth of "
@@ -208,6 +214,14 @@ class SurfaceOptions:
         flag=Flag(
             "--closed-tiles",
             "also a closed STL of every tile and channel, for printing and booleans",
+        ),
+    )
+    caps: bool = setting(
+        True,
+        "whether flat caps close surfaces at the block's faces; without, they are open there",
+        flag=Flag(
+            "--caps",
+            "flat caps close surfaces at the block's faces (default); --no-caps leaves them open",
         ),
     )
     keep_holder: bool = setting(

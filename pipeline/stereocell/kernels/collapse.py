@@ -17,6 +17,8 @@ in a few classes of cost rather than by a queue. Each is sound by itself:
   surroundings do
 - no triangle gets sharper than the bound, or than .6 of the sharpest one around
 - no triangle comes to lie in a cut plane
+- a vertex of a cap, the flat end of a body, moves within its plane alone: caps of several channels
+  keep their order, since each stays flat
 - the vertex, and all that went into it, are near the new triangles: distances add up
 
 Interfaces between objects share lines and corners. A vertex within an interface moves onto any
@@ -96,6 +98,7 @@ def collapse(
     stray: float,
     sharpest: float,
     past: Ints,
+    caps: NDArray[np.uint8] | None = None,
 ) -> tuple[Ints, Flags, Ints]:
     """Return a surface's triangles by the vertices that are left, int32 (m, 3), and which are left.
 
@@ -110,11 +113,12 @@ def collapse(
                same for all vertices of a body
     stray, sharpest  see `Limits`
     past       collapses of a try before, with fewer locked vertices; (0, 2): there was none
+    caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are none
     """
     n, m = len(at), len(triangles)
     limits = Limits(stray, sharpest, BLOCK)
     if n <= BLOCK:
-        mesh = make_mesh(n, m, planes=planes, errors=errors)
+        mesh = make_mesh(n, m, planes=planes, caps=caps, errors=errors)
         fill_fans(mesh, triangles, locked)
         return _run(mesh, at, triangles, past, limits)
     order = order_vertices(at)
@@ -122,7 +126,13 @@ def collapse(
     place[order] = np.arange(n, dtype=np.int32)
     turns = order_triangles(triangles, place)
     ordered = place[triangles[turns]]
-    mesh = make_mesh(n, m, planes=planes[order], errors=errors[order])
+    mesh = make_mesh(
+        n,
+        m,
+        planes=planes[order],
+        caps=None if caps is None else caps[order],
+        errors=errors[order],
+    )
     fill_fans(mesh, ordered, locked[order])
     corners, left, made = _run(mesh, at[order], ordered, place[past], limits)
     result, is_left = np.empty((m, 3), np.int32), np.empty(m, bool)
@@ -317,12 +327,14 @@ def find_cost_after(v: int, limit: int, mesh: Mesh, ring: Ring) -> int:
 def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
     """Write the price of moving u onto each neighbour; return the number of the cheapest.
 
-    A price is infinite where u would leave its line.
+    A price is infinite where u would leave its line, or its cap.
     """
-    cheapest, least = 0, np.inf
+    cheapest, least, own = 0, np.inf, mesh.caps[u]
     for j in range(ring.sizes[NEIGHBOURS]):
         price = price_of(mesh.quadrics, u, mesh.at, ring.near[j])
         if not is_surface(mesh) and mesh.on_line[u] and ring.shared[j] == 2:
+            price = np.inf
+        if own & ~mesh.caps[ring.near[j]]:
             price = np.inf
         ring.price[j] = price
         if price < least:

@@ -92,7 +92,7 @@ def compile_of_meshes() -> None:
     order_triangles(triangles, order_vertices(at))
     nothing = np.zeros((0, 2), np.int32)
     left, _, _ = collapse(at, triangles, flags, bits, errors, 3.0, 0.9, nothing)
-    flip_edges(at, left, flags, bits, errors, 0.9)
+    flip_edges(at, left, flags, bits, bits, errors, 0.9)
     orders = find_orders(triangles, 4)
     collapse_interfaces(at, triangles, flags, errors, 3.0, 0.9, orders, nothing)
     thin_rim(at, triangles, np.zeros(4, np.int8), np.zeros(4, np.uint8), flags, 0.1, 0.9)

@@ -78,6 +78,7 @@ def flip_edges(
     triangles: Ints,
     locked: NDArray[np.bool_],
     planes: NDArray[np.uint8],
+    caps: NDArray[np.uint8],
     errors: Points,
     sharp: float,
 ) -> int:
@@ -87,6 +88,7 @@ def flip_edges(
     triangles  int32 (m, 3); boundary edges stay
     locked     bool (n,), vertices whose edges, and those opposite to them, stay
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
+    caps       uint8 (n,), the same of caps, whose edges stay in them
     errors     float64 (n,), largest distance by which the surface moves at a vertex
     sharp      cosine of the angle below which a triangle is sharp
     """
@@ -120,6 +122,8 @@ def flip_edges(
                 if locked[u] or locked[v] or locked[a] or locked[b]:
                     continue
                 if planes[a] & planes[b] & (planes[u] | planes[v]):
+                    continue
+                if caps[u] & caps[v] & ~(caps[a] & caps[b]):
                     continue
                 before = max(smallest_angle_cosine(at, u, v, a), smallest_angle_cosine(at, v, u, b))
                 after = max(smallest_angle_cosine(at, a, u, b), smallest_angle_cosine(at, b, v, a))

@@ -28,6 +28,7 @@ class Mesh(NamedTuple):
     stays: Flags  # bool (n,), vertices that no collapse moves
     on_line: Flags  # interfaces: bool (n,), vertices of lines; a surface: (0,)
     planes: NDArray[np.uint8]  # uint8 (n,), a bit for each cut plane that a vertex lies in
+    caps: NDArray[np.uint8]  # uint8 (n,), the same of caps: a vertex moves within its caps alone
     errors: Points  # float64 (n,), largest root of the mean squared distance from the planes
 
 
@@ -70,6 +71,7 @@ def make_mesh(
     *,
     on_line: Flags | None = None,
     planes: NDArray[np.uint8] | None = None,
+    caps: NDArray[np.uint8] | None = None,
     errors: Points | None = None,
 ) -> Mesh:
     """Return a mesh of n vertices and m triangles without positions and edges.
@@ -85,6 +87,7 @@ def make_mesh(
         stays=np.zeros(n, bool),
         on_line=np.zeros(0, bool) if on_line is None else on_line,
         planes=np.zeros(n, np.uint8) if planes is None else planes,
+        caps=np.zeros(n, np.uint8) if caps is None else caps,
         errors=np.zeros(n) if errors is None else errors,
     )
 

@@ -4,12 +4,13 @@ Simplification keeps a part of the fine surface's vertices, and flat triangles b
 of a round body lie inside of it: at coarse levels bodies would lose a third of their volume. Here
 all vertices of a body move outward by one distance, until its volume is the fine one's, or the
 distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
-bit and no other reaches it. No vertex leaves the tile's box, or the fine mesh's where the caps of
-the data's end lie outside of that. Where bodies come to cross each other or themselves, the
-vertices there move half as far with every try, at last not at all, and the body's others farther
-for it, unless these are FEW; a body that still crosses after all TRIES stays. Where MANY cross, as
-in noise, of which walls are nearer than the move is long, these bodies stay at once: tries would
-cost more than all the rest of a level.
+bit and no other reaches it. Vertices of caps, the flat ends of bodies, move within their planes. No
+vertex leaves the tile's box, or the fine mesh's where the caps of the data's end lie outside of
+that. Where bodies come to cross each other or themselves, the vertices there move half as far with
+every try, at last not at all, and the body's others farther for it, unless these are FEW; a body
+that still crosses after all TRIES stays. Where MANY cross, as in noise, of which walls are nearer
+than the move is long, these bodies stay at once: tries would cost more than all the rest of a
+level.
 
 Between near walls a body may have no room: it lacks volume, and textures/lod_chain.py simplifies
 the level less.
@@ -89,6 +90,7 @@ class FineVolumes:
     planes    the cut planes
     box       of the tile; None: vertices may move anywhere
     topology  of the mesh; None: it is found
+    caps      planes of caps, which stay flat
     """
 
     def __init__(
@@ -97,10 +99,11 @@ class FineVolumes:
         planes: tuple[Plane, ...],
         box: Box | None = None,
         topology: Topology | None = None,
+        caps: tuple[Plane, ...] = (),
     ) -> None:
         topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         self._label, count = topology.bodies
-        self._planes = planes
+        self._planes, self._caps = planes, caps
         low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
         self._origin = (low.astype(np.float64) + high) / 2
         self._low, self._high = np.full(3, -np.inf), np.full(3, np.inf)
@@ -206,9 +209,12 @@ class FineVolumes:
         """
         label, count = bodies
         at, moved = start.copy(), np.zeros(count)
+        flat = [(axis, start[:, axis] == np.float32(value)) for axis, value in self._caps]
         for _ in range(STEPS):
             missing = wanted - self._measure(at, triangles, label, count)
             ways = sum_normals(at, triangles) * share[:, None]
+            for axis, on_cap in flat:
+                ways[on_cap, axis] = 0.0
             gain = sum_gains(at, triangles, label, count, ways)
             step = np.divide(missing, gain, out=np.zeros(count), where=gain > 1e-12)
             step = np.clip(moved + step, -max_move_um, max_move_um) - moved

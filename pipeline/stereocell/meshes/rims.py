@@ -36,6 +36,8 @@ def thin_rims(
     """
     target = np.arange(len(mesh.positions))
     for axis, place in lattice.cuts():
+        if place in (lattice.region.start[axis], lattice.region.stop[axis] - 1):
+            continue  # no other tile follows, which could be held against these
         start, stop = list(lattice.own.start), list(lattice.own.stop)
         start[axis], stop[axis] = place - 1, place + 2
         beside = Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))

@@ -72,6 +72,7 @@ def simplify_part(
     *,
     locked: NDArray[np.bool_],
     planes: tuple[Plane, ...],
+    caps: tuple[Plane, ...] = (),
     past: Moves,
 ) -> tuple[NDArray[np.uint32], NDArray[np.bool_], Moves]:
     """Return the triangles of some whole bodies simplified, uint32 (m, 3), and which are left.
@@ -81,6 +82,8 @@ def simplify_part(
     triangles  uint32 (m, 3), by the mesh's vertices
     errors     float64 (n,), see `find_errors`
     locked     bool (n,), vertices that stay
+    planes     the cut planes
+    caps       planes of caps, which stay flat
     past       the bodies' moves before more vertices were locked, made again but around these
     """
     used, own = renumber(triangles, len(mesh.positions))
@@ -88,7 +91,7 @@ def simplify_part(
         return triangles, np.zeros(0, bool), NOTHING
     at = mesh.positions[used].astype(np.float64)
     at -= (at.min(axis=0) + at.max(axis=0)) / 2
-    bits = find_planes(mesh.positions[used], planes)
+    bits, of_caps = (find_planes(mesh.positions[used], some) for some in (planes, caps))
     sharpest, sharp = np.cos(np.radians([SHARPEST_DEG, FLIP_DEG])).tolist()
     number = np.zeros(len(mesh.positions), np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
@@ -101,9 +104,10 @@ def simplify_part(
         STRAY,
         sharpest,
         number[past],
+        of_caps,
     )
     kept = corners[left]
-    flip_edges(at, kept, locked[used], bits, errors[used], sharp)
+    flip_edges(at, kept, locked[used], bits, of_caps, errors[used], sharp)
     corners[left] = kept
     return used.astype(np.uint32)[corners], left, used.astype(np.int32)[moves]
 

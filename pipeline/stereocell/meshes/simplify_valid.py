@@ -63,15 +63,20 @@ class Simplifier:
     mesh      positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes    the cut planes, where the mesh may be open
     topology  of the mesh; None: it is found
+    caps      planes of caps, which stay flat
 
     A mesh that has defects itself keeps the bodies with defects.
     """
 
     def __init__(
-        self, mesh: Mesh, planes: tuple[Plane, ...], topology: Topology | None = None
+        self,
+        mesh: Mesh,
+        planes: tuple[Plane, ...],
+        topology: Topology | None = None,
+        caps: tuple[Plane, ...] = (),
     ) -> None:
         vertices = len(mesh.positions)
-        self._mesh, self._planes = mesh, planes
+        self._mesh, self._planes, self._caps = mesh, planes, caps
         self._bodies = (topology or find_topology(mesh.triangles, vertices)).bodies
         self._body_of = self._bodies[0][mesh.triangles[:, 0]]
         # of the given triangles: their corners now, and which are left
@@ -165,6 +170,7 @@ class Simplifier:
             self._errors,
             locked=self._tries > 0,
             planes=self._planes,
+            caps=self._caps,
             past=past if but_around_locks else NOTHING,
         )
         return self._put(chosen, corners, left, moves)

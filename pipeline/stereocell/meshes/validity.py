@@ -196,6 +196,8 @@ class Sizes:
     are_known  bool (b,): not of a body that reaches from plane to plane along all three axes
     low, high  (b, 3), the corners of each body's box
     first      int64 (b,), a triangle of each body, or -1: it has none
+    faces_out  bool (b,): of a body that is open on a plane, and whose triangles face as the normals
+               of its vertices do
     """
 
     volumes: NDArray[np.float64]
@@ -203,6 +205,7 @@ class Sizes:
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     first: Indices
+    faces_out: NDArray[np.bool_]
 
 
 def measure_sizes(mesh: Mesh, planes: tuple[Plane, ...], topology: Topology) -> Sizes:
@@ -216,16 +219,16 @@ def measure_sizes(mesh: Mesh, planes: tuple[Plane, ...], topology: Topology) -> 
         touched = np.unique(labels[rim[on, 0]])
         zero[touched, column] = value
         cuts[touched, column] += 1
-    size, volumes, low, high = measure_windings(
+    along, volumes, low, high = measure_windings(
         positions, np.ascontiguousarray(mesh.normals, np.float32), triangles, labels, zero
     )
-    known = np.zeros(bodies, bool)
+    size, known = along.copy(), np.zeros(bodies, bool)
     for axis in range(3):
         # Gauss: the integral of x n_x. Caps across other axes add nothing, nor does one at x = 0
         fits = (cuts[:, axis] <= 1) & ~known
         size[fits] = volumes[fits, axis] / 6  # doubled areas, and sums of three heights
         known |= fits
-    return Sizes(size, known, low, high, first)
+    return Sizes(size, known, low, high, first, (cuts > 0).any(axis=1) & (along > 0))
 
 
 def _inside_out(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...]) -> Indices:
@@ -236,5 +239,7 @@ def _inside_out(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...]) -> In
     size, low, high, first = found.volumes, found.low, found.high, found.first
     wrong, solid = (first >= 0) & (size <= 0), (first >= 0) & (size > 0)
     hollow = np.flatnonzero(wrong & (size < 0))
-    wrong[hollow] = ~lie_within(low, high, hollow, np.flatnonzero(solid))
+    # a solid that fills a tile up to all its planes has no surface there in which cavities lie
+    is_held = lie_within(low, high, hollow, np.flatnonzero(solid)) | found.faces_out[hollow]
+    wrong[hollow] = ~is_held
     return first[wrong]

@@ -13,6 +13,7 @@ from typing import Protocol
 from stereocell.filters.denoise import SMOOTHING_REACH
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.errors import SourceError, UsageError
+from stereocell.model.lattice import CAP
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.settings import AUTO
 from stereocell.model.spacing import Point, Spacing
@@ -32,6 +33,7 @@ from stereocell.steps.labels import Labels
 # Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
 UNIT_VOXELS = 1 << 27  # voxels
 UNIT_TILES = 8  # tiles
+MIN_PLACES = 8  # fewest places of caps that half a voxel is shared out to
 MIN_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
 
 
@@ -151,6 +153,19 @@ class Plan:
         through objects would open them.
         """
         return self.modality == "MR" and not self.labels and not has_brain(self.channels)
+
+    def cap_of(self, channel: Channel) -> float | None:
+        """Return how many spacings past the outermost voxels a channel is capped; None: it is not.
+
+        The outermost, half a voxel past them, is the face of the block, on which the objects of
+        label maps end. Each channel's caps lie a hair inside of those before, so that no two ever
+        coincide: programs would show a confetti of both. At MIN_PLACES or fewer a hair is a 16th of
+        a voxel, more than the steps of places in a bundle, and channels may be added at the end.
+        """
+        if not self.settings.surface.caps:
+            return None
+        hair = CAP / max(MIN_PLACES, len(self.channels) + 1)
+        return CAP - hair * (self.channels.index(channel) + 1)
 
     def level_of(self, channel: Channel) -> int:
         """Return the level of its source at which a channel is read."""

@@ -32,7 +32,9 @@ def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> Buil
     own = tile.lattice(plan.region)
     window = own.grown(plan.halo, plan.region)
     given = UnitInput(
-        lattice=Lattice(window, own, plan.region, plan.spacing_um, plan.origin_um),
+        lattice=Lattice(
+            window, own, plan.region, plan.spacing_um, plan.origin_um, plan.cap_of(channel)
+        ),
         iso=None if level is None else around(level.field, window),
         background=around(found.statistics.background, window),
         repair=found.repair,

@@ -61,6 +61,7 @@ def find_remarks(facts: Facts) -> list[Remark]:
         _remark(
             "with pieces apart from the body left out", _holders(facts), "channel", is_note=True
         ),
+        _remark("open at the block's faces", _open(facts), "surface", is_note=True),
         _remark("on how the source is read and built", facts.plan.notes, "note", is_note=True),
         _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
@@ -89,6 +90,15 @@ def _holders(facts: Facts) -> list[str]:
         for channel in facts.plan.channels
         if (holder := facts.survey[channel.id].holder) is not None
     ]
+
+
+def _open(facts: Facts) -> list[str]:
+    """Return a line for each channel that is left open where the block ends."""
+    if facts.plan.settings.surface.caps:
+        return []
+    built = dict.fromkeys(unit.channel.name for unit in facts.units if not unit.reason)
+    why = "open on purpose (--no-caps), on the planes of the outermost voxels; no solid"
+    return [f"{name}: {why}" for name in built]
 
 
 def _thin(units: Iterable[UnitFacts]) -> list[str]:

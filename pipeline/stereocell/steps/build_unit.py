@@ -18,7 +18,7 @@ class BuildUnit(Step[Unit]):
     painted  the channel that is sampled onto the surface; None: none is
     """
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
     FORM: ClassVar[UnitFolder] = UNIT_FOLDER
 
     voxels: Voxels

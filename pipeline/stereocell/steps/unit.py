@@ -125,6 +125,7 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
         lod=given.options.lod,
         clock=clock,
         box=lattice.own_box(),
+        caps=lattice.cap_planes(),
         get_texturer=shading.texturer,
     )
     return Unit(lods, closed, eight_bit, "", dropped, filled, clock.seconds, measured, None, cover)

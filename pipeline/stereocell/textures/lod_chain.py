@@ -47,6 +47,7 @@ def make_levels(
     lod: LodOptions,
     clock: Clock,
     box: Box | None = None,
+    caps: tuple[Plane, ...] = (),
     get_texturer: GetTexturer | None = None,
     first: int = 0,
 ) -> tuple[Lod, ...]:
@@ -56,6 +57,7 @@ def make_levels(
     planes        the cut planes
     spacing_um    of the voxels, (z, y, x)
     box           of the tile, least and largest corner (x, y, z), um, which vertices don't leave
+    caps          planes of caps, which stay flat
     get_texturer  None: levels get no values
     first         the first level that is made; `fine` is then the level before it
 
@@ -67,7 +69,7 @@ def make_levels(
     place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
     with clock("volume kept"):
         topology: Topology | None = find_topology(fine.triangles, len(fine.positions))
-        volumes = FineVolumes(fine, planes, box, topology)
+        volumes = FineVolumes(fine, planes, box, topology, caps)
         bodies = SmallBodies(fine, topology)
     with clock("measure"):
         to_fine = of_all = Nearest(fine, lod.samples)
@@ -83,7 +85,8 @@ def make_levels(
                 mesh, number = compact(mesh, mesh.triangles[stay]), number[used]
                 topology = None
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
-        simplified, kept = _simplify(mesh, topology, number, planes, volumes, length, clock)
+        simplifier = Simplifier(mesh, planes, topology, caps)
+        simplified, kept = _simplify(simplifier, topology, number, volumes, length, clock)
         mesh, topology = simplified.mesh, simplified.topology  # the past ones take much memory
         number, shown = number[simplified.vertices], kept.mesh
         with clock("measure"):
@@ -115,21 +118,19 @@ def make_levels(
 
 
 def _simplify(
-    mesh: Mesh,
+    simplifier: Simplifier,
     topology: Topology,
     number: NDArray[np.int64],
-    planes: tuple[Plane, ...],
     volumes: FineVolumes,
     error_um: float,
     clock: Clock,
 ) -> tuple[Simplified, Kept]:
     """Return a level simplified, and the same with its volumes.
 
-    mesh      the level before
-    topology  of that
-    number    of each of its vertices in the fine mesh
+    simplifier  of the level before
+    topology    of that level
+    number      of each of its vertices in the fine mesh
     """
-    simplifier = Simplifier(mesh, planes, topology)
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)
     count = len(simplified.mesh.triangles)

@@ -1,4 +1,4 @@
-"""Read from a composed stage which source it was built from."""
+"""Read from a composed stage which source it was built from, and how its surfaces end."""
 
 import hashlib
 import re
@@ -18,6 +18,17 @@ def fingerprint_of(stage: Usd.Stage) -> str:
     if len(found) < 2:
         return "".join(found)
     return hashlib.sha256(" ".join(found).encode()).hexdigest()
+
+
+def has_caps(stage: Usd.Stage) -> bool:
+    """Return whether surfaces are closed at the block's faces; they are if no layer denies it."""
+    for layer in stage.GetUsedLayers():
+        about = layer.customLayerData
+        for name in ("stereocell", "settings", "surface", "caps"):
+            about = about.get(name) if isinstance(about, dict) else None
+        if about is False:
+            return False
+    return True
 
 
 def _stated_in(layer: Sdf.Layer) -> str:

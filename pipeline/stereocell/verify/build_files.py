@@ -50,7 +50,10 @@ def check_units(out_folder: OutFolder) -> str:
         ]
     removal = "remove what is damaged and " if problems else ""
     raise_on_all([*lists, *problems], f"{removal}{UNITS_AGAIN}")
-    return f"{files} files of {len(index)} units"
+    is_planned = not find_document_faults(out_folder, "plan")
+    is_open = is_planned and not out_folder.plan().settings.surface.caps
+    about = ", whose surfaces are open at the block's faces on purpose (--no-caps)" * is_open
+    return f"{files} files of {len(index)} units{about}"
 
 
 def _damaged_survey(out_folder: OutFolder) -> list[str]:

@@ -1,5 +1,6 @@
 """The pictures of one sample, a program and a file each, and what is measured of them."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,10 @@ from support.dcc.view import lights_of
 
 UNITS = {"stage": 1e-6, "flat": 1e-6, "usdz": 1.0}  # metres in a unit of each USD file
 VOLUMES = "add-on, volumes"
+# Seen from the front a .glb is in the shade of Blender's default lamp, which stands behind it
+BY_DEFAULT_CAMERA = "Blender's view, glb"
+# The renderer in which Blender shows an import without volumes
+EEVEE = "add-on, EEVEE"
 COLUMNS = {
     "Storm, stage": ("storm", "stage"),
     "Storm, usdc": ("storm", "flat"),
@@ -29,7 +34,9 @@ COLUMNS = {
     "Blender, usdc": ("blender", "flat"),
     "Blender, usdz": ("blender", "usdz"),
     "Blender, glb": ("blender", "glb"),
+    BY_DEFAULT_CAMERA: ("blender", "glb"),
     "add-on": ("add-on", "stage"),
+    EEVEE: ("add-on", "stage"),
     VOLUMES: ("add-on", "stage"),
     "three, glb": ("three", "glb"),
     "three, usdz": ("three", "usdz"),
@@ -54,18 +61,21 @@ class Picture:
         return [light, f"hues: {hues}" if hues else "no hue"]
 
 
-def draw_pictures(stage_path: Path, folder: Path, size: tuple[int, int]) -> dict[str, Picture]:
+def draw_pictures(
+    stage_path: Path, folder: Path, size: tuple[int, int], columns: Collection[str] = tuple(COLUMNS)
+) -> dict[str, Picture]:
     """Draw a stage and what is exported of it in each program; return the pictures by column."""
     files = export_files(stage_path, folder)
     small = (size[0] // 2, size[1] // 2)  # of volumes, which take longest
-    _draw(files, folder, size, small)
+    _draw(files, folder, columns, (size, small))
     stage, view = Usd.Stage.Open(str(stage_path)), files.views["stage"]
     truth, small_truth = (find_truth(stage, view, pixels) for pixels in (size, small))
+    other = {VOLUMES: small_truth, BY_DEFAULT_CAMERA: None}
     return {
-        column: _read(_place(folder, column), small_truth, is_seen_through=True)
-        if column == VOLUMES
-        else _read(_place(folder, column), truth)
-        for column in COLUMNS
+        column: _read(
+            _place(folder, column), other.get(column, truth), is_seen_through=column == VOLUMES
+        )
+        for column in columns
     }
 
 
@@ -73,10 +83,17 @@ def _place(folder: Path, column: str) -> Path:
     return folder / f"{column.replace(', ', '_')}.png"
 
 
-def _draw(files: Files, folder: Path, size: tuple[int, int], small: tuple[int, int]) -> None:
-    by_blender, for_the_web = [], []
+def _draw(
+    files: Files,
+    folder: Path,
+    columns: Collection[str],
+    sizes: tuple[tuple[int, int], tuple[int, int]],
+) -> None:
+    size, small = sizes
+    by_blender, by_eevee, for_the_web = [], [], []
     lights = lights_of(Usd.Stage.Open(str(files.stage)))
-    for column, (program, kind) in COLUMNS.items():
+    for column in columns:
+        program, kind = COLUMNS[column]
         file, view, picture = getattr(files, kind), files.views[kind], _place(folder, column)
         job = {"file": file, "view": view.json(), "pixels": size, "picture": picture}
         if program == "storm":
@@ -84,18 +101,25 @@ def _draw(files: Files, folder: Path, size: tuple[int, int], small: tuple[int, i
         elif program in ("blender", "add-on"):
             if kind in ("stage", "flat"):
                 job["view"] = None
+            if column == BY_DEFAULT_CAMERA:
+                job["view"] = "default"
             if column == VOLUMES:
                 job |= {"pixels": small, "choices": {"representation": "volume"}}
+            if column == EEVEE:
+                by_eevee.append({**job, "by": program, "engine": "BLENDER_EEVEE"})
+                continue
             by_blender.append({**job, "by": program})
         else:
             # a .glb has no lights, a .usdz its own but for the image of the dome
             suns = lights["suns"] if kind == "glb" else []
             for_the_web.append({**job, "program": program, "lights": {**lights, "suns": suns}})
     draw_by_blender(by_blender, folder)
+    if by_eevee:
+        draw_by_blender(by_eevee, folder)
     draw_for_the_web(for_the_web, folder)
 
 
-def _read(file: Path, truth: Truth, *, is_seen_through: bool = False) -> Picture:
+def _read(file: Path, truth: Truth | None, *, is_seen_through: bool = False) -> Picture:
     with Image.open(file) as opened:
         image = np.asarray(opened.convert("RGBA")) / 255
     return Picture(

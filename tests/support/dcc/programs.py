@@ -1,6 +1,7 @@
 """Draw a sample's files in the programs that open them, with the view of the stage's camera."""
 
 import json
+import os
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,5 +74,9 @@ def draw_by_blender(jobs: list[dict[str, object]], folder: Path) -> None:
     listed = folder / "blender.json"
     listed.write_text(json.dumps(jobs, default=str))
     command = [PYTHON, str(REPOSITORY / "tests/blender/draw.py"), str(listed)]
-    drawn = subprocess.run(command, capture_output=True, text=True, timeout=60 + 120 * len(jobs))
+    # EEVEE asks for OpenGL 4.6, and Mesa says of its drawing by software that it is 4.5
+    environment = {**os.environ, "EGL_PLATFORM": "surfaceless", "MESA_GL_VERSION_OVERRIDE": "4.6"}
+    drawn = subprocess.run(
+        command, capture_output=True, text=True, timeout=300 + 120 * len(jobs), env=environment
+    )
     assert drawn.returncode == 0, drawn.stderr[-3000:]
