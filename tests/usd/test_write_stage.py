@@ -183,13 +183,13 @@ def test_representations_switch_meshes_and_volumes(over: Usd.Stage) -> None:
     assert over.GetPrimAtPath(leaf("r0_c0", EMPTY_ID, "_volume"))
 
 
-def test_selections_stand_in_the_root_layer(stage_path: Path) -> None:
-    root = Sdf.Layer.FindOrOpen(str(stage_path))
+def test_selections_stand_in_the_layer_of_the_contents(stage_path: Path) -> None:
+    root = Sdf.Layer.FindOrOpen(str(stage_path.parent / "contents.usda"))
     for tile in TILES:
         selections = root.GetPrimAtPath(f"/Specimen/Tiles/{tile}").variantSelections
         assert dict(selections) == {"lod": "lod1", "representation": "mesh"}
     looks = Sdf.Layer.FindOrOpen(str(stage_path.parent / "looks" / "channels.usda"))
-    assert "./looks/channels.usda" in root.subLayerPaths  # of the root's layer stack
+    assert "./looks/channels.usda" in root.subLayerPaths
     for channel in (F_ID, BALL_ID, EMPTY_ID):
         selections = looks.GetPrimAtPath(f"/Specimen/Channels/{channel}").variantSelections
         assert dict(selections) == {"transferFunction": "default"}

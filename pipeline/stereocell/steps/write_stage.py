@@ -14,7 +14,7 @@ from stereocell.storage.file_list import FileList
 from stereocell.usd.write_display import DISPLAY_NAME
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
-from stereocell.usd.written_files import STAGE_NAME, AsWritten, write_list
+from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME, AsWritten, write_list
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Tables:
 class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
 
     name: str
     tiles: tuple[WriteStageTile, ...]
@@ -46,7 +46,7 @@ class WriteStage(Keyed):
     tables: Tables
 
     def write(self, stage_dir: Path) -> str:
-        """Write stage.usda, display.usda and looks/ beside the tiles, which are there.
+        """Write stage.usda, contents.usda, display.usda and looks/ beside the tiles.
 
         Returns a line about the specimen's physical size.
         """
@@ -71,5 +71,5 @@ class WriteStage(Keyed):
         """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
         write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
-        display = stage_dir / DISPLAY_NAME
-        write_list(stage_dir, tiles, stage_dir / "looks", stage, display, small)
+        others = (stage_dir / name for name in ("looks", CONTENTS_NAME, DISPLAY_NAME))
+        write_list(stage_dir, tiles, *others, stage, small)

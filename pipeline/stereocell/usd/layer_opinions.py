@@ -2,8 +2,8 @@
 
 All layers of a composition count: the layer that was opened, its sublayers, and those that
 references, payloads and inherits bring in. The layers that a build wrote are left out. They are
-known by the stage's own layer, which has the channels' appearances as a sublayer. A flattened stage
-has no such layer: there, edits can't be told from what was built.
+known by the layer of the stage's contents, which has the channels' appearances as a sublayer. A
+flattened stage has no such layer: there, edits can't be told from what was built.
 """
 
 from collections.abc import Iterator
@@ -15,6 +15,7 @@ from pxr import Sdf, Usd, UsdUtils
 from stereocell.usd.layer import ROOT, TILES
 from stereocell.usd.write_stage import SUBLAYERS
 from stereocell.usd.write_tile import LAYER_NAME
+from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME
 
 # How prims are composed: USD itself consumes these fields
 _COMPOSITION = frozenset(
@@ -82,7 +83,7 @@ class BuiltLayers:
                 inside = file.relative_to(folder)
                 is_look = f"./{inside.as_posix()}" in SUBLAYERS
                 is_tile = inside.name == LAYER_NAME and inside.parts[:1] == ("tiles",)
-                is_stage = len(inside.parts) == 1 and SUBLAYERS[0] in layer.subLayerPaths
+                is_stage = str(inside) in (STAGE_NAME, CONTENTS_NAME)
                 if is_look or is_tile or is_stage:
                     return True
         return False
