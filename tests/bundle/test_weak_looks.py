@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
+from stereocell.bundle.manifest import read_manifest
+from stereocell.model.errors import StageError
 from support import edit_cases
 from support.bundles import channel, write, write_tiles
 from support.stages import edit_over
@@ -65,7 +67,13 @@ def scene(tmp_path):
     return scene_over(stages, tmp_path / "scene.usda")
 
 
-def test_a_variant_set_above_a_specimen_recolours_it_alone(scene):
+def bundle_of(scene: Usd.Stage, folder: Path) -> tuple[list[str], Path]:
+    """Return the lines on the bundle of a saved scene, and the bundle."""
+    scene.GetRootLayer().Save()
+    return write(Path(scene.GetRootLayer().realPath), folder / "bundle"), folder / "bundle"
+
+
+def test_a_variant_set_above_a_specimen_recolours_it_alone(scene, tmp_path):
     palette = scene.GetPrimAtPath("/World").GetVariantSets().AddVariantSet("palette")
     palette.AddVariant("green")
     palette.SetVariantSelection("green")
@@ -74,16 +82,71 @@ def test_a_variant_set_above_a_specimen_recolours_it_alone(scene):
         color.Set(Gf.Vec3f(*GREEN))
     assert colors_of(scene, "/World/A") == {GREEN}
     assert colors_of(scene, "/World/B") != {GREEN}
+    for name, other in (("A", "B"), ("B", "A")):
+        scene.GetPrimAtPath(f"/World/{name}").SetActive(True)
+        scene.GetPrimAtPath(f"/World/{other}").SetActive(False)
+        told, bundle = bundle_of(scene, tmp_path / f"of_{name}")
+        assert (channel(bundle)["color"] == list(GREEN)) == (name == "A")
+        assert [line for line in told if "is not taken over" in line] == []
 
 
 @pytest.mark.parametrize("place", ["/_look", "/__class__/Specimen"])
-def test_one_class_recolours_all_specimens_of_a_scene(scene, place):
-    look = scene.OverridePrim(f"{place}/Channels/CD31")
-    look.CreateAttribute("inputs:color", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*GREEN))
+def test_one_class_recolours_all_specimens_of_a_scene(scene, tmp_path, place):
+    look = scene.CreateClassPrim("/_look") if place == "/_look" else scene.OverridePrim(place)
+    path = look.GetPath().AppendPath("Channels/CD31")
+    color = scene.OverridePrim(path).CreateAttribute("inputs:color", Sdf.ValueTypeNames.Color3f)
+    color.Set(Gf.Vec3f(*GREEN))
     if place == "/_look":
         for name in ("A", "B"):
             scene.GetPrimAtPath(f"/World/{name}").GetInherits().AddInherit(place)
     assert colors_of(scene, "/World/A") == colors_of(scene, "/World/B") == {GREEN}
+    scene.GetPrimAtPath("/World/A").SetActive(False)
+    told, bundle = bundle_of(scene, tmp_path)
+    assert channel(bundle)["color"] == list(GREEN)
+    assert [line for line in told if "is not taken over" in line] == []
+
+
+def test_a_scene_of_several_specimens_is_refused_by_their_names(scene, tmp_path):
+    with pytest.raises(StageError, match=r"found 2 specimens, /World/A, /World/B, expected one"):
+        bundle_of(scene, tmp_path)
+
+
+@pytest.mark.parametrize("arc", ["reference", "payload"])
+def test_a_specimen_has_the_name_and_the_place_that_a_scene_gives_it(tmp_path, arc):
+    file = write_tiles(tmp_path / "A")
+    scene = scene_over({}, tmp_path / "scene.usda")
+    UsdGeom.Xformable(scene.GetPrimAtPath("/World")).AddTranslateOp().Set(Gf.Vec3d(100, 0, 0))
+    specimen = UsdGeom.Xform.Define(scene, "/World/Shelf/Liver").GetPrim()
+    if arc == "reference":
+        specimen.GetReferences().AddReference(str(file))
+    else:
+        specimen.GetPayloads().AddPayload(str(file))
+    scene.OverridePrim("/World/Shelf/Liver/Channels/CD31").CreateAttribute(
+        "inputs:colour", Sdf.ValueTypeNames.Color3f
+    ).Set(Gf.Vec3f(*GREEN))
+    edit_cases.define_arrow(scene, "/World/Shelf/Liver/Arrow")
+    edit_cases.define_arrow(scene, "/World/Shelf/Arrow")
+    told, bundle = bundle_of(scene, tmp_path)
+    manifest = read_manifest(bundle)
+    assert manifest["specimen"]["name"] == "two tiles"
+    assert manifest["specimen"]["bounds_um"]["min"][0] == 100
+    assert [layer["name"] for layer in manifest["additions"]["layers"]] == ["Arrow"]
+    lost = [line for line in told if "is not taken over" in line]
+    assert ["inputs:colour" in lost[0], "outside /World/Shelf/Liver" in lost[1]] == [True, True]
+    assert len(lost) == 2
+
+
+@pytest.mark.parametrize("path", ["/Specimen", "/__class__/Specimen"])
+def test_a_channel_that_is_hidden_at_first_stays_in_the_bundle(edit, path):
+    """Whichever arc hides it: it is not shown at first, and the panel still has it."""
+
+    def hide(stage: Usd.Stage) -> None:
+        shown = stage.OverridePrim(f"{path}/Shown/CD31")
+        shown.CreateAttribute("visibility", Sdf.ValueTypeNames.Token, False).Set("invisible")
+
+    found = channel(edit(hide))
+    assert found["opens"] is False
+    assert found["tileset"]
 
 
 def test_a_library_of_looks_among_the_sublayers_reaches_the_bundle(stage, tmp_path):

@@ -21,6 +21,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 from stereocell.formats.exr import read_rgb
 from stereocell.usd.layer import LIGHTS
 from stereocell.usd.read_attributes import file_of
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as
 from stereocell.usd.written_files import AsWritten
 
@@ -34,7 +35,7 @@ def copy_lights(composed: Usd.Stage, small: Usd.Stage, as_written: AsWritten) ->
     Returns the images of the lights by their names in the archive. Raises StageError for a damaged
     image.
     """
-    group = composed.GetPrimAtPath(LIGHTS)
+    group = composed.GetPrimAtPath(specimen_of(composed).lights)
     images: dict[str, bytes] = {}
     for light in group.GetChildren() if group else ():
         is_distant = light.IsA(UsdLux.DistantLight) or light.IsA(UsdLux.DomeLight)

@@ -28,12 +28,13 @@ from pxr import Kind as Kinds
 
 from stereocell.formats.gltf import Material
 from stereocell.storage.atomic_write import replacing
-from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.layer import METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_appearances import shows_at_first
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.usdz_lights import copy_lights
 from stereocell.usd.written_files import AsWritten
 
@@ -107,7 +108,7 @@ def write_usdz(
 
 def _choices(stage: Usd.Stage) -> list[list[str]]:
     """Return the IDs of the channels to show: the first choice of which any is drawn."""
-    every = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    every = stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren()
     names = [str(prim.GetName()) for prim in every]
     shown = [name for name, prim in zip(names, every, strict=True) if shows_at_first(prim)]
     return [shown, names] if shown else [names]
