@@ -8,7 +8,7 @@
 import os
 from pathlib import Path
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
@@ -17,6 +17,7 @@ from stereocell.usd.layer import (
     UP_AXIS,
     export,
 )
+from stereocell.usd.preview_surface import repeats_color
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
@@ -105,12 +106,21 @@ def _enlarge(flat: Sdf.Layer, specimen: Specimen, scale: float) -> None:
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:
-    """Copy the edited colour of each material to its shader: many programs read only that one."""
+    """Copy the edited colour of each material to its shader and to the meshes that it draws.
+
+    Many programs read only those.
+    """
     for prim in stage.Traverse():
         edited = edited_color(prim) if prim.IsA(UsdShade.Material) else None
         if edited is not None:
             color = flat.GetAttributeAtPath(f"{prim.GetPath()}/surface.inputs:diffuseColor")
             color.default = edited.Get()
+        display = UsdGeom.Mesh(prim).GetDisplayColorAttr() if prim.IsA(UsdGeom.Mesh) else None
+        if display and repeats_color(display):
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            edited = edited_color(material.GetPrim()) if material else None
+            if edited is not None:
+                flat.GetAttributeAtPath(display.GetPath()).default = Vt.Vec3fArray([edited.Get()])
 
 
 def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:
