@@ -14,7 +14,13 @@ from stereocell.storage.file_list import FileList
 from stereocell.usd.write_display import DISPLAY_NAME
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
-from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME, AsWritten, write_list
+from stereocell.usd.written_files import (
+    CONTENTS_NAME,
+    NVINDEX_NAME,
+    STAGE_NAME,
+    AsWritten,
+    write_list,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +52,7 @@ class WriteStage(Keyed):
     tables: Tables
 
     def write(self, stage_dir: Path) -> str:
-        """Write stage.usda, contents.usda, display.usda and looks/ beside the tiles.
+        """Write the layers of the stage and looks/ beside the tiles.
 
         Returns a line about the specimen's physical size.
         """
@@ -71,5 +77,5 @@ class WriteStage(Keyed):
         """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
         write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
-        others = (stage_dir / name for name in ("looks", CONTENTS_NAME, DISPLAY_NAME))
+        others = (stage_dir / name for name in ("looks", CONTENTS_NAME, DISPLAY_NAME, NVINDEX_NAME))
         write_list(stage_dir, tiles, *others, stage, small)

@@ -15,7 +15,7 @@ from pxr import Sdf, Usd, UsdUtils
 from stereocell.usd.specimen import specimen_of
 from stereocell.usd.write_stage import SUBLAYERS
 from stereocell.usd.write_tile import LAYER_NAME
-from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME
+from stereocell.usd.written_files import CONTENTS_NAME, NVINDEX_NAME, STAGE_NAME
 
 # How prims are composed: USD itself consumes these fields
 _COMPOSITION = frozenset(
@@ -83,7 +83,7 @@ class BuiltLayers:
                 inside = file.relative_to(folder)
                 is_look = f"./{inside.as_posix()}" in SUBLAYERS
                 is_tile = inside.name == LAYER_NAME and inside.parts[:1] == ("tiles",)
-                is_stage = str(inside) in (STAGE_NAME, CONTENTS_NAME)
+                is_stage = str(inside) in (STAGE_NAME, CONTENTS_NAME, NVINDEX_NAME)
                 if is_look or is_tile or is_stage:
                     return True
         return False

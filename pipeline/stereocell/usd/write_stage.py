@@ -8,6 +8,7 @@ tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
 display.usda                  the stage, larger: see usd/write_display.py
+nvindex.usda                  the stage for NVIDIA IndeX: see usd/write_nvindex.py
 
 USD's order of strength puts a layer's own opinions before inherits, these before variants, and
 variants before references. All that a build states comes by a reference, so it is weaker than
@@ -19,6 +20,7 @@ Of the content of tiles, contents.usda states only the selected variants: they a
 tile is unloaded.
 """
 
+import hashlib
 import json
 import shutil
 from collections.abc import Mapping, Sequence
@@ -59,6 +61,7 @@ from stereocell.usd.layer import (
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 from stereocell.usd.write_appearances import write_appearances
 from stereocell.usd.write_display import DISPLAY_NAME, write_display
+from stereocell.usd.write_nvindex import write_nvindex
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
 from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME
 
@@ -137,6 +140,7 @@ def write_stage(
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     root.SetDisplayName(name)
     root.AddAppliedSchema(SPECIMEN_API)
+    UsdGeom.ModelAPI.Apply(root)
     set_attribute(root, "stereocell:modality", Sdf.ValueTypeNames.Token, modality)
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
     group = UsdGeom.Xform.Define(stage, TILES)
@@ -165,30 +169,44 @@ def write_stage(
         _state_cut(root, moved)
     low, high = moved[:, 0].min(axis=0), moved[:, 1].max(axis=0)
     define_cameras(stage, low, high)
+    UsdGeom.ModelAPI(root).SetExtentsHint(vec3f([low, high]))
+    size = describe_size(high - low)
+    root.SetDocumentation(
+        f"{name}: {size} in true size, a unit is 1 um. Channels has the look of each channel, "
+        "Shown which of them show, Tiles the surfaces and volumes."
+    )
     scale = display_scale(float((high - low).max()))
     set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
-    write_display(stage_dir, low, high, scale)
+    write_display(stage_dir, name, low, high, scale)
+    with_volumes = [one for one in appearances if one.id not in (tables or {})]
+    write_nvindex(stage_dir, with_volumes, [tile.id for tile in tiles])
 
     layer = stage.GetRootLayer()
     layer.documentation = _CONTENTS_NOTE
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = list(SUBLAYERS)
     export(layer, stage_dir / CONTENTS_NAME)
-    _write_interface(stage_dir, provenance)
-    size = describe_size(high - low)
+    _write_interface(stage_dir, name, provenance)
     return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
 
 
-def _write_interface(stage_dir: Path, provenance: Provenance) -> None:
+def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> None:
     """Write stage.usda: the specimen's root, which has all its content by a reference."""
+    plain = {key: _plain(value) for key, value in provenance.items()}
     stage = new_stage(".usda", ROOT.name)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     for path, kind in ((BROADCAST.GetParentPath(), "Scope"), (BROADCAST, "Xform")):
         stage.DefinePrim(path, kind).SetSpecifier(Sdf.SpecifierClass)
     root.GetInherits().AddInherit(BROADCAST)
+    model = Usd.ModelAPI(root)
+    model.SetAssetName(name)
+    model.SetAssetIdentifier(Sdf.AssetPath(f"./{STAGE_NAME}"))
+    # The version follows from all that the build depends on.
+    text = json.dumps(plain, sort_keys=True)
+    model.SetAssetVersion(hashlib.sha256(text.encode()).hexdigest()[:12])
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE
-    layer.customLayerData = {"stereocell": {k: _plain(v) for k, v in provenance.items()}}
+    layer.customLayerData = {"stereocell": plain}
     del stage  # the reference only resolves beside the file
     reference = layer.GetPrimAtPath(ROOT).referenceList
     reference.prependedItems.append(Sdf.Reference(f"./{CONTENTS_NAME}"))
