@@ -127,7 +127,8 @@ def test_the_root_states_what_the_asset_is(stage_path: Path, tmp_path: Path) -> 
     changed = {"generator": "tests", "seed": 2}
     appearances = make_appearances()
     write_stage(other.parent, "F", appearances=appearances, tiles=tiles, provenance=changed)
-    version = Usd.ModelAPI(Usd.Stage.Open(str(other)).GetDefaultPrim()).GetAssetVersion()
+    again = Usd.Stage.Open(str(other))
+    version = Usd.ModelAPI(again.GetDefaultPrim()).GetAssetVersion()
     assert model.GetAssetVersion() not in ("", version)
 
 

@@ -12,6 +12,7 @@ from stereocell.model.spacing import Spacing
 from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
 from stereocell.storage.file_list import FileList
 from stereocell.usd.write_display import DISPLAY_NAME
+from stereocell.usd.write_previews import PREVIEWS, write_previews
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
 from stereocell.usd.written_files import (
@@ -74,8 +75,16 @@ class WriteStage(Keyed):
         )
 
     def write_list(self, stage_dir: Path, tiles: FileList) -> None:
-        """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
+        """Write specimen.usdz and the previews, and last the list of all files.
+
+        tiles  the files of the tiles
+        """
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
-        write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
-        others = (stage_dir / name for name in ("looks", CONTENTS_NAME, DISPLAY_NAME, NVINDEX_NAME))
+        as_written = AsWritten({stage_dir.resolve(): tiles})
+        write_usdz(stage, small, as_written=as_written)
+        write_previews(stage_dir, as_written)
+        others = (
+            stage_dir / name
+            for name in ("looks", PREVIEWS, CONTENTS_NAME, DISPLAY_NAME, NVINDEX_NAME)
+        )
         write_list(stage_dir, tiles, *others, stage, small)

@@ -81,12 +81,7 @@ def write_usdz(
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
     prims = [prim for prim in tile_prims(stage) if not tiles or prim.GetName() in tiles]
-    found: list[_Part] = []
-    shown = level
-    for some in [channels] if channels else _choices(stage):
-        shown = _choose_level(stage, some, as_written) if level is None else level
-        if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
-            break
+    found, shown = find_parts(stage, prims, as_written, level=level, channels=channels)
     if shown is None or not found:
         path.unlink(missing_ok=True)
         return None
@@ -104,6 +99,24 @@ def write_usdz(
     content |= copy_lights(stage, flat, as_written)
     _pack(flat.GetRootLayer(), content, path)
     return shown
+
+
+def find_parts(
+    stage: Usd.Stage,
+    prims: list[Usd.Prim],
+    as_written: AsWritten,
+    *,
+    level: int | None = None,
+    channels: Collection[str] = (),
+) -> tuple[list[_Part], int | None]:
+    """Return the meshes of some tiles, `prims`, and their level of detail; see `write_usdz`."""
+    found: list[_Part] = []
+    shown = level
+    for some in [channels] if channels else _choices(stage):
+        shown = _choose_level(stage, some, as_written) if level is None else level
+        if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
+            break
+    return found, shown
 
 
 def _choices(stage: Usd.Stage) -> list[list[str]]:
