@@ -26,6 +26,7 @@ sys.path += [str(path) for path in LOCAL.glob("python/lib/python3*/site-packages
 sys.path.append(str(Path(__file__).parents[2] / "usd_assets" / "blender"))
 
 import bmesh  # noqa: E402  (bpy brings it)
+import mathutils  # noqa: E402  (bpy brings it)
 import stereocell_import  # noqa: E402
 from mathutils import Matrix  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
@@ -481,6 +482,46 @@ def step_plain_import(arguments):
         "lights": {light.name: light.type for light in bpy.data.lights},
         "sky": [bpy.path.abspath(image.filepath) for image in images],
     }
+
+
+def faces_at_edges(data):
+    """Return how many edges of a mesh have 1, 2, ... faces, and its volume."""
+    shape = bmesh.new()
+    shape.from_mesh(data)
+    counts = {}
+    for edge in shape.edges:
+        count = str(len(edge.link_faces))
+        counts[count] = counts.get(count, 0) + 1
+    volume = shape.calc_volume()
+    shape.free()
+    return {"edges": counts, "volume": volume}
+
+
+def step_carve(arguments):
+    """Import a tile by Blender's own importer; cut a box out of each surface, and smooth it.
+
+    Returns the edges and the volume before and after each, and the names of the UVs.
+    """
+    assert bpy.ops.wm.usd_import(filepath=arguments["tile"]) == {"FINISHED"}
+    found = {}
+    for block in [block for block in bpy.data.objects if block.type == "MESH"]:
+        before = faces_at_edges(block.data)
+        corners = [block.matrix_world @ mathutils.Vector(corner) for corner in block.bound_box]
+        bpy.ops.mesh.primitive_cube_add(size=block.dimensions.x, location=corners[6])
+        box = bpy.context.object
+        cut = block.modifiers.new("cut", "BOOLEAN")
+        cut.operation, cut.object, cut.solver = "DIFFERENCE", box, "EXACT"
+        bpy.context.view_layer.objects.active = block
+        assert bpy.ops.object.modifier_apply(modifier="cut") == {"FINISHED"}
+        after = faces_at_edges(block.data)
+        smooth = block.modifiers.new("smooth", "SMOOTH")
+        smooth.iterations = 5
+        assert bpy.ops.object.modifier_apply(modifier="smooth") == {"FINISHED"}
+        uvs = [layer.name for layer in block.data.uv_layers]
+        smoothed = faces_at_edges(block.data)
+        found[block.name] = {"before": before, "cut": after, "smoothed": smoothed, "uvs": uvs}
+        bpy.data.objects.remove(box)
+    return found
 
 
 def step_lighting(arguments):

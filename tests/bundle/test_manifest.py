@@ -11,9 +11,9 @@ from stereocell.engine.run import Engine
 from stereocell.model.errors import OutputError
 from stereocell.notebook.bundle_files import NotebookBundle
 from stereocell.serve.brick_library import BrickLibrary
-from stereocell.usd.layer_units import LINES
 from support import plain_bundle
 from support.bundles import write_bundle, write_tiles
+from support.stages import HEAD
 
 FIRST, SECOND = "ab" * 32, "cd" * 32
 
@@ -31,9 +31,7 @@ def _state(layer_file: Path, fingerprint: object) -> None:
 
 def _over(stage: Path, place: Path) -> Path:
     """Write a layer of an artist over a stage, which states no source."""
-    place.write_text(
-        "#usda 1.0\n(\n" + "\n".join(LINES.values()) + f"\nsubLayers = [@{stage}@]\n)\n"
-    )
+    place.write_text(f"{HEAD}subLayers = [@{stage}@]\n)\n")
     return place
 
 

@@ -20,7 +20,8 @@ from stereocell.export.chosen import Chosen
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.model.errors import UsageError
-from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
+from stereocell.report.draw_scenes import draw_image
+from stereocell.textures.draw_meshes import Shape, turning_frame
 from stereocell.usd.layer import SHOWN
 from support import spheres
 from support.bundles import CD31

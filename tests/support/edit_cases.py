@@ -124,10 +124,40 @@ def _draw_as_cards(stage: Usd.Stage) -> None:
     UsdGeom.ModelAPI.Apply(stage.GetPrimAtPath(TILE)).CreateModelDrawModeAttr("cards")
 
 
-def _inherit_color(stage: Usd.Stage) -> None:
-    look = stage.CreateClassPrim("/_red")
+def _green_class(stage: Usd.Stage) -> str:
+    look = stage.CreateClassPrim("/_green")
     look.CreateAttribute("inputs:color", _Types.Color3f).Set(Gf.Vec3f(0, 1, 0))
-    stage.GetPrimAtPath(CHANNEL).GetInherits().AddInherit("/_red")
+    return "/_green"
+
+
+def inherit_color(stage: Usd.Stage) -> None:
+    """Let a channel inherit a class that states its colour."""
+    stage.GetPrimAtPath(CHANNEL).GetInherits().AddInherit(_green_class(stage))
+
+
+def _specialize_color(stage: Usd.Stage) -> None:
+    stage.GetPrimAtPath(CHANNEL).GetSpecializes().AddSpecialize(_green_class(stage))
+
+
+def broadcast_color(stage: Usd.Stage) -> None:
+    """State a channel's colour on the class that the specimens of all stages inherit."""
+    channel = stage.OverridePrim("/__class__/Specimen/Channels/CD31")
+    channel.CreateAttribute("inputs:color", _Types.Color3f, custom=False).Set(Gf.Vec3f(0, 1, 0))
+
+
+def color_in_variant(where: str) -> Callable[[Usd.Stage], object]:
+    """Return an edit that states a channel's colour in a variant set on a prim."""
+
+    def change(stage: Usd.Stage) -> None:
+        palette = stage.GetPrimAtPath(where).GetVariantSets().AddVariantSet("palette")
+        palette.AddVariant("green")
+        palette.SetVariantSelection("green")
+        with palette.GetVariantEditContext():
+            channel = stage.OverridePrim(CHANNEL)
+            color = channel.CreateAttribute("inputs:color", _Types.Color3f, custom=False)
+            color.Set(Gf.Vec3f(0, 1, 0))
+
+    return change
 
 
 def _keep_in_variant(stage: Usd.Stage) -> None:
@@ -174,8 +204,8 @@ CASES: tuple[EditCase, ...] = (
         "/Specimen/Channels/CD13 is not taken over: the stage has no such prim: did you mean CD31",
     ),
     EditCase(
-        "`inputs:color` by a class that a channel inherits",
-        _inherit_color,
+        "`inputs:color` by a class that a channel specializes",
+        _specialize_color,
         "reported",
         "CD31.inputs:color is not taken over: the stage's own value, in channels.usda, is stronger",
     ),
@@ -184,6 +214,24 @@ CASES: tuple[EditCase, ...] = (
         _put(CHANNEL, "inputs:color", _Types.Color3f, Gf.Vec3f(0, 1, 0), 1, 2),
         "refused",
         "CD31.inputs:color: found values over time",
+    ),
+    EditCase(
+        "`inputs:color` by a class that a channel inherits",
+        inherit_color,
+        "taken",
+        "surfaces and volumes of the channel",
+    ),
+    EditCase(
+        "`inputs:color` by the class `/__class__/Specimen`",
+        broadcast_color,
+        "taken",
+        "surfaces and volumes of the channel",
+    ),
+    EditCase(
+        "`inputs:color` in the selected variant of a set on `/Specimen`",
+        color_in_variant("/Specimen"),
+        "taken",
+        "surfaces and volumes of the channel",
     ),
     EditCase(
         "`inputs:roughness` of a channel's shader",

@@ -102,7 +102,12 @@ def tile(
         keep = slice(0, rings + 1) if column == 0 else slice(rings, None)
         lods.append(Lod(sphere(rings, keep), distance, flat if level else None))
     contents = tuple(
-        ChannelContent(appearance.id, tuple(lods) if appearance.iso_value else (), volume)
+        ChannelContent(
+            appearance.id,
+            tuple(lods) if appearance.iso_value else (),
+            volume,
+            color=appearance.color,
+        )
         for appearance in appearances
     )
     if measured:

@@ -53,16 +53,21 @@ def make_fields() -> tuple[NDArray[np.float32], ...]:
 def make_tiles() -> list[TileContent]:
     fields = make_fields()
     tiles = []
-    for name, (start, stop, end) in zip(TILES, CUTS, strict=True):
+    for tile, (start, stop, end) in zip(TILES, CUTS, strict=True):
         channels = tuple(
-            ChannelContent(to_identifier(n), _make_lods(f, start, end), _make_volume(f, start, end))
-            for n, f in zip(NAMES, fields, strict=True)
+            ChannelContent(
+                to_identifier(name),
+                _make_lods(field, start, end),
+                _make_volume(field, start, end),
+                color=color,
+            )
+            for name, field, color in zip(NAMES, fields, COLORS, strict=True)
         )
         depth, height, width = SPACING_UM
         first = (0.0, 0.0, start * width)
         last = ((SHAPE[0] - 1) * depth, (SHAPE[1] - 1) * height, (end - 1) * width)
         own = (SHAPE[0], SHAPE[1], stop - start)
-        tiles.append(TileContent(name, SPACING_UM, first, last, own, channels))
+        tiles.append(TileContent(tile, SPACING_UM, first, last, own, channels))
     return tiles
 
 

@@ -30,7 +30,7 @@ def bounds(prim: Usd.Prim) -> NDArray[np.float64]:
 
 
 def at_display(path: str) -> str:
-    return f"/Display{path}"
+    return f"/F{path}"
 
 
 def test_surfaces_are_enlarged_by_a_transform(stage_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_its_cameras_see_the_specimen_as_those_of_the_stage(stage_path: Path) ->
     true, display = Usd.Stage.Open(str(stage_path)), display_of(stage_path)
     cameras = [prim for prim in display.Traverse() if prim.IsA(UsdGeom.Camera)]
     assert [str(prim.GetPath()) for prim in cameras] == [
-        f"/Display/Cameras/{name}" for name in ("mono", "left", "right")
+        f"/F/Cameras/{name}" for name in ("mono", "left", "right")
     ]
     for prim in cameras:
         there = UsdGeom.Camera(prim).GetCamera()

@@ -14,7 +14,7 @@ from stereocell.samples.head import make_head
 from stereocell.samples.head_dicom import write_dicom
 from support.phantoms import write_ome_tiff
 
-# An index takes as many bytes as the float that it would replace, and older readers ignore indices.
+# Viewers of augmented reality may ignore indices, so specimen.usdz has none.
 OFF = IndexedPrimvarChecker
 
 
@@ -60,8 +60,9 @@ def test_the_rules_find_no_fault_in_a_sample(tmp_path: Path, sample: str) -> Non
     assert main(["stage", out, "--workers", "0"]) == 0
     engine = ValidationEngine()  # all rules that are on by default, for each variant
     assert len(engine.initialized_rules) > 30
-    engine.disable_rule(OFF)
     for name in ("stage.usda", "display.usda", "specimen.usdz"):
+        if name == "specimen.usdz":
+            engine.disable_rule(OFF)
         file = tmp_path / "out" / "stage" / name
         assert file.is_file()
         issues = list(engine.validate(str(file)).issues())

@@ -14,7 +14,7 @@ from stereocell.model.channel import TransferFunctions2d
 from stereocell.model.errors import OutputError
 from stereocell.storage import assets
 from stereocell.usd.numbers2d import ATTRIBUTES
-from stereocell.usd.write_stage import write_tile
+from stereocell.usd.write_stage import TileExtent, write_stage, write_tile
 from support.digests import digests_of
 from support.phantoms import f_phantom
 from support.stages import (
@@ -29,6 +29,7 @@ from support.stages import (
     TILES,
     has_schema,
     leaf,
+    make_appearances,
     make_tiles,
     write_whole,
 )
@@ -104,6 +105,31 @@ def test_the_stage_has_its_prims_kinds_and_units(stage_path: Path) -> None:
     data = stage.GetRootLayer().customLayerData["stereocell"]
     assert data["generator"] == "tests"
     assert data["settings"]["lod.errors"] == "[0.1, 0.4]"
+
+
+def test_the_root_states_what_the_asset_is(stage_path: Path, tmp_path: Path) -> None:
+    stage = Usd.Stage.Open(str(stage_path), Usd.Stage.LoadNone)
+    root = stage.GetDefaultPrim()
+    model = Usd.ModelAPI(root)
+    assert model.GetAssetName() == "F"
+    assert model.GetAssetIdentifier().path == "./stage.usda"
+    assert "9 x 12 x 8 um" in root.GetDocumentation()
+    # the box of all tiles, which are not loaded
+    low, high = np.array(UsdGeom.ModelAPI(root).GetExtentsHint())
+    depth, height, width = SPACING_UM
+    slices, rows, columns = SHAPE
+    half = np.array([width, height, depth]) / 2
+    assert low == pytest.approx(np.array([0, -(rows - 1) * height, 0]) - half)
+    assert high == pytest.approx(np.array([(columns - 1) * width, 0, (slices - 1) * depth]) + half)
+    # another build of other settings is another version
+    other = tmp_path / "other/stage.usda"
+    tiles = [TileExtent.of(tile) for tile in make_tiles()]
+    changed = {"generator": "tests", "seed": 2}
+    appearances = make_appearances()
+    write_stage(other.parent, "F", appearances=appearances, tiles=tiles, provenance=changed)
+    again = Usd.Stage.Open(str(other))
+    version = Usd.ModelAPI(again.GetDefaultPrim()).GetAssetVersion()
+    assert model.GetAssetVersion() not in ("", version)
 
 
 def test_every_name_in_the_files_is_relative(stage_path: Path) -> None:
@@ -183,13 +209,13 @@ def test_representations_switch_meshes_and_volumes(over: Usd.Stage) -> None:
     assert over.GetPrimAtPath(leaf("r0_c0", EMPTY_ID, "_volume"))
 
 
-def test_selections_stand_in_the_root_layer(stage_path: Path) -> None:
-    root = Sdf.Layer.FindOrOpen(str(stage_path))
+def test_selections_stand_in_the_layer_of_the_contents(stage_path: Path) -> None:
+    root = Sdf.Layer.FindOrOpen(str(stage_path.parent / "contents.usda"))
     for tile in TILES:
         selections = root.GetPrimAtPath(f"/Specimen/Tiles/{tile}").variantSelections
         assert dict(selections) == {"lod": "lod1", "representation": "mesh"}
     looks = Sdf.Layer.FindOrOpen(str(stage_path.parent / "looks" / "channels.usda"))
-    assert "./looks/channels.usda" in root.subLayerPaths  # of the root's layer stack
+    assert "./looks/channels.usda" in root.subLayerPaths
     for channel in (F_ID, BALL_ID, EMPTY_ID):
         selections = looks.GetPrimAtPath(f"/Specimen/Channels/{channel}").variantSelections
         assert dict(selections) == {"transferFunction": "default"}

@@ -211,7 +211,7 @@ def narrow_the_lookup_table(out: Path) -> None:
 
 
 def drop_a_tile(out: Path) -> None:
-    stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"), Usd.Stage.LoadNone)
+    stage = Usd.Stage.Open(str(out / "stage" / "contents.usda"), Usd.Stage.LoadNone)
     stage.RemovePrim("/Specimen/Tiles/r0_c1")
     stage.GetRootLayer().Save()
 

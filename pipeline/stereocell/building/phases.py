@@ -168,7 +168,7 @@ def _survey(passes: Passes, phase: Phase) -> Survey:
 
 
 def run_stage(out: Path, engine: Engine) -> None:
-    """Write OUT/stage from the units: stage.usda, display.usda, looks/, tiles/ and, where there is
+    """Write OUT/stage from the units: its layers, looks/, tiles/ and, where there is
     a surface, specimen.usdz; last their list, files.json. Other files stay.
 
     Raises OutputError where units are missing or damaged, TasksFailedError where tiles fail.

@@ -11,10 +11,11 @@ from fnmatch import fnmatchcase
 from pxr import Usd
 
 from stereocell.usd.edit_table import TAKEN
-from stereocell.usd.layer import CHANNELS, OPENING_CUT, PAINTED_BY, SIDES
+from stereocell.usd.layer import OPENING_CUT, PAINTED_BY, SIDES
 from stereocell.usd.layer_opinions import BuiltLayers
 from stereocell.usd.lost_edits import WHOLE
 from stereocell.usd.numbers2d import ATTRIBUTES
+from stereocell.usd.specimen import specimen_of
 
 Names = dict[str, tuple[str, ...]]  # place -> patterns of names
 
@@ -127,7 +128,7 @@ def notes_on_functions(stage: Usd.Stage, lacks: tuple[Lack, ...]) -> Iterator[st
     """Yield a line on each channel whose transfer function a layer chooses, where none is kept."""
     reason, built = left_out(lacks, "channel", "transferFunction"), BuiltLayers(stage)
     session = stage.GetSessionLayer()  # readers select variants there
-    for prim in stage.GetPrimAtPath(CHANNELS).GetChildren() if reason else ():
+    for prim in stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren() if reason else ():
         choosing = [
             spec.layer
             for spec in prim.GetPrimStack()

@@ -13,7 +13,8 @@ from stereocell.export.chosen import Chosen
 from stereocell.formats.gltf import vertex_colors
 from stereocell.model.errors import OutputError
 from stereocell.model.extra_packages import import_extra
-from stereocell.report.draw_scenes import Shape, draw_image, turning_frame
+from stereocell.report.draw_scenes import draw_image
+from stereocell.textures.draw_meshes import Shape, turning_frame
 
 PICTURE_TRIANGLES = 2_000_000  # more do not show on 1600 pixels
 VIDEO_TRIANGLES = 200_000  # a frame of 31 000 takes .35 s of CPU, of 640 pixels

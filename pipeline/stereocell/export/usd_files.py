@@ -8,23 +8,17 @@
 import os
 from pathlib import Path
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
-from stereocell.usd.layer import (
-    CAMERAS,
-    CHANNELS,
-    METERS_PER_UNIT,
-    ROOT,
-    SHOWN,
-    TILES,
-    UP_AXIS,
-    export,
-)
+from stereocell.usd.layer import METERS_PER_UNIT, UP_AXIS, export, vec3f
+from stereocell.usd.preview_surface import repeats_color
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
+from stereocell.usd.specimen import Specimen, specimen_of
 from stereocell.usd.write_usdz import SIZE_M, write_usdz
 
 
@@ -49,10 +43,10 @@ def write_light_copy(chosen: Chosen, path: Path, level: int) -> str:
 
 def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     """Write .usdc or .usda; return a line about it. Raises OutputError."""
-    stage = chosen.stage
+    stage, specimen = chosen.stage, specimen_of(chosen.stage)
     kept = {channel.id for channel in chosen.channels}
     for name in chosen.tiles:
-        prim = stage.Load(TILES.AppendChild(name))
+        prim = stage.Load(specimen.tiles.AppendChild(name))
         levels = [one for one in lod_levels(prim) if one <= level]
         if levels:
             select_variant(prim, "lod", f"lod{levels[-1]}")
@@ -60,18 +54,22 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     _state_colors(stage, flat)
     for name in chosen.all_tiles:
         if name not in chosen.tiles:
-            _remove(flat, TILES.AppendChild(name))
-    for place in (CHANNELS, SHOWN, *map(TILES.AppendChild, chosen.tiles)):
+            _remove(flat, specimen.tiles.AppendChild(name))
+    for place in (
+        specimen.channels,
+        specimen.shown,
+        *map(specimen.tiles.AppendChild, chosen.tiles),
+    ):
         for one in _channels(stage, place):
             if one not in kept:
                 _remove(flat, place.AppendChild(one))
     stage.GetSessionLayer().Clear()
     # a layer of an artist's may state none of these
-    flat.defaultPrim = ROOT.name
+    flat.defaultPrim = specimen.top
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.metersPerUnit, METERS_PER_UNIT)
     flat.pseudoRoot.SetInfo(UsdGeom.Tokens.upAxis, UP_AXIS)
     if chosen.options.scale is not None:
-        _enlarge(flat, chosen.options.scale)
+        _enlarge(flat, specimen, chosen.options.scale)
     # where the file will be: it is written in a folder beside its place
     folder = path.parent.parent.resolve()
     UsdUtils.ModifyAssetPaths(flat, lambda asset: _relative(asset, folder))
@@ -81,18 +79,21 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
     return f"{tiles} at lod{level}; {size}; volumes and maps stay in {chosen.path.parent}"
 
 
-def _enlarge(flat: Sdf.Layer, scale: float) -> None:
-    """Enlarge the tiles by a transform, and move the cameras away as much.
+def _enlarge(flat: Sdf.Layer, specimen: Specimen, scale: float) -> None:
+    """Enlarge the tiles by a transform, the specimen's box, and how far away the cameras are.
 
     A transform above the cameras would leave their clipping ranges as they are.
     """
     stage = Usd.Stage.Open(flat, Usd.Stage.LoadNone)
-    tiles = UsdGeom.Xformable(stage.GetPrimAtPath(TILES))
+    tiles = UsdGeom.Xformable(stage.GetPrimAtPath(specimen.tiles))
     placed = tiles.GetOrderedXformOps()
     enlarged = tiles.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
     enlarged.Set(Gf.Vec3d(scale))
     tiles.SetXformOpOrder([enlarged, *placed])
-    group = stage.GetPrimAtPath(CAMERAS)
+    whole = UsdGeom.ModelAPI(stage.GetPrimAtPath(specimen.root))
+    if hint := whole.GetExtentsHint():
+        whole.SetExtentsHint(vec3f(np.array(hint) * scale))
+    group = stage.GetPrimAtPath(specimen.cameras)
     for prim in group.GetChildren() if group else ():
         if not prim.IsA(UsdGeom.Camera):
             continue
@@ -105,12 +106,21 @@ def _enlarge(flat: Sdf.Layer, scale: float) -> None:
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:
-    """Copy the edited colour of each material to its shader: many programs read only that one."""
+    """Copy the edited colour of each material to its shader and to the meshes that it draws.
+
+    Many programs read only those.
+    """
     for prim in stage.Traverse():
         edited = edited_color(prim) if prim.IsA(UsdShade.Material) else None
         if edited is not None:
             color = flat.GetAttributeAtPath(f"{prim.GetPath()}/surface.inputs:diffuseColor")
             color.default = edited.Get()
+        display = UsdGeom.Mesh(prim).GetDisplayColorAttr() if prim.IsA(UsdGeom.Mesh) else None
+        if display and repeats_color(display):
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            edited = edited_color(material.GetPrim()) if material else None
+            if edited is not None:
+                flat.GetAttributeAtPath(display.GetPath()).default = Vt.Vec3fArray([edited.Get()])
 
 
 def _channels(stage: Usd.Stage, place: Sdf.Path) -> list[str]:

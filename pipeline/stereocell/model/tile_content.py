@@ -29,6 +29,7 @@ class ChannelContent:
     measured  the volume's voxels as they were read; None: they are not kept
     objects   the table of the objects in `lods`, which count in it; None: it is no label map
     touching  walls of these objects to others; None: not known
+    color     linear RGB 0..1, by which the tile shows the channel without its stage; None: by none
     """
 
     channel_id: str
@@ -39,6 +40,7 @@ class ChannelContent:
     measured: NDArray[Any] | None = None
     objects: ObjectTable | None = None
     touching: SharedWalls | None = None
+    color: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

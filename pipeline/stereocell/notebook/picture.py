@@ -17,7 +17,8 @@ from stereocell.export.chosen import Chosen
 from stereocell.export.options import ExportOptions
 from stereocell.model.color import linear_color
 from stereocell.model.errors import StageError
-from stereocell.report.draw_scenes import Shape, draw_image
+from stereocell.report.draw_scenes import draw_image
+from stereocell.textures.draw_meshes import Shape
 
 Looks = Mapping[str, Mapping[str, Any]]  # by the channel's ID, as `Viewer.channels`
 

@@ -29,15 +29,19 @@ def stage_tile_step(
     tables  of all objects, by the ID of their label map
     """
 
-    def part(channel_id: str, paint: PaintColors | None = None) -> UnitPart:
-        return UnitPart(channel_id, units[f"{tile.id}/{channel_id}"], paint)
-
     parts = [
-        part(channel.id, PaintColors(channel.color, painter.color) if painter else None)
+        UnitPart(
+            channel.id,
+            units[f"{tile.id}/{channel.id}"],
+            channel.color,
+            PaintColors(channel.color, painter.color) if painter else None,
+        )
         for channel in plan.channels
         for painter in [plan.painter(channel)]
     ]
-    parts += [part(labels.id) for labels in plan.labels]
+    parts += [
+        UnitPart(labels.id, units[f"{tile.id}/{labels.id}"], labels.color) for labels in plan.labels
+    ]
     lattice = tile.lattice(plan.region)
     content = TileContent(
         id=tile.id,

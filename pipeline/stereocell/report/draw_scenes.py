@@ -1,34 +1,13 @@
-"""Pictures of meshes, drawn without OpenGL: alike on every machine.
-
-Parallel projection from the front, above and the right. One lamp stands over the left shoulder, and
-a weaker one on the right; light comes from the sky and the ground as well.
-"""
+"""Pictures of meshes of units, as WebP."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
-from stereocell.model.color import to_srgb8
 from stereocell.preview.draw_slices import encode
-from stereocell.textures.rasterize import find_pixels
-
-Vector = NDArray[np.float64]
-Box = tuple[tuple[float, ...], tuple[float, ...]]
-
-# Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
-_EYE = np.array([0.42, 0.5, 1.0])
-_UP = np.array([0.0, 1.0, 0.0])
-# linear light
-_GROUND_LIGHT, _SKY_LIGHT = 0.06, 0.18
-_LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))  # right, up, towards the eye; light
-_GLOSS, _GLOSS_POWER = 0.12, 25.0
-_BACKGROUND = (0.0033, 0.0040, 0.0052)
-_LINES = (0.148, 0.171, 0.214)
-_FINE = 2  # factor by which a picture is drawn larger, then averaged down
-_MARGIN = 1.04  # factor by which the view exceeds the frame
+from stereocell.textures.draw_meshes import Box, Shape, draw_pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +16,6 @@ class Surface:
 
     file: str
     color: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A mesh in memory, and the linear RGB of all of it (3,) or of its vertices (n, 3), 0..1."""
-
-    positions: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
-    normals: NDArray[np.float32]
-    color: Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,29 +42,18 @@ class Picture:
     height: int
 
 
-@dataclass(frozen=True, slots=True)
-class _View:
-    """Where points of the world lie in the picture; columns are to the right, up, and to the eye.
-
-    size  (height, width), pixels as they are drawn
-    """
-
-    axes: Vector
-    centre: Vector
-    scale: float
-    size: tuple[int, int]
-
-    def place(self, points: NDArray[np.floating]) -> tuple[Vector, Vector]:
-        """Return the pixels (n, 2), x right, y down, and depths (n,), larger is nearer."""
-        right, up, depth = ((points - self.centre) @ self.axes).T
-        height, width = self.size
-        return np.stack([width / 2 + self.scale * right, height / 2 - self.scale * up], 1), depth
-
-
 def draw_scene(scene: Scene) -> Picture:
     """Return a picture of the scene."""
-    image = draw_image(map(_load, scene.surfaces), scene.frame, scene.size, boxes=scene.boxes)
+    shapes = map(_load, scene.surfaces)
+    image = Image.fromarray(draw_pixels(shapes, scene.frame, scene.size, boxes=scene.boxes))
     return Picture(encode(image), *image.size)
+
+
+def draw_image(
+    shapes: Iterable[Shape], frame: Box, size: tuple[int, int], *, turned_deg: float = 0.0
+) -> Image.Image:
+    """Return a picture of meshes; see `draw_pixels`."""
+    return Image.fromarray(draw_pixels(shapes, frame, size, turned_deg=turned_deg))
 
 
 def _load(surface: Surface) -> Shape:
@@ -104,110 +62,3 @@ def _load(surface: Surface) -> Shape:
             arrays[name] for name in ("positions", "triangles", "normals")
         )
     return Shape(positions, triangles, normals, np.array(surface.color))
-
-
-def draw_image(
-    shapes: Iterable[Shape],
-    frame: Box,
-    size: tuple[int, int],
-    *,
-    boxes: Iterable[Box] = (),
-    turned_deg: float = 0.0,
-) -> Image.Image:
-    """Return a picture of meshes; see Scene.
-
-    turned_deg  the eye goes round the upright axis by this; `frame` fills the picture at 0
-    """
-    view = _look_at(frame, size, turned_deg)
-    picture = np.empty((view.size[0] * view.size[1], 3))
-    picture[:] = _BACKGROUND
-    nearest = np.full(view.size, -np.inf)
-    for shape in shapes:
-        places, depth = view.place(shape.positions)
-        corners = places[shape.triangles]
-        pixel, triangle, weights = find_pixels(
-            corners, depth[shape.triangles], view.size, nearest=nearest
-        )
-        at = shape.triangles[triangle]
-        shaded = np.einsum("nk,nkj->nj", weights, shape.normals[at].astype(np.float64))
-        shaded = shaded @ view.axes
-        shaded[_are_turned_away(corners[triangle])] *= -1  # the inside is drawn, too
-        color = shape.color
-        if color.ndim == 2:
-            color = np.einsum("nk,nkj->nj", weights, color[at])
-        picture[pixel] = _light(shaded, color)
-    for low, high in boxes:
-        _outline(picture, nearest, view, np.array([low, high]))
-    drawn = picture.reshape(*view.size, 3)
-    parts = [drawn[down::_FINE, on::_FINE] for down in range(_FINE) for on in range(_FINE)]
-    mean = sum(parts[1:], parts[0]) / len(parts)  # a third of what .mean over two axes takes
-    return Image.fromarray(to_srgb8(mean.astype(np.float32)))
-
-
-def turning_frame(low: Vector, high: Vector) -> Box:
-    """Return the frame that a box (x, y, z) never leaves, however far it is turned."""
-    middle, half = (low + high) / 2, (high - low) / 2
-    aside = np.abs(_EYE[[0, 2]]).sum() / np.hypot(_EYE[0], _EYE[2])
-    half[[0, 2]] = np.hypot(half[0], half[2]) / aside
-    return tuple((middle - half).tolist()), tuple((middle + half).tolist())
-
-
-def _look_at(frame: Box, size: tuple[int, int], turned_deg: float) -> _View:
-    low, high = (np.array(corner) for corner in frame)
-    to_eye = _EYE / np.linalg.norm(_EYE)
-    right = np.cross(_UP, to_eye)
-    right /= np.linalg.norm(right)
-    up = np.cross(to_eye, right)
-    # width and height of the frame's box from the eye
-    across, upright = float(np.abs(right) @ (high - low)), float(np.abs(up) @ (high - low))
-    width, most = size
-    height = int(np.clip(width * upright / across, min(0.3 * width, most), most))
-    scale = _FINE * min(width / across, height / upright) / _MARGIN
-    axes = np.stack([right, up, to_eye], axis=1)
-    if turned_deg:
-        sin, cos = np.sin(np.radians(turned_deg)), np.cos(np.radians(turned_deg))
-        axes = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]]) @ axes
-    return _View(axes, (low + high) / 2, scale, (height * _FINE, width * _FINE))
-
-
-def _are_turned_away(corners: Vector) -> NDArray[np.bool_]:
-    """Return which triangles (n, 3, 2), in pixels, show their inside: clockwise, as y is down."""
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    turned: NDArray[np.bool_] = ax * by - ay * bx > 0
-    return turned
-
-
-def _light(normals: Vector, color: Vector) -> Vector:
-    """Return the linear light (n, 3) of points with such normals (n, 3), of any length."""
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
-    sky = 0.5 + 0.5 * normals[:, 1]
-    diffuse = _GROUND_LIGHT * (1 - sky) + _SKY_LIGHT * sky
-    gloss = np.zeros(len(normals))
-    for direction, light in _LAMPS:
-        to_lamp = np.array(direction) / np.linalg.norm(direction)
-        halfway = to_lamp + np.array([0.0, 0.0, 1.0])
-        halfway /= np.linalg.norm(halfway)
-        diffuse += light * np.maximum(normals @ to_lamp, 0)
-        gloss += light * np.maximum(normals @ halfway, 0) ** _GLOSS_POWER
-    return diffuse[:, None] * color + _GLOSS * gloss[:, None]
-
-
-def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> None:
-    """Draw a box's edges where nothing is nearer; ends: (2, 3), its corners."""
-    height, width = view.size
-    for axis in range(3):
-        beside, above = (axis + 1) % 3, (axis + 2) % 3
-        for i in (0, 1):
-            for j in (0, 1):
-                edge = ends.copy()
-                edge[:, beside], edge[:, above] = ends[i, beside], ends[j, above]
-                places, depth = view.place(edge)
-                steps = int(np.ceil(np.abs(places[1] - places[0]).max())) + 1
-                share = np.linspace(0, 1, steps)[:, None]
-                column, row = np.floor(places[0] + share * (places[1] - places[0])).T.astype(int)
-                here = depth[0] + share[:, 0] * (depth[1] - depth[0])
-                inside = (row >= 0) & (row < height - 1) & (column >= 0) & (column < width - 1)
-                row, column, here = row[inside], column[inside], here[inside]
-                for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):  # as wide as a pixel at last
-                    seen = here >= nearest[row + down, column + on]
-                    picture[(row[seen] + down) * width + column[seen] + on] = _LINES

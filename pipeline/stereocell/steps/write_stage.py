@@ -12,9 +12,16 @@ from stereocell.model.spacing import Spacing
 from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
 from stereocell.storage.file_list import FileList
 from stereocell.usd.write_display import DISPLAY_NAME
+from stereocell.usd.write_previews import PREVIEWS, write_previews
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
-from stereocell.usd.written_files import STAGE_NAME, AsWritten, write_list
+from stereocell.usd.written_files import (
+    CONTENTS_NAME,
+    NVINDEX_NAME,
+    STAGE_NAME,
+    AsWritten,
+    write_list,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +39,7 @@ class Tables:
 class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
 
     name: str
     tiles: tuple[WriteStageTile, ...]
@@ -46,7 +53,7 @@ class WriteStage(Keyed):
     tables: Tables
 
     def write(self, stage_dir: Path) -> str:
-        """Write stage.usda, display.usda and looks/ beside the tiles, which are there.
+        """Write the layers of the stage and looks/ beside the tiles.
 
         Returns a line about the specimen's physical size.
         """
@@ -68,8 +75,16 @@ class WriteStage(Keyed):
         )
 
     def write_list(self, stage_dir: Path, tiles: FileList) -> None:
-        """Write specimen.usdz, and last the list of all files; `tiles`: those of the tiles."""
+        """Write specimen.usdz and the previews, and last the list of all files.
+
+        tiles  the files of the tiles
+        """
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
-        write_usdz(stage, small, as_written=AsWritten({stage_dir.resolve(): tiles}))
-        display = stage_dir / DISPLAY_NAME
-        write_list(stage_dir, tiles, stage_dir / "looks", stage, display, small)
+        as_written = AsWritten({stage_dir.resolve(): tiles})
+        write_usdz(stage, small, as_written=as_written)
+        write_previews(stage_dir, as_written)
+        others = (
+            stage_dir / name
+            for name in ("looks", PREVIEWS, CONTENTS_NAME, DISPLAY_NAME, NVINDEX_NAME)
+        )
+        write_list(stage_dir, tiles, *others, stage, small)

@@ -24,15 +24,20 @@ from stereocell.usd import written_files
 
 @dataclass(frozen=True, slots=True)
 class UnitPart:
-    """The unit of one channel in a tile; `paint`: the colours of its surface, if it is painted."""
+    """The unit of one channel in a tile.
+
+    color  of the channel, linear RGB
+    paint  the colours of its surface; None: it is not painted
+    """
 
     channel_id: str
     folder: Path
+    color: tuple[float, float, float]
     paint: PaintColors | None = None
 
     def key_content(self) -> list[object]:
         """Return what counts in a key: a unit's folder is named by its key."""
-        return [self.channel_id, self.folder.name, content_of(self.paint)]
+        return [self.channel_id, self.folder.name, self.color, content_of(self.paint)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +80,7 @@ class WriteStageTile(Step[StageTile]):
     stage_dir  the folder with the tile's files, where an artist may edit them
     """
 
-    VERSION: ClassVar[int] = 2
+    VERSION: ClassVar[int] = 3
     FORM: ClassVar[Document[StageTile]] = Document(
         "units.schema.json#StageTile", asdict, _from_json, written_files.REMEDY
     )
@@ -102,22 +107,24 @@ class WriteStageTile(Step[StageTile]):
 
     def run(self) -> StageTile:
         """Write the tile. Raises OutputError where a unit is damaged."""
-        tables = {one.labels_id: (one.table, one.touching) for one in self.tables}
-        no_volume = self.shared | tables.keys()
-        channels = tuple(
-            ChannelContent(
-                unit.channel_id,
-                load_lods(unit.folder),
-                None if unit.channel_id in no_volume else load_volume(unit.folder),
-                unit.paint,
-                find_closed(unit.folder),
-                None if unit.channel_id in no_volume else load_measured(unit.folder),
-                *tables.get(unit.channel_id, (None, None)),
-            )
-            for unit in self.units
-        )
+        tables = {one.labels_id: one for one in self.tables}
+        channels = tuple(self._content_of(unit, tables.get(unit.channel_id)) for unit in self.units)
         content = replace(self.content, channels=channels)
         return StageTile(self.key, *stage_writer.write_tile(self.stage_dir, content))
+
+    def _content_of(self, unit: UnitPart, table: TableOfTile | None) -> ChannelContent:
+        has_volume = table is None and unit.channel_id not in self.shared
+        return ChannelContent(
+            unit.channel_id,
+            load_lods(unit.folder),
+            load_volume(unit.folder) if has_volume else None,
+            unit.paint,
+            find_closed(unit.folder),
+            load_measured(unit.folder) if has_volume else None,
+            table.table if table else None,
+            table.touching if table else None,
+            unit.color,
+        )
 
 
 def _digest(walls: SharedWalls) -> str:

@@ -17,11 +17,19 @@ Size = int | None  # of an object in bytes; None: it was removed
 
 _SMALL_BYTES = 1 << 16  # largest object that counts as small
 # files that list or describe others; they are uploaded after those, in this order
-_LAST = ("tile.usdc", "stage.usda", "files.json", "manifest.json", "unit.json", "tile.json")
+_LAST = (
+    "tile.usdc",
+    "contents.usda",
+    "stage.usda",
+    "files.json",
+    "manifest.json",
+    "unit.json",
+    "tile.json",
+)
 # the objects that steer a build: a few for each unit, all small
 STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
-    r"|units/[^/]+/stage\.json|stage/stage\.usda|stage/looks/.+|tissue/[^/]+\.json"
+    r"|units/[^/]+/stage\.json|stage/(contents|stage)\.usda|stage/looks/.+|tissue/[^/]+\.json"
 )
 
 

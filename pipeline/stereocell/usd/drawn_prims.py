@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from pxr import Tf, Usd, UsdGeom, UsdUtils
 
 from stereocell.model.errors import StageError
-from stereocell.usd.layer import SHOWN
 from stereocell.usd.read_attributes import require_still
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import one_line
 
 _PERSPECTIVE = 1e-9  # largest deviation of an affine matrix's last column
@@ -42,12 +42,14 @@ def is_visible(prim: Usd.Prim) -> bool:
 
 
 def _is_hidden(prim: Usd.Prim) -> bool:
-    """Return whether a prim's own opinion hides it, or one that it inherits from no SHOWN prim."""
+    """Return whether a prim is hidden by another opinion than that on its channel's SHOWN prim."""
     visibility = UsdGeom.Imageable(prim).GetVisibilityAttr()
     if not visibility or visibility.Get() != UsdGeom.Tokens.invisible:
         return False
-    strongest = visibility.GetPropertyStack(Usd.TimeCode.Default())[0]
-    return not strongest.path.HasPrefix(SHOWN)
+    stage, now = prim.GetStage(), Usd.TimeCode.Default()
+    shown = stage.GetPrimAtPath(specimen_of(stage).shown.AppendChild(prim.GetName()))
+    of_channel = UsdGeom.Imageable(shown).GetVisibilityAttr().GetPropertyStack(now) if shown else []
+    return visibility.GetPropertyStack(now)[0] not in of_channel
 
 
 def to_world(prim: Usd.Prim) -> NDArray[np.float64]:

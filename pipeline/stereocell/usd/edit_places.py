@@ -7,7 +7,6 @@ from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_table import is_taken
-from stereocell.usd.layer import CHANNELS, LIGHTS, ROOT, SHOWN, TILES
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 from stereocell.usd.read_additions import is_addition
 from stereocell.usd.read_appearances import surface_of
@@ -15,6 +14,7 @@ from stereocell.usd.read_display import is_single, shows_display_color
 from stereocell.usd.read_lights import is_light
 from stereocell.usd.read_textures import vertex_values_of
 from stereocell.usd.read_views import is_view
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.write_objects import COLUMNS, LABELS
 
 _READER = "UsdPrimvarReader"
@@ -28,24 +28,27 @@ class Places:
 
     def __init__(self, stage: Usd.Stage, bound: set[Sdf.Path]) -> None:
         self._stage, self._bound = stage, bound
-        group = stage.GetPrimAtPath(CHANNELS)
+        self._paths = specimen_of(stage)
+        group = stage.GetPrimAtPath(self._paths.channels)
         self._channels = {str(prim.GetName()) for prim in group.GetChildren()}
-        self._tiles = {str(prim.GetName()) for prim in stage.GetPrimAtPath(TILES).GetAllChildren()}
+        tiles = stage.GetPrimAtPath(self._paths.tiles).GetAllChildren()
+        self._tiles = {str(prim.GetName()) for prim in tiles}
         self._drawn: dict[Sdf.Path, dict[Sdf.Path, str]] = {}
 
     def of(self, path: Sdf.Path) -> str:
         """Return the place of a prim; empty: it is none that the stage's readers look at."""
-        if path == ROOT:
+        paths = self._paths
+        if path == paths.root:
             return "specimen"
-        if path == CHANNELS:
+        if path == paths.channels:
             return "channels"
-        if path == LIGHTS:
+        if path == paths.lights:
             return "lights"
-        if path.GetParentPath() == SHOWN:
+        if path.GetParentPath() == paths.shown:
             return "shown" if path.name in self._channels else ""
-        names = str(path).split("/")[2:]
-        if path.HasPrefix(TILES):
-            known = self._in_tiles(names[1:])
+        if path.HasPrefix(paths.tiles):
+            is_below = path != paths.tiles
+            known = self._in_tiles(str(path.MakeRelativePath(paths.tiles)).split("/") * is_below)
             if known:
                 return known
         prim = self._stage.GetPrimAtPath(path)
@@ -57,7 +60,7 @@ class Places:
             return "sphere" if prim.IsA(UsdLux.SphereLight) else "light"
         if is_addition(prim):
             return "addition"
-        if path.GetParentPath() == CHANNELS:
+        if path.GetParentPath() == paths.channels:
             return "channel" if prim.IsA(UsdShade.Material) else ""
         return self._of_shading(prim)
 
@@ -85,7 +88,8 @@ class Places:
 
     def _is_used(self, material: Usd.Prim) -> bool:
         path = material.GetPath()
-        return path.GetParentPath() == CHANNELS or path.HasPrefix(TILES) or path in self._bound
+        is_channels = path.GetParentPath() == self._paths.channels
+        return is_channels or path.HasPrefix(self._paths.tiles) or path in self._bound
 
     def _shaders(self, material: Usd.Prim) -> dict[Sdf.Path, str]:
         """Return the shaders that draw a material's surface, and their IDs."""
@@ -139,6 +143,7 @@ def read_primvars(mesh: Usd.Prim) -> Iterator[str]:
     if not mesh.HasAttribute(LABELS):
         return
     yield from (OBJECT_ID, PAINT, "displayColor")
-    channel = mesh.GetStage().GetPrimAtPath(CHANNELS.AppendChild(mesh.GetParent().GetName()))
+    stage, name = mesh.GetStage(), mesh.GetParent().GetName()
+    channel = stage.GetPrimAtPath(specimen_of(stage).channels.AppendChild(name))
     columns = channel.GetAttribute(COLUMNS).Get() if channel else None
     yield from map(str, columns or ())

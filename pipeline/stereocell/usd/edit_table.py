@@ -142,6 +142,7 @@ TAKEN: dict[str, tuple[str, ...]] = {
 # The build writes these from other values of the stage, and the bundle makes them anew: place ->
 # name -> what to edit instead; empty: an edit of a mesh rightly brings it along
 DERIVED: dict[str, dict[str, str]] = {
+    "specimen": {"extentsHint": ""},
     "channel": {
         "stereocell:lut": "stereocell:opacityPoints",
         "stereocell:isoConfidence": "stereocell:isoValue",

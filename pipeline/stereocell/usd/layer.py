@@ -19,6 +19,8 @@ from stereocell.storage.atomic_write import replacing
 METERS_PER_UNIT = 1e-6  # a stage unit is 1 um
 UP_AXIS = UsdGeom.Tokens.y
 ROOT = Sdf.Path("/Specimen")
+# A class that the root of each stage inherits: one edit for all specimens of a scene
+BROADCAST = Sdf.Path("/__class__").AppendChild(ROOT.name)
 # on /Specimen: the plane that it opens cut by, as its normal (x, y, z) and its offset, um, world
 OPENING_CUT = "stereocell:openingCut"
 # on /Specimen: lengths in display.usda for a length of the specimen, see usd/write_display.py

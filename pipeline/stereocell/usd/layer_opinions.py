@@ -2,8 +2,8 @@
 
 All layers of a composition count: the layer that was opened, its sublayers, and those that
 references, payloads and inherits bring in. The layers that a build wrote are left out. They are
-known by the stage's own layer, which has the channels' appearances as a sublayer. A flattened stage
-has no such layer: there, edits can't be told from what was built.
+known by the layer of the stage's contents, which has the channels' appearances as a sublayer. A
+flattened stage has no such layer: there, edits can't be told from what was built.
 """
 
 from collections.abc import Iterator
@@ -12,9 +12,10 @@ from pathlib import Path
 
 from pxr import Sdf, Usd, UsdUtils
 
-from stereocell.usd.layer import ROOT, TILES
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.write_stage import SUBLAYERS
 from stereocell.usd.write_tile import LAYER_NAME
+from stereocell.usd.written_files import CONTENTS_NAME, NVINDEX_NAME, STAGE_NAME
 
 # How prims are composed: USD itself consumes these fields
 _COMPOSITION = frozenset(
@@ -82,7 +83,7 @@ class BuiltLayers:
                 inside = file.relative_to(folder)
                 is_look = f"./{inside.as_posix()}" in SUBLAYERS
                 is_tile = inside.name == LAYER_NAME and inside.parts[:1] == ("tiles",)
-                is_stage = len(inside.parts) == 1 and SUBLAYERS[0] in layer.subLayerPaths
+                is_stage = str(inside) in (STAGE_NAME, CONTENTS_NAME, NVINDEX_NAME)
                 if is_look or is_tile or is_stage:
                     return True
         return False
@@ -111,20 +112,22 @@ def _specs_of_users(prim: Usd.Prim, built: BuiltLayers) -> list[Sdf.PrimSpec]:
 
 def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
     """Yield all prims, of tiles only those that a user's layer touches, loaded one by one."""
-    every = Usd.PrimAllPrimsPredicate
-    for top in stage.GetPseudoRoot().GetFilteredChildren(every):
-        if top.GetPath() != ROOT:
-            yield from Usd.PrimRange(top, every)
-            continue
-        yield top
-        for group in top.GetFilteredChildren(every):
-            if group.GetPath() != TILES:
-                yield from Usd.PrimRange(group, every)
-                continue
-            yield group
-            for path in [child.GetPath() for child in group.GetFilteredChildren(every)]:
-                if _specs_of_users(stage.GetPrimAtPath(path), built):
-                    yield from _loaded_prims(stage, path)
+    tiles = specimen_of(stage).tiles
+    for top in stage.GetPseudoRoot().GetFilteredChildren(Usd.PrimAllPrimsPredicate):
+        yield from _walk(top, tiles, built)
+
+
+def _walk(prim: Usd.Prim, tiles: Sdf.Path, built: BuiltLayers) -> Iterator[Usd.Prim]:
+    every, path, stage = Usd.PrimAllPrimsPredicate, prim.GetPath(), prim.GetStage()
+    if not tiles.HasPrefix(path):
+        yield from Usd.PrimRange(prim, every)
+        return
+    yield prim
+    for child in [one.GetPath() for one in prim.GetFilteredChildren(every)]:
+        if path != tiles:
+            yield from _walk(stage.GetPrimAtPath(child), tiles, built)
+        elif _specs_of_users(stage.GetPrimAtPath(child), built):
+            yield from _loaded_prims(stage, child)
 
 
 def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:

@@ -9,15 +9,19 @@ from collections.abc import Iterator
 from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
-from stereocell.usd.layer import METERS_PER_UNIT, ROOT, UP_AXIS
+from stereocell.usd.layer import METERS_PER_UNIT, UP_AXIS
+from stereocell.usd.specimen import specimen_of
 
 _FALLBACK_UNIT = 0.01  # metres: USD's unit where a layer states none
-# field of a layer -> the line that states it
-LINES = {
-    UsdGeom.Tokens.metersPerUnit: "metersPerUnit = 1e-6",
-    UsdGeom.Tokens.upAxis: f'upAxis = "{UP_AXIS}"',
-    "defaultPrim": f'defaultPrim = "{ROOT.name}"',
-}
+
+
+def lines_for(stage: Usd.Stage) -> dict[str, str]:
+    """Return the line that states each field of a layer over a stage, by the field."""
+    return {
+        UsdGeom.Tokens.metersPerUnit: "metersPerUnit = 1e-6",
+        UsdGeom.Tokens.upAxis: f'upAxis = "{UP_AXIS}"',
+        "defaultPrim": f'defaultPrim = "{specimen_of(stage).top}"',
+    }
 
 
 def require_units(stage: Usd.Stage) -> None:
@@ -27,16 +31,21 @@ def require_units(stage: Usd.Stage) -> None:
     payload's layer is not looked at. The default prim is that of the stage's root layer alone:
     other programs open no other.
     """
+    lines, top = lines_for(stage), specimen_of(stage).top
     for layer in stage.GetLayerStack(includeSessionLayers=False):
-        for field, found, expected, effect in _wrong_fields(layer, layer == stage.GetRootLayer()):
+        expected_prim = top if layer == stage.GetRootLayer() else ""
+        for field, found, expected, effect in _wrong_fields(layer, expected_prim):
             raise StageError(
-                f"{layer.realPath}: {field} is {found}, expected {expected}: write {LINES[field]} "
+                f"{layer.realPath}: {field} is {found}, expected {expected}: write {lines[field]} "
                 f"there; {effect}"
             )
 
 
-def _wrong_fields(layer: Sdf.Layer, is_root: bool) -> Iterator[tuple[str, str, str, str]]:
-    """Yield the fields that a layer states wrongly: name, value, expected value, effect."""
+def _wrong_fields(layer: Sdf.Layer, top: str) -> Iterator[tuple[str, str, str, str]]:
+    """Yield the fields that a layer states wrongly: name, value, expected value, effect.
+
+    top  name of the default prim; empty: any
+    """
     root = layer.pseudoRoot
     unit, axis = UsdGeom.Tokens.metersPerUnit, UsdGeom.Tokens.upAxis
     if root.HasInfo(unit) and not UsdGeom.LinearUnitsAre(root.GetInfo(unit), METERS_PER_UNIT):
@@ -44,21 +53,25 @@ def _wrong_fields(layer: Sdf.Layer, is_root: bool) -> Iterator[tuple[str, str, s
         yield unit, f"{root.GetInfo(unit):g}", f"{METERS_PER_UNIT:g}", effect
     if root.HasInfo(axis) and root.GetInfo(axis) != UP_AXIS:
         yield axis, str(root.GetInfo(axis)), str(UP_AXIS), "this turns nothing"
-    if is_root and layer.defaultPrim and layer.defaultPrim not in (ROOT.name, str(ROOT)):
+    if top and layer.defaultPrim and not _leads_to(str(layer.defaultPrim), top):
         effect = "other programs open that prim alone"
-        yield "defaultPrim", str(layer.defaultPrim), ROOT.name, effect
+        yield "defaultPrim", str(layer.defaultPrim), top, effect
+
+
+def _leads_to(default_prim: str, top: str) -> bool:
+    return default_prim.removeprefix("/") == top
 
 
 def note_missing(stage: Usd.Stage) -> str:
     """Return a line on the fields that a stage's root layer lacks; empty: it states them all."""
-    layer = stage.GetRootLayer()
-    lacks = [field for field in LINES if not layer.pseudoRoot.HasInfo(field)]
+    layer, known = stage.GetRootLayer(), lines_for(stage)
+    lacks = [field for field in known if not layer.pseudoRoot.HasInfo(field)]
     if not lacks:
         return ""
     effect = "may open it turned, or not find its specimen"
     if UsdGeom.Tokens.metersPerUnit in lacks:
         effect = f"open it {_FALLBACK_UNIT / METERS_PER_UNIT:.0f} times too large"
-    lines = ", ".join(LINES[field] for field in lacks)
+    lines = ", ".join(known[field] for field in lacks)
     return (
         f"{layer.realPath}: states no {', no '.join(lacks)}, so other programs {effect}: write "
         f"each on a line of its own between the parentheses at the top of the layer: {lines}"

@@ -19,10 +19,10 @@ from pxr import Sdf, Sdr, Tf, Usd, UsdGeom, UsdShade
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_places import Places, read_primvars
 from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, TAKEN, is_taken, reason_of
-from stereocell.usd.layer import ROOT
 from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
 from stereocell.usd.read_attributes import over_time
 from stereocell.usd.read_bindings import binding_fault
+from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
 _OWN_BINDING = ("mesh", "addition")  # places whose own binding is the strongest
@@ -138,6 +138,7 @@ class _Finder:
         self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path], left_out: LeftOut
     ) -> None:
         self._built, self._left_out = built, left_out
+        self._specimen = specimen_of(stage)
         self._places = Places(stage, bound)
         self._found: dict[tuple[str, str], list[LostEdit | _Fate]] = {}
         self._covered: set[Sdf.Path] = set()
@@ -153,7 +154,8 @@ class _Finder:
         for fates in self._found.values():
             edits = [fate for fate in fates if isinstance(fate, LostEdit)]
             if edits and _Fate.TAKEN not in fates:
-                kept[next((edit for edit in edits if str(ROOT) in edit.what), edits[0])] = None
+                root = str(self._specimen.root)
+                kept[next((edit for edit in edits if root in edit.what), edits[0])] = None
         return list(kept)
 
     def _judge(self, prim: Usd.Prim, opinion: Opinion) -> LostEdit | _Fate:
@@ -182,7 +184,9 @@ class _Finder:
         return LostEdit(_words_for(prim, path, name), name, reason)
 
     def _built_place(self, prim: Usd.Prim) -> str:
-        is_built = prim and any(spec.layer in self._built for spec in prim.GetPrimStack())
+        if not prim or not prim.GetPath().HasPrefix(self._specimen.root):
+            return ""
+        is_built = any(spec.layer in self._built for spec in prim.GetPrimStack())
         return _BUILT if is_built else ""
 
     def _judge_prim(self, path: Sdf.Path, prim: Usd.Prim) -> LostEdit | _Fate:
@@ -199,8 +203,8 @@ class _Finder:
         if kind in _GROUPS and not (own and own.IsAbstract()):
             return _Fate.COVERED  # by the lines on what it holds
         self._covered.add(path)
-        if not path.HasPrefix(ROOT):
-            reason = f"it lies outside {ROOT}"
+        if not path.HasPrefix(self._specimen.root):
+            reason = f"it lies outside {self._specimen.root}"
             return LostEdit(f"{kind or 'prim'} {path}", kind, reason)
         reason = next(
             (why for known, why in ADDED.items() if kind == known or kind.endswith(known)),

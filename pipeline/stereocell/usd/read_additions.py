@@ -13,13 +13,13 @@ from stereocell.formats.gltf import Material
 from stereocell.meshes.tubes import sweep_tubes
 from stereocell.model.mesh import Mesh
 from stereocell.usd.drawn_prims import is_visible, to_world
-from stereocell.usd.layer import ROOT, TILES
 from stereocell.usd.read_appearances import WHITE, material_of, surface_of
 from stereocell.usd.read_attributes import require_still, value_of
 from stereocell.usd.read_curves import curve_lines
 from stereocell.usd.read_display import display_color, display_opacity, has_many_display_colors
 from stereocell.usd.read_mesh import move_mesh, read_mesh
 from stereocell.usd.read_textures import maps_of
+from stereocell.usd.specimen import specimen_of
 
 _GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
 _PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract  # loaded or not
@@ -43,9 +43,11 @@ class Addition:
 
 def is_addition(prim: Usd.Prim) -> bool:
     """Return whether a prim is a mesh or curves below /Specimen, and no surface of a channel."""
-    path = prim.GetPath()
+    path, specimen = prim.GetPath(), specimen_of(prim.GetStage())
     is_drawn = prim.IsA(UsdGeom.Mesh) or prim.IsA(UsdGeom.BasisCurves)
-    return bool(is_drawn) and path.HasPrefix(ROOT) and not _is_surface(path)
+    return (
+        bool(is_drawn) and path.HasPrefix(specimen.root) and not _is_surface(path, specimen.tiles)
+    )
 
 
 def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
@@ -74,9 +76,9 @@ def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
             yield prim
 
 
-def _is_surface(path: Sdf.Path) -> bool:
+def _is_surface(path: Sdf.Path, tiles: Sdf.Path) -> bool:
     """Return whether a channel's surface in a tile has this path."""
-    names = str(path.MakeRelativePath(TILES)).split("/") if path.HasPrefix(TILES) else []
+    names = str(path.MakeRelativePath(tiles)).split("/") if path.HasPrefix(tiles) else []
     return len(names) == 3 and names[2] == f"{names[1]}_{names[0]}"
 
 

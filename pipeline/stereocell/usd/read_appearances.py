@@ -15,7 +15,7 @@ from stereocell.model.channel import (
 from stereocell.model.errors import StageError
 from stereocell.model.settings import MAX_VOXEL_VALUE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
-from stereocell.usd.layer import BUILT_COLOR, CHANNELS, SHOWN
+from stereocell.usd.layer import BUILT_COLOR
 from stereocell.usd.numbers2d import read_numbers
 from stereocell.usd.read_attributes import (
     color_of,
@@ -27,6 +27,7 @@ from stereocell.usd.read_attributes import (
 )
 from stereocell.usd.read_shapes2d import read_shapes
 from stereocell.usd.read_textures import feeder
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as, text_of
 
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -36,11 +37,12 @@ _VOLUME_WINDOW = "stereocell:volumeWindow"
 
 def read_appearances(stage: Usd.Stage) -> list[ComposedAppearance]:
     """Return the channels' appearances, in the stage's order: one or more. Raises StageError."""
-    prims = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    group = specimen_of(stage).channels
+    prims = stage.GetPrimAtPath(group).GetChildren()
     found = [_read_appearance(prim) for prim in prims if prim.IsA(UsdShade.Material)]
     if not found:
         layer = stage.GetRootLayer().realPath
-        raise StageError(f"{layer}: no channel is active below {CHANNELS}, expected one or more")
+        raise StageError(f"{layer}: no channel is active below {group}, expected one or more")
     return found
 
 
@@ -154,7 +156,9 @@ def shows_at_first(prim: Usd.Prim) -> bool:
 
     It does in stages that do not say. Raises StageError for a visibility over time.
     """
-    shown = UsdGeom.Imageable(prim.GetStage().GetPrimAtPath(SHOWN.AppendChild(prim.GetName())))
+    stage = prim.GetStage()
+    path = specimen_of(stage).shown.AppendChild(prim.GetName())
+    shown = UsdGeom.Imageable(stage.GetPrimAtPath(path))
     if not shown:
         return True
     attribute = shown.GetVisibilityAttr()

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 from pxr import Sdf, Usd, UsdShade
 
-from stereocell.usd.layer import CHANNELS, ROOT, TILES
+from stereocell.usd.layer import CHANNELS
 from stereocell.usd.read_stage import tile_prims
+from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
 _COLLECTION = "collection"
@@ -20,7 +21,8 @@ _EDIT = f"inputs:color of {CHANNELS}/NAME changes surfaces and volumes"
 
 def notes_on_bindings(stage: Usd.Stage) -> Iterator[str]:
     """Yield a sentence on each material above the channels that the surfaces take over."""
-    groups = (stage.GetPrimAtPath(path) for path in (ROOT, TILES))
+    specimen = specimen_of(stage)
+    groups = (stage.GetPrimAtPath(path) for path in (specimen.root, specimen.tiles))
     for prim in (*groups, *tile_prims(stage)):
         for relationship in prim.GetRelationships():
             name = relationship.GetName()

@@ -6,6 +6,7 @@ than a plain value feeds the colour of the mesh's material, and multiplies the o
 
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
+from stereocell.usd.preview_surface import repeats_color
 from stereocell.usd.read_attributes import color_of, shortest
 from stereocell.usd.read_textures import feeder
 from stereocell.usd.typed_values import read_as
@@ -25,10 +26,26 @@ def display_color(mesh: Usd.Prim) -> Color | None:
 
     Raises StageError for one outside 0..1.
     """
-    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("displayColor")
-    if not is_single(primvar):
+    primvar = _find_edited_color(mesh)
+    if primvar is None or not is_single(primvar):
         return None
     return color_of(primvar.GetAttr(), primvar.ComputeFlattened()[0])
+
+
+def _find_edited_color(mesh: Usd.Prim) -> UsdGeom.Primvar | None:
+    """Return the display colour that holds for a mesh if the build did not state it."""
+    prim = mesh
+    while prim and not prim.IsPseudoRoot():
+        primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor")
+        is_stated = bool(primvar) and primvar.HasAuthoredValue()
+        # USD inherits constant primvars alone
+        is_heard = prim == mesh or (
+            is_stated and primvar.GetInterpolation() == UsdGeom.Tokens.constant
+        )
+        if is_stated and is_heard and not repeats_color(primvar.GetAttr()):
+            return primvar
+        prim = prim.GetParent()
+    return None
 
 
 def has_many_display_colors(mesh: Usd.Prim) -> bool:

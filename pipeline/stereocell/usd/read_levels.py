@@ -15,7 +15,6 @@ from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.usd.drawn_prims import drawn, to_world
 from stereocell.usd.layer import (
-    CHANNELS,
     DISTANCE,
     LARGEST_DISTANCE,
     SHAPE_HASH,
@@ -37,6 +36,7 @@ from stereocell.usd.read_mesh import LargeFaceError, read_mesh
 from stereocell.usd.read_objects import without_hidden
 from stereocell.usd.read_textures import ComposedMaps, maps_of, vertex_values_of
 from stereocell.usd.read_variants import lod_levels
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as, text_of
 
 _Types = Sdf.ValueTypeNames
@@ -134,7 +134,8 @@ def _material(
             material = replace(material, color=color)
         elif has_many_display_colors(prim):
             material, fed = replace(material, color=WHITE), {*fed, "displayColor"}
-    channel = prim.GetStage().GetPrimAtPath(CHANNELS.AppendChild(channel_id))
+    stage = prim.GetStage()
+    channel = stage.GetPrimAtPath(specimen_of(stage).channels.AppendChild(channel_id))
     return replace(material, opacity=material.opacity * display_opacity(prim, channel)), fed
 
 

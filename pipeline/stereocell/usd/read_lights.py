@@ -24,8 +24,8 @@ from stereocell.formats.latlong import Radiance, read_latlong, turned
 from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset
 from stereocell.usd.drawn_prims import is_visible, to_world
-from stereocell.usd.layer import ROOT
 from stereocell.usd.read_attributes import Point, file_of, require_still, value_of
+from stereocell.usd.specimen import Specimen, specimen_of
 
 MAX_LAMPS = 3  # of the viewer
 MAX_STRENGTH = 10.0  # of a lamp of the viewer; a stronger one is as strong as this
@@ -83,7 +83,8 @@ class StageLights:
 
 def is_light(prim: Usd.Prim) -> bool:
     """Return whether a prim is a light that becomes a lamp or the room's light."""
-    return prim.GetPath().HasPrefix(ROOT) and any(prim.IsA(kind) for kind in _KINDS)
+    root = specimen_of(prim.GetStage()).root
+    return prim.GetPath().HasPrefix(root) and any(prim.IsA(kind) for kind in _KINDS)
 
 
 def visible_lights(stage: Usd.Stage) -> Iterator[Usd.Prim]:
@@ -107,7 +108,8 @@ def read_lights(
     Raises StageError for values over time, and for an image that can't be read.
     """
     lights = list(visible_lights(stage))
-    if not lights or _descriptions(lights) == _built_descriptions():
+    root = specimen_of(stage).root
+    if not lights or _descriptions(lights, root) == _built_descriptions():
         return None
     middle, longest = (low + high) / 2, float((high - low).max())
     lamps: list[StageLamp] = []
@@ -140,12 +142,13 @@ def notes_on_lights(lights: StageLights | None) -> Iterator[str]:
             )
 
 
-def _descriptions(lights: list[Usd.Prim]) -> dict[str, tuple[object, ...]]:
-    """Return what each light says, by path, to be compared with the lights of the build."""
-    return {str(light.GetPath()): _description(light) for light in lights}
+def _descriptions(lights: list[Usd.Prim], root: Sdf.Path) -> dict[str, tuple[object, ...]]:
+    """Return what each light says, by its path below a specimen, to be compared with the build."""
+    paths = [str(light.GetPath().MakeRelativePath(root)) for light in lights]
+    return {path: _description(light, root) for path, light in zip(paths, lights, strict=True)}
 
 
-def _description(light: Usd.Prim) -> tuple[object, ...]:
+def _description(light: Usd.Prim, root: Sdf.Path) -> tuple[object, ...]:
     attributes = [
         attribute
         for attribute in light.GetAuthoredAttributes()
@@ -157,14 +160,15 @@ def _description(light: Usd.Prim) -> tuple[object, ...]:
         if isinstance(value, Sdf.AssetPath):
             value = Path(value.resolvedPath).read_bytes() if value.resolvedPath else value.path
         values.append((attribute.GetName(), value, attribute.GetNumTimeSamples()))
-    world = UsdGeom.XformCache().GetLocalToWorldTransform(light)
-    return light.GetTypeName(), tuple(values), world
+    above = light.GetStage().GetPrimAtPath(root)
+    place, _ = UsdGeom.XformCache().ComputeRelativeTransform(light, above)
+    return light.GetTypeName(), tuple(values), place
 
 
 def _built_descriptions() -> dict[str, tuple[object, ...]]:
     built = Usd.Stage.Open(str(find_asset("usd_assets/lights.usda")))
     lights = [prim for prim in Usd.PrimRange.AllPrims(built.GetPseudoRoot()) if is_light(prim)]
-    return _descriptions(lights)
+    return _descriptions(lights, Specimen().root)
 
 
 def _radiance(light: Usd.Prim) -> NDArray[np.float64]:

@@ -10,8 +10,9 @@ from pxr import Sdf, Usd, UsdGeom
 from stereocell.model.errors import StageError
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, SharedWalls
-from stereocell.usd.layer import CHANNELS, PAINTED_BY
+from stereocell.usd.layer import PAINTED_BY
 from stereocell.usd.primvar_names import OBJECT_ID
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.typed_values import read_as, require_type, text_of
 from stereocell.usd.write_objects import (
     COLUMN,
@@ -48,7 +49,7 @@ def read_columns(stage: Usd.Stage, channel_id: str) -> tuple[list[Column], str] 
 
     Raises StageError for a column that isn't described.
     """
-    prim = stage.GetPrimAtPath(CHANNELS.AppendChild(channel_id))
+    prim = stage.GetPrimAtPath(specimen_of(stage).channels.AppendChild(channel_id))
     ids = read_as(prim.GetAttribute(COLUMNS), _Types.TokenArray)
     if ids is None:
         return None
@@ -93,7 +94,8 @@ def shown_objects(mesh: Usd.Prim) -> NDArray[np.bool_] | None:
     labels = read_as(mesh.GetAttribute(LABELS), _Types.UInt64Array)
     if labels is None:
         return None
-    channel = mesh.GetStage().GetPrimAtPath(CHANNELS.AppendChild(mesh.GetParent().GetName()))
+    stage, name = mesh.GetStage(), mesh.GetParent().GetName()
+    channel = stage.GetPrimAtPath(specimen_of(stage).channels.AppendChild(name))
     hidden = read_as(channel.GetAttribute(HIDDEN), _Types.UInt64Array) if channel else None
     own, gone = (np.array(list(one or ()), np.uint64) for one in (labels, hidden))
     return ~np.isin(own, gone)
@@ -173,9 +175,10 @@ def read_tile_objects(mesh: Usd.Prim, columns: list[Column]) -> TileObjects | No
 
 def painter_of(stage: Usd.Stage, channel_id: str) -> str:
     """Return the ID of the channel whose intensity objects' vertices have; empty: none is there."""
-    path = CHANNELS.AppendChild(channel_id)
+    channels = specimen_of(stage).channels
+    path = channels.AppendChild(channel_id)
     name = text_of(stage.GetPrimAtPath(path).GetAttribute(PAINTED_BY))
-    is_there = Sdf.Path.IsValidIdentifier(name) and stage.GetPrimAtPath(CHANNELS.AppendChild(name))
+    is_there = Sdf.Path.IsValidIdentifier(name) and stage.GetPrimAtPath(channels.AppendChild(name))
     return name if is_there else ""
 
 

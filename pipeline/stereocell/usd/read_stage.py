@@ -16,7 +16,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.world_box import move_box
 from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
-from stereocell.usd.layer import CHANNELS, OPENING_CUT, PATIENT_API, ROOT, SIDES, TILES
+from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES
 from stereocell.usd.layer_units import require_units
 from stereocell.usd.read_attributes import (
     Point,
@@ -25,6 +25,7 @@ from stereocell.usd.read_attributes import (
     select_variant,
 )
 from stereocell.usd.read_variants import TileChoice, read_choice
+from stereocell.usd.specimen import find_specimen, specimen_of
 from stereocell.usd.typed_values import one_line, read_as, text_of
 from stereocell.usd.written_files import AsWritten
 
@@ -47,23 +48,24 @@ def open_stage(path: Path) -> Usd.Stage:
         ) from error
     finally:
         del quiet
+    specimen = find_specimen(stage)
     require_composed(stage)
     require_units(stage)
-    for needed in (ROOT, CHANNELS, TILES):
+    for needed in (specimen.root, specimen.channels, specimen.tiles):
         if not stage.GetPrimAtPath(needed):
             raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
     return stage
 
 
 def specimen_name(stage: Usd.Stage) -> str:
-    """Return the display name of /Specimen; without one, the prim's name."""
-    root = stage.GetPrimAtPath(ROOT)
+    """Return the display name of the specimen; without one, its prim's name."""
+    root = stage.GetPrimAtPath(specimen_of(stage).root)
     return str(root.GetDisplayName() or root.GetName())
 
 
 def modality_of(stage: Usd.Stage) -> str:
     """Return DICOM's code of the modality, `MR` or the like; empty: the stage states none."""
-    return text_of(stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality"))
+    return text_of(stage.GetPrimAtPath(specimen_of(stage).root).GetAttribute("stereocell:modality"))
 
 
 def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
@@ -72,7 +74,7 @@ def sides_of(stage: Usd.Stage) -> dict[str, Point] | None:
     They are turned, and mirrored, as the group of the tiles is. Raises StageError for a side that
     is no direction.
     """
-    group = stage.GetPrimAtPath(TILES)
+    group = stage.GetPrimAtPath(specimen_of(stage).tiles)
     if PATIENT_API not in group.GetAppliedSchemas():
         return None
     turn = to_world(group)[:3, :3]
@@ -93,13 +95,15 @@ def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
 
     Raises StageError for a normal without a direction.
     """
-    root = stage.GetPrimAtPath(ROOT)
+    root = stage.GetPrimAtPath(specimen_of(stage).root)
     if root.GetAttribute(OPENING_CUT).Get() is None:
         return None
     *normal, offset = numbers_of(root, OPENING_CUT, 4)
     length = float(np.linalg.norm(normal))
     if not 0 < length < FARTHEST_UM or not abs(offset) < FARTHEST_UM * length:
-        raise StageError(f"{ROOT}.{OPENING_CUT}: found {normal}, {offset:g}, expected a plane")
+        raise StageError(
+            f"{root.GetPath()}.{OPENING_CUT}: found {normal}, {offset:g}, expected a plane"
+        )
     x, y, z = (float(part) for part in np.round(np.array(normal) / length, _SIDE_DIGITS) + 0.0)
     return (x, y, z), offset / length
 
@@ -107,7 +111,7 @@ def opening_cut_of(stage: Usd.Stage) -> tuple[Point, float] | None:
 def tile_prims(stage: Usd.Stage) -> list[Usd.Prim]:
     """Return the tiles that are active and visible, loaded or not, in the stage's order."""
     kept = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
-    prims = stage.GetPrimAtPath(TILES).GetFilteredChildren(kept)
+    prims = stage.GetPrimAtPath(specimen_of(stage).tiles).GetFilteredChildren(kept)
     return [prim for prim in prims if is_visible(prim)]
 
 
@@ -137,7 +141,7 @@ def loaded(
     Its meshes and volumes are both active, for any selection. Raises StageError where the
     payload can't be composed, or where a layer differs from its list as a damaged one does.
     """
-    path = TILES.AppendChild(tile_id)
+    path = specimen_of(stage).tiles.AppendChild(tile_id)
     with cached(Path(stage.GetRootLayer().realPath).parent / "tiles" / tile_id):
         if as_written is not None:
             for folder in _stage_folders(stage):

@@ -14,11 +14,11 @@ from pxr import Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.usd.drawn_prims import is_visible, to_world
-from stereocell.usd.layer import CAMERAS
 from stereocell.usd.read_attributes import Point, numbers_of
+from stereocell.usd.specimen import specimen_of
 
 _MAX_ROLL_DEG = 1.0  # degrees; a smaller roll is not seen
-_OF_BUILD = frozenset(CAMERAS.AppendChild(name) for name in ("mono", "left", "right"))
+_OF_BUILD = ("mono", "left", "right")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,10 @@ class StageView:
 
 def is_view(prim: Usd.Prim) -> bool:
     """Return whether a prim is a camera other than those of the build."""
-    return bool(prim.IsA(UsdGeom.Camera)) and prim.GetPath() not in _OF_BUILD
+    if not prim.IsA(UsdGeom.Camera):
+        return False
+    is_beside = prim.GetPath().GetParentPath() == specimen_of(prim.GetStage()).cameras
+    return not (is_beside and prim.GetName() in _OF_BUILD)
 
 
 def read_views(

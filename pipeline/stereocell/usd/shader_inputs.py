@@ -65,10 +65,26 @@ def feed_image(stage: Usd.Stage, look: Sdf.Path, kind: Kind, file: str) -> None:
 
 
 def feed_vertices(
-    mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind, values: NDArray[np.float32]
+    mesh: UsdGeom.Mesh,
+    look: Sdf.Path,
+    kind: Kind,
+    values: NDArray[np.float32],
+    indices: NDArray[np.int32] | None = None,
 ) -> None:
-    """Store values at a mesh's vertices, (n,) or (n, 3), float32, and feed them to its surface."""
-    set_primvar(mesh, kind, values)
+    """Store values at a mesh's vertices, (n,) or (n, 3), float32, and feed them to its surface.
+
+    indices  (n,) of each vertex into `values`; None: as many values as vertices
+    """
+    data = np.ascontiguousarray(values, dtype=np.float32)
+    is_color = kind == "color"
+    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        FEEDS[kind].primvar,
+        _Types.Color3fArray if is_color else _Types.FloatArray,
+        UsdGeom.Tokens.vertex,
+    )
+    primvar.Set(Vt.Vec3fArray.FromNumpy(data) if is_color else Vt.FloatArray.FromNumpy(data))
+    if indices is not None:
+        primvar.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(indices, np.int32)))
     feed_primvar(mesh, look, kind)
 
 
@@ -79,18 +95,6 @@ def feed_primvar(mesh: UsdGeom.Mesh, look: Sdf.Path, kind: Kind) -> None:
     reader.CreateIdAttr(feed.reader)
     reader.CreateInput("varname", _Types.String).Set(feed.primvar)
     _connect(stage, look, feed, reader.CreateOutput("result", feed.output_type))
-
-
-def set_primvar(mesh: UsdGeom.Mesh, kind: Kind, values: NDArray[np.float32]) -> None:
-    """Store values at a mesh's vertices: (n,), or (n, 3) for colours."""
-    data = np.ascontiguousarray(values, dtype=np.float32)
-    is_color = kind == "color"
-    primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
-        FEEDS[kind].primvar,
-        _Types.Color3fArray if is_color else _Types.FloatArray,
-        UsdGeom.Tokens.vertex,
-    )
-    primvar.Set(Vt.Vec3fArray.FromNumpy(data) if is_color else Vt.FloatArray.FromNumpy(data))
 
 
 def _connect(stage: Usd.Stage, look: Sdf.Path, feed: _Feed, source: UsdShade.Output) -> None:

@@ -40,10 +40,10 @@ from stereocell.usd.layer import (
     set_attribute,
 )
 from stereocell.usd.numbers2d import write_numbers
+from stereocell.usd.preview_surface import define_surface
 from stereocell.usd.write_objects import write_columns
 
 _STORM = "glslfx"  # Storm's name among the render contexts of materials
-ROUGHNESS = 0.5  # roughness of all surfaces: the default of UsdPreviewSurface
 
 _Types = Sdf.ValueTypeNames
 
@@ -72,7 +72,7 @@ def write_appearances(
         is_fed = bool(appearance.painted_by) or appearance.id in tables
         _author_surface(material, is_fed)
         if appearance.id in tables:
-            write_columns(material.GetPrim(), tables[appearance.id], ROUGHNESS)
+            write_columns(material.GetPrim(), tables[appearance.id])
         _author_functions(material.GetPrim(), appearance)
         if appearance.level is not None:
             write_json(folder / _level_name(appearance), level_to_json(appearance.level))
@@ -145,20 +145,11 @@ def _author_appearance(material: UsdShade.Material, appearance: Appearance) -> N
 
 
 def _author_surface(material: UsdShade.Material, is_fed: bool) -> None:
-    stage, path = material.GetPrim().GetStage(), material.GetPath().AppendChild("surface")
-    surface = UsdShade.Shader.Define(stage, path)
-    surface.CreateIdAttr("UsdPreviewSurface")
-    # else tiles feed it: an opinion here would be stronger than theirs
-    if not is_fed:
-        color = material.GetInput("color").Get()
-        repeated = surface.CreateInput("diffuseColor", _Types.Color3f)
-        repeated.Set(color)
-        repeated.GetAttr().SetCustomDataByKey(BUILT_COLOR, color)
-    surface.CreateInput("metallic", _Types.Float).Set(0.0)
-    surface.CreateInput("roughness", _Types.Float).Set(ROUGHNESS)
-    output = surface.CreateOutput("surface", _Types.Token)
-    material.CreateSurfaceOutput().ConnectToSource(output)
-    if not is_fed:
+    # where tiles feed the colour, an opinion here would be stronger than theirs
+    color = None if is_fed else material.GetInput("color").Get()
+    surface = define_surface(material, color)
+    if color is not None:
+        surface.GetInput("diffuseColor").GetAttr().SetCustomDataByKey(BUILT_COLOR, color)
         _author_live_surface(material, surface)
 
 

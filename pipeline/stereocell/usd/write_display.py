@@ -2,54 +2,66 @@
 
 A specimen of 67 um lies in true size below the clipping plane of most cameras. display.usda is in
 metres; it references stage.usda and carries the display scale as a transform, so that the stage
-itself stays in true size. Its cameras are its own: USD scales the place of a camera below a
-transform, but not its clipping range.
+itself stays in true size. Its root has the specimen's name, since it is the one that scenes
+reference; edits address /Specimen of stage.usda, whose name is the same for all specimens, so a
+layer fits the next build and another specimen. Its cameras are its own: USD scales the place of a
+camera below a transform, but not its clipping range.
 """
 
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom
+from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom
 
 from stereocell.model.physical_size import describe_size
 from stereocell.usd.cameras import define_cameras
-from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, ROOT, UP_AXIS, export
+from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.written_files import STAGE_NAME
 
 DISPLAY_NAME = "display.usda"
-DISPLAY = Sdf.Path("/Display")
 
 
 def write_display(
-    stage_dir: Path, low: NDArray[np.float64], high: NDArray[np.float64], scale: float
+    stage_dir: Path,
+    name: str,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    scale: float,
 ) -> None:
     """Write display.usda beside stage.usda.
 
+    name       the specimen's; the root prim has it, as far as a prim's name can
     low, high  corners of the specimen (x, y, z), world um
     scale      lengths there for a length of the specimen
 
     Raises OutputError where it can't be written.
     """
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    layer.defaultPrim = DISPLAY.name
+    display = Sdf.Path.absoluteRootPath.AppendChild(Tf.MakeValidIdentifier(name))
+    layer.defaultPrim = display.name
     size = describe_size(high - low)
     layer.documentation = (
         f"The stage in metres, {scale:g} times the specimen, whose size is {size}. "
         "To edit the specimen, put a layer over stage.usda; this one follows."
     )
+    factor = scale * METERS_PER_UNIT
     stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UP_AXIS)
-    root = UsdGeom.Xform.Define(stage, DISPLAY).GetPrim()
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
-    specimen = UsdGeom.Xform.Define(stage, DISPLAY.AppendChild(ROOT.name))
-    factor = scale * METERS_PER_UNIT
+    root = UsdGeom.Xform.Define(stage, display).GetPrim()
+    root.SetDisplayName(name)
+    model = Usd.ModelAPI(root)
+    model.SetKind(Kind.Tokens.assembly)
+    model.SetAssetName(name)
+    model.SetAssetIdentifier(Sdf.AssetPath(f"./{DISPLAY_NAME}"))
+    UsdGeom.ModelAPI.Apply(root).SetExtentsHint(vec3f([low * factor, high * factor]))
+    specimen = UsdGeom.Xform.Define(stage, display.AppendChild(ROOT.name))
     specimen.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display").Set(Gf.Vec3d(factor))
     hidden = Sdf.CreatePrimInLayer(layer, specimen.GetPath().AppendChild(CAMERAS.name))
     hidden.active = False
     define_cameras(
-        stage, low * factor, high * factor, group=DISPLAY.AppendChild(CAMERAS.name), unit_m=1.0
+        stage, low * factor, high * factor, group=display.AppendChild(CAMERAS.name), unit_m=1.0
     )
     del stage  # the reference only resolves beside the file
     reference = layer.GetPrimAtPath(specimen.GetPath()).referenceList

@@ -11,13 +11,14 @@ which holds no other one: the classes' materials are below CLASSES.
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from stereocell.model.identifiers import to_identifier
 from stereocell.model.mesh import Mesh
 from stereocell.model.object_table import Column, ObjectTable, SharedWalls
 from stereocell.objects.table import color_objects
 from stereocell.usd.layer import CLASSES, set_attribute
+from stereocell.usd.preview_surface import define_surface
 from stereocell.usd.primvar_names import OBJECT_ID, PAINT
 
 LABELS = "stereocell:objectLabels"  # on a tile's mesh: the numbers in the label map
@@ -44,7 +45,7 @@ def classes_of(table: ObjectTable) -> Column | None:
     return column if column is not None and 0 < len(column.categories) <= MAX_CLASSES else None
 
 
-def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:
+def write_columns(prim: Usd.Prim, table: ObjectTable) -> None:
     """Write what the columns of a channel's objects mean, and the materials of its classes."""
     ids = Vt.TokenArray([column.id for column in table.columns])
     set_attribute(prim, COLUMNS, _Types.TokenArray, ids, custom=True)
@@ -69,13 +70,7 @@ def write_columns(prim: Usd.Prim, table: ObjectTable, roughness: float) -> None:
         path = CLASSES.AppendChild(prim.GetName()).AppendChild(class_name(classes, code))
         material = UsdShade.Material.Define(prim.GetStage(), path)
         material.GetPrim().SetDisplayName(classes.categories[code])
-        surface = UsdShade.Shader.Define(prim.GetStage(), path.AppendChild("surface"))
-        surface.CreateIdAttr("UsdPreviewSurface")
-        surface.CreateInput("diffuseColor", _Types.Color3f).Set(Gf.Vec3f(*color))
-        surface.CreateInput("metallic", _Types.Float).Set(0.0)
-        surface.CreateInput("roughness", _Types.Float).Set(roughness)
-        output = surface.CreateOutput("surface", _Types.Token)
-        material.CreateSurfaceOutput().ConnectToSource(output)
+        define_surface(material, color)
 
 
 def define_objects(
@@ -107,6 +102,7 @@ def define_objects(
         material = UsdShade.Material.Define(prim.GetStage(), path)
         source = CLASSES.AppendChild(channel_id).AppendChild(name)
         material.GetPrim().GetInherits().AddInherit(source)
+        define_surface(material, classes.colors[code])
 
 
 def write_objects(
@@ -114,8 +110,12 @@ def write_objects(
     look: Sdf.Path,
     made: Mesh,
     table: ObjectTable,
+    kept: NDArray[np.int64],
 ) -> None:
-    """Write one level's objects: primvars, colours and classes."""
+    """Write one level's objects: primvars, colours and classes.
+
+    kept  the vertices of `made` that are points of `mesh`
+    """
     assert made.objects is not None
     of_face = made.objects[made.triangles[:, 0]].astype(np.int32)
     count = len(table.labels)
@@ -135,7 +135,7 @@ def write_objects(
     _write(primvars, "displayColor", _Types.Color3fArray, shown, indices)
     if made.paint is not None:
         paint = primvars.CreatePrimvar(PAINT, _Types.FloatArray, UsdGeom.Tokens.vertex)
-        paint.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(made.paint, np.float32)))
+        paint.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(made.paint[kept], np.float32)))
     classes = classes_of(table)
     if classes is not None:
         _write_classes(mesh, look, classes, of_face)

@@ -1,18 +1,26 @@
-"""Write the stage of a specimen: stage.usda, which only composes, and its looks.
+"""Write the stage of a specimen: stage.usda, which only names it, its contents and its looks.
 
-stage.usda                    /Specimen: tiles by payload, cameras; sublayers the two looks/ layers
+stage.usda                    /Specimen, a reference to contents.usda
+contents.usda                 tiles by payload, cameras; sublayers the two looks/ layers
 looks/channels.usda           /Specimen/Channels, see usd/write_appearances.py
 looks/lights.usda             a copy of usd_assets/lights.usda, and beside it the image of its dome
 tiles/<tile>/tile.usdc        see usd/write_tile.py
 
 specimen.usdz                 see usd/write_usdz.py
 display.usda                  the stage, larger: see usd/write_display.py
+nvindex.usda                  the stage for NVIDIA IndeX: see usd/write_nvindex.py
 
-Of the content of tiles and looks, stage.usda states only the selected variants of the tiles. So
-they can be read and changed in the one layer that a person reads, and are known while a tile is
-unloaded. An artist's layer over the stage is stronger than all of these.
+USD's order of strength puts a layer's own opinions before inherits, these before variants, and
+variants before references. All that a build states comes by a reference, so it is weaker than
+whatever is layered over the stage: a class that a channel inherits, or a variant set on /Specimen
+or a prim above. /Specimen inherits /__class__/Specimen, which is empty: opinions about that class
+in a scene reach each specimen that the scene references.
+
+Of the content of tiles, contents.usda states only the selected variants: they are known while a
+tile is unloaded.
 """
 
+import hashlib
 import json
 import shutil
 from collections.abc import Mapping, Sequence
@@ -35,6 +43,7 @@ from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.workspace import cached
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import (
+    BROADCAST,
     DISPLAY_SCALE,
     LAYER_SUFFIXES,
     OPENING_CUT,
@@ -52,15 +61,19 @@ from stereocell.usd.layer import (
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 from stereocell.usd.write_appearances import write_appearances
 from stereocell.usd.write_display import DISPLAY_NAME, write_display
+from stereocell.usd.write_nvindex import write_nvindex
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
-from stereocell.usd.written_files import STAGE_NAME
+from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME
 
 __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
-# The sublayers of stage.usda, the strongest first
+# The sublayers of contents.usda, the strongest first
 SUBLAYERS = ("./looks/channels.usda", "./looks/lights.usda")
-_NOTE = """Composition only: see looks/ for colours and transfer functions, tiles/ for the data.
-Edit in a layer of your own that has this one as a sublayer; a new build writes these files anew."""
+_NOTE = """Edit in a layer of your own that has this one as a sublayer; a new build writes these
+files anew. All content comes from contents.usda by a reference, so any opinion in your layers is
+stronger, in classes and variants too."""
+_CONTENTS_NOTE = """Tiles and cameras; see looks/ for colours and transfer functions, tiles/ for
+data. Edit in a layer over stage.usda: one over this layer is not known to `stereocell bundle`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,15 +110,15 @@ def write_stage(
     opens_cut: bool = False,
     tables: Mapping[str, ObjectTable] | None = None,
 ) -> str:
-    """Write stage.usda, display.usda and looks/ over tiles that `write_tile` has written.
+    """Write the stage over tiles that `write_tile` has written.
 
     Returns a line about the specimen's physical size.
 
-    A tile that is written later has its default variants, and no selection in stage.usda.
+    A tile that is written later has its default variants, and no selection in contents.usda.
 
     name        the specimen's; becomes the display name of /Specimen
-    provenance  settings and versions; stored in the layer's customLayerData: numbers, texts and
-                dictionaries as they are, other values as JSON text
+    provenance  settings and versions; stored in the customLayerData of stage.usda: numbers, texts
+                and dictionaries as they are, other values as JSON text
     modality    DICOM's code of the modality (`MR`, `CT`, ...), on /Specimen; empty: not known
     placement   rows of a (4, 4) matrix for columns, um: a transform on /Specimen/Tiles; the
                 identity is not written
@@ -127,6 +140,7 @@ def write_stage(
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     root.SetDisplayName(name)
     root.AddAppliedSchema(SPECIMEN_API)
+    UsdGeom.ModelAPI.Apply(root)
     set_attribute(root, "stereocell:modality", Sdf.ValueTypeNames.Token, modality)
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
     group = UsdGeom.Xform.Define(stage, TILES)
@@ -155,18 +169,48 @@ def write_stage(
         _state_cut(root, moved)
     low, high = moved[:, 0].min(axis=0), moved[:, 1].max(axis=0)
     define_cameras(stage, low, high)
+    UsdGeom.ModelAPI(root).SetExtentsHint(vec3f([low, high]))
+    size = describe_size(high - low)
+    root.SetDocumentation(
+        f"{name}: {size} in true size, a unit is 1 um. Channels has the look of each channel, "
+        "Shown which of them show, Tiles the surfaces and volumes."
+    )
     scale = display_scale(float((high - low).max()))
     set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
-    write_display(stage_dir, low, high, scale)
+    write_display(stage_dir, name, low, high, scale)
+    with_volumes = [one for one in appearances if one.id not in (tables or {})]
+    write_nvindex(stage_dir, with_volumes, [tile.id for tile in tiles])
 
     layer = stage.GetRootLayer()
-    layer.documentation = _NOTE
-    layer.customLayerData = {"stereocell": {k: _plain(v) for k, v in provenance.items()}}
+    layer.documentation = _CONTENTS_NOTE
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = list(SUBLAYERS)
-    export(layer, stage_dir / STAGE_NAME)
-    size = describe_size(high - low)
+    export(layer, stage_dir / CONTENTS_NAME)
+    _write_interface(stage_dir, name, provenance)
     return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
+
+
+def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> None:
+    """Write stage.usda: the specimen's root, which has all its content by a reference."""
+    plain = {key: _plain(value) for key, value in provenance.items()}
+    stage = new_stage(".usda", ROOT.name)
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    for path, kind in ((BROADCAST.GetParentPath(), "Scope"), (BROADCAST, "Xform")):
+        stage.DefinePrim(path, kind).SetSpecifier(Sdf.SpecifierClass)
+    root.GetInherits().AddInherit(BROADCAST)
+    model = Usd.ModelAPI(root)
+    model.SetAssetName(name)
+    model.SetAssetIdentifier(Sdf.AssetPath(f"./{STAGE_NAME}"))
+    # The version follows from all that the build depends on.
+    text = json.dumps(plain, sort_keys=True)
+    model.SetAssetVersion(hashlib.sha256(text.encode()).hexdigest()[:12])
+    layer = stage.GetRootLayer()
+    layer.documentation = _NOTE
+    layer.customLayerData = {"stereocell": plain}
+    del stage  # the reference only resolves beside the file
+    reference = layer.GetPrimAtPath(ROOT).referenceList
+    reference.prependedItems.append(Sdf.Reference(f"./{CONTENTS_NAME}"))
+    export(layer, stage_dir / STAGE_NAME)
 
 
 def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:

@@ -1,11 +1,13 @@
 """Write one tile of a stage: tile.usdc, and beside it its volumes and baked maps.
 
-A tile names no look but its channel's: its materials inherit the prim /Specimen/Channels/<channel>,
-which lies outside this file. USD resolves such an inherit in the stage that holds the payload. So
-that one prim sets the look of all tiles, and an opinion about it in any layer over the stage
-reaches them all. Baked maps belong to the tile: normals, occlusion and sampled channel of each
-level feed the shader inside the level's variant. The channel's opinion would be the stronger one,
-so a channel with a sampled channel has no opinion about diffuseColor.
+A tile's materials inherit the prim /Specimen/Channels/<channel>, which lies outside this file. USD
+resolves such an inherit in the stage that holds the payload. So that one prim sets the look of all
+tiles, and an opinion about it in any layer over the stage reaches them all. What the tile itself
+states about the colour is weaker: it shows where the tile is opened by itself.
+
+Baked maps belong to the tile: normals, occlusion and sampled channel of each level feed the shader
+inside the level's variant. The channel's opinion would be the stronger one, so a channel with a
+sampled channel has no opinion about diffuseColor.
 
 In the same way a channel's surface and volume inherit the visibility of /Specimen/Shown/<channel>.
 
@@ -27,10 +29,11 @@ from pxr import Kind as Kinds
 from stereocell.formats.exr import write_atlas
 from stereocell.formats.vdb import GRID_NAME, MEASURED_NAME, write_vdb
 from stereocell.formats.vdb_read import read_vdb_head
+from stereocell.meshes.weld import weld_seams
 from stereocell.model.color import to_srgb8
 from stereocell.model.errors import StageError
 from stereocell.model.identifiers import from_identifier
-from stereocell.model.mesh import Lod
+from stereocell.model.mesh import Lod, Mesh
 from stereocell.model.tile_content import APRON, ChannelContent, TileContent
 from stereocell.model.world_box import world_box
 from stereocell.storage.atomic_write import replacing_folder
@@ -50,11 +53,14 @@ from stereocell.usd.layer import (
     vec3d,
     vec3f,
 )
+from stereocell.usd.preview_surface import define_surface, repeat_color
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_primvar, feed_vertices
 from stereocell.usd.write_objects import define_objects, write_objects
 
 DEFAULT_LOD = 1  # level of detail that a stage selects
 LAYER_NAME = "tile.usdc"
+
+_STEPS = np.arange(256, dtype=np.uint8)  # what baked values at vertices may be
 
 _Types = Sdf.ValueTypeNames
 
@@ -176,6 +182,7 @@ def _define_look(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
     stage, path = branch.GetPrim().GetStage(), branch.GetPath()
     look = UsdShade.Material.Define(stage, path.AppendChild(_leaf(tile, channel, "_look")))
     look.GetPrim().GetInherits().AddInherit(CHANNELS.AppendChild(channel.channel_id))
+    define_surface(look, channel.color)
 
 
 def _bind(gprim: UsdGeom.Gprim, branch: UsdGeom.Xform, look: str) -> None:
@@ -259,12 +266,13 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     lod = channel.lods[level]
     branch = root.GetPath().AppendChild(channel.channel_id)
     mesh = UsdGeom.Mesh.Get(root.GetStage(), branch.AppendChild(_leaf(tile, channel)))
-    points = vec3f(lod.mesh.positions)
-    triangles = lod.mesh.triangles.astype(np.int32)
+    kept, welded = weld_seams(lod.mesh)
+    points = vec3f(lod.mesh.positions[kept])
+    triangles = welded[lod.mesh.triangles].astype(np.int32)
     mesh.CreatePointsAttr(points)
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel()))
-    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals))
+    mesh.CreateNormalsAttr(vec3f(lod.mesh.normals[kept]))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     if len(points):
         mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
@@ -273,18 +281,28 @@ def _author_lod(root: Usd.Prim, tile: TileContent, channel: ChannelContent, leve
     if lod.quality is not None:
         set_attribute(mesh.GetPrim(), DISTANCE_SAMPLES, _Types.Int, lod.quality.samples)
     set_attribute(mesh.GetPrim(), SHAPE_HASH, _Types.String, hash_shape(mesh))
-    primvars = UsdGeom.PrimvarsAPI(mesh)
-    vertex = UsdGeom.Tokens.vertex
-    if lod.mesh.uvs is not None:
-        st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, vertex)
-        st.Set(Vt.Vec2fArray.FromNumpy(_float32(lod.mesh.uvs)))
-    if lod.mesh.tangents is not None:
-        tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, vertex)
-        tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(lod.mesh.tangents)))
+    _author_uvs(mesh, lod.mesh)
     look = branch.AppendChild(_leaf(tile, channel, "_look"))
     if channel.objects is not None:
-        write_objects(mesh, look, lod.mesh, channel.objects)
+        write_objects(mesh, look, lod.mesh, channel.objects, kept)
     _author_maps(mesh, look, channel, level)
+
+
+def _author_uvs(mesh: UsdGeom.Mesh, made: Mesh) -> None:
+    """Write UVs and tangents by face corner: charts end at seams, and points must not.
+
+    Both have a value for each vertex of the split mesh, and indices by corner.
+    """
+    primvars, corner = UsdGeom.PrimvarsAPI(mesh), UsdGeom.Tokens.faceVarying
+    indices = Vt.IntArray.FromNumpy(made.triangles.astype(np.int32).ravel())
+    if made.uvs is not None:
+        st = primvars.CreatePrimvar("st", _Types.TexCoord2fArray, corner)
+        st.Set(Vt.Vec2fArray.FromNumpy(_float32(made.uvs)))
+        st.SetIndices(indices)
+    if made.tangents is not None:
+        tangents = primvars.CreatePrimvar("tangents", _Types.Float4Array, corner)
+        tangents.Set(Vt.Vec4fArray.FromNumpy(_float32(made.tangents)))
+        tangents.SetIndices(indices)
 
 
 def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, level: int) -> None:
@@ -296,12 +314,17 @@ def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, le
     if has_maps:
         feed_image(stage, look, "normal", f"./{_map_name(channel, level, 'normal')}")
     baked = lod.baked
+    is_painted = baked is not None and baked.paint is not None and channel.paint is not None
+    if channel.color is not None and channel.objects is None and not is_painted:
+        repeat_color(mesh, channel.color)
     if baked is None:
         return
     if has_maps:
         feed_image(stage, look, "occlusion", f"./{_map_name(channel, level, 'occlusion')}")
     else:
-        feed_vertices(mesh, look, "occlusion", np.divide(baked.openness, 255, dtype=np.float32))
+        _feed_steps(
+            mesh, look, "occlusion", np.divide(_STEPS, 255, dtype=np.float32), baked.openness
+        )
     if baked.paint is None or channel.paint is None:
         return
     if has_maps:
@@ -310,7 +333,22 @@ def _author_maps(mesh: UsdGeom.Mesh, look: Sdf.Path, channel: ChannelContent, le
         average = channel.paint.mix(baked.paint).reshape(-1, 3).mean(axis=0)
         UsdGeom.Gprim(mesh).CreateDisplayColorAttr([Gf.Vec3f(*map(float, average))])
     else:
-        feed_vertices(mesh, look, "color", channel.paint.mix(baked.paint))
+        _feed_steps(mesh, look, "color", channel.paint.mix(_STEPS), baked.paint)
+
+
+def _feed_steps(
+    mesh: UsdGeom.Mesh,
+    look: Sdf.Path,
+    kind: Kind,
+    table: NDArray[np.float32],
+    at_vertices: NDArray[np.uint8],
+) -> None:
+    """Feed baked bytes at vertices to a surface, by a table of the values that occur.
+
+    table  (256,) or (256, 3), the value of each byte
+    """
+    used, indices = np.unique(at_vertices, return_inverse=True)
+    feed_vertices(mesh, look, kind, table[used], indices.reshape(-1).astype(np.int32))
 
 
 def _author_representations(root: Usd.Prim, tile: TileContent) -> None:

@@ -30,13 +30,14 @@ from pxr import Kind as Kinds
 from stereocell.formats.gltf import Material
 from stereocell.model.mesh import Mesh
 from stereocell.storage.atomic_write import replacing
-from stereocell.usd.layer import CHANNELS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
+from stereocell.usd.layer import METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
 from stereocell.usd.read_additions import Addition, read_additions
 from stereocell.usd.read_appearances import shows_at_first
 from stereocell.usd.read_levels import ComposedLod, count_faces, mesh_at, read_lods
 from stereocell.usd.read_stage import hinted_box, loaded, open_stage, specimen_name, tile_prims
 from stereocell.usd.read_variants import lod_levels
 from stereocell.usd.shader_inputs import Kind, feed_image, feed_vertices
+from stereocell.usd.specimen import specimen_of
 from stereocell.usd.usdz_lights import copy_lights
 from stereocell.usd.written_files import AsWritten
 
@@ -83,12 +84,7 @@ def write_usdz(
     as_written = as_written or AsWritten({stage_path.parent: {}})
     stage = open_stage(stage_path)
     prims = [prim for prim in tile_prims(stage) if not tiles or prim.GetName() in tiles]
-    found: list[_Part] = []
-    shown = level
-    for some in [channels] if channels else _choices(stage):
-        shown = _choose_level(stage, some, as_written) if level is None else level
-        if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
-            break
+    found, shown = find_parts(stage, prims, as_written, level=level, channels=channels)
     if shown is None or not found:
         path.unlink(missing_ok=True)
         return None
@@ -112,9 +108,27 @@ def write_usdz(
     return shown
 
 
+def find_parts(
+    stage: Usd.Stage,
+    prims: list[Usd.Prim],
+    as_written: AsWritten,
+    *,
+    level: int | None = None,
+    channels: Collection[str] = (),
+) -> tuple[list[_Part], int | None]:
+    """Return the meshes of some tiles, `prims`, and their level of detail; see `write_usdz`."""
+    found: list[_Part] = []
+    shown = level
+    for some in [channels] if channels else _choices(stage):
+        shown = _choose_level(stage, some, as_written) if level is None else level
+        if shown is not None and (found := list(_read_parts(stage, prims, some, shown))):
+            break
+    return found, shown
+
+
 def _choices(stage: Usd.Stage) -> list[list[str]]:
     """Return the IDs of the channels to show: the first choice of which any is drawn."""
-    every = stage.GetPrimAtPath(CHANNELS).GetChildren()
+    every = stage.GetPrimAtPath(specimen_of(stage).channels).GetChildren()
     names = [str(prim.GetName()) for prim in every]
     shown = [name for name, prim in zip(names, every, strict=True) if shows_at_first(prim)]
     return [shown, names] if shown else [names]

@@ -28,7 +28,8 @@ from stereocell.storage.file_list import (
 from stereocell.storage.workspace import cached, fetch, is_file
 from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 
-FILES, STAGE_NAME = "files.json", "stage.usda"
+FILES, STAGE_NAME, CONTENTS_NAME = "files.json", "stage.usda", "contents.usda"
+NVINDEX_NAME = "nvindex.usda"
 CHANGED = "changed since it was written: edited in place, or damaged"
 DOUBTFUL = "changed since it was written, not in size: damaged, or edited in place"
 REMEDY = "run `stereocell stage OUT`"

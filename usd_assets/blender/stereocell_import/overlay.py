@@ -433,8 +433,18 @@ def _write_shape(layer, place, mesh, points):
         name = "normals" if primvar is None else "primvars:normals"
         set_value(layer, place, name, kind.Normal3fArray, Vt.Vec3fArray.FromNumpy(turned))
     tangents = np.array(prim.GetAttribute("primvars:tangents").Get() or [], np.float32)
-    if tangents.shape == (len(points), 4):
-        turned = turn_with(tangents[:, :3], before, points, triangles, groups)
+    corners = np.array(prim.GetAttribute("primvars:tangents:indices").Get() or [], np.int64)
+    if tangents.ndim == 2 and len(corners) == len(indices):
+        # Each value belongs to one point; a point on a seam of UVs has several.
+        point_of = np.zeros(len(tangents), np.int64)
+        point_of[corners] = indices
+        around = cut_fans(counts, corners)
+    else:
+        point_of, around = np.arange(len(points)), triangles
+    if tangents.shape == (len(point_of), 4):
+        turned = turn_with(
+            tangents[:, :3], before[point_of], points[point_of], around, groups[point_of]
+        )
         turned = np.ascontiguousarray(np.concatenate([turned, tangents[:, 3:]], axis=1))
         array = Vt.Vec4fArray.FromNumpy(turned)
         set_value(layer, place, "primvars:tangents", kind.Float4Array, array)

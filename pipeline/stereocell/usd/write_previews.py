@@ -1,0 +1,107 @@
+"""Draw a specimen for browsers of assets, and cards that stand for it in heavy scenes.
+
+previews/thumbnail.png   named by the root's AssetPreviewsAPI
+previews/card_xpos.png   and the other five sides: the cards of UsdGeomModelAPI
+
+Both show the surfaces that `specimen.usdz` has. A scene that sets the root's `model:drawMode` to
+`cards` sees a box with the six pictures in place of the specimen. The pictures have the bytes that
+the surfaces give, on every machine.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pxr import Sdf, Usd, UsdGeom, UsdMedia
+
+from stereocell.model.color import linear_color
+from stereocell.storage.atomic_write import replacing_folder
+from stereocell.textures.draw_meshes import Box, Shape, draw_pixels, draw_side
+from stereocell.usd.layer import ROOT, export
+from stereocell.usd.read_levels import ComposedLod
+from stereocell.usd.read_stage import hinted_box, open_stage, tile_prims
+from stereocell.usd.write_usdz import find_parts
+from stereocell.usd.written_files import STAGE_NAME, AsWritten
+
+PREVIEWS = "previews"  # the folder beside stage.usda
+_THUMBNAIL = "thumbnail.png"
+_THUMBNAIL_WIDTH = 512  # pixels
+_CARD_EDGE = 512  # pixels, the longer edge of a card
+# Each side of the box: directions to the right, up and to the eye of an upright picture, and the
+# quarter turns against the clock that it takes to lie on the card as USD maps it
+_SIDES = {
+    "XPos": ((0, 0, -1), (0, 1, 0), (1, 0, 0), 3),
+    "XNeg": ((0, 0, 1), (0, 1, 0), (-1, 0, 0), 1),
+    "YPos": ((-1, 0, 0), (0, 0, 1), (0, 1, 0), 0),
+    "YNeg": ((1, 0, 0), (0, 0, 1), (0, -1, 0), 0),
+    "ZPos": ((1, 0, 0), (0, 1, 0), (0, 0, 1), 0),
+    "ZNeg": ((-1, 0, 0), (0, 1, 0), (0, 0, -1), 2),
+}
+
+
+def write_previews(stage_dir: Path, as_written: AsWritten) -> bool:
+    """Draw the previews of a stage and name them in stage.usda; return whether there are any.
+
+    A specimen without surfaces has none. Raises OutputError where a file can't be written.
+    """
+    path = stage_dir / STAGE_NAME
+    stage = open_stage(path)
+    tiles = tile_prims(stage)
+    found, _ = find_parts(stage, tiles, as_written)
+    boxes = np.array([hinted_box(prim) for prim in tiles])
+    box = tuple(boxes[:, 0].min(axis=0).tolist()), tuple(boxes[:, 1].max(axis=0).tolist())
+    with replacing_folder(stage_dir / PREVIEWS) as folder:
+        if found:
+            _draw(folder, [_shape_of(part.lod) for part in found], box)
+    if found:
+        _name_previews(stage, path)
+    return bool(found)
+
+
+def _draw(folder: Path, shapes: list[Shape], box: Box) -> None:
+    low = np.min([shape.positions.min(axis=0) for shape in shapes], axis=0)
+    high = np.max([shape.positions.max(axis=0) for shape in shapes], axis=0)
+    frame = tuple(low.tolist()), tuple(high.tolist())
+    size = (_THUMBNAIL_WIDTH, _THUMBNAIL_WIDTH)
+    _save(draw_pixels(shapes, frame, size), folder / _THUMBNAIL)
+    for side, (right, up, to_eye, turns) in _SIDES.items():
+        upright = draw_side(shapes, box, np.array([right, up, to_eye], np.float64).T, _CARD_EDGE)
+        _save(np.ascontiguousarray(np.rot90(upright, turns)), folder / _card_name(side))
+
+
+def _save(pixels: NDArray[np.uint8], file: Path) -> None:
+    Image.fromarray(pixels).save(file, format="PNG")
+
+
+def _card_name(side: str) -> str:
+    return f"card_{side.lower()}.png"
+
+
+def _shape_of(lod: ComposedLod) -> Shape:
+    mesh = lod.mesh
+    color: NDArray[np.float64] = np.array(lod.material.color)
+    if mesh.colors is not None:
+        color = mesh.colors.astype(np.float64)
+    elif lod.maps.color is not None and mesh.uvs is not None:
+        with Image.open(lod.maps.color) as image:
+            texels = np.asarray(image.convert("RGB"))
+        height, width = texels.shape[:2]
+        column = np.clip(np.rint(mesh.uvs[:, 0] * width - 0.5), 0, width - 1).astype(int)
+        row = np.clip(np.rint((1 - mesh.uvs[:, 1]) * height - 0.5), 0, height - 1).astype(int)
+        steps = np.array([linear_color((byte, 0, 0))[0] for byte in range(256)])
+        color = steps[texels[row, column]]
+    return Shape(mesh.positions, mesh.triangles, mesh.normals, color)
+
+
+def _name_previews(stage: Usd.Stage, path: Path) -> None:
+    root = stage.GetPrimAtPath(ROOT)
+    thumbnail = UsdMedia.AssetPreviewsAPI.Thumbnails(Sdf.AssetPath(f"./{PREVIEWS}/{_THUMBNAIL}"))
+    UsdMedia.AssetPreviewsAPI.Apply(root).SetDefaultThumbnails(thumbnail)
+    model = UsdGeom.ModelAPI.Apply(root)
+    model.CreateModelCardGeometryAttr(UsdGeom.Tokens.box)
+    model.CreateModelApplyDrawModeAttr(True)
+    for side in _SIDES:
+        attribute = getattr(model, f"CreateModelCardTexture{side}Attr")()
+        attribute.Set(Sdf.AssetPath(f"./{PREVIEWS}/{_card_name(side)}"))
+    export(stage.GetRootLayer(), path)
