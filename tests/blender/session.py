@@ -29,6 +29,7 @@ import bmesh  # noqa: E402  (bpy brings it)
 import mathutils  # noqa: E402  (bpy brings it)
 import stereocell_import  # noqa: E402
 from mathutils import Matrix  # noqa: E402
+from pxr import UsdUtils  # noqa: E402
 from stereocell_import.importing import COLOR, PRIM, VOLUME  # noqa: E402
 from stereocell_import.looks import color_of, points_of  # noqa: E402
 
@@ -482,6 +483,26 @@ def step_plain_import(arguments):
         "lights": {light.name: light.type for light in bpy.data.lights},
         "sky": [bpy.path.abspath(image.filepath) for image in images],
     }
+
+
+def step_usdchecker(arguments):
+    """Return what `usdchecker` finds in files, in all variants: errors, warnings, failed checks."""
+    found = {}
+    for name in arguments["files"]:
+        checker = UsdUtils.ComplianceChecker(
+            arkit=False,
+            skipARKitRootLayerCheck=False,
+            rootPackageOnly=False,
+            skipVariants=False,
+            verbose=False,
+        )
+        checker.CheckCompliance(str(Path(arguments["stage_dir"]) / name))
+        found[name] = [
+            *checker.GetErrors(),
+            *checker.GetWarnings(),
+            *checker.GetFailedChecks(),
+        ]
+    return found
 
 
 def faces_at_edges(data):

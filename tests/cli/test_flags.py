@@ -36,6 +36,7 @@ TYPED: dict[str, tuple[list[str], str, str, Any]] = {
     "--iso-value": (["a=b=400"], "iso_values", "a=b", 400.0),
     "--window": (["CT=-160:240"], "windows", "CT", "-160:240"),
     "--bits": (["8"], "volume", "bits", 8),
+    "--without-vdb": ([], "volume", "without_vdb", True),
     "--surfaces": (["CT=outer,300"], "surfaces", "CT", "outer,300"),
     "--iso-scope": (["tile"], "isovalue", "scope", "tile"),
     "--paint": (["CD31=MART1"], "paint", "CD31", "MART1"),

@@ -57,6 +57,7 @@ from stereocell.storage.json_files import write_sealed
 from stereocell.storage.overwriting import is_forced
 from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.usd.write_usdz import USDZ_NAME
+from stereocell.usd.written_files import describe_parts, read_stage_list
 
 
 def make_plan(
@@ -210,6 +211,7 @@ def run_stage(out: Path, engine: Engine) -> None:
                 "windows; --bits 8 leaves them out"
             )
         stage.write_list(stage_dir, files)
+        phase.print(describe_parts(read_stage_list(stage_dir)))
 
 
 def run_bundle(

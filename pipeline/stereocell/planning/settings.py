@@ -210,6 +210,16 @@ class VolumeOptions:
         ),
         bounds=COUNT_OR_NONE,
     )
+    without_vdb: bool = setting(
+        False,
+        "the stage has no .vdb files: other programs draw no volumes, and another window is "
+        "applied to the voxels of 8 bits",
+        flag=Flag(
+            "--without-vdb",
+            "a small stage without .vdb files: bundle and viewer keep their volumes, other "
+            "programs draw surfaces alone; implies --bits 8",
+        ),
+    )
 
     def __post_init__(self) -> None:
         if self.bits not in (EIGHT_BITS, 16):

@@ -55,7 +55,14 @@ def stage_tile_step(
         TableOfTile(id_, table.of_tile(tile.id), table.touching(tile.id))
         for id_, table in tables.items()
     )
-    return WriteStageTile(content, tuple(parts), plan.shared_volumes, own, stage_dir=stage_dir)
+    return WriteStageTile(
+        content,
+        tuple(parts),
+        plan.shared_volumes,
+        own,
+        not plan.settings.volume.without_vdb,
+        stage_dir=stage_dir,
+    )
 
 
 def stage_step(

@@ -5,6 +5,7 @@ from itertools import product
 from stereocell.meshes.alpha_wrap import find_wrapper
 from stereocell.model.errors import UsageError
 from stereocell.model.lattice import Lattice
+from stereocell.model.settings import EIGHT_BITS
 from stereocell.model.tiling import Tile
 from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
@@ -76,7 +77,7 @@ def unit_options(settings: Settings) -> UnitOptions:
     return UnitOptions(
         float(surface.smoothing_um),
         surface.closed_tiles,
-        settings.volume.bits,
+        EIGHT_BITS if settings.volume.without_vdb else settings.volume.bits,
         settings.lod,
         settings.unwrap,
         find_wrapper() if surface.wrap == "alpha-wrap" else "",

@@ -76,6 +76,7 @@ class WriteStageTile(Step[StageTile]):
     """Write one tile of the stage. The result is a record of its files, beside the units.
 
     content    the tile without its channels
+    has_vdb    whether the volumes are written for other programs, too
     shared     IDs of the channels whose volume is another channel's: they have surfaces alone
     stage_dir  the folder with the tile's files, where an artist may edit them
     """
@@ -89,6 +90,7 @@ class WriteStageTile(Step[StageTile]):
     units: tuple[UnitPart, ...]
     shared: frozenset[str] = frozenset()
     tables: tuple[TableOfTile, ...] = ()
+    has_vdb: bool = True
     stage_dir: Path = field(kw_only=True, compare=False)
 
     @property
@@ -110,7 +112,9 @@ class WriteStageTile(Step[StageTile]):
         tables = {one.labels_id: one for one in self.tables}
         channels = tuple(self._content_of(unit, tables.get(unit.channel_id)) for unit in self.units)
         content = replace(self.content, channels=channels)
-        return StageTile(self.key, *stage_writer.write_tile(self.stage_dir, content))
+        return StageTile(
+            self.key, *stage_writer.write_tile(self.stage_dir, content, has_vdb=self.has_vdb)
+        )
 
     def _content_of(self, unit: UnitPart, table: TableOfTile | None) -> ChannelContent:
         has_volume = table is None and unit.channel_id not in self.shared

@@ -29,7 +29,7 @@ _LAST = (
 # the objects that steer a build: a few for each unit, all small
 STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
-    r"|units/[^/]+/stage\.json|stage/(contents|stage)\.usda|stage/looks/.+|tissue/[^/]+\.json"
+    r"|units/[^/]+/stage\.json|stage/(contents|stage)\.usda|stage/(looks|previews)/.+|tissue/[^/]+\.json"
 )
 
 

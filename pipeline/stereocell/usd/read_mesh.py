@@ -84,6 +84,17 @@ def read_mesh(
     if is_edited:
         sizes = {"faceVarying": len(indices), "uniform": len(counts), "constant": 1}
         values = _fitting(values, sizes, len(points))
+    if seams := _find_seams(primvars, values, indices, len(points)):
+        point_of, indices = seams
+        if objects is not None:
+            objects = objects[point_of] if len(objects) == len(points) else None
+        points = points[point_of]
+        values = {
+            name: (_primvar_values(primvars, name), "vertex")
+            if kind == "faceVarying"
+            else (array[point_of], kind)
+            for name, (array, kind) in values.items()
+        }
     if all(kind in ("vertex", "varying") for _, kind in values.values()):
         triangles = indices[corners]
         arrays = {name: array for name, (array, _) in values.items()}
@@ -168,6 +179,40 @@ def _primvar(primvar: UsdGeom.Primvar) -> _Values | None:
     if flat is not None:
         require_type(primvar.GetAttr().GetPath(), flat, _PRIMVARS[primvar.GetPrimvarName()])
     return _array(flat, np.float32), str(primvar.GetInterpolation())
+
+
+def _find_seams(
+    primvars: UsdGeom.PrimvarsAPI,
+    values: Mapping[str, _Values],
+    indices: NDArray[np.int64],
+    points: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """Return the point (n,) of each value by face corner, and the value of each corner.
+
+    The pipeline writes UVs and tangents with the same indices, each value for one point: these are
+    the vertices that it had before it joined them along the seams. None: the mesh has others.
+    """
+    by_corner = [name for name, (_, kind) in values.items() if kind == "faceVarying"]
+    others = [array for array, kind in values.values() if kind in ("vertex", "varying")]
+    is_known = {"st", "tangents"}.issuperset(by_corner)
+    if not by_corner or not is_known or len(by_corner) + len(others) < len(values):
+        return None
+    if any(len(array) != points for array in others):
+        return None
+    found = [np.array(primvars.GetPrimvar(name).GetIndices(), np.int64) for name in by_corner]
+    first, count = found[0], len(_primvar_values(primvars, by_corner[0]))
+    if any(not np.array_equal(first, one) for one in found) or len(first) != len(indices):
+        return None
+    if any(len(_primvar_values(primvars, name)) != count for name in by_corner):
+        return None
+    point_of = np.full(count, -1)
+    point_of[first] = indices
+    is_whole = point_of.min(initial=0) >= 0 and np.array_equal(point_of[first], indices)
+    return (point_of, first) if is_whole else None
+
+
+def _primvar_values(primvars: UsdGeom.PrimvarsAPI, name: str) -> NDArray[np.float32]:
+    return _array(primvars.GetPrimvar(name).Get(), np.float32)
 
 
 def _at_vertices(

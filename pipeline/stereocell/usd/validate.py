@@ -258,8 +258,8 @@ def _check_volume(volume: UsdVol.Volume) -> Iterator[Finding]:
     prim = volume.GetPrim()
     where = _place(prim)
     fields = volume.GetFieldPaths()
-    if not fields:
-        yield Finding("volume", where, "0 fields, expected one or more of one file")
+    if not fields and not prim.HasAttribute("stereocell:atlas"):
+        yield Finding("volume", where, "0 fields and no atlas, expected one of them")
     files: set[str] = set()
     for name, path in sorted(fields.items()):
         asset = UsdVol.OpenVDBAsset(prim.GetStage().GetPrimAtPath(path))

@@ -65,8 +65,10 @@ _STEPS = np.arange(256, dtype=np.uint8)  # what baked values at vertices may be
 _Types = Sdf.ValueTypeNames
 
 
-def write_tile(stage_dir: Path, tile: TileContent) -> tuple[FileList, int]:
+def write_tile(stage_dir: Path, tile: TileContent, *, has_vdb: bool = True) -> tuple[FileList, int]:
     """Write the folder `stage_dir`/tiles/<tile>/ in place of an older one.
+
+    has_vdb  whether volumes have fields of OpenVDB, which other programs draw
 
     Returns its files, and the bytes of its voxels as measured.
 
@@ -77,8 +79,8 @@ def write_tile(stage_dir: Path, tile: TileContent) -> tuple[FileList, int]:
         _check_shape(tile, channel)
     with replacing_folder(stage_dir / "tiles" / tile.id) as folder:
         for channel in tile.channels:
-            _write_files(folder, tile, channel)
-        export(_compose(tile), folder / LAYER_NAME)
+            _write_files(folder, tile, channel, has_vdb)
+        export(_compose(tile, has_vdb), folder / LAYER_NAME)
         files = {file.name: measure(file) for file in sorted(folder.iterdir())}
         # here, since a stored folder's large files leave this machine
         grids = [grid for file in folder.glob("*.vdb") for grid in read_vdb_head(file)]
@@ -107,7 +109,7 @@ def _closed_name(channel_id: str) -> str:
     return f"{channel_id}_closed.stl"
 
 
-def _compose(tile: TileContent) -> Sdf.Layer:
+def _compose(tile: TileContent, has_vdb: bool) -> Sdf.Layer:
     """Return the layer tile.usdc."""
     stage = new_stage(".usdc", tile.id)
     root = UsdGeom.Xform.Define(stage, Sdf.Path.absoluteRootPath.AppendChild(tile.id)).GetPrim()
@@ -120,7 +122,9 @@ def _compose(tile: TileContent) -> Sdf.Layer:
         if channel.lods:
             _define_mesh(branch, tile, channel)
         if channel.volume is not None:
-            _define_volume(branch, tile, channel, channel.volume)
+            volume = _define_volume(branch, tile, channel, channel.volume)
+            if has_vdb:
+                _define_fields(volume, channel)
     _author_lods(root, tile)
     _author_representations(root, tile)
     return stage.GetRootLayer()
@@ -139,8 +143,8 @@ def _check_shape(tile: TileContent, channel: ChannelContent) -> None:
         raise ValueError(f"{tile.id}/{channel.channel_id}: {found}, expected {expected}")
 
 
-def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> None:
-    if channel.volume is not None:
+def _write_files(folder: Path, tile: TileContent, channel: ChannelContent, has_vdb: bool) -> None:
+    if channel.volume is not None and has_vdb:
         write_vdb(
             folder / f"{channel.channel_id}.vdb",
             channel.volume[tuple(slice(APRON, APRON + n) for n in tile.own_shape)],
@@ -149,6 +153,7 @@ def _write_files(folder: Path, tile: TileContent, channel: ChannelContent) -> No
             measured=channel.measured,
             apron=APRON,
         )
+    if channel.volume is not None:
         write_atlas(folder / f"{channel.channel_id}.exr", channel.volume)
     if channel.closed is not None:
         shutil.copyfile(channel.closed, folder / _closed_name(channel.channel_id))
@@ -207,26 +212,11 @@ def _define_mesh(branch: UsdGeom.Xform, tile: TileContent, channel: ChannelConte
 
 def _define_volume(
     branch: UsdGeom.Xform, tile: TileContent, channel: ChannelContent, voxels: NDArray[np.uint8]
-) -> None:
-    """Define the volume and its fields, nested below, of one file: clients read one per volume.
-
-    What lies around the tile is in `measured` too: a new window is applied to that, and the
-    bundle's volumes have an apron.
-    """
+) -> UsdVol.Volume:
+    """Define the volume, and the atlas of its voxels that the bundle reads."""
     stage = branch.GetPrim().GetStage()
     path = branch.GetPath().AppendChild(_leaf(tile, channel, "_volume"))
     volume = UsdVol.Volume.Define(stage, path)
-    tokens = UsdVol.Tokens
-    fields = [(GRID_NAME, tokens.fogVolume, tokens.half)]
-    if channel.measured is not None:
-        fields.append((MEASURED_NAME, tokens.unknown, tokens.float_))
-    for name, kind, numbers in fields:
-        field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(name))
-        field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
-        field.CreateFieldNameAttr(name)
-        field.CreateFieldClassAttr(kind)
-        field.CreateFieldDataTypeAttr(numbers)
-        volume.CreateFieldRelationship(name, field.GetPath())
     _bind(volume, branch, _leaf(tile, channel, "_look"))
 
     first, spacing = np.asarray(tile.first_um), np.asarray(tile.spacing_um)
@@ -243,6 +233,27 @@ def _define_volume(
     set_attribute(prim, "stereocell:apron", _Types.Int, APRON, custom=True)
     set_attribute(prim, "stereocell:boundsMin", _Types.Double3, vec3d(low), custom=True)
     set_attribute(prim, "stereocell:boundsMax", _Types.Double3, vec3d(high), custom=True)
+    return volume
+
+
+def _define_fields(volume: UsdVol.Volume, channel: ChannelContent) -> None:
+    """Define a volume's fields, nested below, of one file: clients read one per volume.
+
+    What lies around the tile is in `measured` too: a new window is applied to that, and the
+    bundle's volumes have an apron.
+    """
+    stage, path = volume.GetPrim().GetStage(), volume.GetPath()
+    tokens = UsdVol.Tokens
+    fields = [(GRID_NAME, tokens.fogVolume, tokens.half)]
+    if channel.measured is not None:
+        fields.append((MEASURED_NAME, tokens.unknown, tokens.float_))
+    for name, kind, numbers in fields:
+        field = UsdVol.OpenVDBAsset.Define(stage, path.AppendChild(name))
+        field.CreateFilePathAttr(f"./{channel.channel_id}.vdb")
+        field.CreateFieldNameAttr(name)
+        field.CreateFieldClassAttr(kind)
+        field.CreateFieldDataTypeAttr(numbers)
+        volume.CreateFieldRelationship(name, field.GetPath())
 
 
 def _author_lods(root: Usd.Prim, tile: TileContent) -> None:

@@ -47,6 +47,32 @@ def read_stage_list(stage_dir: Path) -> dict[str, Any]:
     return read_list(stage_dir / FILES, REMEDY)
 
 
+# What the files of a stage hold, by suffix; tiles have no other .usdc
+_PARTS = {
+    ".vdb": "volumes for other programs",
+    ".exr": "volumes for the bundle, and looks",
+    ".usdc": "surfaces",
+    ".png": "maps and previews",
+    ".stl": "closed copies",
+    ".usdz": "specimen.usdz",
+}
+
+
+def describe_parts(listed: FileList) -> str:
+    """Return a line on how large a stage is, and each of its parts, the largest first."""
+    sizes = dict.fromkeys((*_PARTS, ""), 0)
+    for path, entry in listed.items():
+        suffix = Path(path).suffix
+        sizes[suffix if suffix in _PARTS else ""] += entry["bytes"]
+    largest = sorted(sizes.items(), key=lambda part: -part[1])
+    words = [
+        f"{size / 1e6:.1f} {_PARTS[suffix]} ({suffix})"
+        for suffix, size in largest
+        if suffix and size
+    ]
+    return f"{sum(sizes.values()) / 1e6:.1f} MB: {', '.join(words)}"
+
+
 def digest_of(listed: FileList) -> str:
     """Return a digest of a list."""
     return hashlib.sha256(encode(listed)).hexdigest()[:20]
