@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Sdf, Usd, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from stereocell.usd.layer import ROOT, TILES
 from stereocell.usd.write_stage import SUBLAYERS
@@ -39,6 +39,11 @@ _COMPOSITION = frozenset(
 _NOTES = frozenset(("documentation", "comment", "hidden", "userDocBrief", "uiHints"))
 # Variant sets of the build: the readers of a stage select each variant
 _ALL_READ = frozenset(("lod", "representation", "transferFunction"))
+# All prims, those of instances too
+_EVERY = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+_DEFINED = Usd.TraverseInstanceProxies(
+    Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+)  # loaded or not
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +93,32 @@ class BuiltLayers:
         return False
 
 
+def defined_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """Yield all prims that are active and defined, those of instances and payloads too.
+
+    USD composes nothing below a payload that is not loaded. So a tile is loaded where a layer of a
+    user has anything below it, and stays loaded. Prototypes of instancers stand nowhere.
+    """
+    built = BuiltLayers(stage)
+    if not all(layer in built for layer in _layers(stage)):
+        for path in stage.FindLoadable():
+            if not _is_in_tile(path) or _is_touched_below(stage.GetPrimAtPath(path), built):
+                _load(stage, path)
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DEFINED))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()
+        yield prim
+
+
+def _is_in_tile(path: Sdf.Path) -> bool:
+    return bool(path.HasPrefix(TILES)) and path != TILES
+
+
+def _is_touched_below(prim: Usd.Prim, built: BuiltLayers) -> bool:
+    return any(spec.nameChildren or spec.variantSets for spec in _specs_of_users(prim, built))
+
+
 def opinions_of_users(stage: Usd.Stage, built: BuiltLayers) -> Iterator[tuple[Usd.Prim, Opinion]]:
     """Yield each opinion that a layer adds, with the composed prim, whose tile is then loaded."""
     if all(layer in built for layer in _layers(stage)):
@@ -109,17 +140,28 @@ def _specs_of_users(prim: Usd.Prim, built: BuiltLayers) -> list[Sdf.PrimSpec]:
     ]
 
 
+def _load(stage: Usd.Stage, path: Sdf.Path) -> None:
+    """Load a payload and those below it, except that no tile is loaded by what holds all tiles."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the readers raise USD's errors
+    is_above = TILES.HasPrefix(path)
+    stage.Load(path, Usd.LoadWithoutDescendants if is_above else Usd.LoadWithDescendants)
+    del quiet
+
+
 def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
     """Yield all prims, of tiles only those that a user's layer touches, loaded one by one."""
     every = Usd.PrimAllPrimsPredicate
+    for path in stage.FindLoadable():
+        if not _is_in_tile(path):
+            _load(stage, path)
     for top in stage.GetPseudoRoot().GetFilteredChildren(every):
         if top.GetPath() != ROOT:
-            yield from Usd.PrimRange(top, every)
+            yield from Usd.PrimRange(top, _EVERY)
             continue
         yield top
         for group in top.GetFilteredChildren(every):
             if group.GetPath() != TILES:
-                yield from Usd.PrimRange(group, every)
+                yield from Usd.PrimRange(group, _EVERY)
                 continue
             yield group
             for path in [child.GetPath() for child in group.GetFilteredChildren(every)]:
@@ -129,11 +171,9 @@ def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
 
 def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:
     is_loaded = path in stage.GetLoadSet() or not stage.GetPrimAtPath(path).IsActive()
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the reader of the tile raises USD's errors
     if not is_loaded:
-        stage.Load(path)
-    del quiet
-    yield from Usd.PrimRange(stage.GetPrimAtPath(path), Usd.PrimAllPrimsPredicate)
+        _load(stage, path)
+    yield from Usd.PrimRange(stage.GetPrimAtPath(path), _EVERY)
     if not is_loaded:
         stage.Unload(path)
 

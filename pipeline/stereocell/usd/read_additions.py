@@ -14,15 +14,16 @@ from stereocell.meshes.tubes import sweep_tubes
 from stereocell.model.mesh import Mesh
 from stereocell.usd.drawn_prims import is_visible, to_world
 from stereocell.usd.layer import ROOT, TILES
+from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_appearances import WHITE, material_of, surface_of
 from stereocell.usd.read_attributes import require_still, value_of
 from stereocell.usd.read_curves import curve_lines
 from stereocell.usd.read_display import display_color, display_opacity, has_many_display_colors
 from stereocell.usd.read_mesh import move_mesh, read_mesh
 from stereocell.usd.read_textures import maps_of
+from stereocell.usd.typed_values import read_as
 
 _GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
-_PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract  # loaded or not
 _Types = Sdf.ValueTypeNames
 
 
@@ -61,15 +62,18 @@ def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
 
 
 def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a line on each image of an added mesh, which is lost."""
+    """Yield a line on each image of an added mesh, which is lost, and on what has no faces."""
     for prim in _additions(stage):
+        if not _has_faces(prim):
+            yield f"{prim.GetTypeName()} {prim.GetPath()} is not taken over: it has no faces"
+            continue
         surface = _surface(prim)
         for file in maps_of(surface).files if surface else ():
             yield f"image {file.name} of {prim.GetPath()} is not taken over: added meshes have none"
 
 
 def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), _PREDICATE):
+    for prim in defined_prims(stage):
         if is_addition(prim) and is_visible(prim):
             yield prim
 
@@ -80,7 +84,14 @@ def _is_surface(path: Sdf.Path) -> bool:
     return len(names) == 3 and names[2] == f"{names[1]}_{names[0]}"
 
 
+def _has_faces(prim: Usd.Prim) -> bool:
+    name = "faceVertexCounts" if prim.IsA(UsdGeom.Mesh) else "curveVertexCounts"
+    return bool(read_as(prim.GetAttribute(name), _Types.IntArray))
+
+
 def _read(prim: Usd.Prim) -> Mesh | None:
+    if not _has_faces(prim):
+        return None
     matrix = to_world(prim)
     if prim.IsA(UsdGeom.Mesh):
         shown = {"displayColor"} if _shows_many_colors(prim) else set()
