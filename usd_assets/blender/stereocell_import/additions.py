@@ -130,6 +130,11 @@ def _write_material(layer, path, block, lost):
             f"image of {name} of material {materials[0].name} is not taken over: added meshes have "
             "none"
         )
+    tree = materials[0].node_tree
+    if tree and not any(node.bl_idname == "ShaderNodeBsdfPrincipled" for node in tree.nodes):
+        lost.append(
+            f"nodes of material {materials[0].name} are not taken over: a Principled BSDF is"
+        )
     over = f"{path}/material"
     for place, kind in ((over, "Material"), (f"{over}/surface", "Shader")):
         spec = Sdf.CreatePrimInLayer(layer, place)

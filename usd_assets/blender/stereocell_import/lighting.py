@@ -55,6 +55,8 @@ def _set_strengths(stage, objects):
         if not prim.GetAttribute("inputs:normalize").Get():
             continue
         exposure = prim.GetAttribute("inputs:exposure").Get() or 0.0
+        if hasattr(block.data, "exposure"):
+            block.data.exposure = 0.0
         block.data.energy = prim.GetAttribute("inputs:intensity").Get() * 2**exposure
 
 
