@@ -194,6 +194,24 @@ def test_an_edit_in_a_payload_of_the_layer_is_reported(edit, tmp_path):
     assert line.startswith("Cube /Specimen/Kit/Box is not taken over: nothing in the bundle")
 
 
+@pytest.mark.parametrize("scheme", ["none", "catmullClark"])
+def test_a_polygonal_box_without_normals_has_sharp_edges(edit, scheme):
+    """Storm shades it so; without a scheme a mesh is a cage of a smooth surface."""
+    box = trimesh.creation.box((4, 4, 4))
+
+    def change(stage):
+        mesh = UsdGeom.Mesh.Define(stage, "/Specimen/Box")
+        mesh.CreatePointsAttr([Gf.Vec3f(*map(float, point)) for point in box.vertices])
+        mesh.CreateFaceVertexCountsAttr([3] * 12)
+        mesh.CreateFaceVertexIndicesAttr([int(corner) for corner in box.faces.ravel()])
+        mesh.CreateSubdivisionSchemeAttr(scheme)
+
+    (mesh,) = scene_of(edit(change)).values()
+    largest = np.abs(mesh.vertex_normals).max(axis=1)
+    assert (largest > 0.999).all() if scheme == "none" else (largest < 0.9).all()
+    assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume == pytest.approx(64, rel=1e-4)
+
+
 def test_prototypes_of_an_instancer_are_not_drawn_where_they_are_defined(edit):
     def change(stage):
         many = UsdGeom.PointInstancer.Define(stage, "/Specimen/Many")

@@ -386,7 +386,7 @@ CASES: tuple[EditCase, ...] = (
         "an added mesh or curve without faces",
         lambda stage: UsdGeom.Mesh.Define(stage, "/Specimen/Annotations/Nothing"),
         "reported",
-        "Mesh /Specimen/Annotations/Nothing is not taken over: it has no faces",
+        "Mesh /Specimen/Annotations/Nothing is not taken over",
     ),
     EditCase(
         "an added sphere, cube or other shape without points",

@@ -7,6 +7,7 @@ plain values of its material. Without a material it has its display colour. Curv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.formats.gltf import Material
@@ -24,6 +25,7 @@ from stereocell.usd.read_textures import maps_of
 from stereocell.usd.typed_values import read_as
 
 _GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
+_POLYGONAL = ("none", "bilinear")  # schemes of subdivision whose edges stay sharp
 _Types = Sdf.ValueTypeNames
 
 
@@ -95,12 +97,37 @@ def _read(prim: Usd.Prim) -> Mesh | None:
     matrix = to_world(prim)
     if prim.IsA(UsdGeom.Mesh):
         shown = {"displayColor"} if _shows_many_colors(prim) else set()
-        return read_mesh(UsdGeom.Mesh(prim), matrix, shown=shown)
+        faces = read_mesh(UsdGeom.Mesh(prim), matrix, shown=shown)
+        return _facet(faces) if faces is not None and _is_faceted(prim) else faces
     curves = UsdGeom.BasisCurves(prim)
     require_still(curves.GetPointsAttr(), curves.GetWidthsAttr())
     value_of(prim, "points", _Types.Point3fArray)
     mesh = sweep_tubes(curve_lines(curves))
     return None if mesh is None else move_mesh(mesh, matrix)
+
+
+def _is_faceted(prim: Usd.Prim) -> bool:
+    """Return whether USD shades each face by itself: a polygonal mesh that states no normals."""
+    mesh = UsdGeom.Mesh(prim)
+    is_polygonal = mesh.GetSubdivisionSchemeAttr().Get() in _POLYGONAL
+    has_normals = (
+        mesh.GetNormalsAttr().HasValue() or prim.GetAttribute("primvars:normals").HasValue()
+    )
+    return is_polygonal and not has_normals
+
+
+def _facet(mesh: Mesh) -> Mesh:
+    """Return a mesh whose triangles have corners and a normal of their own."""
+    corners = mesh.triangles.ravel()
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return Mesh(
+        mesh.positions[corners],
+        np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0).astype(np.float32),
+        colors=None if mesh.colors is None else mesh.colors[corners],
+    )
 
 
 def _surface(prim: Usd.Prim) -> UsdShade.Shader | None:
