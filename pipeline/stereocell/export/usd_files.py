@@ -8,12 +8,11 @@
 import os
 from pathlib import Path
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
 from stereocell.usd.layer import (
-    CAMERAS,
     CHANNELS,
     METERS_PER_UNIT,
     ROOT,
@@ -22,6 +21,7 @@ from stereocell.usd.layer import (
     UP_AXIS,
     export,
 )
+from stereocell.usd.layer_opinions import load_payloads_of_users
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
 from stereocell.usd.read_variants import lod_levels
@@ -56,6 +56,7 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
         levels = [one for one in lod_levels(prim) if one <= level]
         if levels:
             select_variant(prim, "lod", f"lod{levels[-1]}")
+    load_payloads_of_users(stage)
     flat = stage.Flatten(addSourceFileComment=False)
     _state_colors(stage, flat)
     for name in chosen.all_tiles:
@@ -82,26 +83,48 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _enlarge(flat: Sdf.Layer, scale: float) -> None:
-    """Enlarge the tiles by a transform, and move the cameras away as much.
+    """Enlarge what is drawn below /Specimen by transforms, and move the cameras away as much.
 
     A transform above the cameras would leave their clipping ranges as they are.
     """
     stage = Usd.Stage.Open(flat, Usd.Stage.LoadNone)
-    tiles = UsdGeom.Xformable(stage.GetPrimAtPath(TILES))
-    placed = tiles.GetOrderedXformOps()
-    enlarged = tiles.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
-    enlarged.Set(Gf.Vec3d(scale))
-    tiles.SetXformOpOrder([enlarged, *placed])
-    group = stage.GetPrimAtPath(CAMERAS)
-    for prim in group.GetChildren() if group else ():
-        if not prim.IsA(UsdGeom.Camera):
-            continue
-        camera = UsdGeom.Camera(prim)
-        for attribute in (camera.GetFocusDistanceAttr(), camera.GetClippingRangeAttr()):
-            attribute.Set(attribute.Get() * scale)
-        for op in camera.GetOrderedXformOps():
-            if op.GetOpType() == UsdGeom.XformOp.TypeTranslate:
-                op.Set(op.Get() * scale)
+    for prim in stage.GetPrimAtPath(ROOT).GetChildren():
+        _enlarge_below(prim, scale)
+
+
+def _enlarge_below(prim: Usd.Prim, scale: float) -> None:
+    """Enlarge a prim where it can have a transform, else those below it."""
+    if prim.IsA(UsdGeom.Camera):
+        _move_camera(UsdGeom.Camera(prim), scale)
+    elif prim.IsA(UsdGeom.Xformable):
+        placed = UsdGeom.Xformable(prim)
+        ops = placed.GetOrderedXformOps()
+        enlarged = placed.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
+        enlarged.Set(Gf.Vec3d(scale))
+        placed.SetXformOpOrder([enlarged, *ops], placed.GetResetXformStack())
+        _keep_brightness(prim, scale)
+    else:
+        for child in prim.GetChildren():
+            _enlarge_below(child, scale)
+
+
+def _move_camera(camera: UsdGeom.Camera, scale: float) -> None:
+    for attribute in (camera.GetFocusDistanceAttr(), camera.GetClippingRangeAttr()):
+        attribute.Set(attribute.Get() * scale)
+    for op in camera.GetOrderedXformOps():
+        if op.GetOpType() == UsdGeom.XformOp.TypeTranslate:
+            op.Set(op.Get() * scale)
+        elif op.GetOpType() == UsdGeom.XformOp.TypeTransform:
+            matrix = op.Get()
+            op.Set(Gf.Matrix4d(matrix).SetTranslateOnly(matrix.ExtractTranslation() * scale))
+
+
+def _keep_brightness(prim: Usd.Prim, scale: float) -> None:
+    """Let spheres of light shine as bright from farther away: those of a stated power."""
+    for light in map(UsdLux.SphereLight, Usd.PrimRange(prim)):
+        if light and light.GetNormalizeAttr().Get():
+            intensity = light.GetIntensityAttr()
+            intensity.Set(intensity.Get() * scale**2)
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:

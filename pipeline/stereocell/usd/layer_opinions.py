@@ -93,17 +93,25 @@ class BuiltLayers:
         return False
 
 
+def load_payloads_of_users(stage: Usd.Stage) -> None:
+    """Load the payloads that layers of a user add, and the tiles below which one has anything.
+
+    USD composes nothing below a payload that is not loaded, or below a prim that it defines.
+    """
+    built = BuiltLayers(stage)
+    if all(layer in built for layer in _layers(stage)):
+        return
+    for path in stage.FindLoadable():
+        if not _is_in_tile(path) or _is_touched_below(stage.GetPrimAtPath(path), built):
+            _load(stage, path)
+
+
 def defined_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Yield all prims that are active and defined, those of instances and payloads too.
 
-    USD composes nothing below a payload that is not loaded. So a tile is loaded where a layer of a
-    user has anything below it, and stays loaded. Prototypes of instancers stand nowhere.
+    Prototypes of instancers stand nowhere. Payloads of users stay loaded.
     """
-    built = BuiltLayers(stage)
-    if not all(layer in built for layer in _layers(stage)):
-        for path in stage.FindLoadable():
-            if not _is_in_tile(path) or _is_touched_below(stage.GetPrimAtPath(path), built):
-                _load(stage, path)
+    load_payloads_of_users(stage)
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DEFINED))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
