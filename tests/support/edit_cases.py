@@ -154,6 +154,13 @@ def _fade(stage: Usd.Stage) -> None:
     )
 
 
+def _hide_in_an_instance(stage: Usd.Stage) -> None:
+    stage.GetPrimAtPath(TILE).SetInstanceable(True)
+    over = Sdf.CreatePrimInLayer(stage.GetEditTarget().GetLayer(), BRANCH)
+    hidden = Sdf.AttributeSpec(over, "visibility", _Types.Token)
+    hidden.default = "invisible"
+
+
 def _add_to_a_level(stage: Usd.Stage) -> None:
     """Add an arrow inside the finest level of detail, and select another one."""
     levels = stage.GetPrimAtPath(TILE).GetVariantSet("lod")
@@ -355,6 +362,12 @@ CASES: tuple[EditCase, ...] = (
         lambda stage: define_arrow(stage).GetPointsAttr().Set([Gf.Vec3f(0)] * 7, 2.0),
         "refused",
         "Arrow.points: found values over time",
+    ),
+    EditCase(
+        "an edit below a tile that is an instance",
+        _hide_in_an_instance,
+        "reported",
+        "/r0_c0/CD31 is not taken over: USD ignores opinions below an instance",
     ),
     EditCase(
         "visibility of an added group over time",

@@ -39,6 +39,7 @@ _COMPOSITION = frozenset(
 _NOTES = frozenset(("documentation", "comment", "hidden", "userDocBrief", "uiHints"))
 # Variant sets of the build: the readers of a stage select each variant
 _ALL_READ = frozenset(("lod", "representation", "transferFunction"))
+BELOW_INSTANCE = "@below an instance"  # names an opinion that USD ignores
 # All prims, those of instances too
 _EVERY = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 _DEFINED = Usd.TraverseInstanceProxies(
@@ -188,6 +189,9 @@ def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:
 
 def _opinions(spec: Sdf.PrimSpec, path: Sdf.Path, prim: Usd.Prim) -> Iterator[Opinion]:
     yield from _own_opinions(spec, path, "")
+    if prim.IsInstance() and spec.path == path:
+        for child in spec.nameChildren:
+            yield Opinion(path.AppendChild(child.name), BELOW_INSTANCE, child)
     for set_name, variants in spec.variantSets.items():
         selected = prim.GetVariantSet(set_name).GetVariantSelection()
         for variant in variants.variants.values():

@@ -20,7 +20,12 @@ from stereocell.model.errors import StageError
 from stereocell.usd.edit_places import Places, read_primvars
 from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, TAKEN, is_taken, reason_of
 from stereocell.usd.layer import ROOT
-from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
+from stereocell.usd.layer_opinions import (
+    BELOW_INSTANCE,
+    BuiltLayers,
+    Opinion,
+    opinions_of_users,
+)
 from stereocell.usd.read_attributes import over_time
 from stereocell.usd.read_bindings import binding_fault
 
@@ -163,6 +168,9 @@ class _Finder:
         if any(path.HasPrefix(one) for one in self._covered):
             return _Fate.COVERED
         own = prim.GetStage().GetPrimAtPath(path)
+        if name == BELOW_INSTANCE:
+            reason = f"USD ignores opinions below an instance: set instanceable of {prim.GetPath()}"
+            return LostEdit(str(path), name, f"{reason} to false")
         place = self._places.of(path) or self._built_place(own) or _place_of_group(own)
         if not place:
             return self._judge_prim(path, prim, opinion)
