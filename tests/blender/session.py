@@ -371,6 +371,62 @@ def work_in_edit_mode(root):
     bmesh.update_edit_mesh(block.data)
 
 
+def an_arrow(name):
+    """Add an object of one triangle; return it."""
+    arrow = bpy.data.meshes.new(name)
+    arrow.from_pydata([(0, 0, 0), (2, 4, 0), (-2, 4, 0)], [], [(0, 1, 2)])
+    block = bpy.data.objects.new(name, arrow)
+    bpy.context.scene.collection.objects.link(block)
+    return block
+
+
+def instance_a_collection(_root):
+    pins = bpy.data.collections.new("pins")
+    bpy.ops.object.empty_add()
+    empty = bpy.context.active_object
+    empty.name, empty.instance_type, empty.instance_collection = "pins", "COLLECTION", pins
+
+
+def shift_a_camera(_root):
+    bpy.ops.object.camera_add()
+    camera = bpy.context.active_object
+    camera.name, camera.data.shift_y = "Close", 0.25
+
+
+def animate_an_arrow(_root):
+    an_arrow("arrow").keyframe_insert("location")
+
+
+def paint_without_a_principled_shader(_root):
+    material = bpy.data.materials.new("neon")
+    material.use_nodes = True
+    material.node_tree.nodes.clear()
+    material.node_tree.nodes.new("ShaderNodeEmission")
+    an_arrow("arrow").data.materials.append(material)
+
+
+def light_by_area(_root):
+    bpy.ops.object.light_add(type="POINT")
+    lamp = bpy.context.active_object
+    lamp.name, lamp.data.normalize = "Bulb", False
+
+
+def shine(root):
+    """Add a sun by its exposure and temperature, and an arrow brighter than white."""
+    bpy.ops.object.light_add(type="SUN")
+    sun = bpy.context.active_object
+    sun.name, sun.data.energy, sun.data.exposure = "Evening", 2.0, 3.0
+    sun.data.use_temperature, sun.data.temperature = True, 2500.0
+    material = gold()
+    (shader,) = [n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled"]
+    shader.inputs["Base Color"].default_value = (2.0, 1.0, 0.0, 1.0)
+    shader.inputs["Emission Color"].default_value = (1.0, 0.25, 0.0, 1.0)
+    shader.inputs["Emission Strength"].default_value = 8.0
+    block = an_arrow("arrow")
+    block.data.materials.append(material)
+    block.matrix_world = root.matrix_world
+
+
 def gold():
     """Return a translucent material with plain values."""
     material = bpy.data.materials.new("gold")
@@ -436,7 +492,8 @@ _ODD = {
     for one in (drop_a_face, add_a_vertex, rename, copy, add_new, add_a_probe, add_a_spot,
                 smooth_by_modifier, rewire_a_material, replace_a_material, color_a_ramp,
                 move_a_camera, change_the_world, take_out, add_shape_keys, animate,
-                paint_other_uvs, work_in_edit_mode, decorate)
+                paint_other_uvs, work_in_edit_mode, decorate, instance_a_collection, shift_a_camera,
+                animate_an_arrow, paint_without_a_principled_shader, light_by_area, shine)
 }  # fmt: skip
 
 

@@ -470,6 +470,11 @@ NAME = "CD3_x3b5__r0_c0"
         ("add_shape_keys", f"shape key of {NAME} is not taken over: apply it"),
         ("animate", f"animation of {NAME} is not taken over but for this frame"),
         ("paint_other_uvs", f"a change of UVs of {NAME} is not taken over"),
+        ("instance_a_collection", "instances by pins are not taken over: make them real"),
+        ("shift_a_camera", "shift of camera Close is not taken over: the viewer has none"),
+        ("animate_an_arrow", "animation of arrow is not taken over but for this frame"),
+        ("paint_without_a_principled_shader", "nodes of material neon are not taken over"),
+        ("light_by_area", "strength by area of light Bulb is not taken over"),
     ],
 )
 def test_an_edit_that_no_layer_carries_is_named(
@@ -546,6 +551,47 @@ def test_what_an_artist_adds_reaches_the_bundle(
     assert document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"][3] == pytest.approx(
         0.4
     )
+
+
+def test_exposure_temperature_and_colors_above_white_reach_the_bundle(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    overlay, bundle = tmp_path / "edit.usda", tmp_path / "bundle"
+    found = run("edit", tmp_path, stage=stage_path, overlay=overlay, odd=["shine"])
+    assert found["told"][0][0] == "Info", found["told"]
+    lines = [line for line in write(overlay, bundle) if "is not taken over" in line]
+    (lamp,) = [
+        one for one in load(bundle / "manifest.json")["lights"]["lamps"] if "Ev" in one["name"]
+    ]
+    # A sun of 2 W/m2 and three stops; a candle's red is far brighter than its blue.
+    red, green, blue = lamp["color"]
+    assert red == 1
+    assert 0.2 < green < 0.6
+    assert blue < 0.15
+    plain = 2.0 * 2**3 / np.pi
+    assert plain < lamp["strength"] <= 10, lines
+    (mesh,) = additions_of(bundle).values()
+    assert tuple(mesh.visual.material.baseColorFactor[:3]) == (255, 128, 0)
+    assert tuple(mesh.visual.material.emissiveFactor) == pytest.approx((1, 0.25, 0), abs=1e-6)
+
+
+def test_additions_of_an_earlier_export_are_moved_and_hidden(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "first.usda", tmp_path / "second.usda"
+    run("edit", tmp_path, stage=stage_path, overlay=first, odd=["decorate"])
+    group = "/Specimen/Annotations"
+    found = run(
+        "edit", tmp_path, stage=first, overlay=second,
+        move={f"{group}/box": (5, 0, 0)}, hide=[f"{group}/wire"], delete=[f"{group}/label"],
+    )  # fmt: skip
+    ((kind, told),) = found["told"]
+    assert kind == "Info", told
+    write(second, tmp_path / "bundle")
+    names = {one["name"] for one in load(tmp_path / "bundle/manifest.json")["additions"]["layers"]}
+    assert names == {"arrow: here", "box"}
+    box = additions_of(tmp_path / "bundle")[f"{group}/box"]
+    assert box.bounds == pytest.approx(np.array([(42, -7, 3), (48, -3, 5)]), abs=1e-3)
 
 
 def test_a_copy_of_a_surface_is_an_addition_of_its_color(stage_path: Path, tmp_path: Path) -> None:

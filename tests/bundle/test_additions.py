@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from stereocell.model.errors import StageError
 from support.bundles import load
-from support.edit_cases import define_arrow, define_material, define_wire
+from support.edit_cases import BRANCH, define_arrow, define_material, define_wire
 
 
 def scene_of(bundle):
@@ -131,6 +131,99 @@ def test_an_added_mesh_inside_a_tile_moves_with_it(edit):
     assert edit.told == []
     (mesh,) = scene_of(bundle).values()
     assert mesh.bounds[:, 2] == pytest.approx([13, 13])
+
+
+def test_an_added_mesh_in_a_channel_s_branch_of_a_tile_is_a_layer(edit):
+    """The branch itself is only defined by the tile's payload."""
+    path = f"{BRANCH}/Arrow"
+    bundle = edit(lambda stage: define_arrow(stage, path))
+    assert edit.told == []
+    assert [one["id"] for one in load(bundle / "manifest.json")["additions"]["layers"]] == [path]
+
+
+@pytest.mark.parametrize("arc", ["payload", "reference", "instance"])
+def test_what_another_file_brings_is_taken_over(edit, tmp_path, arc):
+    """A mesh, a camera and a light of a file that stands turned and moved in the specimen."""
+    kit = Usd.Stage.CreateNew(str(tmp_path / "kit.usda"))
+    UsdGeom.SetStageUpAxis(kit, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(kit, 1e-6)
+    kit.SetDefaultPrim(UsdGeom.Xform.Define(kit, "/Kit").GetPrim())
+    define_arrow(kit, "/Kit/Arrow")
+    UsdGeom.Camera.Define(kit, "/Kit/Eye").AddTranslateOp().Set(Gf.Vec3d(0, 0, 50))
+    UsdLux.DistantLight.Define(kit, "/Kit/Sun")
+    kit.Save()
+
+    def change(stage):
+        group = UsdGeom.Xform.Define(stage, "/Specimen/Kit")
+        UsdGeom.XformCommonAPI(group).SetTranslate((0, 0, 20))
+        group.AddRotateYOp().Set(90)
+        prim = group.GetPrim()
+        arcs = prim.GetPayloads() if arc == "payload" else prim.GetReferences()
+        (arcs.AddPayload if arc == "payload" else arcs.AddReference)("./kit.usda")
+        prim.SetInstanceable(arc == "instance")
+
+    bundle = edit(change)
+    assert edit.told == []
+    manifest = load(bundle / "manifest.json")
+    assert [one["id"] for one in manifest["additions"]["layers"]] == ["/Specimen/Kit/Arrow"]
+    (mesh,) = scene_of(bundle).values()
+    # A turn by 90 degrees about y brings x to -z, and z to x.
+    assert mesh.bounds == pytest.approx(np.array([(4, 0, 8), (4, 9, 12)]), abs=1e-4)
+    (view,) = manifest["views"]
+    assert view["position_um"] == pytest.approx([50, 0, 20], abs=1e-4)
+    sun = next(lamp for lamp in manifest["lights"]["lamps"] if lamp["name"] == "Sun")
+    assert sun["towards"] == pytest.approx([1, 0, 0], abs=1e-6)
+
+
+def test_an_edit_in_a_payload_of_the_layer_is_reported(edit, tmp_path):
+    kit = Usd.Stage.CreateNew(str(tmp_path / "kit.usda"))
+    kit.SetDefaultPrim(UsdGeom.Xform.Define(kit, "/Kit").GetPrim())
+    UsdGeom.Cube.Define(kit, "/Kit/Box")
+    UsdGeom.SetStageUpAxis(kit, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(kit, 1e-6)
+    kit.Save()
+    edit(
+        lambda s: (
+            UsdGeom.Xform.Define(s, "/Specimen/Kit")
+            .GetPrim()
+            .GetPayloads()
+            .AddPayload("./kit.usda")
+        )
+    )
+    (line,) = edit.told
+    assert line.startswith("Cube /Specimen/Kit/Box is not taken over: nothing in the bundle")
+
+
+@pytest.mark.parametrize("scheme", ["none", "catmullClark"])
+def test_a_polygonal_box_without_normals_has_sharp_edges(edit, scheme):
+    """Storm shades it so; without a scheme a mesh is a cage of a smooth surface."""
+    box = trimesh.creation.box((4, 4, 4))
+
+    def change(stage):
+        mesh = UsdGeom.Mesh.Define(stage, "/Specimen/Box")
+        mesh.CreatePointsAttr([Gf.Vec3f(*map(float, point)) for point in box.vertices])
+        mesh.CreateFaceVertexCountsAttr([3] * 12)
+        mesh.CreateFaceVertexIndicesAttr([int(corner) for corner in box.faces.ravel()])
+        mesh.CreateSubdivisionSchemeAttr(scheme)
+
+    (mesh,) = scene_of(edit(change)).values()
+    largest = np.abs(mesh.vertex_normals).max(axis=1)
+    assert (largest > 0.999).all() if scheme == "none" else (largest < 0.9).all()
+    assert trimesh.Trimesh(mesh.vertices, mesh.faces).volume == pytest.approx(64, rel=1e-4)
+
+
+def test_prototypes_of_an_instancer_are_not_drawn_where_they_are_defined(edit):
+    def change(stage):
+        many = UsdGeom.PointInstancer.Define(stage, "/Specimen/Many")
+        define_arrow(stage, "/Specimen/Many/Arrow")
+        many.CreatePrototypesRel().AddTarget("/Specimen/Many/Arrow")
+        many.CreateProtoIndicesAttr([0, 0])
+        many.CreatePositionsAttr([Gf.Vec3f(0, 0, 5), Gf.Vec3f(9, 0, 5)])
+
+    bundle = edit(change)
+    assert "additions" not in load(bundle / "manifest.json")
+    (line,) = edit.told
+    assert line.startswith("PointInstancer /Specimen/Many is not taken over")
 
 
 def test_the_usdz_has_an_added_mesh_beside_the_specimen(stage, edit):

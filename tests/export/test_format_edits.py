@@ -75,6 +75,11 @@ def case_of(what: str) -> EditCase:
         ("a camera", ".glb", "Camera /Specimen/Cameras/close is not taken over: the file has no"),
         ("an added mesh", ".3mf", "Mesh /Specimen/Annotations/Arrow is not taken over: the file"),
         (
+            "an added mesh or curve without faces",
+            ".glb",
+            "Mesh /Specimen/Annotations/Nothing is not taken over: it has no faces",
+        ),
+        (
             "`displayOpacity` of a mesh",
             ".ply",
             "primvars:displayOpacity is not taken over: of a ma",

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pxr import Gf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 
 from stereocell.export.options import ExportOptions
 from stereocell.export.write import export_stage
 from stereocell.usd.validate import validate_stage, validate_usdz
 from support import spheres
 from support.bundles import CD31
+from support.edit_cases import define_arrow
 
 
 def meshes(stage: Usd.Stage) -> dict[str, UsdGeom.Mesh]:
@@ -107,6 +108,48 @@ def test_the_cameras_of_an_enlarged_file_see_what_they_saw(
     assert large.clippingRange.max == pytest.approx(true.clippingRange.max * 2000)
     assert large.focusDistance == pytest.approx(true.focusDistance * 2000)
     assert large.frustum.window == true.frustum.window
+
+
+def test_additions_lights_and_cameras_are_enlarged_with_the_specimen(
+    edited: Callable[[Callable[[Usd.Stage], object]], Path], tmp_path: Path
+) -> None:
+    kit = Usd.Stage.CreateNew(str(tmp_path / "kit.usda"))
+    UsdGeom.SetStageUpAxis(kit, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(kit, 1e-6)
+    kit.SetDefaultPrim(UsdGeom.Xform.Define(kit, "/Kit").GetPrim())
+    define_arrow(kit, "/Kit/Arrow")
+    kit.Save()
+
+    def change(stage: Usd.Stage) -> None:
+        group = UsdGeom.Xform.Define(stage, "/Specimen/Annotations/Kit")
+        group.GetPrim().GetPayloads().AddPayload("./kit.usda")
+        group.AddTranslateOp().Set(Gf.Vec3d(0, 1, 0))
+        define_arrow(stage)
+        camera = UsdGeom.Camera.Define(stage, "/Specimen/Cameras/close")
+        camera.AddTransformOp().Set(Gf.Matrix4d(1).SetTranslate(Gf.Vec3d(10, -5, 24)))
+        lamp = UsdLux.SphereLight.Define(stage, "/Specimen/Lights/Lamp")
+        lamp.CreateNormalizeAttr(True)
+        lamp.CreateIntensityAttr(6.0)
+        lamp.AddTranslateOp().Set(Gf.Vec3d(0, 40, 0))
+
+    path = tmp_path / "large.usda"
+    export_stage(edited(change), path, options=ExportOptions(lod=1, scale=100.0))
+    stage = Usd.Stage.Open(str(path))
+    boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    for name, low, high in (
+        ("Arrow", (8, 0, 4), (12, 9, 4)),
+        ("Kit/Arrow", (8, 1, 4), (12, 10, 4)),
+    ):
+        prim = stage.GetPrimAtPath(f"/Specimen/Annotations/{name}")
+        box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
+        found = np.array([box.GetMin(), box.GetMax()])
+        assert found == pytest.approx(100 * np.array([low, high], float))
+    places = UsdGeom.XformCache()
+    camera = places.GetLocalToWorldTransform(stage.GetPrimAtPath("/Specimen/Cameras/close"))
+    assert camera.ExtractTranslation() == Gf.Vec3d(1000, -500, 2400)
+    lamp = stage.GetPrimAtPath("/Specimen/Lights/Lamp")
+    assert places.GetLocalToWorldTransform(lamp).ExtractTranslation() == Gf.Vec3d(0, 4000, 0)
+    assert lamp.GetAttribute("inputs:intensity").Get() == pytest.approx(6e4)
 
 
 def bounds(stage: Usd.Stage) -> NDArray[np.float64]:

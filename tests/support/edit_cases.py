@@ -184,6 +184,22 @@ def _fade(stage: Usd.Stage) -> None:
     )
 
 
+def _hide_in_an_instance(stage: Usd.Stage) -> None:
+    stage.GetPrimAtPath(TILE).SetInstanceable(True)
+    over = Sdf.CreatePrimInLayer(stage.GetEditTarget().GetLayer(), BRANCH)
+    hidden = Sdf.AttributeSpec(over, "visibility", _Types.Token)
+    hidden.default = "invisible"
+
+
+def _add_to_a_level(stage: Usd.Stage) -> None:
+    """Add an arrow inside the finest level of detail, and select another one."""
+    levels = stage.GetPrimAtPath(TILE).GetVariantSet("lod")
+    levels.SetVariantSelection("lod0")
+    with levels.GetVariantEditContext():
+        define_arrow(stage, f"{TILE}/Arrow")
+    levels.SetVariantSelection("lod1")
+
+
 CASES: tuple[EditCase, ...] = (
     EditCase(
         "`inputs:color` of a channel",
@@ -394,6 +410,44 @@ CASES: tuple[EditCase, ...] = (
         lambda stage: define_arrow(stage).GetPointsAttr().Set([Gf.Vec3f(0)] * 7, 2.0),
         "refused",
         "Arrow.points: found values over time",
+    ),
+    EditCase(
+        "an edit below a tile that is an instance",
+        _hide_in_an_instance,
+        "reported",
+        "/r0_c0/CD31 is not taken over: USD ignores opinions below an instance",
+    ),
+    EditCase(
+        "visibility of an added group over time",
+        lambda stage: (
+            UsdGeom.Xform.Define(stage, "/Specimen/Kit")
+            .CreateVisibilityAttr()
+            .Set("invisible", 2.0)
+        ),
+        "refused",
+        "Kit.visibility: found values over time",
+    ),
+    EditCase(
+        "a primvar of one's own on an added group",
+        lambda stage: (
+            UsdGeom.PrimvarsAPI(UsdGeom.Xform.Define(stage, "/Specimen/Kit"))
+            .CreatePrimvar("displayColour", _Types.Color3fArray)
+            .Set([Gf.Vec3f(1, 0, 0)])
+        ),
+        "reported",
+        "Kit.primvars:displayColour is not taken over: no material of the mesh reads this primvar",
+    ),
+    EditCase(
+        "an added mesh in a level of detail that is not selected",
+        _add_to_a_level,
+        "reported",
+        "/r0_c0/Arrow is not taken over: it stands in a variant that is not selected",
+    ),
+    EditCase(
+        "an added mesh or curve without faces",
+        lambda stage: UsdGeom.Mesh.Define(stage, "/Specimen/Annotations/Nothing"),
+        "reported",
+        "Mesh /Specimen/Annotations/Nothing is not taken over",
     ),
     EditCase(
         "an added sphere, cube or other shape without points",

@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pxr import Usd, UsdLux
 
-from support.bundles import load
+from support.bundles import load, write
+from support.edit_cases import define_arrow, define_camera
+from support.stages import edit_over
 from support.unity_import import boxes, volume_of
 
 Run = Callable[..., subprocess.CompletedProcess[bytes]]
@@ -56,6 +59,22 @@ def test_more_than_four_channels_are_marched_apart(
     (tmp_path / "five" / "manifest.json").write_text(json.dumps(manifest))
     found = imported(tmp_path / "five")
     assert [c["isVisible"] for c in found["channels"]] == [False, True, True, True, True]
+
+
+@pytest.mark.slow
+def test_what_a_layer_added_and_unity_lacks_is_named(
+    stage: Path, bundle: Path, imported: Import, tmp_path: Path
+) -> None:
+    def change(edited: Usd.Stage) -> None:
+        define_arrow(edited)
+        define_camera(edited)
+        UsdLux.DistantLight.Define(edited, "/Specimen/Lights/Sun")
+
+    assert imported(bundle)["warnings"] == []
+    write(edit_over(tmp_path / "edited.usda", stage, change), tmp_path / "bundle")
+    (line,) = imported(tmp_path / "bundle")["warnings"]
+    words = "not imported: added meshes (additions.glb), lamps, cameras"
+    assert line.endswith(words)
 
 
 @pytest.mark.slow

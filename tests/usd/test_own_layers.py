@@ -219,8 +219,9 @@ def test_an_edit_that_is_lost_fails_a_strict_bundle_and_writes_nothing(
     assert "Channel0.inputs:colour is not taken over: no reader knows this name" in told
     assert "found 1 edit that no bundle takes over, expected none with --strict" in told
     assert not (out / "bundle").exists()
-    assert main(command) == 0
-    assert "Channel0.inputs:colour is not taken over" in capsys.readouterr().err
+    for _ in range(2):  # the second time the bundle is up to date
+        assert main(command) == 0
+        assert "Channel0.inputs:colour is not taken over" in capsys.readouterr().err
     assert main([*command, "--strict"]) == 1  # the finished bundle is no excuse
     channel.RemoveProperty("inputs:colour")
     over.GetRootLayer().Save()

@@ -9,11 +9,12 @@ import os
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils, Vt
 
 from stereocell.export.chosen import Chosen
 from stereocell.model.counted import counted
 from stereocell.usd.layer import METERS_PER_UNIT, UP_AXIS, export, vec3f
+from stereocell.usd.layer_opinions import load_payloads_of_users
 from stereocell.usd.preview_surface import repeats_color
 from stereocell.usd.read_appearances import edited_color
 from stereocell.usd.read_attributes import select_variant
@@ -50,6 +51,7 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
         levels = [one for one in lod_levels(prim) if one <= level]
         if levels:
             select_variant(prim, "lod", f"lod{levels[-1]}")
+    load_payloads_of_users(stage)
     flat = stage.Flatten(addSourceFileComment=False)
     _state_colors(stage, flat)
     for name in chosen.all_tiles:
@@ -80,29 +82,52 @@ def write_flattened(chosen: Chosen, path: Path, level: int) -> str:
 
 
 def _enlarge(flat: Sdf.Layer, specimen: Specimen, scale: float) -> None:
-    """Enlarge the tiles by a transform, the specimen's box, and how far away the cameras are.
+    """Enlarge what is drawn below the specimen by transforms, and move the cameras away as much.
 
     A transform above the cameras would leave their clipping ranges as they are.
     """
     stage = Usd.Stage.Open(flat, Usd.Stage.LoadNone)
-    tiles = UsdGeom.Xformable(stage.GetPrimAtPath(specimen.tiles))
-    placed = tiles.GetOrderedXformOps()
-    enlarged = tiles.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
-    enlarged.Set(Gf.Vec3d(scale))
-    tiles.SetXformOpOrder([enlarged, *placed])
-    whole = UsdGeom.ModelAPI(stage.GetPrimAtPath(specimen.root))
+    root = stage.GetPrimAtPath(specimen.root)
+    whole = UsdGeom.ModelAPI(root)
     if hint := whole.GetExtentsHint():
         whole.SetExtentsHint(vec3f(np.array(hint) * scale))
-    group = stage.GetPrimAtPath(specimen.cameras)
-    for prim in group.GetChildren() if group else ():
-        if not prim.IsA(UsdGeom.Camera):
-            continue
-        camera = UsdGeom.Camera(prim)
-        for attribute in (camera.GetFocusDistanceAttr(), camera.GetClippingRangeAttr()):
-            attribute.Set(attribute.Get() * scale)
-        for op in camera.GetOrderedXformOps():
-            if op.GetOpType() == UsdGeom.XformOp.TypeTranslate:
-                op.Set(op.Get() * scale)
+    for prim in root.GetChildren():
+        _enlarge_below(prim, scale)
+
+
+def _enlarge_below(prim: Usd.Prim, scale: float) -> None:
+    """Enlarge a prim where it can have a transform, else those below it."""
+    if prim.IsA(UsdGeom.Camera):
+        _move_camera(UsdGeom.Camera(prim), scale)
+    elif prim.IsA(UsdGeom.Xformable):
+        placed = UsdGeom.Xformable(prim)
+        ops = placed.GetOrderedXformOps()
+        enlarged = placed.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display")
+        enlarged.Set(Gf.Vec3d(scale))
+        placed.SetXformOpOrder([enlarged, *ops], placed.GetResetXformStack())
+        _keep_brightness(prim, scale)
+    else:
+        for child in prim.GetChildren():
+            _enlarge_below(child, scale)
+
+
+def _move_camera(camera: UsdGeom.Camera, scale: float) -> None:
+    for attribute in (camera.GetFocusDistanceAttr(), camera.GetClippingRangeAttr()):
+        attribute.Set(attribute.Get() * scale)
+    for op in camera.GetOrderedXformOps():
+        if op.GetOpType() == UsdGeom.XformOp.TypeTranslate:
+            op.Set(op.Get() * scale)
+        elif op.GetOpType() == UsdGeom.XformOp.TypeTransform:
+            matrix = op.Get()
+            op.Set(Gf.Matrix4d(matrix).SetTranslateOnly(matrix.ExtractTranslation() * scale))
+
+
+def _keep_brightness(prim: Usd.Prim, scale: float) -> None:
+    """Let spheres of light shine as bright from farther away: those of a stated power."""
+    for light in map(UsdLux.SphereLight, Usd.PrimRange(prim)):
+        if light and light.GetNormalizeAttr().Get():
+            intensity = light.GetIntensityAttr()
+            intensity.Set(intensity.Get() * scale**2)
 
 
 def _state_colors(stage: Usd.Stage, flat: Sdf.Layer) -> None:

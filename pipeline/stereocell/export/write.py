@@ -32,7 +32,8 @@ from stereocell.model.errors import OutputError, UsageError
 from stereocell.storage.atomic_write import put_in_place
 from stereocell.storage.overwriting import require_free
 from stereocell.storage.temporary_names import clear_beside
-from stereocell.usd.lost_edits import notes_on_edits, require_no_lost_edit
+from stereocell.usd.lost_edits import WHOLE, notes_on_edits, require_no_lost_edit
+from stereocell.usd.read_additions import notes_on_additions
 from stereocell.usd.stage_files import dependencies
 from stereocell.usd.typed_values import usd_boundary
 from stereocell.usd.write_usdz import MAX_TRIANGLES
@@ -187,6 +188,8 @@ def _report_edits(chosen: Chosen, lacks: tuple[Lack, ...], ending: str) -> None:
     """Report each edit that the file won't have. Raises StageError for one, with --strict."""
     stage, lost = chosen.stage, partial(edits.left_out, lacks)
     more = list(edits.notes_on_functions(stage, lacks))
+    if not edits.left_out(lacks, "addition", WHOLE):
+        more += notes_on_additions(stage)
     if chosen.options.strict:
         require_no_lost_edit(stage, more, left_out=lost, taker=f"{ending} leaves out")
     for line in (*notes_on_edits(stage, lost), *more):

@@ -110,6 +110,8 @@ TAKEN: dict[str, tuple[str, ...]] = {
     "light": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
     "sphere": (*_PLACED, *_SHOWN, *INPUTS, "@displayName"),
     "lights": (*_PLACED, *_SHOWN),
+    # holds additions, lights or cameras
+    "group": (*_PLACED, *_SHOWN, *_DISPLAYED),
     "addition": (
         *_PLACED,
         *_SHOWN,

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Sdf, Usd, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from stereocell.usd.specimen import specimen_of
 from stereocell.usd.write_stage import SUBLAYERS
@@ -40,6 +40,12 @@ _COMPOSITION = frozenset(
 _NOTES = frozenset(("documentation", "comment", "hidden", "userDocBrief", "uiHints"))
 # Variant sets of the build: the readers of a stage select each variant
 _ALL_READ = frozenset(("lod", "representation", "transferFunction"))
+BELOW_INSTANCE = "@below an instance"  # names an opinion that USD ignores
+# All prims, those of instances too
+_EVERY = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+_DEFINED = Usd.TraverseInstanceProxies(
+    Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+)  # loaded or not
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +95,41 @@ class BuiltLayers:
         return False
 
 
+def load_payloads_of_users(stage: Usd.Stage) -> None:
+    """Load the payloads that layers of a user add, and the tiles below which one has anything.
+
+    USD composes nothing below a payload that is not loaded, or below a prim that it defines.
+    """
+    built = BuiltLayers(stage)
+    if all(layer in built for layer in _layers(stage)):
+        return
+    tiles = specimen_of(stage).tiles
+    for path in stage.FindLoadable():
+        if not _is_in_tile(path, tiles) or _is_touched_below(stage.GetPrimAtPath(path), built):
+            _load(stage, path)
+
+
+def defined_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """Yield all prims that are active and defined, those of instances and payloads too.
+
+    Prototypes of instancers stand nowhere. Payloads of users stay loaded.
+    """
+    load_payloads_of_users(stage)
+    prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DEFINED))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()
+        yield prim
+
+
+def _is_in_tile(path: Sdf.Path, tiles: Sdf.Path) -> bool:
+    return bool(path.HasPrefix(tiles)) and path != tiles
+
+
+def _is_touched_below(prim: Usd.Prim, built: BuiltLayers) -> bool:
+    return any(spec.nameChildren or spec.variantSets for spec in _specs_of_users(prim, built))
+
+
 def opinions_of_users(stage: Usd.Stage, built: BuiltLayers) -> Iterator[tuple[Usd.Prim, Opinion]]:
     """Yield each opinion that a layer adds, with the composed prim, whose tile is then loaded."""
     if all(layer in built for layer in _layers(stage)):
@@ -110,20 +151,31 @@ def _specs_of_users(prim: Usd.Prim, built: BuiltLayers) -> list[Sdf.PrimSpec]:
     ]
 
 
+def _load(stage: Usd.Stage, path: Sdf.Path) -> None:
+    """Load a payload and those below it, except that no tile is loaded by what holds all tiles."""
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the readers raise USD's errors
+    is_above = specimen_of(stage).tiles.HasPrefix(path)
+    stage.Load(path, Usd.LoadWithoutDescendants if is_above else Usd.LoadWithDescendants)
+    del quiet
+
+
 def _composed_prims(stage: Usd.Stage, built: BuiltLayers) -> Iterator[Usd.Prim]:
     """Yield all prims, of tiles only those that a user's layer touches, loaded one by one."""
     tiles = specimen_of(stage).tiles
+    for path in stage.FindLoadable():
+        if not _is_in_tile(path, tiles):
+            _load(stage, path)
     for top in stage.GetPseudoRoot().GetFilteredChildren(Usd.PrimAllPrimsPredicate):
         yield from _walk(top, tiles, built)
 
 
 def _walk(prim: Usd.Prim, tiles: Sdf.Path, built: BuiltLayers) -> Iterator[Usd.Prim]:
-    every, path, stage = Usd.PrimAllPrimsPredicate, prim.GetPath(), prim.GetStage()
+    path, stage = prim.GetPath(), prim.GetStage()
     if not tiles.HasPrefix(path):
-        yield from Usd.PrimRange(prim, every)
+        yield from Usd.PrimRange(prim, _EVERY)
         return
     yield prim
-    for child in [one.GetPath() for one in prim.GetFilteredChildren(every)]:
+    for child in [one.GetPath() for one in prim.GetFilteredChildren(Usd.PrimAllPrimsPredicate)]:
         if path != tiles:
             yield from _walk(stage.GetPrimAtPath(child), tiles, built)
         elif _specs_of_users(stage.GetPrimAtPath(child), built):
@@ -132,17 +184,18 @@ def _walk(prim: Usd.Prim, tiles: Sdf.Path, built: BuiltLayers) -> Iterator[Usd.P
 
 def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:
     is_loaded = path in stage.GetLoadSet() or not stage.GetPrimAtPath(path).IsActive()
-    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # the reader of the tile raises USD's errors
     if not is_loaded:
-        stage.Load(path)
-    del quiet
-    yield from Usd.PrimRange(stage.GetPrimAtPath(path), Usd.PrimAllPrimsPredicate)
+        _load(stage, path)
+    yield from Usd.PrimRange(stage.GetPrimAtPath(path), _EVERY)
     if not is_loaded:
         stage.Unload(path)
 
 
 def _opinions(spec: Sdf.PrimSpec, path: Sdf.Path, prim: Usd.Prim) -> Iterator[Opinion]:
     yield from _own_opinions(spec, path, "")
+    if prim.IsInstance() and spec.path == path:
+        for child in spec.nameChildren:
+            yield Opinion(path.AppendChild(child.name), BELOW_INSTANCE, child)
     for set_name, variants in spec.variantSets.items():
         selected = prim.GetVariantSet(set_name).GetVariantSelection()
         for variant in variants.variants.values():

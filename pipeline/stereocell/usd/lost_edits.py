@@ -19,13 +19,19 @@ from pxr import Sdf, Sdr, Tf, Usd, UsdGeom, UsdShade
 from stereocell.model.errors import StageError
 from stereocell.usd.edit_places import Places, read_primvars
 from stereocell.usd.edit_table import ADDED, ASSUMED, DERIVED, TAKEN, is_taken, reason_of
-from stereocell.usd.layer_opinions import BuiltLayers, Opinion, opinions_of_users
+from stereocell.usd.layer_opinions import (
+    BELOW_INSTANCE,
+    BuiltLayers,
+    Opinion,
+    opinions_of_users,
+)
 from stereocell.usd.read_attributes import over_time
 from stereocell.usd.read_bindings import binding_fault
 from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
-_OWN_BINDING = ("mesh", "addition")  # places whose own binding is the strongest
+# Places whose own binding is the strongest, and groups of such places
+_OWN_BINDING = ("mesh", "addition", "group")
 _MOST_LINES = 3  # of edits that are alike; the last line counts the others
 _GROUPS = ("Xform", "Scope", "")  # types of prims that only hold others
 _FLAT = (
@@ -163,16 +169,19 @@ class _Finder:
         path, name = opinion.prim, opinion.name
         if any(path.HasPrefix(one) for one in self._covered):
             return _Fate.COVERED
-        place = self._places.of(path) or self._built_place(prim.GetStage().GetPrimAtPath(path))
+        own = prim.GetStage().GetPrimAtPath(path)
+        if name == BELOW_INSTANCE:
+            reason = f"USD ignores opinions below an instance: set instanceable of {prim.GetPath()}"
+            return LostEdit(str(path), name, f"{reason} to false")
+        place = self._places.of(path) or self._built_place(own) or _place_of_group(own)
         if not place:
-            return self._judge_prim(path, prim)
+            return self._judge_prim(path, prim, opinion)
         if opinion.variant:
             return LostEdit(
                 f"variant {opinion.variant} on {prim.GetPath()}",
                 "variant",
                 "it is not selected",
             )
-        own = prim.GetStage().GetPrimAtPath(path)
         if reason := self._left_out(place, WHOLE):
             self._covered.add(path)
             return LostEdit(f"{own.GetTypeName()} {path}", str(own.GetTypeName()), reason)
@@ -189,7 +198,7 @@ class _Finder:
         is_built = any(spec.layer in self._built for spec in prim.GetPrimStack())
         return _BUILT if is_built else ""
 
-    def _judge_prim(self, path: Sdf.Path, prim: Usd.Prim) -> LostEdit | _Fate:
+    def _judge_prim(self, path: Sdf.Path, prim: Usd.Prim, opinion: Opinion) -> LostEdit | _Fate:
         """Return how a prim that no reader looks at is lost."""
         own = prim.GetStage().GetPrimAtPath(path)
         if own and not own.IsDefined() and not own.IsAbstract():
@@ -199,6 +208,9 @@ class _Finder:
             return LostEdit(
                 str(path), "prim", f"the stage has no such prim{_hint(path.name, names)}"
             )
+        if not own and prim.IsActive() and not opinion.variant:
+            self._covered.add(path)
+            return LostEdit(str(path), "prim", "it stands in a variant that is not selected")
         kind = str(own.GetTypeName()) if own else ""
         if kind in _GROUPS and not (own and own.IsAbstract()):
             return _Fate.COVERED  # by the lines on what it holds
@@ -278,6 +290,13 @@ class _Finder:
         ]
         usual = ASSUMED.get(attribute.GetName(), below[0] if below else _fallback(attribute))
         return usual is not None and bool(spec.default == usual)
+
+
+def _place_of_group(prim: Usd.Prim) -> str:
+    """Return the place of a group that a layer adds below /Specimen; empty: it is none."""
+    is_group = prim and prim.IsDefined() and not prim.IsAbstract() and prim.GetTypeName() in _GROUPS
+    is_below = is_group and prim.GetPath().HasPrefix(specimen_of(prim.GetStage()).root)
+    return "group" if is_below else ""
 
 
 def _words_for(prim: Usd.Prim, path: Sdf.Path, name: str) -> str:

@@ -7,12 +7,14 @@ plain values of its material. Without a material it has its display colour. Curv
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.formats.gltf import Material
 from stereocell.meshes.tubes import sweep_tubes
 from stereocell.model.mesh import Mesh
 from stereocell.usd.drawn_prims import is_visible, to_world
+from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_appearances import WHITE, material_of, surface_of
 from stereocell.usd.read_attributes import require_still, value_of
 from stereocell.usd.read_curves import curve_lines
@@ -20,9 +22,10 @@ from stereocell.usd.read_display import display_color, display_opacity, has_many
 from stereocell.usd.read_mesh import move_mesh, read_mesh
 from stereocell.usd.read_textures import maps_of
 from stereocell.usd.specimen import specimen_of
+from stereocell.usd.typed_values import read_as
 
 _GREY = (0.5, 0.5, 0.5)  # linear RGB of what has neither a material nor a display colour
-_PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract  # loaded or not
+_POLYGONAL = ("none", "bilinear")  # schemes of subdivision whose edges stay sharp
 _Types = Sdf.ValueTypeNames
 
 
@@ -63,15 +66,18 @@ def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
 
 
 def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a line on each image of an added mesh, which is lost."""
+    """Yield a line on each image of an added mesh, which is lost, and on what has no faces."""
     for prim in _additions(stage):
+        if not _has_faces(prim):
+            yield f"{prim.GetTypeName()} {prim.GetPath()} is not taken over: it has no faces"
+            continue
         surface = _surface(prim)
         for file in maps_of(surface).files if surface else ():
             yield f"image {file.name} of {prim.GetPath()} is not taken over: added meshes have none"
 
 
 def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), _PREDICATE):
+    for prim in defined_prims(stage):
         if is_addition(prim) and is_visible(prim):
             yield prim
 
@@ -82,16 +88,48 @@ def _is_surface(path: Sdf.Path, tiles: Sdf.Path) -> bool:
     return len(names) == 3 and names[2] == f"{names[1]}_{names[0]}"
 
 
+def _has_faces(prim: Usd.Prim) -> bool:
+    name = "faceVertexCounts" if prim.IsA(UsdGeom.Mesh) else "curveVertexCounts"
+    return bool(read_as(prim.GetAttribute(name), _Types.IntArray))
+
+
 def _read(prim: Usd.Prim) -> Mesh | None:
+    if not _has_faces(prim):
+        return None
     matrix = to_world(prim)
     if prim.IsA(UsdGeom.Mesh):
         shown = {"displayColor"} if _shows_many_colors(prim) else set()
-        return read_mesh(UsdGeom.Mesh(prim), matrix, shown=shown)
+        faces = read_mesh(UsdGeom.Mesh(prim), matrix, shown=shown)
+        return _facet(faces) if faces is not None and _is_faceted(prim) else faces
     curves = UsdGeom.BasisCurves(prim)
     require_still(curves.GetPointsAttr(), curves.GetWidthsAttr())
     value_of(prim, "points", _Types.Point3fArray)
     mesh = sweep_tubes(curve_lines(curves))
     return None if mesh is None else move_mesh(mesh, matrix)
+
+
+def _is_faceted(prim: Usd.Prim) -> bool:
+    """Return whether USD shades each face by itself: a polygonal mesh that states no normals."""
+    mesh = UsdGeom.Mesh(prim)
+    is_polygonal = mesh.GetSubdivisionSchemeAttr().Get() in _POLYGONAL
+    has_normals = (
+        mesh.GetNormalsAttr().HasValue() or prim.GetAttribute("primvars:normals").HasValue()
+    )
+    return is_polygonal and not has_normals
+
+
+def _facet(mesh: Mesh) -> Mesh:
+    """Return a mesh whose triangles have corners and a normal of their own."""
+    corners = mesh.triangles.ravel()
+    a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return Mesh(
+        mesh.positions[corners],
+        np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0).astype(np.float32),
+        colors=None if mesh.colors is None else mesh.colors[corners],
+    )
 
 
 def _surface(prim: Usd.Prim) -> UsdShade.Shader | None:

@@ -24,6 +24,7 @@ from stereocell.formats.latlong import Radiance, read_latlong, turned
 from stereocell.model.errors import StageError
 from stereocell.storage.assets import find_asset
 from stereocell.usd.drawn_prims import is_visible, to_world
+from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_attributes import Point, file_of, require_still, value_of
 from stereocell.usd.specimen import Specimen, specimen_of
 
@@ -34,7 +35,6 @@ _KINDS = (UsdLux.DistantLight, UsdLux.SphereLight, UsdLux.DomeLight, UsdLux.Dome
 # What a dome's image may be: its parameterization, and where its pole is
 _KNOWN = {"inputs:texture:format": ("latlong", "automatic"), "poleAxis": ("Y", "scene")}
 _WHITE = (1.0, 1.0, 1.0)
-_PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract  # loaded or not
 
 # The inputs that decide about a lamp or a room
 INPUTS = (
@@ -89,7 +89,7 @@ def is_light(prim: Usd.Prim) -> bool:
 
 def visible_lights(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Yield the prims of the lights below /Specimen that are drawn, in the stage's order."""
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), _PREDICATE):
+    for prim in defined_prims(stage):
         if is_light(prim) and is_visible(prim):
             yield prim
 

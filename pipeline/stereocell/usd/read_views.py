@@ -14,6 +14,7 @@ from pxr import Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.usd.drawn_prims import is_visible, to_world
+from stereocell.usd.layer_opinions import defined_prims
 from stereocell.usd.read_attributes import Point, numbers_of
 from stereocell.usd.specimen import specimen_of
 
@@ -52,7 +53,7 @@ def read_views(
     Raises StageError for a camera without a lens or over time.
     """
     middle, longest = (low + high) / 2, float((high - low).max())
-    for prim in stage.Traverse():
+    for prim in defined_prims(stage):
         if is_view(prim) and is_visible(prim):
             yield _view_of(prim, middle, longest)
 

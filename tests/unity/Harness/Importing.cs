@@ -61,6 +61,7 @@ static class Importing
         return new JObject(
             new JProperty("root", Dumping.Dump(root)),
             new JProperty("objects", new JArray(AssetDatabase.ContextOf(Asset).Objects.Keys)),
+            new JProperty("warnings", new JArray(AssetDatabase.ContextOf(Asset).Warnings)),
             new JProperty("sources", new JArray(AssetDatabase.ContextOf(Asset).SourceDependencies)),
             new JProperty("depth", ReferenceEquals(Camera.main, null) ? "" : Camera.main.depthTextureMode.ToString()),
             new JProperty("channels", JToken.FromObject(specimen.channels.Select(c => new { c.id, c.name, c.isVisible, c.function, c.functions, c.firstRow, surfaces = c.surfaces.Count }))),

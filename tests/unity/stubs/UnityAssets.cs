@@ -147,6 +147,7 @@ namespace UnityEditor.AssetImporters
         public readonly List<string> CustomDependencies = new List<string>();
         public readonly List<string> SourceDependencies = new List<string>();
         public readonly List<string> Errors = new List<string>();
+        public readonly List<string> Warnings = new List<string>();
         public string assetPath { get; internal set; }
         public Object mainObject { get; private set; }
         public void AddObjectToAsset(string identifier, Object obj)
@@ -162,5 +163,6 @@ namespace UnityEditor.AssetImporters
         public void DependsOnSourceAsset(string path) { SourceDependencies.Add(path); }
         public void DependsOnCustomDependency(string dependency) { CustomDependencies.Add(dependency); }
         public void LogImportError(string msg, Object obj = null) { Errors.Add(msg); }
+        public void LogImportWarning(string msg, Object obj = null) { Warnings.Add(msg); }
     }
 }

@@ -13,6 +13,7 @@ from pxr import Gf, Sdf, UsdGeom, Vt
 
 from .choice import ROOT
 from .layer_values import set_value
+from .lighting import color_of_light
 from .looks import plain_values
 
 ANNOTATIONS = f"{ROOT}/Annotations"
@@ -25,13 +26,23 @@ _Types = Sdf.ValueTypeNames
 def write_additions(context, layer, stage, root, strangers, lost):
     """Yield what is written of the objects that the specimen did not have; `lost` gets the rest.
 
-    Hidden objects are left out, and so are empties, which only hold others.
+    Hidden objects are left out, and so are empties, which hold others.
     """
     to_stage = root.matrix_world.inverted()
     names = _Names(layer, stage)
     for block in strangers:
-        if block.hide_render or not block.visible_get() or block.type == "EMPTY":
+        if block.hide_render or not block.visible_get():
             continue
+        if block.is_instancer:
+            lost.append(f"instances by {block.name} are not taken over: make them real")
+        if block.type == "EMPTY":
+            continue
+        moving = (one.animation_data for one in (block, block.data))
+        if any(one is not None and (one.action or one.drivers) for one in moving):
+            lost.append(
+                f"animation of {block.name} is not taken over but for this frame: nothing moves "
+                "here"
+            )
         matrix = to_stage @ block.matrix_world
         if block.type in _SURFACES:
             yield from _write_surface(context, layer, block, matrix, names, lost)
@@ -119,6 +130,11 @@ def _write_material(layer, path, block, lost):
             f"image of {name} of material {materials[0].name} is not taken over: added meshes have "
             "none"
         )
+    tree = materials[0].node_tree
+    if tree and not any(node.bl_idname == "ShaderNodeBsdfPrincipled" for node in tree.nodes):
+        lost.append(
+            f"nodes of material {materials[0].name} are not taken over: a Principled BSDF is"
+        )
     over = f"{path}/material"
     for place, kind in ((over, "Material"), (f"{over}/surface", "Shader")):
         spec = Sdf.CreatePrimInLayer(layer, place)
@@ -153,6 +169,12 @@ def _write_camera(context, layer, block, matrix, names, lost):
     else:  # AUTO: the sensor's width is the picture's longer edge
         is_wide = fit == "HORIZONTAL" or width >= height
         vertical = camera.sensor_width * (height / width if is_wide else 1.0)
+    for name, is_set in (
+        ("shift", camera.shift_x or camera.shift_y),
+        ("depth of field", camera.dof.use_dof),
+    ):
+        if is_set:
+            lost.append(f"{name} of camera {block.name} is not taken over: the viewer has none")
     path = names.define(CAMERAS, "Camera", block.name)
     set_value(layer, path, "focalLength", _Types.Float, camera.lens)
     set_value(layer, path, "verticalAperture", _Types.Float, vertical)
@@ -171,8 +193,14 @@ def _write_light(layer, block, matrix, names, lost):
         return
     is_sun = light.type == "SUN"
     path = names.define(LIGHTS, "DistantLight" if is_sun else "SphereLight", block.name)
-    set_value(layer, path, "inputs:color", _Types.Color3f, Gf.Vec3f(*light.color))
+    set_value(layer, path, "inputs:color", _Types.Color3f, Gf.Vec3f(*color_of_light(light)))
     set_value(layer, path, "inputs:normalize", _Types.Bool, True)
+    if exposure := getattr(light, "exposure", 0.0):
+        set_value(layer, path, "inputs:exposure", _Types.Float, exposure)
+    if not getattr(light, "normalize", True):
+        lost.append(
+            f"strength by area of light {block.name} is not taken over: turn on its Normalize"
+        )
     if is_sun:
         set_value(layer, path, "inputs:angle", _Types.Float, math.degrees(light.angle))
         set_value(layer, path, "inputs:intensity", _Types.Float, light.energy)

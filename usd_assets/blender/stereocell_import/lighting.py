@@ -55,12 +55,23 @@ def _set_strengths(stage, objects):
         if not prim.GetAttribute("inputs:normalize").Get():
             continue
         exposure = prim.GetAttribute("inputs:exposure").Get() or 0.0
+        if hasattr(block.data, "exposure"):
+            block.data.exposure = 0.0
         block.data.energy = prim.GetAttribute("inputs:intensity").Get() * 2**exposure
 
 
 def light_values(block):
     """Return a light's strength and its colour, to be compared with those of the import."""
-    return [block.data.energy, *block.data.color]
+    exposure = getattr(block.data, "exposure", 0.0)
+    return [block.data.energy * 2**exposure, *color_of_light(block.data)]
+
+
+def color_of_light(light):
+    """Return a light's linear colour, that of its temperature included."""
+    color = list(light.color)
+    if getattr(light, "use_temperature", False):
+        color = [a * b for a, b in zip(color, light.temperature_color, strict=True)]
+    return color
 
 
 def intensity_of(prim, energy, before):

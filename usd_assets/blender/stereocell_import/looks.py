@@ -89,11 +89,17 @@ def plain_values(material):
         else:
             value = socket.default_value
             found[name] = value if isinstance(value, float) else tuple(value)[:3]
+    found["diffuseColor"] = _at_most_1(found["diffuseColor"])
     strength = surface.inputs["Emission Strength"].default_value
-    glow = [min(1.0, strength * part) for part in surface.inputs["Emission Color"].default_value]
-    if max(glow[:3]) > 0:
-        found["emissiveColor"] = tuple(glow[:3])
+    glow = [strength * part for part in surface.inputs["Emission Color"].default_value[:3]]
+    if max(glow) > 0:
+        found["emissiveColor"] = _at_most_1(glow)
     return found, images
+
+
+def _at_most_1(color):
+    """Return a colour of the same hue whose largest part is 1 at most, as a bundle has it."""
+    return tuple(part / max(1.0, *color) for part in color)
 
 
 def color_surface(material, group):

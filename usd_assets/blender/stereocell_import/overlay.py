@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
-from .additions import LIGHTS, write_additions
+from .additions import CAMERAS, LIGHTS, write_additions
 from .choice import CHANNELS, METERS_PER_UNIT, ROOT, TILES, open_stage
 from .importing import COLOR, PRIM, STATE, VOLUME, matrix_of
 from .layer_values import set_value
@@ -27,6 +27,7 @@ from .problem import StageProblem
 from .shapes import cut_fans, group_seams, turn_with
 from .snapshot import digest_nodes, find_losses, points_of_mesh, take_snapshot
 
+BUILT_CAMERAS = ("mono", "left", "right")
 _IN_GROUP = "a channel's colour and opacity are values of its node group"
 _MOVED = 1e-4  # of the longest translation and of 1: floats of 32 bits, through a scale of 1e-6
 
@@ -217,6 +218,10 @@ def _write_hidden(layer, state, objects):
             if leaf in hidden:
                 _hide(layer, leaf)
                 yield f"{leaf.rsplit('/', 1)[1]}: hidden"
+    for leaf in hidden:
+        if not leaf.startswith(f"{TILES}/"):  # an addition of an earlier export
+            _hide(layer, leaf)
+            yield f"{leaf.rsplit('/', 1)[1]}: hidden"
 
 
 def _is_hidden(block):
@@ -236,7 +241,7 @@ def _write_moved(layer, state, root, objects, lost):
             continue
         name = path.rpartition("/")[2]
         is_field = path.rpartition("/")[0] in state["leaves"]  # of a volume: drawn as that is
-        if is_field or not f"{path}/".startswith((f"{TILES}/", f"{LIGHTS}/")):
+        if is_field or not _is_placed(path, state):
             lost.append(f"the place of {name} is not taken over: {_why_it_stays(path, is_field)}")
             continue
         rows = [[round(float(v), 6) for v in row] for row in zip(*matrix, strict=True)]
@@ -247,10 +252,21 @@ def _write_moved(layer, state, root, objects, lost):
         yield f"{name}: moved"
 
 
+def _is_placed(path, state):
+    """Return whether a bundle takes over where a prim stands, or what it holds."""
+    if f"{path}/".startswith((f"{TILES}/", f"{LIGHTS}/")):
+        return True
+    above, _, name = path.rpartition("/")
+    if above == CAMERAS:
+        return name not in BUILT_CAMERAS
+    added = (leaf for leaf in state["leaves"] if not leaf.startswith(f"{TILES}/"))
+    return any(f"{leaf}/".startswith(f"{path}/") for leaf in added)
+
+
 def _why_it_stays(path, is_field):
     if is_field:
         return "move its volume"
-    is_camera = path.startswith(f"{ROOT}/Cameras/")
+    is_camera = path.startswith(f"{CAMERAS}/")
     return "add a camera of your own" if is_camera else "nothing in the bundle stands there"
 
 
@@ -283,6 +299,12 @@ def _write_points(layer, stage, state, objects, lost):
         now = take_snapshot(block)
         if now["points"] == before["points"] or now["faces"] != before["faces"]:
             continue  # other faces are told as a loss
+        if not path.startswith(f"{TILES}/"):
+            lost.append(
+                f"the shape of {before['name']} is not taken over: an earlier layer added it: hide "
+                "it, and edit a copy"
+            )
+            continue
         tile = path.removeprefix(f"{TILES}/").partition("/")[0]
         lod = state["lods"].get(tile, "")
         mesh = UsdGeom.Mesh(_as_staged(stage, f"{TILES}/{tile}", lod, path) or Usd.Prim())

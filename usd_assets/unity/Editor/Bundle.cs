@@ -72,6 +72,9 @@ namespace StereoCell.Editor
         public readonly List<TileEntry> Tiles = new List<TileEntry>();
         public readonly List<ChannelEntry> Channels = new List<ChannelEntry>();
 
+        /// <summary>The parts of the bundle that the viewer has and this package does not, in words.</summary>
+        public readonly List<string> LeftOut = new List<string>();
+
         readonly BundleFiles folder;
         readonly JObject files;
 
@@ -97,6 +100,9 @@ namespace StereoCell.Editor
                 });
             }
             foreach (var channel in Member(manifest, "channels")) Channels.Add(ChannelOf(channel));
+            if (manifest["additions"] != null) LeftOut.Add("added meshes (additions.glb)");
+            if (manifest["lights"] != null) LeftOut.Add("lamps");
+            if (manifest["views"] != null) LeftOut.Add("cameras");
         }
 
         /// <summary>The bytes of a file of the bundle.</summary>

@@ -31,6 +31,7 @@ namespace StereoCell.Editor
                 using (var files = BundleFiles.Open(ctx.assetPath))
                 {
                     var bundle = new Bundle(files);
+                    if (bundle.LeftOut.Count > 0) ctx.LogImportWarning(ctx.assetPath + ": not imported: " + string.Join(", ", bundle.LeftOut));
                     root = new GameObject(bundle.Name);
                     var guid = AssetDatabase.AssetPathToGUID(ctx.assetPath);
                     new SpecimenBuilder(bundle, options, guid, OwnMaterial, ctx.AddObjectToAsset).Build(root);
