@@ -73,6 +73,7 @@ def export_edits(context, path):
         *write_additions(context, layer, stage, root, strangers, lost),
     ]
     _write_hints(layer, stage, state, root, objects)
+    _widen_root(layer, stage)
     with as_staged(context, root):
         lost += _find_losses(context, state, objects)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
@@ -398,6 +399,31 @@ def _write_hints(layer, stage, state, root, objects):
         if len(boxes) > 1 and not np.allclose([low, high], boxes[0], atol=0):
             box = Vt.Vec3fArray.FromNumpy(np.array([low, high], np.float32))
             set_value(layer, path, "extentsHint", Sdf.ValueTypeNames.Float3Array, box)
+
+
+def _widen_root(layer, stage):
+    """Let the specimen's box hold what was moved or added."""
+    root = stage.GetPrimAtPath(ROOT)
+    hint = UsdGeom.ModelAPI(root).GetExtentsHint()
+    if not hint:
+        return
+    edits = Sdf.Layer.CreateAnonymous(".usda")
+    edits.TransferContent(layer)
+    edits.subLayerPaths = []
+    session = stage.GetSessionLayer()
+    session.subLayerPaths = [*session.subLayerPaths, edits.identifier]
+    try:
+        purposes = [UsdGeom.Tokens.default_, UsdGeom.Tokens.render]
+        boxes = UsdGeom.BBoxCache(Usd.TimeCode.Default(), purposes, True)
+        box = Gf.Range3d(Gf.Vec3d(*hint[0]), Gf.Vec3d(*hint[1]))
+        for child in root.GetChildren():
+            box.UnionWith(boxes.ComputeRelativeBound(child, root).ComputeAlignedRange())
+    finally:
+        session.subLayerPaths = [path for path in session.subLayerPaths if path != edits.identifier]
+    corners = np.array([list(box.GetMin()), list(box.GetMax())])
+    if not np.allclose(corners, np.array(hint[:2]), atol=0):
+        array = Vt.Vec3fArray.FromNumpy(corners.astype(np.float32))
+        set_value(layer, ROOT, "extentsHint", Sdf.ValueTypeNames.Float3Array, array)
 
 
 def _extents(stage, tile, path):
