@@ -247,3 +247,12 @@ def test_the_usdz_has_an_added_mesh_beside_the_specimen(stage, edit):
     material = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
     surface = material.ComputeSurfaceSource()[0]
     assert tuple(surface.GetInput("diffuseColor").Get()) == (0, 0, 1)
+
+
+def test_the_subdivision_that_usd_takes_for_granted_is_named(edit):
+    def change(stage):
+        define_arrow(stage).GetPrim().RemoveProperty("subdivisionScheme")
+
+    edit(change)
+    (line,) = edit.told
+    assert line.startswith("subdivision of /Specimen/Annotations/Arrow, which is USD's default")

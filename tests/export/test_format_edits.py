@@ -94,6 +94,18 @@ def test_a_line_says_what_a_format_has_no_field_for(
     assert words in lines[0]
 
 
+@pytest.mark.parametrize("ending", [".glb", ".usdz"])
+def test_a_file_of_some_tiles_says_that_it_leaves_additions_out(
+    edited: Callable[..., Path], tmp_path: Path, ending: str
+) -> None:
+    lines: list[str] = []
+    stage, file = edited(case_of("an added mesh").change), tmp_path / f"s{ending}"
+    options = ExportOptions(tiles=("r0_c0",))
+    export_stage(stage, file, options=options, report=lines.append)
+    (line,) = [line for line in lines if "is not taken over" in line]
+    assert "Arrow is not taken over: a file of some tiles or of a region has" in line
+
+
 def test_a_color_that_repeats_the_stage_s_own_needs_no_line(
     edited: Callable[..., Path], tmp_path: Path
 ) -> None:

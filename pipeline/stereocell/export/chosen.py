@@ -129,6 +129,11 @@ class Chosen:
             self.channels = every
 
     @property
+    def is_part(self) -> bool:
+        """Whether only some tiles or a region are written, and nothing that layers add."""
+        return bool(self.options.tiles) or self.region is not None
+
+    @property
     def region(self) -> Region | None:
         return self.options.region
 

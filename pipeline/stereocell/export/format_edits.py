@@ -84,6 +84,9 @@ _NO_LIGHTS = Lack(
 _NO_ADDITIONS = Lack(
     "the file has the channels' surfaces and volumes alone", {"addition": (WHOLE,)}
 )
+NO_ADDITIONS_OF_PART = Lack(
+    "a file of some tiles or of a region has the channels' surfaces alone", {"addition": (WHOLE,)}
+)
 _OF_CHANNELS = (*_NOWHERE, _NO_LIGHTS, _NO_ADDITIONS)
 _NO_SPHERES = Lack("usdz is scaled, and has no lights with a place", {"sphere": ("*", WHOLE)})
 _NO_SHOWN = Lack("--channels chooses the channels of this file", {"shown": ("visibility",)})

@@ -2,7 +2,7 @@
 
 Of a label map each object is a node of its own, with its name, up to MAX_NODES of them; beyond
 that a tile's objects are one mesh, in their colours. Meshes and curves that layers add have a node
-of their own, unless only some tiles are written.
+of their own, unless only some tiles or a region are written.
 """
 
 import tempfile
@@ -60,7 +60,7 @@ def write_gltf(chosen: Chosen, path: Path, level: int) -> str:
                 triangles += len(mesh.triangles)
         if not count:
             raise chosen.nothing("surface")
-        for addition in [] if options.tiles else read_additions(chosen.stage):
+        for addition in [] if chosen.is_part else read_additions(chosen.stage):
             mesh, material = _of_one_color(addition.mesh, addition.material)
             positions = mesh.positions.astype(np.float64) * scale
             where = {"addition": addition.path}

@@ -173,7 +173,8 @@ def _export(
     with usd_boundary(stage_path):
         chosen = Chosen(stage_path, options, report)
         if way.lacks is not None:
-            _report_edits(chosen, way.lacks, ending)
+            lacks = (*way.lacks, edits.NO_ADDITIONS_OF_PART) if chosen.is_part else way.lacks
+            _report_edits(chosen, lacks, ending)
         if way.is_seen:
             chosen.show_as_viewer()
     with usd_boundary(stage_path), _folder_beside(file) as beside:

@@ -66,14 +66,31 @@ def read_additions(stage: Usd.Stage) -> Iterator[Addition]:
 
 
 def notes_on_additions(stage: Usd.Stage) -> Iterator[str]:
-    """Yield a line on each image of an added mesh, which is lost, and on what has no faces."""
+    """Yield a line on each image and each subdivision that is lost, and on what has no faces."""
     for prim in _additions(stage):
         if not _has_faces(prim):
             yield f"{prim.GetTypeName()} {prim.GetPath()} is not taken over: it has no faces"
             continue
+        if _is_subdivided_by_default(prim):
+            yield (
+                f"subdivision of {prim.GetPath()}, which is USD's default, is not taken over: "
+                "surfaces are not subdivided here: apply it, or state subdivisionScheme none"
+            )
         surface = _surface(prim)
         for file in maps_of(surface).files if surface else ():
             yield f"image {file.name} of {prim.GetPath()} is not taken over: added meshes have none"
+
+
+def _is_subdivided_by_default(prim: Usd.Prim) -> bool:
+    """Return whether other programs round a mesh that states no scheme of subdivision.
+
+    A mesh with normals is polygonal in the eyes of most of them.
+    """
+    if not prim.IsA(UsdGeom.Mesh):
+        return False
+    mesh = UsdGeom.Mesh(prim)
+    has_normals = mesh.GetNormalsAttr().HasAuthoredValue() or prim.HasAttribute("primvars:normals")
+    return not has_normals and not mesh.GetSubdivisionSchemeAttr().HasAuthoredValue()
 
 
 def _additions(stage: Usd.Stage) -> Iterator[Usd.Prim]:
