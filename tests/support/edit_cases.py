@@ -170,6 +170,15 @@ def _keep_in_variant(stage: Usd.Stage) -> None:
     palette.SetVariantSelection("day")
 
 
+def _forget_the_set(stage: Usd.Stage) -> None:
+    layer = stage.GetEditTarget().GetLayer()
+    spec = Sdf.CreatePrimInLayer(layer, CHANNEL)
+    variants = Sdf.VariantSetSpec(spec, "transferFunction")
+    variant = Sdf.VariantSpec(variants, "default").primSpec
+    points = Sdf.AttributeSpec(variant, "stereocell:opacityPoints", _Types.Float2Array)
+    points.default = [Gf.Vec2f(0, 0), Gf.Vec2f(1, 0.5)]
+
+
 def _choose(path: str, name: str, variant: str) -> Callable[[Usd.Stage], object]:
     return lambda stage: stage.GetPrimAtPath(path).GetVariantSet(name).SetVariantSelection(variant)
 
@@ -315,6 +324,12 @@ CASES: tuple[EditCase, ...] = (
         _choose(CHANNEL, "transferFunction", "sharp"),
         "taken",
         "the function that the viewer opens with",
+    ),
+    EditCase(
+        "an opinion in a variant of a set that the layer does not list",
+        _forget_the_set,
+        "reported",
+        "variant 'default' of transferFunction on /Specimen/Channels/CD31 is not taken over: its",
     ),
     EditCase(
         "an opinion in a variant that is not selected",

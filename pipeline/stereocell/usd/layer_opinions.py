@@ -7,7 +7,7 @@ flattened stage has no such layer: there, edits can't be told from what was buil
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pxr import Sdf, Usd, UsdGeom, UsdUtils
@@ -62,6 +62,7 @@ class Opinion:
     name: str
     spec: Sdf.Spec
     variant: str = ""
+    is_unlisted: bool = False
 
     @property
     def source(self) -> tuple[str, str]:
@@ -136,7 +137,7 @@ def opinions_of_users(stage: Usd.Stage, built: BuiltLayers) -> Iterator[tuple[Us
         return
     for prim in _composed_prims(stage, built):
         for spec in _specs_of_users(prim, built):
-            for opinion in _opinions(spec, prim.GetPath(), prim):
+            for opinion in _opinions(spec, prim, built):
                 yield prim, opinion
 
 
@@ -191,17 +192,29 @@ def _loaded_prims(stage: Usd.Stage, path: Sdf.Path) -> Iterator[Usd.Prim]:
         stage.Unload(path)
 
 
-def _opinions(spec: Sdf.PrimSpec, path: Sdf.Path, prim: Usd.Prim) -> Iterator[Opinion]:
+def _opinions(spec: Sdf.PrimSpec, prim: Usd.Prim, built: BuiltLayers) -> Iterator[Opinion]:
+    path = prim.GetPath()
     yield from _own_opinions(spec, path, "")
     if prim.IsInstance() and spec.path == path:
         for child in spec.nameChildren:
             yield Opinion(path.AppendChild(child.name), BELOW_INSTANCE, child)
     for set_name, variants in spec.variantSets.items():
         selected = prim.GetVariantSet(set_name).GetVariantSelection()
+        is_listed = _is_listed(prim, spec.path, set_name, built)
         for variant in variants.variants.values():
-            if variant.name != selected:
-                words = "" if set_name in _ALL_READ else f"{variant.name!r} of {set_name}"
+            words = f"{variant.name!r} of {set_name}"
+            if not is_listed:
+                for opinion in _tree_of_variant(variant.primSpec, path, words):
+                    yield replace(opinion, is_unlisted=True)
+            elif variant.name != selected:
+                words = "" if set_name in _ALL_READ else words
                 yield from _tree_of_variant(variant.primSpec, path, words)
+
+
+def _is_listed(prim: Usd.Prim, path: Sdf.Path, name: str, built: BuiltLayers) -> bool:
+    """Return whether a spec at a place lists a variant set: else USD ignores its variants there."""
+    specs = [spec for spec in _specs_of_users(prim, built) if spec.path == path]
+    return any(name in spec.variantSetNameList.GetAppliedItems() for spec in specs)
 
 
 def _tree_of_variant(spec: Sdf.PrimSpec, path: Sdf.Path, variant: str) -> Iterator[Opinion]:

@@ -180,7 +180,9 @@ class _Finder:
             return LostEdit(
                 f"variant {opinion.variant} on {prim.GetPath()}",
                 "variant",
-                "it is not selected",
+                "its layer does not list the set: write prepend variantSets there"
+                if opinion.is_unlisted
+                else "it is not selected",
             )
         if reason := self._left_out(place, WHOLE):
             self._covered.add(path)

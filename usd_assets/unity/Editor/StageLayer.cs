@@ -58,9 +58,19 @@ namespace StereoCell.Editor
         static void AppendLook(StringBuilder text, ChannelEdit edit)
         {
             text.Append("        over \"" + edit.Id + "\"");
+            var metadata = "";
             if (edit.Function != null)
             {
-                text.Append(" (\n            variants = {\n                string transferFunction = \"" + edit.Function + "\"\n            }\n        )");
+                metadata += "            variants = {\n                string transferFunction = \"" + edit.Function + "\"\n            }\n";
+            }
+            if (edit.Points.Count > 0)
+            {
+                // USD ignores the variants of a set that their layer does not list.
+                metadata += "            prepend variantSets = \"transferFunction\"\n";
+            }
+            if (metadata.Length > 0)
+            {
+                text.Append(" (\n" + metadata + "        )");
             }
             text.Append("\n        {\n");
             if (edit.Color != null)
