@@ -10,6 +10,7 @@ from stereocell.steps.write_bundle import WriteBundle
 from stereocell.textures.map_packages import encoder_version, require_map_packages
 from stereocell.usd import written_files
 from stereocell.usd.stage_files import dependencies, may_be_image
+from stereocell.usd.write_previews import PREVIEWS
 
 
 def require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
@@ -45,7 +46,9 @@ def bundle_step(out_folder: OutFolder, path: Path, viewer: Path | None) -> Write
     files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
     made_of = (str(path.absolute()), *states_of(files)) if kept is None else tuple(kept)
     # an image may feed a surface, and is encoded then: by this version, or not at all
-    encoder = encoder_version() if any(map(may_be_image, files)) else None
+    previews = out_folder.stage_dir / PREVIEWS  # which feed none
+    images = [file for file in files if may_be_image(file) and file.parent != previews]
+    encoder = encoder_version() if images else None
     page = () if viewer is None else tuple(states_of(sorted(viewer.rglob("*"))))
     return WriteBundle(made_of, page, encoder)
 
