@@ -124,7 +124,7 @@ def test_stage_shows_the_paint_and_leaves_other_channels_to_be_recoloured(built:
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{tile.GetPath()}/body/body_r0_c0"))
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayColor")
     assert primvar.GetInterpolation() == "vertex"
-    colors = np.array(primvar.Get())
+    colors = np.array(primvar.ComputeFlattened())
     bare, painted = _sides(np.array(mesh.GetPointsAttr().Get()))
     np.testing.assert_allclose(colors[bare], np.tile(base, (bare.sum(), 1)), atol=0.05)
     np.testing.assert_allclose(

@@ -245,10 +245,10 @@ def run_bundle(
                 written = [tile.place for tile in tiles]
                 for note in write_bundle(composed, written, out_folder.bundle_dir, viewer):
                     phase.print(note)
+            phase.about = "" if stage is None else f"of {printable(path.name)}"
         elif stage is not None:  # lost edits are named whenever somebody asks for the layer
             with opened_stage(path) as composed:
                 phase.print(*composed.notes())
-            phase.about = "" if stage is None else f"of {printable(path.name)}"
     out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         phase.print("the viewer is not built, so the bundle has no page: run `make setup`")
