@@ -69,7 +69,7 @@ def test_channels_are_shown_coloured_and_classified_by_name(
         assert material[f"_Color{place}"] == pytest.approx([0.21404114, 1, 0, 1])
         assert material["_Shown"][1 - place] == 0
         assert box["enabled"]
-        # what the pass's state needs is in a material, and so in play mode alone
+        # A material holds the values that the state of the pass needs. Only play mode has one.
         assert material.get("_ZTest") == (8 if plays else None)
         assert material.get("_SceneDepth") == (1 if plays else None)
     assert found["depth"] == "Depth"

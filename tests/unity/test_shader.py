@@ -98,7 +98,7 @@ def test_every_number_of_a_material_is_in_the_block_that_is_batched(
 
 @each_pipeline
 def test_an_unknown_name_does_not(pipeline: str, tmp_path: Path) -> None:
-    """What the tests above are worth: the compiler sees the whole program."""
+    """The compiler sees the whole program, so the tests above can fail."""
     with pytest.raises(subprocess.CalledProcessError):
         compile_stage("frag", tmp_path, "march=gone+", pipeline=pipeline)
 

@@ -32,11 +32,11 @@ MAX_LAMPS = 3  # of the viewer
 MAX_STRENGTH = 10.0  # of a lamp of the viewer; a stronger one is as strong as this
 _NEAREST = 0.25  # longest edges: a lamp in the specimen is as bright as at this distance
 _KINDS = (UsdLux.DistantLight, UsdLux.SphereLight, UsdLux.DomeLight, UsdLux.DomeLight_1)
-# What a dome's image may be: its parameterization, and where its pole is
+# The image of a dome may have these parameterizations, and its pole may be there.
 _KNOWN = {"inputs:texture:format": ("latlong", "automatic"), "poleAxis": ("Y", "scene")}
 _WHITE = (1.0, 1.0, 1.0)
 
-# The inputs that decide about a lamp or a room
+# These inputs decide how bright a lamp or a room is, and in which colour.
 INPUTS = (
     "inputs:color",
     "inputs:intensity",

@@ -47,7 +47,7 @@ def read_stage_list(stage_dir: Path) -> dict[str, Any]:
     return read_list(stage_dir / FILES, REMEDY)
 
 
-# What the files of a stage hold, by suffix; tiles have no other .usdc
+# This table says what the files of a stage hold, by suffix. Tiles have no other .usdc.
 _PARTS = {
     ".vdb": "volumes for other programs",
     ".exr": "volumes for the bundle, and looks",

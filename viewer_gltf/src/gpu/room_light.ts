@@ -18,7 +18,7 @@ export type RoomLight = Readonly<{
   sky: Rgb;
   /** Light from below: a dark room's floor still keeps a colour from turning black. */
   ground: Rgb;
-  /** Whose axes the directions to the lamps are in: lamps hang over the viewer's shoulder, or stand with the specimen. */
+  /** The directions to the lamps are in the axes of the eye, over whose shoulder they hang, or of the specimen. */
   standsWith: "eye" | "specimen";
 }>;
 

@@ -158,7 +158,7 @@ export class Forms {
   }
 }
 
-/** How far from the specimen what is added widens the view, in its longest edges. */
+/** Additions widen the view as far as this beside the specimen, in its longest edges. */
 const WIDEST = 0.5;
 
 /** Corners of the box round what a layer adds, um, world, as far as it lies beside the specimen. */

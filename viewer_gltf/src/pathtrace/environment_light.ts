@@ -10,7 +10,7 @@ const OWN = "own";
 /** The name of the light of the stage's domes. */
 const STAGE = "stage";
 
-/** Where the image of a stage's domes is. */
+/** The bundle and the file that hold the image of a stage's domes. */
 export type StageRoom = Readonly<{ base: string; file: FileRef }>;
 
 export class EnvironmentLight {

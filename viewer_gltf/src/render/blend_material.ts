@@ -1,8 +1,8 @@
 /**
- * Surfaces that give way to their volume: inside the disc, or as a whole, and surfaces that are
- * made translucent. Depth is written first, without colour, so that of a translucent surface only
- * what lies in front shows. Translucent channels are drawn one after another, farthest first, each with a depth of
- * its own, so that they show through one another. Where a solid is cut open, or ends at the tile that is a volume, its inside
+ * This file blends surfaces that give way to their volume, inside the disc or as a whole, and surfaces that are
+ * made translucent. A first pass writes the depth without colour, so that only the front of a translucent surface
+ * shows. Each translucent channel has a depth of its own. The channels are drawn from the farthest to the nearest, so
+ * that they show through one another. Where a solid is cut open, or ends at the tile that is a volume, its inside
  * is drawn as the plane there: flat, and lit as that.
  */
 import {
@@ -127,7 +127,7 @@ export function depthMaterial(
   return material;
 }
 
-/** Of the render order, between the depth of a channel's surfaces and their colour. */
+/** This step of the render order lies between the depth of a channel's surfaces and their colour. */
 const DEPTH_AHEAD = 0.5;
 
 /** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */

@@ -24,7 +24,7 @@ export function roomLightOf({ lights, specimen: { bounds_um } }: Manifest): Room
   };
 }
 
-/** What paths of light start with. The light of a stage needs no other exposure than surfaces have. */
+/** Returns the settings that path tracing opens with. The light of a stage needs no other exposure than surfaces have. */
 export function traceLitBy(lights: Lights | undefined, bounds: Bounds): TraceSettings {
   if (lights === undefined) return START_TRACE;
   const off = START_TRACE.lamps.map((lamp): Lamp => ({ ...lamp, isOn: false }));
@@ -50,7 +50,7 @@ function lampOf(lamp: StageLamp, bounds: Bounds): Lamp {
   return { isOn: true, x, y, z, color: lamp.color, strength: lamp.strength };
 }
 
-/** To a lamp from the specimen's middle: in its longest edges, or, of a far lamp, a direction. */
+/** Returns the way from the specimen's middle to a lamp in longest edges, or the direction to a far lamp. */
 function asideOf({ towards, position_um }: StageLamp, { min, max }: Bounds): Vec3 {
   if (position_um === null) return towards ?? [0, 0, 1];
   const edge = Math.max(...max.map((v, k) => v - min[k]));
