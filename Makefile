@@ -229,7 +229,7 @@ AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures non
 # one process compiles all for the three, which would each do it, side by side
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
+	OPENBLAS_NUM_THREADS=1 STEREOCELL_MESSAGES=out/messages.md $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
 # CI has no time for all tests with two versions of Python, so the newest one gets a few: the files
 # that libraries read and write, a full disk, and the wheel by itself from a build to a .glb. pyenv's

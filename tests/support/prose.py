@@ -2,13 +2,13 @@
 
     python -m tests.support.prose [--count] [FILE ...]
 
-Without files, every file of the repository is checked. A hit is printed as FILE:LINE, the rule and the
-sentence, and ends the check with exit code 1. `--count` prints the texts and hits of each folder.
+Without files, every file of the repository is checked. A hit is printed as FILE:LINE, the rule and
+the sentence, and ends the check with exit code 1. `--count` prints the texts and hits by folder.
 
-The rules are those that a program can hold: how a sentence begins, words of the glossary that have a
-better one, and how long a sentence is. The prose linter vale has the same kinds of rule. It is not used
-because its package fetches a program from the web when it first runs, and because it reads neither the
-messages of Python and TypeScript nor GLSL.
+The rules are those that a program can hold: how a sentence begins, words of the glossary that have
+a better one, and how long a sentence is. The prose linter vale has the same kinds of rule. It is
+not used because its package fetches a program from the web when it first runs, and because it
+reads neither the messages of Python and TypeScript nor GLSL.
 """
 
 import ast
@@ -28,7 +28,7 @@ Text = tuple[int, str]  # line in the file, counted from 1; text without its mar
 MAX_WORDS = 30  # of a sentence of a comment, docstring or message
 MAX_AVERAGE_WORDS = 18.0  # of the sentences of a page of docs
 NO_SUBJECT = re.compile(
-    r"^(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of|so that|as said)\b"
+    r"^(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of|so that)\b"
     r"(?!.*\?$)",
     re.IGNORECASE,
 )
@@ -85,7 +85,8 @@ def _python(source: str) -> Iterator[Text]:
 
 
 TOKENS = re.compile(
-    r"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`",
+    r"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/"
+    r"|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`",
     re.DOTALL,
 )
 
