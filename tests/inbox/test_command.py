@@ -31,7 +31,7 @@ from stereocell.cli.__main__ import main
         ),
         (
             ["--inbox", "box", "--allow-frame", "https://a.example"],
-            "--allow-frame does not apply to an inbox, whose users choose in the page: leave it out",
+            "--allow-frame does not apply to an inbox, whose users choose in the page",
         ),
     ],
 )
