@@ -166,6 +166,7 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
                 plan.placement,
                 plan.settings.lod.samples,
                 channel_id in plan.shared_volumes,
+                not plan.settings.volume.without_vdb,
             ),
         )
 
