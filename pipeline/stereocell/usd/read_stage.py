@@ -17,7 +17,7 @@ from stereocell.model.world_box import move_box
 from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
 from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES
-from stereocell.usd.layer_units import require_units
+from stereocell.usd.layer_units import require_no_display, require_units
 from stereocell.usd.read_attributes import (
     Point,
     numbers_of,
@@ -27,7 +27,7 @@ from stereocell.usd.read_attributes import (
 from stereocell.usd.read_variants import TileChoice, read_choice
 from stereocell.usd.specimen import find_specimen, specimen_of
 from stereocell.usd.typed_values import one_line, read_as, text_of
-from stereocell.usd.written_files import AsWritten
+from stereocell.usd.written_files import STAGE_NAME, AsWritten
 
 _SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
 _Types = Sdf.ValueTypeNames
@@ -50,11 +50,30 @@ def open_stage(path: Path) -> Usd.Stage:
         del quiet
     specimen = find_specimen(stage)
     require_composed(stage)
-    require_units(stage)
+    if stage.GetPrimAtPath(specimen.channels):
+        require_no_display(stage)
+        require_units(stage)
     for needed in (specimen.root, specimen.channels, specimen.tiles):
         if not stage.GetPrimAtPath(needed):
-            raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
+            raise StageError(
+                f"{path}: no prim {needed}, expected a StereoCell stage, or a layer over its "
+                f"{STAGE_NAME}"
+            )
+    _require_places(stage)
     return stage
+
+
+def _require_places(stage: Usd.Stage) -> None:
+    """Raise StageError where a layer gives prims of the build another path by `relocates`."""
+    root = specimen_of(stage).root
+    for layer in stage.GetLayerStack(includeSessionLayers=False):
+        for old, new in layer.relocates:
+            if old != root and (old.HasPrefix(root) or new.HasPrefix(root)):
+                raise StageError(
+                    f"{layer.realPath}: relocates {old} to {new or 'nothing'}, expected prims "
+                    "where the build wrote them, since tiles and channels are found by path: "
+                    "set a display name, or deactivate what shall not show"
+                )
 
 
 def specimen_name(stage: Usd.Stage) -> str:
