@@ -10,7 +10,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.bundle.manifest import read_manifest
-from stereocell.model.errors import StageError
+from stereocell.model.errors import StageError, StereoCellError
 from stereocell.usd.read_provenance import note_on_source
 from stereocell.usd.read_stage import open_stage
 from support import edit_cases
@@ -199,3 +199,40 @@ def test_a_layer_over_the_stage_of_another_source_is_named(tmp_path: Path) -> No
     assert note_on_source(open_stage(stages[0]), stages[0]) == ""
     note = note_on_source(open_stage(stages[1]), stages[0])
     assert "B/stage.usda: shows another specimen (fingerprint bbbbbbbbbbbb) than" in note
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("/Specimen/Tiles/r0_c0", "/Specimen/Tiles/left"),
+        (edit_cases.CHANNEL, "/Specimen/Channels/vessels"),
+        (edit_cases.MESH, f"{edit_cases.BRANCH}/mesh"),
+    ],
+)
+def test_a_flattened_stage_whose_prims_were_renamed_is_refused(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    stage = Usd.Stage.Open(str(write_tiles(tmp_path / "A")))
+    flat = Usd.Stage.Open(stage.Flatten())
+    editor = Usd.NamespaceEditor(flat)
+    assert editor.MovePrimAtPath(old, new)
+    editor.ApplyEdits()
+    file = tmp_path / "A/flat.usda"
+    flat.GetRootLayer().Export(str(file))
+    with pytest.raises(
+        StereoCellError, match="a surface of the build whose tile, channel or mesh was"
+    ):
+        write(file, tmp_path / "bundle")
+
+
+def test_a_flattened_stage_under_another_root_has_its_surfaces(tmp_path: Path) -> None:
+    stage = Usd.Stage.Open(str(write_tiles(tmp_path / "A")))
+    flat = Usd.Stage.Open(stage.Flatten())
+    editor = Usd.NamespaceEditor(flat)
+    assert editor.MovePrimAtPath("/Specimen", "/Kidney")
+    editor.ApplyEdits()
+    flat.GetRootLayer().defaultPrim = "Kidney"
+    file = tmp_path / "A/flat.usda"
+    flat.GetRootLayer().Export(str(file))
+    write(file, tmp_path / "bundle")
+    assert len(list((tmp_path / "bundle").rglob("lod0.glb"))) == len(_TILES)

@@ -16,7 +16,7 @@ from stereocell.model.errors import StageError
 from stereocell.model.world_box import move_box
 from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
-from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES
+from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES, SURFACE_API
 from stereocell.usd.layer_units import require_no_display, require_units
 from stereocell.usd.read_attributes import (
     Point,
@@ -168,6 +168,28 @@ def loaded(
         yield from _loaded(stage, path)
 
 
+def _require_names(tile: Usd.Prim) -> None:
+    """Raise StageError for a surface of the build that no reader finds, after a prim was renamed.
+
+    A channel that is not active has no reader on purpose.
+    """
+    stage = tile.GetStage()
+    channels = specimen_of(stage).channels
+    for branch in tile.GetChildren():
+        expected = f"{branch.GetName()}_{tile.GetName()}"
+        has_channel = bool(stage.GetPrimAtPath(channels.AppendChild(branch.GetName())))
+        if has_channel and branch.GetChild(expected):
+            continue
+        for mesh in branch.GetChildren():
+            if SURFACE_API in mesh.GetAppliedSchemas():
+                raise StageError(
+                    f"{mesh.GetPath()}: a surface of the build whose tile, channel or mesh was "
+                    f"renamed, expected {tile.GetPath()}/CHANNEL/CHANNEL_{tile.GetName()} with a "
+                    f"channel of {channels}: give the prims their names back; their display names "
+                    "are free"
+                )
+
+
 def _stage_folders(stage: Usd.Stage) -> list[Path]:
     """Return the folders of a stage's layers, without its payloads."""
     paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
@@ -184,6 +206,7 @@ def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileCh
         choice = read_choice(prim)
         if "both" in prim.GetVariantSet("representation").GetVariantNames():
             select_variant(prim, "representation", "both")
+        _require_names(prim)
         yield prim, choice
     finally:
         stage.Unload(path)
