@@ -65,6 +65,7 @@ def describe(root):
                 "high": [max(c[k] for c in corners) for k in range(3)],
                 "world": list(block.dimensions),
                 "faces": len(block.data.polygons),
+                "name": block.name,
                 "color": surface_color(block.data.materials[0]),
             }
         elif block.type == "VOLUME":

@@ -239,6 +239,23 @@ def test_an_import_has_the_channels_that_the_stage_shows_or_all(
     assert channels_of(channels="ALL") == shown | {F_ID}
 
 
+def test_blocks_have_the_names_that_channels_show(stage_path: Path, tmp_path: Path) -> None:
+    layer, overlay = tmp_path / "over.usda", tmp_path / "edit.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths = [str(stage_path)]
+    stage.SetMetadata("metersPerUnit", 1e-6)
+    stage.SetMetadata("upAxis", "Y")
+    stage.GetPrimAtPath(f"/Specimen/Channels/{F_ID}").SetDisplayName("CD31/µ 1")
+    stage.Save()
+    found = run("import", tmp_path, stage=layer, representation="both")
+    assert found["meshes"][leaf("r0_c0", F_ID)]["name"] == "CD31/µ 1_r0_c0"
+    assert found["meshes"][leaf("r0_c0", BALL_ID)]["name"] == f"{NAMES[1]}_r0_c0"
+    assert found["volumes"][leaf("r0_c0", F_ID, "_volume")]["material"] == "CD31/µ 1 volume"
+    # the names of the import are no edits
+    found = run("edit", tmp_path, stage=layer, overlay=overlay, representation="AS_STAGED")
+    assert found["told"] == [("Info", "0 edits: ")]
+
+
 def test_volumes_have_their_grid_place_and_transfer_function(
     stage_path: Path, tmp_path: Path
 ) -> None:
@@ -374,7 +391,7 @@ def test_moved_points_are_carried_with_all_that_follows_from_them(
     )  # fmt: skip
     ((kind, told),) = found["told"]
     assert kind == "Info"
-    assert f"CD3_x3b5__r0_c0: points at {lod}" in told
+    assert f"{NAME}: points at {lod}" in told
     assert ("finer levels keep their shape" in told) == (lod != "lod0")
     assert validate_stage(overlay) == []
     built, edited = (mesh_at(path, LETTER, lod) for path in (stage_path, overlay))
@@ -448,7 +465,7 @@ def test_moved_meshes_and_volumes_are_carried(stage_path: Path, tmp_path: Path, 
     assert entries[1]["matrix"][12:] == pytest.approx([0, -4, 0, 1])
 
 
-NAME = "CD3_x3b5__r0_c0"
+NAME = f"{NAMES[0]}_r0_c0"  # in Blender
 
 
 @pytest.mark.parametrize(
@@ -602,7 +619,7 @@ def test_a_copy_of_a_surface_is_an_addition_of_its_color(stage_path: Path, tmp_p
     (layer,) = manifest["additions"]["layers"]
     assert layer["name"] == f"{NAME}.001"
     (mesh,) = additions_of(tmp_path / "bundle").values()
-    (channel,) = [one for one in manifest["channels"] if one["id"] in NAME]
+    (channel,) = [one for one in manifest["channels"] if one["id"] == F_ID]
     found = np.array(mesh.visual.material.baseColorFactor[:3]) / 255
     assert found == pytest.approx(channel["color"], abs=1 / 255)
 

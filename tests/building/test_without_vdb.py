@@ -7,6 +7,7 @@ import pytest
 from pxr import Usd, UsdVol
 
 from stereocell.cli.__main__ import main
+from stereocell.formats.exr import read_atlas, write_atlas
 from stereocell.usd.validate import validate_stage
 from support import phantoms
 from support.bundles import files
@@ -47,6 +48,20 @@ def test_volumes_stay_in_the_bundle_and_are_no_files_of_other_programs(
     )
     assert one
     assert one == other
+
+
+def test_a_deep_check_passes_and_still_compares_the_voxels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = built(tmp_path / "small", "--without-vdb")
+    assert main(["check", str(out), "--deep"]) == 0
+    assert "volumes equal" in capsys.readouterr().out
+    (atlas,) = (out / "stage/tiles").rglob("*.exr")
+    voxels = read_atlas(atlas)
+    voxels[10, 10, 10] ^= 1
+    write_atlas(atlas, voxels)
+    assert main(["check", str(out), "--deep"]) == 1
+    assert "1 of 17576 voxels are not the source's" in capsys.readouterr().out
 
 
 def test_a_new_window_is_applied_to_the_voxels_of_eight_bits(tmp_path: Path) -> None:

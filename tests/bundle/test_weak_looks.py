@@ -10,7 +10,9 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from stereocell.bundle.manifest import read_manifest
-from stereocell.model.errors import StageError
+from stereocell.model.errors import StageError, StereoCellError
+from stereocell.usd.read_provenance import note_on_source
+from stereocell.usd.read_stage import open_stage
 from support import edit_cases
 from support.bundles import channel, write, write_tiles
 from support.stages import edit_over
@@ -164,3 +166,73 @@ def test_a_library_of_looks_among_the_sublayers_reaches_the_bundle(stage, tmp_pa
     told = write(written, tmp_path / "bundle")
     assert [line for line in told if "is not taken over" in line] == []
     assert channel(tmp_path / "bundle")["color"] == list(GREEN)
+
+
+@pytest.mark.parametrize("instance", ["/World/A", "/World"])
+def test_a_specimen_that_is_an_instance_is_refused_with_the_line_to_write(
+    tmp_path: Path, instance: str
+) -> None:
+    stage = write_tiles(tmp_path / "A")
+    group = scene_over({"A": stage}, tmp_path / "group.usda")
+    if instance == "/World":
+        group.GetRootLayer().Save()
+        group = scene_over({}, tmp_path / "scene.usda")
+        group.GetPrimAtPath("/World").GetReferences().AddReference(str(tmp_path / "group.usda"))
+    group.GetPrimAtPath(instance).SetInstanceable(True)
+    with pytest.raises(StageError, match=f"{instance}: is an instance, .* instanceable = false"):
+        bundle_of(group, tmp_path)
+
+
+def test_a_scene_without_a_specimen_is_refused_before_its_default_prim(tmp_path: Path) -> None:
+    stage = write_tiles(tmp_path / "A")
+    scene = scene_over({"tile": stage.parent / "tiles/r0_c0/tile.usdc"}, tmp_path / "scene.usda")
+    with pytest.raises(StageError, match=r"no prim /Specimen, expected .* over its stage\.usda"):
+        bundle_of(scene, tmp_path)
+
+
+def test_a_layer_over_the_stage_of_another_source_is_named(tmp_path: Path) -> None:
+    stages = [write_tiles(tmp_path / name) for name in "AB"]
+    for stage, fingerprint in zip(stages, ("a" * 64, "b" * 64), strict=True):
+        layer = Sdf.Layer.FindOrOpen(str(stage))
+        layer.customLayerData = {"stereocell": {"fingerprint": fingerprint}}
+        layer.Save()
+    assert note_on_source(open_stage(stages[0]), stages[0]) == ""
+    note = note_on_source(open_stage(stages[1]), stages[0])
+    assert "B/stage.usda: shows another specimen (fingerprint bbbbbbbbbbbb) than" in note
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("/Specimen/Tiles/r0_c0", "/Specimen/Tiles/left"),
+        (edit_cases.CHANNEL, "/Specimen/Channels/vessels"),
+        (edit_cases.MESH, f"{edit_cases.BRANCH}/mesh"),
+    ],
+)
+def test_a_flattened_stage_whose_prims_were_renamed_is_refused(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    stage = Usd.Stage.Open(str(write_tiles(tmp_path / "A")))
+    flat = Usd.Stage.Open(stage.Flatten())
+    editor = Usd.NamespaceEditor(flat)
+    assert editor.MovePrimAtPath(old, new)
+    editor.ApplyEdits()
+    file = tmp_path / "A/flat.usda"
+    flat.GetRootLayer().Export(str(file))
+    with pytest.raises(
+        StereoCellError, match="a surface of the build whose tile, channel or mesh was"
+    ):
+        write(file, tmp_path / "bundle")
+
+
+def test_a_flattened_stage_under_another_root_has_its_surfaces(tmp_path: Path) -> None:
+    stage = Usd.Stage.Open(str(write_tiles(tmp_path / "A")))
+    flat = Usd.Stage.Open(stage.Flatten())
+    editor = Usd.NamespaceEditor(flat)
+    assert editor.MovePrimAtPath("/Specimen", "/Kidney")
+    editor.ApplyEdits()
+    flat.GetRootLayer().defaultPrim = "Kidney"
+    file = tmp_path / "A/flat.usda"
+    flat.GetRootLayer().Export(str(file))
+    write(file, tmp_path / "bundle")
+    assert len(list((tmp_path / "bundle").rglob("lod0.glb"))) == len(_TILES)

@@ -59,7 +59,7 @@ def write_bundle(stage, folder, viewer, *, engine, parts=None, report_line=lambd
     folder.parent.mkdir(parents=True, exist_ok=True)
     kept = nullcontext(parts) if parts else tempfile.TemporaryDirectory(dir=folder.parent)
     with kept as place, steps.opened_stage(stage) as composed:
-        for note in composed.notes():
+        for note in composed.notes(stage):
             report_line(note)
         tiles = steps.bundle_tile_tasks(composed, Path(place))
         run_missing(engine, "bundle", tiles)

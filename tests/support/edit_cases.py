@@ -145,6 +145,36 @@ def broadcast_color(stage: Usd.Stage) -> None:
     channel.CreateAttribute("inputs:color", _Types.Color3f, custom=False).Set(Gf.Vec3f(0, 1, 0))
 
 
+def _connect_color(stage: Usd.Stage) -> None:
+    """Connect a channel's colour to an input of a palette."""
+    palette = UsdShade.NodeGraph.Define(stage, "/Specimen/Palette")
+    vessels = palette.CreateInput("vessels", _Types.Color3f)
+    vessels.Set(Gf.Vec3f(0, 1, 0))
+    channel = UsdShade.Material(stage.GetPrimAtPath(CHANNEL))
+    channel.GetInput("color").ConnectToSource(vessels)
+
+
+def _bind_to_collection(*, is_bound: bool) -> Callable[[Usd.Stage], object]:
+    def change(stage: Usd.Stage) -> None:
+        root = stage.OverridePrim("/Specimen")
+        collection = Usd.CollectionAPI.Apply(root, "vessels")
+        collection.CreateIncludesRel().SetTargets([Sdf.Path(MESH)])
+        if is_bound:
+            material = define_material(stage, "/Specimen/Mine", (0, 1, 0))
+            UsdShade.MaterialBindingAPI.Apply(root).Bind(
+                collection, material, "vessels", UsdShade.Tokens.strongerThanDescendants
+            )
+
+    return change
+
+
+def _relocate(old: str, new: str) -> Callable[[Usd.Stage], object]:
+    def change(stage: Usd.Stage) -> None:
+        stage.GetRootLayer().relocates = [(Sdf.Path(old), Sdf.Path(new))]
+
+    return change
+
+
 def color_in_variant(where: str) -> Callable[[Usd.Stage], object]:
     """Return an edit that states a channel's colour in a variant set on a prim."""
 
@@ -249,6 +279,12 @@ CASES: tuple[EditCase, ...] = (
     EditCase(
         "`inputs:color` by the class `/__class__/Specimen`",
         broadcast_color,
+        "taken",
+        "surfaces and volumes of the channel",
+    ),
+    EditCase(
+        "`inputs:color` of a channel, connected to an input of a node graph",
+        _connect_color,
         "taken",
         "surfaces and volumes of the channel",
     ),
@@ -405,6 +441,24 @@ CASES: tuple[EditCase, ...] = (
         _bind("/Specimen", "strongerThanDescendants"),
         "taken",
         "surfaces below it; a line says that volumes keep their colours",
+    ),
+    EditCase(
+        "a material bound to a collection on the specimen, stronger than its descendants",
+        _bind_to_collection(is_bound=True),
+        "taken",
+        "surfaces of the collection; a line says that volumes keep their colours",
+    ),
+    EditCase(
+        "a collection to which no material is bound",
+        _bind_to_collection(is_bound=False),
+        "reported",
+        "collection:vessels:includes is not taken over: no material is bound to this collection",
+    ),
+    EditCase(
+        "a tile or channel at another path, by `relocates`",
+        _relocate(TILE, "/Specimen/Tiles/left"),
+        "refused",
+        "relocates /Specimen/Tiles/r0_c0 to /Specimen/Tiles/left, expected",
     ),
     EditCase(
         "a material bound on the specimen, weaker",

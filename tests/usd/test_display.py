@@ -7,7 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdValidation
 
+from stereocell.model.errors import StageError
 from stereocell.usd.layer import DISPLAY_SCALE
+from stereocell.usd.read_stage import open_stage
 from support.stages import COLORS, F_ID, leaf, write_whole
 
 SCALE = 10_000  # the F is 12 um high
@@ -78,3 +80,29 @@ def test_it_is_valid_and_follows_a_moved_folder(stage_path: Path, tmp_path: Path
     layer = Sdf.Layer.FindOrOpen(str(stage_path.with_name("display.usda")))
     assert list(layer.GetExternalReferences()) == ["./stage.usda"]
     assert "10000 times the specimen, whose size is 9 x 12 x 8 um" in layer.documentation
+
+
+def test_its_root_states_the_asset_as_that_of_the_stage_does(stage_path: Path) -> None:
+    true, display = Usd.Stage.Open(str(stage_path)), display_of(stage_path)
+    ours, theirs = (Usd.ModelAPI(one.GetDefaultPrim()) for one in (true, display))
+    assert theirs.GetAssetVersion() == ours.GetAssetVersion() != ""
+    assert theirs.GetAssetName() == ours.GetAssetName()
+    assert theirs.GetAssetIdentifier().path == "./display.usda"
+    assert "9 x 12 x 8 um in true size" in display.GetDefaultPrim().GetDocumentation()
+
+
+@pytest.mark.parametrize("arc", ["sublayer", "reference"])
+def test_a_layer_over_it_is_refused_by_the_name_of_the_stage(
+    stage_path: Path, tmp_path: Path, arc: str
+) -> None:
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "mine.usda"))
+    file = str(stage_path.with_name("display.usda"))
+    if arc == "sublayer":
+        layer.subLayerPaths = [file]
+    else:
+        shot = Sdf.CreatePrimInLayer(layer, "/Shot")
+        shot.specifier = Sdf.SpecifierDef
+        shot.referenceList.prependedItems.append(Sdf.Reference(file))
+    layer.Save()
+    with pytest.raises(StageError, match=r"lies over display\.usda, .*, expected stage\.usda: put"):
+        open_stage(tmp_path / "mine.usda")

@@ -239,7 +239,7 @@ def run_bundle(
             out_folder.remove_other_folders(out_folder.parts_dir, {step.key})
             parts = out_folder.parts_dir / step.key
             with opened_stage(path) as composed:
-                phase.print(*composed.notes())
+                phase.print(*composed.notes(out_folder.stage_file))
                 tiles = bundle_tile_tasks(composed, parts)
                 run_missing(engine, "bundle", tiles)
                 written = [tile.place for tile in tiles]
@@ -248,7 +248,7 @@ def run_bundle(
             phase.about = "" if stage is None else f"of {printable(path.name)}"
         elif stage is not None:  # lost edits are named whenever somebody asks for the layer
             with opened_stage(path) as composed:
-                phase.print(*composed.notes())
+                phase.print(*composed.notes(out_folder.stage_file))
     out_folder.remove(out_folder.parts_dir)
     if viewer is None and not phase.is_up_to_date:
         phase.print("the viewer is not built, so the bundle has no page: run `make setup`")

@@ -49,7 +49,7 @@ from stereocell.usd.read_lights import (
     visible_lights,
 )
 from stereocell.usd.read_objects import painter_of, read_columns
-from stereocell.usd.read_provenance import fingerprint_of
+from stereocell.usd.read_provenance import fingerprint_of, note_on_source
 from stereocell.usd.read_stage import (
     hinted_box,
     modality_of,
@@ -97,10 +97,13 @@ class Composed:
         names = tuple(str(prim.GetName()) for prim in prims)
         return cls(path, stage, appearances, names, step_m, as_written)
 
-    def notes(self) -> Iterator[str]:
-        """Yield notes on units that the layer does not state, on materials above channels, and on
-        each edit that the bundle does not take over. Raises StageError for an edit over time.
+    def notes(self, built: Path) -> Iterator[str]:
+        """Yield notes on units that the layer does not state, on another specimen than the built
+        stage's, on materials above channels, and on each edit that the bundle does not take over.
+        Raises StageError for an edit over time.
         """
+        if note := note_on_source(self.stage, built):
+            yield note
         if note := note_missing(self.stage):
             yield note
         yield from notes_on_bindings(self.stage)

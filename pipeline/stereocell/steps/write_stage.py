@@ -11,12 +11,12 @@ from stereocell.model.object_table import ObjectTable
 from stereocell.model.spacing import Spacing
 from stereocell.steps.write_stage_tile import WriteStageTile, digest_of_table
 from stereocell.storage.file_list import FileList
-from stereocell.usd.write_display import DISPLAY_NAME
 from stereocell.usd.write_previews import PREVIEWS, write_previews
 from stereocell.usd.write_stage import TileExtent, write_stage
 from stereocell.usd.write_usdz import USDZ_NAME, write_usdz
 from stereocell.usd.written_files import (
     CONTENTS_NAME,
+    DISPLAY_NAME,
     NVINDEX_NAME,
     STAGE_NAME,
     AsWritten,
@@ -39,7 +39,7 @@ class Tables:
 class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
-    VERSION: ClassVar[int] = 3
+    VERSION: ClassVar[int] = 4
 
     name: str
     tiles: tuple[WriteStageTile, ...]

@@ -185,6 +185,7 @@ REASONS: tuple[tuple[str, str], ...] = (
     ("purpose", "nothing in the bundle is drawn by this prim"),
     ("visibility", "nothing in the bundle is drawn by this prim"),
     ("userProperties:*", "properties of the program that wrote the layer stay there"),
+    ("collection:*", "no material is bound to this collection; lamps light all that is there"),
     ("@customData", "custom data stay with the stage"),
     ("@assetInfo", "asset information stays with the stage"),
     ("@kind", "the kinds of prims stay with the stage"),

@@ -5,12 +5,14 @@ programs take the numbers for centimetres.
 """
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from pxr import Sdf, Usd, UsdGeom
 
 from stereocell.model.errors import StageError
 from stereocell.usd.layer import METERS_PER_UNIT, UP_AXIS
 from stereocell.usd.specimen import specimen_of
+from stereocell.usd.written_files import DISPLAY_NAME, STAGE_NAME
 
 _FALLBACK_UNIT = 0.01  # metres: USD's unit where a layer states none
 
@@ -38,6 +40,21 @@ def require_units(stage: Usd.Stage) -> None:
             raise StageError(
                 f"{layer.realPath}: {field} is {found}, expected {expected}: write {lines[field]} "
                 f"there; {effect}"
+            )
+
+
+def require_no_display(stage: Usd.Stage) -> None:
+    """Raise StageError where a layer lies over `display.usda`, or a scene references it.
+
+    That file is in metres and enlarges the stage, so none of its numbers are those of a bundle.
+    """
+    for layer in stage.GetUsedLayers():
+        path = Path(layer.realPath)
+        if path.name == DISPLAY_NAME and path.with_name(STAGE_NAME).is_file():
+            raise StageError(
+                f"{stage.GetRootLayer().realPath}: lies over {path.name}, which shows the stage "
+                f"enlarged and in metres, expected {STAGE_NAME}: put the edits into a layer over "
+                "that one"
             )
 
 

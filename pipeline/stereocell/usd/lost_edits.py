@@ -30,6 +30,7 @@ from stereocell.usd.read_bindings import binding_fault
 from stereocell.usd.specimen import specimen_of
 
 _BINDING = "material:binding"
+_COLLECTION = "collection:"
 # Places whose own binding is the strongest, and groups of such places
 _OWN_BINDING = ("mesh", "addition", "group")
 _MOST_LINES = 3  # of edits that are alike; the last line counts the others
@@ -128,6 +129,19 @@ def find_lost_edits(
     return finder.lost()
 
 
+def _sources_of_colors(stage: Usd.Stage) -> set[Sdf.Path]:
+    """Return the attributes outside of the channels to which a layer connects their colours."""
+    group = stage.GetPrimAtPath(specimen_of(stage).channels)
+    inputs = [UsdShade.Material(prim).GetInput("color") for prim in group.GetChildren()]
+    found = {
+        source.GetPath()
+        for given in inputs
+        if given
+        for source in given.GetValueProducingAttributes()
+    }
+    return {path for path in found if not path.HasPrefix(group.GetPath())}
+
+
 def _bound_materials(stage: Usd.Stage, built: BuiltLayers) -> set[Sdf.Path]:
     return {
         target
@@ -143,8 +157,9 @@ class _Finder:
     def __init__(
         self, stage: Usd.Stage, built: BuiltLayers, bound: set[Sdf.Path], left_out: LeftOut
     ) -> None:
-        self._built, self._left_out = built, left_out
+        self._built, self._left_out, self._bound = built, left_out, bound
         self._specimen = specimen_of(stage)
+        self._feeding = _sources_of_colors(stage)
         self._places = Places(stage, bound)
         self._found: dict[tuple[str, str], list[LostEdit | _Fate]] = {}
         self._covered: set[Sdf.Path] = set()
@@ -173,6 +188,10 @@ class _Finder:
         if name == BELOW_INSTANCE:
             reason = f"USD ignores opinions below an instance: set instanceable of {prim.GetPath()}"
             return LostEdit(str(path), name, f"{reason} to false")
+        if path.AppendProperty(name.lstrip("@")) in self._feeding or (
+            name == WHOLE and path in {one.GetPrimPath() for one in self._feeding}
+        ):
+            return _Fate.TAKEN
         place = self._places.of(path) or self._built_place(own) or _place_of_group(own)
         if not place:
             return self._judge_prim(path, prim, opinion)
@@ -235,6 +254,8 @@ class _Finder:
                 return binding_fault(prim, prim.GetRelationship(name), is_own=is_own)
         elif self._is_read(place, prim, name):
             return self._weakness(prim, opinion)
+        if name.startswith(_COLLECTION) and self._is_bound(prim, name):
+            return ""
         attribute = prim.GetAttribute(name)
         if attribute and self._repeats(attribute, opinion.spec):
             return ""
@@ -246,6 +267,11 @@ class _Finder:
         if attribute and _fallback(attribute) is not None:
             return "the bundle does not use it"
         return f"no reader knows this name{_hint(name, TAKEN.get(place, ()))}"
+
+    def _is_bound(self, prim: Usd.Prim, name: str) -> bool:
+        """Return whether a material is bound to the collection that a property belongs to."""
+        collection = ":".join(name.split(":")[:2])
+        return prim.GetPath().AppendProperty(collection) in self._bound
 
     def _is_read(self, place: str, prim: Usd.Prim, name: str) -> bool:
         if is_taken(place, name):

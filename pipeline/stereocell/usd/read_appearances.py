@@ -87,11 +87,19 @@ def _opacity(surface: UsdShade.Shader) -> float:
 
 def edited_color(material: Usd.Prim) -> Usd.Attribute | None:
     """Return the colour of a material's interface if it was edited since the build."""
-    interface = material.GetAttribute("inputs:color")
+    interface = _interface_color(material)
     surface = material.GetChild("surface")
     repeated = surface.GetAttribute("inputs:diffuseColor") if surface else None
     built = repeated.GetCustomDataByKey(BUILT_COLOR) if repeated else None
     return interface if interface and built is not None and interface.Get() != built else None
+
+
+def _interface_color(material: Usd.Prim) -> Usd.Attribute | None:
+    """Return the attribute that gives a material's `inputs:color` its value, through connections.
+
+    A layer may connect it to another channel's colour. Raises StageError for a shader's output.
+    """
+    return _source(UsdShade.Material(material), "color")
 
 
 def _color_source(surface: UsdShade.Shader) -> Usd.Attribute | None:
@@ -115,7 +123,7 @@ def _channel_color(prim: Usd.Prim) -> Usd.Attribute:
     diffuse = surface.GetInput("diffuseColor") if surface else None
     has_value = diffuse and not diffuse.HasConnectedSource() and diffuse.Get() is not None
     found = _color_source(surface) if has_value else None
-    return found or prim.GetAttribute("inputs:color")
+    return found or _interface_color(prim) or prim.GetAttribute("inputs:color")
 
 
 def _read_appearance(prim: Usd.Prim) -> ComposedAppearance:
@@ -226,15 +234,15 @@ def _share(surface: UsdShade.Shader, name: str, default: float) -> float:
     return default if value is None else min(max(shortest(value), 0.0), 1.0)
 
 
-def _source(surface: UsdShade.Shader, name: str) -> Usd.Attribute | None:
-    """Return the attribute that gives a shader's input its value, through connections."""
-    shader_input = surface.GetInput(name)
-    attributes = shader_input.GetValueProducingAttributes() if shader_input else []
+def _source(node: UsdShade.Shader | UsdShade.Material, name: str) -> Usd.Attribute | None:
+    """Return the attribute that gives an input its value, through connections."""
+    given = node.GetInput(name)
+    attributes = given.GetValueProducingAttributes() if given else []
     if not attributes:
         return None
     if UsdShade.Output.IsOutput(attributes[0]):
         raise StageError(
-            f"{surface.GetPath()}.inputs:{name}: comes from {attributes[0].GetPath()}, "
+            f"{node.GetPath()}.inputs:{name}: comes from {attributes[0].GetPath()}, "
             "expected a plain value"
         )
     return attributes[0]

@@ -2,8 +2,9 @@
 
 import hashlib
 import re
+from pathlib import Path
 
-from pxr import Sdf, Usd
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 _FINGERPRINT = re.compile(r"[0-9a-f]{16,64}")  # of provenance.json, in hexadecimal digits
 
@@ -14,10 +15,34 @@ def fingerprint_of(stage: Usd.Stage) -> str:
     The stage that a build wrote states it, and an artist's layer lies over that one. A stage that
     is composed of several builds has a digest of all their fingerprints.
     """
-    found = sorted({text for layer in stage.GetUsedLayers() if (text := _stated_in(layer))})
+    found = _fingerprints(stage)
     if len(found) < 2:
         return "".join(found)
     return hashlib.sha256(" ".join(found).encode()).hexdigest()
+
+
+def note_on_source(stage: Usd.Stage, built: Path) -> str:
+    """Return a line where a composed stage shows another source than a built one; else empty.
+
+    built  the stage of the folder that the bundle goes to
+    """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()  # other checks report a damaged layer
+    try:
+        layer = Sdf.Layer.FindOrOpen(str(built))
+    except Tf.ErrorException:
+        layer = None
+    del quiet
+    expected, found = _stated_in(layer) if layer else "", _fingerprints(stage)
+    if not expected or not found or expected in found:
+        return ""
+    return (
+        f"{stage.GetRootLayer().realPath}: shows another specimen (fingerprint {found[0][:12]}) "
+        f"than {built} ({expected[:12]}): the bundle shows that of the layer"
+    )
+
+
+def _fingerprints(stage: Usd.Stage) -> list[str]:
+    return sorted({text for layer in stage.GetUsedLayers() if (text := _stated_in(layer))})
 
 
 def has_caps(stage: Usd.Stage) -> bool:

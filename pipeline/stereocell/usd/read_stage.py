@@ -16,8 +16,8 @@ from stereocell.model.errors import StageError
 from stereocell.model.world_box import move_box
 from stereocell.storage.workspace import cached
 from stereocell.usd.drawn_prims import FARTHEST_UM, is_visible, require_composed, to_world
-from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES
-from stereocell.usd.layer_units import require_units
+from stereocell.usd.layer import OPENING_CUT, PATIENT_API, SIDES, SURFACE_API
+from stereocell.usd.layer_units import require_no_display, require_units
 from stereocell.usd.read_attributes import (
     Point,
     numbers_of,
@@ -27,7 +27,7 @@ from stereocell.usd.read_attributes import (
 from stereocell.usd.read_variants import TileChoice, read_choice
 from stereocell.usd.specimen import find_specimen, specimen_of
 from stereocell.usd.typed_values import one_line, read_as, text_of
-from stereocell.usd.written_files import AsWritten
+from stereocell.usd.written_files import STAGE_NAME, AsWritten
 
 _SIDE_DIGITS = 9  # decimals of the unit vectors to a patient's sides: scanners state fewer
 _Types = Sdf.ValueTypeNames
@@ -50,11 +50,30 @@ def open_stage(path: Path) -> Usd.Stage:
         del quiet
     specimen = find_specimen(stage)
     require_composed(stage)
-    require_units(stage)
+    if stage.GetPrimAtPath(specimen.channels):
+        require_no_display(stage)
+        require_units(stage)
     for needed in (specimen.root, specimen.channels, specimen.tiles):
         if not stage.GetPrimAtPath(needed):
-            raise StageError(f"{path}: no prim {needed}, expected a StereoCell stage")
+            raise StageError(
+                f"{path}: no prim {needed}, expected a StereoCell stage, or a layer over its "
+                f"{STAGE_NAME}"
+            )
+    _require_places(stage)
     return stage
+
+
+def _require_places(stage: Usd.Stage) -> None:
+    """Raise StageError where a layer gives prims of the build another path by `relocates`."""
+    root = specimen_of(stage).root
+    for layer in stage.GetLayerStack(includeSessionLayers=False):
+        for old, new in layer.relocates:
+            if old != root and (old.HasPrefix(root) or new.HasPrefix(root)):
+                raise StageError(
+                    f"{layer.realPath}: relocates {old} to {new or 'nothing'}, expected prims "
+                    "where the build wrote them, since tiles and channels are found by path: "
+                    "set a display name, or deactivate what shall not show"
+                )
 
 
 def specimen_name(stage: Usd.Stage) -> str:
@@ -149,6 +168,28 @@ def loaded(
         yield from _loaded(stage, path)
 
 
+def _require_names(tile: Usd.Prim) -> None:
+    """Raise StageError for a surface of the build that no reader finds, after a prim was renamed.
+
+    A channel that is not active has no reader on purpose.
+    """
+    stage = tile.GetStage()
+    channels = specimen_of(stage).channels
+    for branch in tile.GetChildren():
+        expected = f"{branch.GetName()}_{tile.GetName()}"
+        has_channel = bool(stage.GetPrimAtPath(channels.AppendChild(branch.GetName())))
+        if has_channel and branch.GetChild(expected):
+            continue
+        for mesh in branch.GetChildren():
+            if SURFACE_API in mesh.GetAppliedSchemas():
+                raise StageError(
+                    f"{mesh.GetPath()}: a surface of the build whose tile, channel or mesh was "
+                    f"renamed, expected {tile.GetPath()}/CHANNEL/CHANNEL_{tile.GetName()} with a "
+                    f"channel of {channels}: give the prims their names back; their display names "
+                    "are free"
+                )
+
+
 def _stage_folders(stage: Usd.Stage) -> list[Path]:
     """Return the folders of a stage's layers, without its payloads."""
     paths = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
@@ -165,6 +206,7 @@ def _loaded(stage: Usd.Stage, path: Sdf.Path) -> Iterator[tuple[Usd.Prim, TileCh
         choice = read_choice(prim)
         if "both" in prim.GetVariantSet("representation").GetVariantNames():
             select_variant(prim, "representation", "both")
+        _require_names(prim)
         yield prim, choice
     finally:
         stage.Unload(path)

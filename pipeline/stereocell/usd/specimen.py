@@ -6,6 +6,7 @@ session layer of the opened stage, from where all readers take it.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from pxr import Sdf, Usd
 
@@ -22,7 +23,8 @@ from stereocell.usd.layer import (
 )
 
 _KEY = "stereocellSpecimen"  # custom data of the session layer: path of the specimen's prim
-_PREDICATE = Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract
+# Prims of instances too
+_PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +81,11 @@ def specimen_of(stage: Usd.Stage) -> Specimen:
 def find_specimen(stage: Usd.Stage) -> Specimen:
     """Find the specimen of a stage, and keep its place for `specimen_of`.
 
-    Payloads above it are loaded. Raises StageError where there are several.
+    Payloads above it are loaded. Raises StageError where there are several, or where it is an
+    instance, whose tiles can't be loaded one by one.
     """
     if stage.GetPrimAtPath(CHANNELS):
+        _require_no_instance(stage.GetPrimAtPath(ROOT))
         return Specimen()
     found = _roots(stage)
     if len(found) > 1:
@@ -91,6 +95,7 @@ def find_specimen(stage: Usd.Stage) -> Specimen:
         )
     if not found:
         return Specimen()
+    _require_no_instance(stage.GetPrimAtPath(found[0]))
     layer = stage.GetSessionLayer()
     layer.customLayerData = {**layer.customLayerData, _KEY: str(found[0])}
     return Specimen(found[0])
@@ -109,3 +114,15 @@ def _roots(stage: Usd.Stage) -> list[Sdf.Path]:
         else:
             waiting += [child.GetPath() for child in prim.GetFilteredChildren(_PREDICATE)]
     return found
+
+
+def _require_no_instance(root: Usd.Prim) -> None:
+    prim = root
+    while prim and not prim.IsPseudoRoot():
+        if prim.IsInstance():
+            raise StageError(
+                f"{prim.GetPath()}: is an instance, below which no tile can be loaded and no "
+                "variant chosen, expected none: write instanceable = false on it in a layer over "
+                f"{Path(prim.GetStage().GetRootLayer().realPath).name}"
+            )
+        prim = prim.GetParent()

@@ -17,22 +17,21 @@ from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom
 from stereocell.model.physical_size import describe_size
 from stereocell.usd.cameras import define_cameras
 from stereocell.usd.layer import CAMERAS, METERS_PER_UNIT, ROOT, UP_AXIS, export, vec3f
-from stereocell.usd.written_files import STAGE_NAME
-
-DISPLAY_NAME = "display.usda"
+from stereocell.usd.written_files import DISPLAY_NAME, STAGE_NAME
 
 
 def write_display(
     stage_dir: Path,
     name: str,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
+    version: str,
+    box: NDArray[np.float64],
     scale: float,
 ) -> None:
     """Write display.usda beside stage.usda.
 
     name       the specimen's; the root prim has it, as far as a prim's name can
-    low, high  corners of the specimen (x, y, z), world um
+    version    of the asset, that of stage.usda
+    box        lower and upper corner of the specimen (x, y, z), world um
     scale      lengths there for a length of the specimen
 
     Raises OutputError where it can't be written.
@@ -40,6 +39,7 @@ def write_display(
     layer = Sdf.Layer.CreateAnonymous(".usda")
     display = Sdf.Path.absoluteRootPath.AppendChild(Tf.MakeValidIdentifier(name))
     layer.defaultPrim = display.name
+    low, high = box
     size = describe_size(high - low)
     layer.documentation = (
         f"The stage in metres, {scale:g} times the specimen, whose size is {size}. "
@@ -51,9 +51,11 @@ def write_display(
     UsdGeom.SetStageUpAxis(stage, UP_AXIS)
     root = UsdGeom.Xform.Define(stage, display).GetPrim()
     root.SetDisplayName(name)
+    root.SetDocumentation(f"{name}: {size} in true size, {scale:g} times as large here, in metres.")
     model = Usd.ModelAPI(root)
     model.SetKind(Kind.Tokens.assembly)
     model.SetAssetName(name)
+    model.SetAssetVersion(version)
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{DISPLAY_NAME}"))
     UsdGeom.ModelAPI.Apply(root).SetExtentsHint(vec3f([low * factor, high * factor]))
     specimen = UsdGeom.Xform.Define(stage, display.AppendChild(ROOT.name))

@@ -60,10 +60,10 @@ from stereocell.usd.layer import (
 )
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 from stereocell.usd.write_appearances import write_appearances
-from stereocell.usd.write_display import DISPLAY_NAME, write_display
+from stereocell.usd.write_display import write_display
 from stereocell.usd.write_nvindex import write_nvindex
 from stereocell.usd.write_tile import LAYER_NAME, write_tile
-from stereocell.usd.written_files import CONTENTS_NAME, STAGE_NAME
+from stereocell.usd.written_files import CONTENTS_NAME, DISPLAY_NAME, STAGE_NAME
 
 __all__ = ["LAYER_SUFFIXES", "SUBLAYERS", "TileExtent", "is_layer", "write_stage", "write_tile"]
 
@@ -177,7 +177,6 @@ def write_stage(
     )
     scale = display_scale(float((high - low).max()))
     set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
-    write_display(stage_dir, name, low, high, scale)
     with_volumes = [one for one in appearances if one.id not in (tables or {})]
     write_nvindex(stage_dir, with_volumes, [tile.id for tile in tiles])
 
@@ -186,12 +185,16 @@ def write_stage(
     del stage  # the sublayers' paths only resolve beside the file
     layer.subLayerPaths = list(SUBLAYERS)
     export(layer, stage_dir / CONTENTS_NAME)
-    _write_interface(stage_dir, name, provenance)
+    version = _write_interface(stage_dir, name, provenance)
+    write_display(stage_dir, name, version, np.array([low, high]), scale)
     return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
 
 
-def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> None:
-    """Write stage.usda: the specimen's root, which has all its content by a reference."""
+def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> str:
+    """Write stage.usda: the specimen's root, which has all its content by a reference.
+
+    Returns the version of the asset.
+    """
     plain = {key: _plain(value) for key, value in provenance.items()}
     stage = new_stage(".usda", ROOT.name)
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
@@ -203,7 +206,8 @@ def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> None
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{STAGE_NAME}"))
     # The version follows from all that the build depends on.
     text = json.dumps(plain, sort_keys=True)
-    model.SetAssetVersion(hashlib.sha256(text.encode()).hexdigest()[:12])
+    version = hashlib.sha256(text.encode()).hexdigest()[:12]
+    model.SetAssetVersion(version)
     layer = stage.GetRootLayer()
     layer.documentation = _NOTE
     layer.customLayerData = {"stereocell": plain}
@@ -211,6 +215,7 @@ def _write_interface(stage_dir: Path, name: str, provenance: Provenance) -> None
     reference = layer.GetPrimAtPath(ROOT).referenceList
     reference.prependedItems.append(Sdf.Reference(f"./{CONTENTS_NAME}"))
     export(layer, stage_dir / STAGE_NAME)
+    return version
 
 
 def _state_cut(root: Usd.Prim, boxes: NDArray[np.float64]) -> None:

@@ -30,6 +30,7 @@ from stereocell.usd.layer import LAYER_SUFFIXES, is_layer
 
 FILES, STAGE_NAME, CONTENTS_NAME = "files.json", "stage.usda", "contents.usda"
 NVINDEX_NAME = "nvindex.usda"
+DISPLAY_NAME = "display.usda"
 CHANGED = "changed since it was written: edited in place, or damaged"
 DOUBTFUL = "changed since it was written, not in size: damaged, or edited in place"
 REMEDY = "run `stereocell stage OUT`"

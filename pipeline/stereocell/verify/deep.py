@@ -81,17 +81,17 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
                 f"{labels.name} against source",
                 partial(compare_objects, out_folder, plan, labels, engine),
             )
-    yield from _edit_lines(exported)
+    yield from _edit_lines(exported, out_folder.stage_file)
     of_layer = "" if stage else out_folder.phases().get("bundle", {}).get("about", "")
     remedy = of_layer and f"; the bundle is {of_layer}: check it with --stage LAYER"
     yield _line("manifest against stage", lambda: _compare_manifest(exported, bundle), remedy)
     yield _line("bundle against stage", lambda: _compare_bundle(exported, bundle, engine), remedy)
 
 
-def _edit_lines(stage: Path) -> Iterator[CheckLine]:
+def _edit_lines(stage: Path, built: Path) -> Iterator[CheckLine]:
     """Yield a line on each edit that no bundle takes over, which is no fault of the bundle."""
     with suppress(StereoCellError), opened_stage(stage) as composed:  # other lines state the error
-        for note in list(composed.notes()):
+        for note in list(composed.notes(built)):
             yield CheckLine("edits of the stage", True, note)
 
 
@@ -166,6 +166,7 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
                 plan.placement,
                 plan.settings.lod.samples,
                 channel_id in plan.shared_volumes,
+                not plan.settings.volume.without_vdb,
             ),
         )
 

@@ -52,6 +52,7 @@ class SourceTask:
     placement  rows of a (4, 4) matrix for columns, um: from the voxels' world to the stage's tiles
     samples    points spread over each surface
     shares_volume  whether its volume is another channel's
+    has_vdb    whether the volumes are written for other programs, too
     """
 
     unit: BuildUnit
@@ -65,6 +66,7 @@ class SourceTask:
     placement: Matrix
     samples: int
     shares_volume: bool = False
+    has_vdb: bool = True
 
     @property
     def inputs(self) -> list[Path]:
@@ -276,6 +278,9 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
     if wrong:
         problems.append(f"{atlas.name}: {wrong} of {stored.size} voxels are not the source's")
     own = eight_bit[tuple(slice(APRON, APRON + n) for n in task.own_shape)]
+    if not task.has_vdb:
+        extra = next((file for file in (vdb, composed.measured) if file), None)
+        return [*problems, f"{extra.name}: found a field, expected none"] if extra else problems
     if vdb is None:
         return [*problems, "its volume has no field with a file"]
     wanted = None if measured is None else vdb

@@ -154,10 +154,12 @@ def _finish(context, stage, prim_map, scale, is_stereo):
     for prim in stage.GetPrimAtPath(CHANNELS).GetChildren():
         look = _read_look(prim) | {"objects": read_columns(prim)}
         channels[prim.GetName()] = look
-        group = make_color_group(prim.GetName(), look["color"], look["opacity"])
+        shown = prim.GetDisplayName() or prim.GetName()
+        group = make_color_group(shown, look["color"], look["opacity"])
         root[COLOR + prim.GetName()] = group
         _color_surfaces(stage, prim.GetName(), look, group, materials)
         _shade_volumes(stage, root, prim.GetName(), look, group, objects)
+        _name_blocks(prim.GetName(), shown, [*objects.items(), *materials])
     keep_labels(stage, {name for name, one in channels.items() if one["objects"]}, objects)
     context.view_layer.update()
     pair_cameras(context.scene, stage, objects, scale, is_stereo)
@@ -178,6 +180,21 @@ def _finish(context, stage, prim_map, scale, is_stereo):
         "world": "",
         "others": [block.name for block in context.scene.objects if block not in own],
     }
+
+
+def _name_blocks(channel, shown, blocks):
+    """Name what Blender made of a channel's prims by the name that the channel shows.
+
+    Names of prims can't have spaces, slashes or a leading digit, so theirs are encoded.
+    """
+    if shown == channel:
+        return
+    for path, block in blocks:
+        above, _, name = path.rpartition("/")
+        if name == channel:
+            block.name = shown
+        elif name.startswith(f"{channel}_") and above.endswith(f"/{channel}"):
+            block.name = f"{shown}{name.removeprefix(channel)}"
 
 
 def _objects_of(prim_map):
@@ -255,7 +272,9 @@ def _shade_volumes(stage, root, channel, look, group, objects):
         return
     modality = stage.GetPrimAtPath(ROOT).GetAttribute("stereocell:modality").Get()
     voxel = min(_voxel_um(stage.GetPrimAtPath(path)) for path in volumes)
-    material = make_volume_material(channel, group, look, voxel, glow_of(modality))
+    prim = stage.GetPrimAtPath(f"{CHANNELS}/{channel}")
+    shown = prim.GetDisplayName() or channel
+    material = make_volume_material(shown, group, look, voxel, glow_of(modality))
     root[VOLUME + channel] = material
     for block in volumes.values():
         block.data.materials.clear()
