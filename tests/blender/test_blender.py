@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell.cli.__main__ import main
 from stereocell.engine.run import Engine
@@ -217,6 +217,34 @@ def test_the_dialog_offers_the_transfer_functions_that_all_channels_have(
     found = run("import", tmp_path, stage=layer, transfer_function="bone", representation="volume")
     assert np.allclose(found["functions"][F_ID], [(0, 0), (0.75, 0.5)])
     assert run("find_functions", tmp_path, stage=tmp_path / "no.usda") == []
+
+
+def test_a_function_of_more_points_than_a_ramp_holds_is_followed_closely(
+    stage_path: Path, tmp_path: Path
+) -> None:
+    """Blender's ramps end at 32 points; the greys of an MR have 33 of which some lie on a line."""
+    x = np.linspace(0, 1, 100)
+    points = np.stack([x, 0.5 + 0.4 * np.sin(6 * x)], axis=-1).astype(np.float32)
+    layer = tmp_path / "over.usda"
+    stage = Usd.Stage.CreateNew(str(layer))
+    stage.GetRootLayer().subLayerPaths = [str(stage_path)]
+    stage.SetMetadata("metersPerUnit", 1e-6)
+    stage.SetMetadata("upAxis", "Y")
+    channel = stage.GetPrimAtPath(f"/Specimen/Channels/{F_ID}")
+    variants = channel.GetVariantSet("transferFunction")
+    with variants.GetVariantEditContext():
+        channel.GetAttribute("stereocell:opacityPoints").Set(Vt.Vec2fArray.FromNumpy(points))
+    stage.Save()
+    found = run("import", tmp_path, stage=layer, representation="volume")
+    ramp = np.array(found["functions"][F_ID])
+    assert len(ramp) <= 32
+    assert ramp[[0, -1]] == pytest.approx(points[[0, -1]])
+    assert np.interp(x, *ramp.T) == pytest.approx(points[:, 1], abs=0.01)
+    overlay = tmp_path / "edit.usda"
+    edits = run("edit", tmp_path, stage=layer, representation="volume", overlay=overlay)
+    ((_, told),) = edits["told"]
+    assert "representation volume" in told
+    assert "opacities" not in told  # nobody touched the ramp
 
 
 def test_an_import_has_the_channels_that_the_stage_shows_or_all(

@@ -30,3 +30,8 @@ def move_box(
     picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
     corners = np.where(picks == 0, low, high) @ matrix[:3, :3] + matrix[3, :3]
     return corners.min(axis=0), corners.max(axis=0)
+
+
+def box_around(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the box (2, 3) around boxes (n, 2, 3): lower and upper corners (x, y, z)."""
+    return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])

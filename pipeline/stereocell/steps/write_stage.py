@@ -39,7 +39,7 @@ class Tables:
 class WriteStage(Keyed):
     """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
 
-    VERSION: ClassVar[int] = 4
+    VERSION: ClassVar[int] = 5
 
     name: str
     tiles: tuple[WriteStageTile, ...]

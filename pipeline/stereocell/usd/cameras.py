@@ -1,5 +1,8 @@
 """Frame a specimen with three cameras: `mono`, and `left` and `right` for a stereo pair.
 
+They frame what shows: the surfaces of a head can fill a small part of a scan's box, more so if the
+scanner's gantry was tilted. The viewer frames a specimen likewise.
+
 The viewer shows the specimen in a room, its longest edge 1.2 m; the cameras use the same scale. The
 distance between the eyes, 63 mm, shrinks by it. The eyes look straight ahead, parallel; their
 windows are shifted so that both see the specimen's centre at the same place (off-axis stereo, no
@@ -25,25 +28,27 @@ MARGIN = 1.08  # distance as a multiple of the one at which the specimen fills t
 
 def define_cameras(
     stage: Usd.Stage,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
+    box: NDArray[np.float64],
+    shown: NDArray[np.float64],
     *,
     group: Sdf.Path = CAMERAS,
     unit_m: float = METERS_PER_UNIT,
 ) -> None:
-    """Define the cameras, seen from +z, for a box with corners (x, y, z), float64, in the world.
+    """Define the cameras, seen from +z. Boxes are lower and upper corners (x, y, z), in the world.
 
+    box     (2, 3), of all that the stage has; the cameras stand in front of it
+    shown   (2, 3), of what shows; the cameras frame it
     group   the prim above the cameras
     unit_m  metres in a unit of the stage
     """
     lens = 0.01 / unit_m  # mm -> tenths of a stage unit
-    width, height, depth = (float(v) for v in high - low)
-    eye = 0.5 * PUPIL_DISTANCE_M * max(width, height, depth) / ROOM_SIZE_M
+    width, height, depth = (float(v) for v in shown[1] - shown[0])
+    eye = 0.5 * PUPIL_DISTANCE_M * float((box[1] - box[0]).max()) / ROOM_SIZE_M
     across, upwards = (0.5 * a / FOCAL_LENGTH_MM for a in APERTURE_MM)
-    # the front of the box fills the frame first; half an eye distance keeps it in both eyes' frames
+    # the front of what shows fills the frame first; half an eye distance keeps it in both frames
     to_front = MARGIN * max((width / 2 + eye) / across, height / 2 / upwards)
-    distance = to_front + depth / 2
-    centre = (low + high) / 2
+    centre = shown.mean(axis=0)
+    distance = max(to_front + depth / 2, MARGIN * float(box[1, 2] - centre[2]))
     UsdGeom.Scope.Define(stage, group)
     roles = {
         "mono": (0.0, UsdGeom.Tokens.mono),

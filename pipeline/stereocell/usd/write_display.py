@@ -25,22 +25,23 @@ def write_display(
     name: str,
     version: str,
     box: NDArray[np.float64],
+    shown: NDArray[np.float64],
     scale: float,
 ) -> None:
     """Write display.usda beside stage.usda.
 
-    name       the specimen's; the root prim has it, as far as a prim's name can
-    version    of the asset, that of stage.usda
-    box        lower and upper corner of the specimen (x, y, z), world um
-    scale      lengths there for a length of the specimen
+    name       of the specimen; the root prim has this name, as far as a prim's name can
+    version    of the asset, the same as in stage.usda
+    box        (2, 3), lower and upper corner of the specimen (x, y, z), world um
+    shown      (2, 3), lower and upper corner of what is visible, which the cameras frame
+    scale      factor by which the specimen is enlarged
 
     Raises OutputError where it can't be written.
     """
     layer = Sdf.Layer.CreateAnonymous(".usda")
     display = Sdf.Path.absoluteRootPath.AppendChild(Tf.MakeValidIdentifier(name))
     layer.defaultPrim = display.name
-    low, high = box
-    size = describe_size(high - low)
+    size = describe_size(box[1] - box[0])
     layer.documentation = (
         f"The stage in metres, {scale:g} times the specimen, whose size is {size}. "
         "To edit the specimen, put a layer over stage.usda; this one follows."
@@ -57,14 +58,13 @@ def write_display(
     model.SetAssetName(name)
     model.SetAssetVersion(version)
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{DISPLAY_NAME}"))
-    UsdGeom.ModelAPI.Apply(root).SetExtentsHint(vec3f([low * factor, high * factor]))
+    UsdGeom.ModelAPI.Apply(root).SetExtentsHint(vec3f(box * factor))
     specimen = UsdGeom.Xform.Define(stage, display.AppendChild(ROOT.name))
     specimen.AddScaleOp(UsdGeom.XformOp.PrecisionDouble, "display").Set(Gf.Vec3d(factor))
     hidden = Sdf.CreatePrimInLayer(layer, specimen.GetPath().AppendChild(CAMERAS.name))
     hidden.active = False
-    define_cameras(
-        stage, low * factor, high * factor, group=display.AppendChild(CAMERAS.name), unit_m=1.0
-    )
+    group = display.AppendChild(CAMERAS.name)
+    define_cameras(stage, box * factor, shown * factor, group=group, unit_m=1.0)
     del stage  # the reference only resolves beside the file
     reference = layer.GetPrimAtPath(specimen.GetPath()).referenceList
     reference.prependedItems.append(Sdf.Reference(f"./{STAGE_NAME}"))

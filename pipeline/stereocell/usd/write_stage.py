@@ -37,7 +37,7 @@ from stereocell.model.physical_size import describe_size, display_scale
 from stereocell.model.rigid_transform import IDENTITY, Matrix
 from stereocell.model.spacing import Point, Spacing
 from stereocell.model.tile_content import Provenance, TileContent
-from stereocell.model.world_box import move_box, world_box
+from stereocell.model.world_box import box_around, move_box, world_box
 from stereocell.storage.assets import find_asset
 from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.workspace import cached
@@ -151,31 +151,32 @@ def write_stage(
     if has_sides:
         _state_sides(group.GetPrim(), move)
     boxes = np.zeros((len(tiles), 2, 3))
+    surfaces: dict[str, list[NDArray[np.float64]]] = {}  # boxes by channel
     for box, tile in zip(boxes, tiles, strict=True):
         prim = UsdGeom.Xform.Define(stage, TILES.AppendChild(tile.id)).GetPrim()
         Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
         prim.GetPayloads().AddPayload(f"./tiles/{tile.id}/{LAYER_NAME}")
         file = stage_dir / "tiles" / tile.id / LAYER_NAME
         with cached(file):
-            selections, extents = _read_layer(file)
+            selections, extents = _read_layer(file, surfaces)
         for variant_set, variant in selections:
             prim.GetVariantSets().GetVariantSet(variant_set).SetVariantSelection(variant)
         # the box of an unloaded tile; an offset moves surfaces beyond the tile's own box
-        every = np.array([tile.drawn_box, *extents])
-        box[:] = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
+        box[:] = box_around(np.array([tile.drawn_box, *extents]))
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint(vec3f(box))
     moved = np.array([move_box(low, high, move) for low, high in boxes])
     if opens_cut:
         _state_cut(root, moved)
-    low, high = moved[:, 0].min(axis=0), moved[:, 1].max(axis=0)
-    define_cameras(stage, low, high)
-    UsdGeom.ModelAPI(root).SetExtentsHint(vec3f([low, high]))
-    size = describe_size(high - low)
+    whole = box_around(moved)
+    shown = _box_shown(appearances, surfaces, move, whole)
+    define_cameras(stage, whole, shown)
+    UsdGeom.ModelAPI(root).SetExtentsHint(vec3f(whole))
+    size = describe_size(whole[1] - whole[0])
     root.SetDocumentation(
         f"{name}: {size} in true size, a unit is 1 um. Channels has the look of each channel, "
         "Shown which of them show, Tiles the surfaces and volumes."
     )
-    scale = display_scale(float((high - low).max()))
+    scale = display_scale(float((whole[1] - whole[0]).max()))
     set_attribute(root, DISPLAY_SCALE, Sdf.ValueTypeNames.Double, scale)
     with_volumes = [one for one in appearances if one.id not in (tables or {})]
     write_nvindex(stage_dir, with_volumes, [tile.id for tile in tiles])
@@ -186,7 +187,7 @@ def write_stage(
     layer.subLayerPaths = list(SUBLAYERS)
     export(layer, stage_dir / CONTENTS_NAME)
     version = _write_interface(stage_dir, name, provenance)
-    write_display(stage_dir, name, version, np.array([low, high]), scale)
+    write_display(stage_dir, name, version, whole, shown, scale)
     return f"the specimen is {size}; {DISPLAY_NAME} has it {scale:.0f} times as large, in metres"
 
 
@@ -238,10 +239,27 @@ def _state_sides(group: Usd.Prim, move: NDArray[np.float64]) -> None:
         set_attribute(group, name, Sdf.ValueTypeNames.Vector3d, Gf.Vec3d(*own.tolist()))
 
 
-def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
+def _box_shown(
+    appearances: Sequence[Appearance],
+    surfaces: Mapping[str, list[NDArray[np.float64]]],
+    move: NDArray[np.float64],
+    whole: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the box (2, 3), world um, of the shown channels: a volume may fill the whole."""
+    opening = [one.id for one in appearances if one.opens]
+    if not opening or any(id_ not in surfaces for id_ in opening):
+        return whole
+    boxes = [move_box(low, high, move) for id_ in opening for low, high in surfaces[id_]]
+    return box_around(np.array(boxes))
+
+
+def _read_layer(
+    file: Path, surfaces: dict[str, list[NDArray[np.float64]]]
+) -> tuple[list[tuple[str, str]], list[NDArray[np.float64]]]:
     """Return the variants that a tile's own layer selects, (variant set, variant), and all extents.
 
-    The extents (2, 3), um, cover all its prims, for any selection.
+    The extents (2, 3), um, cover all its prims, for any selection. Those of meshes are added to
+    `surfaces`, by channel.
     """
     if not file.is_file():
         return [], []
@@ -249,8 +267,12 @@ def _read_layer(file: Path) -> tuple[list[tuple[str, str]], list[NDArray[np.floa
     extents: list[NDArray[np.float64]] = []
 
     def collect(path: Sdf.Path) -> None:
-        if path.name == "extent":
-            extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
+        if path.name != "extent":
+            return
+        extents.append(np.array(layer.GetAttributeAtPath(path).default, np.float64))
+        place = path.GetPrimPath().StripAllVariantSelections()  # the type stands outside variants
+        if layer.GetPrimAtPath(place).typeName == "Mesh":
+            surfaces.setdefault(place.GetParentPath().name, []).append(extents[-1])
 
     layer.Traverse(Sdf.Path.absoluteRootPath, collect)
     selected = layer.GetPrimAtPath(f"/{layer.defaultPrim}").variantSelections

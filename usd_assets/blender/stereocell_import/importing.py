@@ -15,7 +15,14 @@ from pxr import Usd, UsdGeom
 from .cameras import pair_cameras
 from .choice import CHANNELS, DISPLAY_SCALE, METERS_PER_UNIT, ROOT, TILES, open_stage, write_choice
 from .lighting import begin_world, end_world, light_scene, light_values
-from .looks import color_surface, glow_of, make_color_group, make_volume_material, set_surface_color
+from .looks import (
+    color_surface,
+    fit_ramp,
+    glow_of,
+    make_color_group,
+    make_volume_material,
+    set_surface_color,
+)
 from .objects import keep_labels, read_columns
 from .problem import StageProblem
 from .snapshot import digest_nodes, take_materials, take_snapshot
@@ -233,7 +240,7 @@ def _read_look(prim):
     stored = prim.GetAttribute("stereocell:volumeWindow").Get()
     return {
         "color": list(value("inputs:color")),
-        "points": [list(pair) for pair in value("stereocell:opacityPoints")],
+        "points": fit_ramp(value("stereocell:opacityPoints")),
         "windows": [window, window if stored is None else tuple(stored)],
         "opacity": _opacity_of(prim),
         "function": prim.GetVariantSet("transferFunction").GetVariantSelection(),

@@ -127,17 +127,12 @@ def glow_of(modality):
 def make_volume_material(channel, group, look, voxel_um, glow):
     """Return the material of a channel's volumes.
 
-    look  its `points`, the transfer function: pairs of intensity and opacity, 0..1, intensities
-          rising; and its `windows`: voxel values that are shown as 0 and 1, and those that are 0
-          and 1 in the volumes
+    look  its `points`, the transfer function as `fit_ramp` returns it: pairs of intensity and
+          opacity, 0..1, intensities rising; and its `windows`: voxel values that are shown as 0
+          and 1, and those that are 0 and 1 in the volumes
     glow  emission for the same density of absorption
     """
     points, windows = look["points"], look["windows"]
-    if len(points) > _MAX_POINTS:
-        raise StageProblem(
-            f"{channel}: its transfer function has {len(points)} points, "
-            f"and a colour ramp holds {_MAX_POINTS}"
-        )
     material = bpy.data.materials.new(f"{channel} volume")
     material.use_nodes = True
     tree = material.node_tree
@@ -167,6 +162,25 @@ def make_volume_material(channel, group, look, voxel_um, glow):
     output = _node(tree, "ShaderNodeOutputMaterial", 800)
     tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
     return material
+
+
+def fit_ramp(points):
+    """Return a transfer function with no more points than a colour ramp of Blender holds.
+
+    While there are more, the inner point goes that changes the area below the function least
+    (Visvalingam and Whyatt, 1993).
+    """
+    kept = [list(point) for point in points]
+    while len(kept) > _MAX_POINTS:
+        changes = [_triangle_area(*kept[n - 1 : n + 2]) for n in range(1, len(kept) - 1)]
+        del kept[1 + changes.index(min(changes))]
+    return kept
+
+
+def _triangle_area(one, middle, other):
+    """Return the area by which a function changes where it goes straight from one to other."""
+    (x0, y0), (x1, y1), (x2, y2) = one, middle, other
+    return abs((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)) / 2
 
 
 def points_of(material):
