@@ -35,6 +35,7 @@ from stereocell.read.formats.dicom.modality_table import TABLE_TAGS
 from stereocell.read.formats.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
 from stereocell.read.formats.dicom.origin import ORIGIN_TAGS, origin_of
+from stereocell.read.formats.dicom.remedies import class_name, remedy_for
 from stereocell.read.formats.dicom.segmentation import (
     LABELMAP,
     Segmentation,
@@ -44,7 +45,6 @@ from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.formats.dicom.stated import STATED_TAGS, count_frames, stated_of
 from stereocell.read.formats.dicom.stored_values import PLUGINS, is_compressed
 from stereocell.read.formats.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
-from stereocell.read.formats.dicom.ways_out import class_name, way_out
 
 T = TypeVar("T")
 
@@ -188,7 +188,7 @@ def _explained(error: NoPlaneError, header: Any, segmentation: Segmentation | No
     if segmentation is not None:
         return NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}")
     found = NoPlaneError(f"{_NO_PLACE}{_kind(header)}") if str(error) == _NO_PLACE else error
-    found.way_out = way_out(header, kind_of(header, ()), str(found))
+    found.remedy = remedy_for(header, kind_of(header, ()), str(found))
     return found
 
 

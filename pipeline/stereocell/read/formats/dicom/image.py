@@ -31,12 +31,12 @@ from stereocell.read.formats.dicom.label_stack import stack_labels
 from stereocell.read.formats.dicom.lesser_kind import lesser_notes
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
 from stereocell.read.formats.dicom.pixels import decode, dtype_of
+from stereocell.read.formats.dicom.remedies import in_words
 from stereocell.read.formats.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.formats.dicom.series import find_stacks, is_other_kind
 from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.formats.dicom.stack import Stack
 from stereocell.read.formats.dicom.twice_rescaled import describe_values
-from stereocell.read.formats.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.known_formats import identify
 from stereocell.read.plane_stack import NoStackError, StackLayout
@@ -231,7 +231,7 @@ def _find(location: Location) -> Found:
         left_out["not DICOM"] = len(files) - len(paths)
     frames: dict[bytes, Frame] = {}
     copies: list[tuple[Frame, Frame]] = []
-    ways: list[str] = []
+    remedies: list[str] = []
     known = KnownHeaders()
     for index, path in enumerate(paths):
         try:
@@ -242,7 +242,7 @@ def _find(location: Location) -> Found:
                     copies.append((earlier, frame))
         except NoPlaneError as error:
             left_out[str(error)] += 1
-            ways.append(error.way_out)
+            remedies.append(error.remedy)
     compare = partial(_are_equal, paths, location.shown)
     twice = set()
     # the same image stored twice; with other pixels it is another image
@@ -268,7 +268,7 @@ def _find(location: Location) -> Found:
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
             f"{'' if paths else ', or a volume of another format'}"
-            f"{or_one_of(root, 'dicom')}{in_words(ways)}"
+            f"{or_one_of(root, 'dicom')}{in_words(remedies)}"
         )
     every = tuple(frames.values())
     return Found(tuple(paths), every, find_stacks(every, compare), left_out)

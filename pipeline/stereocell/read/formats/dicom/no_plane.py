@@ -4,7 +4,7 @@
 class NoPlaneError(Exception):
     """A file holds no usable plane; the text gives the reason without the file's values.
 
-    way_out  what the file is, and what to name or export instead; empty: not known
+    remedy  what the file is, and what to name or export instead; empty: not known
     """
 
-    way_out = ""
+    remedy = ""

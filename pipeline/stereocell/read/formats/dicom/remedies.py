@@ -115,7 +115,7 @@ def class_name(header: Any) -> str:
     return kind.name if kind.name != kind else ""  # the name of a private UID is the UID
 
 
-def way_out(header: Any, kind: FrameKind, reason: str) -> str:
+def remedy_for(header: Any, kind: FrameKind, reason: str) -> str:
     """Return what a file that is left out is, and a remedy; empty: not known.
 
     reason  why it is left out
@@ -133,6 +133,6 @@ def way_out(header: Any, kind: FrameKind, reason: str) -> str:
     return next((text for start, text in _REASONS if reason.startswith(start)), "")
 
 
-def in_words(ways: Sequence[str], most: int = 3) -> str:
+def in_words(remedies: Sequence[str], most: int = 3) -> str:
     """Return the different remedies as the end of a message."""
-    return "".join(f"; {way}" for way in list(dict.fromkeys(filter(None, ways)))[:most])
+    return "".join(f"; {one}" for one in list(dict.fromkeys(filter(None, remedies)))[:most])
