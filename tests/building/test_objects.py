@@ -363,12 +363,12 @@ def test_what_can_not_be_built_is_told_in_one_line(
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
     told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
-    assert "found -7, expected 0 or more in labels" in told
+    assert "found -7, expected labels of 0 or more" in told
     assert not (tmp_path / "n").exists()
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
-    assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
+    assert "found -7, expected labels of 0 or more" in capsys.readouterr().err
     for flag in ("--table", "--table-key", "--columns", "--color-by"):
         assert f"{flag} is 'a': of no objects, expected --labels" in refusal(
             capsys, *plan, flag, "a"

@@ -378,7 +378,7 @@ def test_broken_or_replaced_source_is_named_and_nothing_is_touched(
 def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    remarks = ("label images of it: cells", "files left out: 1 cut short")
+    remarks = ("its label images: cells", "files left out: 1 cut short")
     left = SimpleNamespace(fingerprint="f" * 64, remarks=remarks)
     monkeypatch.setattr(input_unchanged, "open_watched", lambda ref: left)
     capfd.readouterr()

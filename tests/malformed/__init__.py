@@ -1,16 +1,17 @@
-"""Malformed inputs, and the command that a user would run on each: what must hold is in trial.py.
+"""Malformed inputs, each with the command that a user would run on it.
 
-cases.py        what a case is, and how files are spoilt
+cases.py        what a case is, and functions that damage files
 *_cases.py      the cases, by format
-base.py         the sound files that are spoilt
-trial.py        one case in a process of its own, and what is wrong with how it ended
-__main__.py     `python tests/malformed`: all of them, and a table
+base.py         the intact files that cases damage
+trial.py        runs one case in a separate process, and checks how it ended
+__main__.py     `python tests/malformed`: all cases, and a table
 
-Beside these hand-written cases there are small random changes of every format (flipped bits, cuts,
-zeros, other numbers), repeatable by their seeds. A format of subjects.py has no such cases above:
+Besides these hand-written cases there are small random changes of every format (flipped bits, cuts,
+zeros, other numbers). A seed repeats each of them. They also cover formats without hand-written
+cases:
 
 subjects.py        an intact source of every format
 mutations.py       kinds of changes
-mutation_trial.py  one changed source, read in a fork, and compared with the intact one
-sweep.py           `python tests/malformed/sweep.py`: all of them, and a table by format
+mutation_trial.py  reads one changed source in a fork, and compares it with the intact one
+sweep.py           `python tests/malformed/sweep.py`: all changes, and a table by format
 """

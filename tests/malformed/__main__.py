@@ -1,4 +1,4 @@
-"""`python tests/malformed`: run the corpus, print a table by kind and outcome, exit 1 on faults."""
+"""`python tests/malformed`: run the corpus, print a table by kind and outcome; exit 1 on faults."""
 
 import argparse
 import json
@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_name] = "1"  # whoever forks has no threads
+    os.environ[_name] = "1"  # a process that forks has no threads
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from malformed import trial  # noqa: E402

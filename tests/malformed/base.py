@@ -1,4 +1,4 @@
-"""The sound files that cases spoil: small volumes in every format, and a build of one of them."""
+"""The intact files that cases damage: small volumes in every format, and a build of one of them."""
 
 import shutil
 from pathlib import Path
@@ -27,7 +27,7 @@ SPACING = (0.5, 0.2, 0.2)
 
 
 def write_base(folder: Path) -> None:
-    """Write them all but the build.
+    """Write all files except the build.
 
     v5.zarr, v4.zarr   two channels, F and G, in chunks; OME-Zarr 0.5 and 0.4
     f.ome.tif          strips and zlib; t.ome.tif: tiles
@@ -63,7 +63,7 @@ def write_base(folder: Path) -> None:
 
 
 def cells_phantom() -> NDArray[np.uint16]:
-    """Eight touching boxes, numbered from 1, with nothing around them, (z, y, x)."""
+    """Eight touching boxes, numbered from 1, surrounded by background, (z, y, x)."""
     labels = np.zeros(SHAPE, np.uint16)
     for number, corner in enumerate(np.ndindex(2, 2, 2), start=1):
         z, y, x = (2 + 6 * corner[0], 4 + 20 * corner[1], 4 + 14 * corner[2])
@@ -89,7 +89,7 @@ def write_objects(folder: Path) -> None:
 
 
 def write_anndata(group: Any, text: Any) -> None:
-    """Write the table of two objects as AnnData does."""
+    """Write the table of two objects in AnnData's layout."""
 
     def put(to: Any, name: str, values: Any) -> None:
         create = to.create_array if hasattr(to, "create_array") else to.create_dataset

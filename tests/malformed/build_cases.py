@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""A build whose documents, units, stage files or bundle are spoilt, and the commands that read it."""
+"""A build whose documents, units, stage files or bundle are damaged, and the commands that read it."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ from support.sealed_files import seal
 
 PLAN, SURVEY, DONE, PHASES = "plan.json", "units/survey.json", "units/done.json", "phases.json"
 MANIFEST, FILES = "bundle/manifest.json", "bundle/files.json"
-# which commands read a document
+# the commands that read each document
 _READERS = {
     PLAN: ("units", "stage", "report", "check"), SURVEY: ("stage", "report", "units"), DONE: ("stage", "report"),
     PHASES: ("stage", "bundle"), MANIFEST: ("check", "serve"), FILES: ("check",),
@@ -173,7 +173,7 @@ def _units() -> Iterator[Case]:
 
 
 def _sealed(change: Change) -> Change:
-    """Return a change after which the file still holds its own hash: it is no damage but a lie."""
+    """Return a change after which the file still states its own hash, so that it looks undamaged."""
 
     def sealed(content: Any) -> Any:
         changed = change(content)
@@ -221,7 +221,7 @@ def _patch(path: Path, place: int, value: int) -> None:
 
 
 def _some(folder: Path, suffix: str, spoil: Callable[[Path], Any]) -> None:
-    """Spoil the first file of a kind, if there is one."""
+    """Damage the first file of a kind, if there is one."""
     for path in sorted(folder.rglob(f"*{suffix}"))[:1]:
         spoil(path)
 
@@ -328,7 +328,7 @@ def _schedulers() -> Iterator[Case]:
             (folder / "s.json").write_bytes(content)
             return ["units", "out", "--scheduler", "s.json"]
 
-        if name != "address of nobody":  # which it waits for
+        if name != "address of nobody":  # the command waits for that address
             yield Case(f"scheduler file {name}", "cluster", make, "refused")
     for text in (
         "tcp://",

@@ -1,4 +1,4 @@
-"""What a case is, and how files are spoilt. All by seeds: the same bytes each time."""
+"""What a case is, and functions that damage files: a seed gives the same bytes each time."""
 
 import json
 import random
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 Change = Callable[[Any], Any]
-# what a text may hold to trouble whoever shows it, or makes a path of it
+# texts that are hard to show, or dangerous as paths
 ODD_NAMES = {
     "empty": "",
     "blank": "   ",
@@ -36,9 +36,9 @@ ODD_NAMES = {
 class Case:
     """One malformed input.
 
-    make    called with the folder of sound files (base.py) and an empty one, in which the command
+    make    called with the folder of intact files (base.py) and an empty one, in which the command
             then runs: puts the input there and returns the command's arguments; OUT is `out`
-    expect  `refused`, `done`, or `any`: either, in good order
+    expect  `refused`, `done`, or `any`: either of them, without a fault
     """
 
     name: str
@@ -56,7 +56,7 @@ def slices(source: str, *flags: str) -> list[str]:
 
 
 def copied(base: Path, folder: Path, name: str) -> Path:
-    """Copy a sound file or folder; return the copy."""
+    """Copy an intact file or folder; return the copy."""
     source, target = base / name, folder / name
     if source.is_dir():
         shutil.copytree(source, target, symlinks=True)
@@ -85,13 +85,13 @@ def put(*steps_and_value: Any) -> Change:
 
 
 def cut(file: Path, share: float) -> None:
-    """Keep so much of a file, 0..1."""
+    """Keep this share of a file, 0 to 1."""
     content = file.read_bytes()
     file.write_bytes(content[: int(len(content) * share)])
 
 
 def flip(file: Path, seed: int, count: int = 3, start: int = 0, stop: int | None = None) -> None:
-    """Flip `count` bits between two bytes of a file."""
+    """Flip `count` bits in a range of bytes of a file."""
     content = bytearray(file.read_bytes())
     chance = random.Random(seed)
     stop = len(content) if stop is None else min(stop, len(content))
@@ -101,11 +101,11 @@ def flip(file: Path, seed: int, count: int = 3, start: int = 0, stop: int | None
 
 
 def nested(depth: int = 100_000) -> bytes:
-    """Return JSON of lists in lists."""
+    """Return JSON of nested lists."""
     return b"[" * depth + b"]" * depth
 
 
-# a JSON document that is none, or another than any of ours
+# bytes that are not JSON, or not a document of StereoCell
 SPOILT_JSON: dict[str, bytes] = {
     "empty": b"",
     "null": b"null",

@@ -28,12 +28,12 @@ def all_cases() -> list[Case]:
 
 
 def one_of_each_kind(cases: list[Case]) -> list[Case]:
-    """Return the case in the middle of each kind's."""
+    """Return the middle case of each kind."""
     kinds = dict.fromkeys(case.kind for case in cases)
     of_kinds = [[case for case in cases if case.kind == kind] for kind in kinds]
     return [some[len(some) // 2] for some in of_kinds]
 
 
 def sample(cases: list[Case], count: int) -> list[Case]:
-    """Return so many of the cases, spread evenly."""
+    """Return `count` of the cases, spread evenly."""
     return [cases[i * len(cases) // count] for i in range(min(count, len(cases)))]

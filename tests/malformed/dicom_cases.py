@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""DICOM: files cut short and flipped, tags that are missing, contradict each other or claim much."""
+"""DICOM: files cut short and flipped; tags that are missing, contradictory or claim large sizes."""
 
 import os
 import random
@@ -27,7 +27,7 @@ def cases() -> Iterator[Case]:
 
 
 def _each(name: str, change: Change, expect: str = "refused", some: slice = slice(None)) -> Case:
-    """A series, the headers of whose files (or of some) are changed."""
+    """A series whose headers are changed, in all its files or in some."""
 
     def make(base: Path, folder: Path) -> list[str]:
         series = copied(base, folder, "series")
@@ -214,12 +214,12 @@ def _pixels() -> Iterator[Case]:
             make,
             "any" if name in ("big-endian", "no UID", "empty", "unknown") else "refused",
         )
-    bomb = struct.pack("<16I", 1, 64, *[0] * 14) + b"\x81\0" * 4_000_000  # packed runs of 128
+    bomb = struct.pack("<16I", 1, 64, *[0] * 14) + b"\x81\0" * 4_000_000  # runs of 128 equal bytes
     yield _each("RLE bomb", lambda ds: _rle(ds, bomb))
 
 
 def _change_syntax(path: Path, change: Change, syntax: str) -> None:
-    """Put pixels in, and then the name of their syntax in place of JPEG's, of whatever length."""
+    """Replace the pixels, and then the name of JPEG's syntax by another of any length."""
     ds = pydicom.dcmread(path)
     change(ds)
     usual = b"1.2.840.10008.1.2.4.70"

@@ -1,14 +1,14 @@
-"""One changed source, read whole in a fork, and compared with the intact one.
+"""Read one changed source completely in a fork, and compare it with the intact one.
 
-The outcomes, in the order in which they are checked:
-fault        a traceback, an abort, a hang, too much memory, or words of a library on stderr
+These are the outcomes, in the order in which they are checked:
+fault        a traceback, an abort, a hang, too much memory, or output of a library on stderr
 refused      in one line, which names the source and the expected state
-right        read as the intact source: the changed bytes do not matter
+right        read like the intact source: the changed bytes do not matter
 unnoticed    voxels differ, and the changed bytes lie where the format has no checksum for voxels;
-             if some lie elsewhere, these alone are read right or refused
+             if some lie elsewhere, these alone are read correctly or refused
 noted        read in part, with a note that the intact source does not have
-other value  the header states another value now: the voxels are those of the intact source, or the
-             header is a text file, in which the size, type or place of the voxels is another
+other value  the header now states another value: the voxels are those of the intact source, or the
+             header is a text file that now states another size, type or position of the voxels
 wrong        anything else
 """
 
@@ -38,7 +38,7 @@ Reading = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The end of a trial: one of OUTCOMES, and words for the person who looks into it."""
+    """The end of a trial: one of OUTCOMES, and a description for the person who investigates it."""
 
     subject: Subject
     seed: int
@@ -51,7 +51,7 @@ class Ended:
 
 
 class Intact:
-    """A subject as it was written, and as it is read."""
+    """A subject as written, and the values that are read from it."""
 
     def __init__(self, subject: Subject, folder: Path) -> None:
         self.subject = subject
@@ -68,7 +68,7 @@ class Intact:
         self.notes: list[str] = self.reading.pop("notes")
 
     def trial(self, seed: int, folder: Path) -> Ended:
-        """Change one file by a seed, below an empty folder, and read the source there."""
+        """Change one file by a seed, in an empty folder, and read the source there."""
         chance = random.Random(f"{self.subject.format} {self.subject.name} {seed}")
         place = folder / "place"
         copy_of(self.folder, place)
@@ -100,7 +100,7 @@ class Intact:
             return ("refused", line) if is_sound else ("fault", f"not one clear line: {line}")
         found = answer["reading"]
         new = sorted(set(found.pop("notes")) - set(self.notes))
-        count = len(found["voxels"])  # a pyramid may state fewer levels now
+        count = len(found["voxels"])  # the changed pyramid may state fewer levels
         expected = self.reading | {"voxels": self.reading["voxels"][:count]}
         other = sorted(key for key in expected if found.get(key) != expected[key])
         if not other:
@@ -118,7 +118,7 @@ class Intact:
 
 
 def _without_changes_in(ranges: Ranges, before: bytes, after: bytes) -> bytes:
-    """Return a changed content with the bytes in ranges as they were."""
+    """Return the changed content, with the bytes in the ranges as before."""
     restored = bytearray(after)
     for start, stop in ranges:
         restored[start:stop] = before[start:stop]
@@ -164,7 +164,7 @@ def _read_and_answer(source: Path, answer: Path, noise: Path) -> None:
     for number in (1, 2):
         os.dup2(file, number)
     sys.stdout = sys.stderr = os.fdopen(os.dup(2), "w", buffering=1)
-    warnings.resetwarnings()  # as a shell's Python has them
+    warnings.resetwarnings()  # the default in a shell's Python
     for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
         warnings.simplefilter("ignore", category)
     try:
@@ -184,7 +184,7 @@ def _place_of(error: BaseException) -> str:
 
 
 def _read(source: Path) -> Reading:
-    """Return all that a build would take from a source, as values of JSON."""
+    """Return everything that a build would use from a source, as JSON values."""
     from stereocell import read
     from stereocell.read.tables import read_table
 

@@ -1,8 +1,8 @@
 """Small changes of files, by seeds: a seed gives the same bytes each time.
 
-Only truncations, and edits of text files, change a file's length. Each kind stands for a way in
-which files are damaged: a bit of memory or of a disk flips, a copy stops, a sector is lost, blocks
-are written in the wrong place, another program writes a field wrongly.
+Only truncations, and edits of text files, change a file's length. Each kind stands for one cause of
+damage: a bit of memory or of a disk flips, a copy stops, a sector is lost, blocks are written in
+the wrong place, another program writes a field wrongly.
 """
 
 import random
@@ -11,14 +11,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 Chance = random.Random
-_HEAD = 1500  # bytes of a file in which most headers lie
+_HEAD = 1500  # first bytes of a file, in which most headers lie
 TEXTS = (".json", ".xml", ".mhd", ".zattrs", ".zarray", ".zgroup", ".csv")
 _NUMBER = re.compile(rb"\d+(?:\.\d+)?")
 _WORDS = (b"0", b"-1", b"1e999", b"nan", b"9" * 400, b"999999999999", b"2.5", b'"x"', b"null", b"")
 
 
 def mutate(file: Path, content: bytes, chance: Chance) -> bytes:
-    """Return the changed content of a file; the kind of change is chosen at random, too."""
+    """Return the changed content of a file; the kind of change is random, too."""
     kinds: list[Callable[[bytes, Chance], bytes]] = [*KINDS.values()]
     if file.name.endswith(TEXTS):
         kinds += [_edit_text] * len(kinds)
@@ -64,7 +64,7 @@ def _swap_blocks(content: bytes, chance: Chance) -> bytes:
 
 
 def _set_field(content: bytes, chance: Chance) -> bytes:
-    """Set a binary number of the head to an extreme."""
+    """Set a binary number in the first bytes to an extreme."""
     size = chance.choice((1, 2, 4, 8))
     place = size * chance.randrange(max(min(_HEAD, len(content)) // size, 1))
     value = chance.choice((b"\0" * size, b"\xff" * size, b"\xff" * (size - 1) + b"\x7f"))
@@ -72,7 +72,7 @@ def _set_field(content: bytes, chance: Chance) -> bytes:
 
 
 def _set_digits(content: bytes, chance: Chance) -> bytes:
-    """Replace a number that is written in digits by another one as long."""
+    """Replace a number in digits by another one of the same length."""
     found = list(_NUMBER.finditer(content))
     if not found:
         return _flip_bit(content, chance)
@@ -82,7 +82,7 @@ def _set_digits(content: bytes, chance: Chance) -> bytes:
 
 
 def _edit_text(content: bytes, chance: Chance) -> bytes:
-    """Replace a number of a text by another word, of any length."""
+    """Replace a number in a text by another word, of any length."""
     found = list(_NUMBER.finditer(content))
     if not found:
         return _flip_bit(content, chance)

@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""NIfTI: fields of the header that lie, streams of gzip, voxels that are no numbers."""
+"""NIfTI: fields of the header that lie, streams of gzip, voxels that are not numbers."""
 
 import gzip
 import os
@@ -15,7 +15,7 @@ import numpy as np
 from malformed.cases import Case, copied, plan, slices
 
 KIND = "nifti"
-# where fields of NIfTI-1 lie, and what they are
+# byte offsets and types of the fields of NIfTI-1
 _FIELDS = {
     "sizeof_hdr": (0, "i"), "dim": (40, "8h"), "datatype": (70, "h"), "bitpix": (72, "h"),
     "pixdim": (76, "8f"), "vox_offset": (108, "f"), "scl_slope": (112, "f"), "scl_inter": (116, "f"),

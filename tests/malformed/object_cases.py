@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""Objects: tables, label maps and DICOM segmentations that are cut short, lie, or are hostile."""
+"""Objects: tables, label maps and DICOM segmentations that are cut short, false, or hostile."""
 
 import contextlib
 import io
@@ -35,7 +35,7 @@ def cases() -> Iterator[Case]:
 def _table(
     name: str, make_table: Callable[[Path], Any], file: str = "t.csv", expect: str = "refused", flags: tuple[str, ...] = ()
 ) -> Case:  # fmt: skip
-    """A table that is joined to the sound label map."""
+    """A table that is joined to the intact label map."""
 
     def make(base: Path, folder: Path) -> list[str]:
         for one in ("f.ome.tif", _LABELS):
@@ -117,7 +117,7 @@ def _texts() -> Iterator[Case]:
 
 
 def _fill(path: Path, head: bytes) -> None:
-    """Write a start and then an x until there is nearly 1 GB."""
+    """Write a start, and then the letter x up to nearly 1 GB."""
     with open(path, "wb") as file:
         file.write(head)
         for _ in range(1023):
@@ -186,7 +186,7 @@ def _stores() -> Iterator[Case]:
 
 
 def _large_parquet(path: Path) -> None:
-    """Write 40 texts of 7 MB, which take hardly any room in the file."""
+    """Write 40 texts of 7 MB, which take very little space in the file."""
     schema = pa.schema({"label": pa.int64(), "a": pa.string()})
     with pq.ParquetWriter(path, schema, use_dictionary=False, compression="zstd") as writer:
         for number in range(40):
@@ -200,7 +200,7 @@ def _change_h5ad(path: Path, change: Callable[[Any], Any]) -> None:
 
 
 def _claim(group: Any, name: str, shape: tuple[int, ...]) -> None:
-    """Put a dataset of a shape there of which nothing is stored."""
+    """Replace a dataset by one that states a shape and stores nothing."""
     del group[name]
     group.create_dataset(name, shape, "f8", chunks=tuple(min(n, 1000) for n in shape))
 
@@ -213,7 +213,7 @@ def _claim_zarr(group: Any, name: str, shape: tuple[int, ...]) -> None:
 def _label_map(
     name: str, write: Callable[[Path], Any], file: str = "l.tif", expect: str = "refused"
 ) -> Case:
-    """A label map beside the sound image, taken as far as the units."""
+    """A label map beside the intact image, which is planned and passed to `units`."""
 
     def make(base: Path, folder: Path) -> list[str]:
         copied(base, folder, "f.ome.tif")
@@ -225,7 +225,7 @@ def _label_map(
 
 
 def _planned(words: list[str]) -> list[str]:
-    """Plan; return the words of a plan that is refused, or nothing."""
+    """Plan; return the arguments of a plan that is refused, otherwise an empty list."""
     from malformed.trial import run_command
 
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):

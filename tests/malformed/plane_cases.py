@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""Plain TIFF and folders of planes: descriptions that lie, names of every ill, no images at all."""
+"""Plain TIFF and folders of planes: descriptions that lie, odd names, files that are not images."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ def cases() -> Iterator[Case]:
 
 
 def _described() -> Iterator[Case]:
-    """Descriptions of ImageJ and tifffile that claim what the file does not hold."""
+    """Descriptions of ImageJ and tifffile that state what the file does not hold."""
     head = "ImageJ=1.54f\n"
     for name, text, expect in (
         ("ImageJ, 10^9 slices", f"{head}images=1000000000\nslices=1000000000\n", "refused"),

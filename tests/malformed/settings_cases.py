@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""Settings: TOML that is none or says absurd things, flags of every ill, names of files and OUT."""
+"""Settings: invalid TOML, absurd values, odd flags, odd names of files and of OUT."""
 
 import os
 from collections.abc import Iterator
@@ -79,7 +79,7 @@ def cases() -> Iterator[Case]:
 def _names() -> Iterator[Case]:
     for name, text in ODD_NAMES.items():
         if "\0" in text:
-            continue  # which no shell can say
+            continue  # no shell can pass it
         for suffix in (".zarr", ".ome.tif"):
 
             def named(
@@ -96,7 +96,8 @@ def _names() -> Iterator[Case]:
                 try:
                     os.rename(source, target)
                 except (OSError, ValueError):
-                    return plan("in/" + text + suffix)  # no such file: to be said in one line
+                    # this file doesn't exist, which one line has to report
+                    return plan("in/" + text + suffix)
                 return plan(os.fsdecode(target))
 
             yield Case(f"{suffix} named {name}", "names", named)

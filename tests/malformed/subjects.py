@@ -1,7 +1,7 @@
 """Intact sources of every format: small, and with a different value in each voxel.
 
-Other libraries than the readers write them where there are some. Each source states the ranges in
-which it holds voxels without a checksum: a byte that changes there can't be noticed.
+They are written by other libraries than the readers where there are any. Each source states the
+ranges in which it holds voxels without a checksum: a byte that changes there can't be noticed.
 """
 
 import shutil
@@ -34,12 +34,13 @@ from support.phantoms import write_ome_tiff, write_ome_zarr
 
 SPACING_UM = (0.5, 0.2, 0.25)  # z, y, x
 _ranks = np.random.default_rng(7).permutation(6 * 32 * 48)
-VOXELS: NDArray[np.uint16] = (_ranks + 700).astype(np.uint16).reshape(6, 32, 48)  # each value once
+# each value occurs once
+VOXELS: NDArray[np.uint16] = (_ranks + 700).astype(np.uint16).reshape(6, 32, 48)
 _BYTES: NDArray[np.uint8] = (VOXELS % 251).astype(np.uint8)
 _LABELS = np.arange(1, 7, dtype=np.uint16)
 _NM: dict[str, Any] = {"pixelResolution": {"dimensions": [250, 200, 500], "unit": "nm"}}
-_PIECE = 12  # voxels of a row that lie together in every format, with the tiles of CZI
-Ranges = list[tuple[int, int]]  # bytes of a file: first, and behind the last
+_PIECE = 12  # voxels of a row that are contiguous in every format, limited by the tiles of CZI
+Ranges = list[tuple[int, int]]  # bytes of a file: the first, and the one after the last
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ class Subject:
 
 
 def _rows(*arrays: NDArray[Any]) -> Callable[[Path], Ranges]:
-    """Return a function that finds the rows of arrays in a file, in either order of bytes."""
+    """Return a function that finds the rows of arrays in a file, in either byte order."""
 
     def find(path: Path) -> Ranges:
         content = path.read_bytes()
@@ -84,7 +85,7 @@ def _whole(path: Path) -> Ranges:
 
 
 def _image_of_jpeg(path: Path) -> Ranges:
-    """Return the range from the first quantisation table on: JPEG has no checksum there."""
+    """Return the range that begins at the first quantisation table: JPEG has no checksum there."""
     return [(path.read_bytes().find(b"\xff\xdb"), 1 << 60)]
 
 
@@ -102,7 +103,7 @@ def _chunks_of_hdf5(path: Path) -> Ranges:
 
 
 def _arrays_of_hdf5(path: Path) -> Ranges:
-    """Return the ranges of contiguous datasets, which hold numbers and the places of texts."""
+    """Return the ranges of contiguous datasets, which hold numbers and the positions of texts."""
     found: Ranges = []
 
     def add(_: str, node: Any) -> None:

@@ -1,8 +1,8 @@
-"""`python tests/malformed/sweep.py`: change every format's source by seeds, and print a table.
+"""Change every format's source by seeds, with `python tests/malformed/sweep.py`, and print a table.
 
-Each source is changed 80 times; `--first` starts at another seed. The same seed makes the same
-change. Exit code 1: a changed source was read wrongly without a note, or did not end with one line,
-and is not in KNOWN.
+Each source is changed 80 times; `--first` sets the first seed. The same seed makes the same change.
+Exit code 1: a changed source was read wrongly without a note, or did not end with one line, and is
+not in KNOWN.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from malformed.mutation_trial import OUTCOMES, Ended, Intact  # noqa: E402
 from malformed.subjects import Subject, all_subjects  # noqa: E402
 from malformed.trial import import_package  # noqa: E402
 
-COUNT = 80  # changes of each source: 2800 in all
+COUNT = 80  # changes of each source; 2800 in total
 _BAD = ("wrong", "fault")
 # Changes that are read wrongly, by name, each with the reason. None is known. The table counts
 # them as wrong.
@@ -66,7 +66,7 @@ def trials(subject: Subject, seeds: range, folder: Path) -> list[Ended]:
 
 
 def table_of(found: list[Ended]) -> str:
-    """Return the counts by format, as a table of Markdown."""
+    """Return the counts by format, as a Markdown table."""
     lines = [
         f"| format | changes | {' | '.join(OUTCOMES)} |",
         f"|---|{'---:|' * (len(OUTCOMES) + 1)}",

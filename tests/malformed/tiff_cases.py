@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""OME-TIFF: cut and flipped files, tags that lie, directories in a ring, OME-XML of every ill."""
+"""OME-TIFF: cut and flipped files, tags that lie, directories in a ring, odd OME-XML."""
 
 import os
 import re
@@ -17,7 +17,7 @@ KIND = "tiff"
 _NS = "http://www.openmicroscopy.org/Schemas/OME/2016-06"
 _PLANES, _SIZE = 4, 16
 _HUGE = 4 << 30
-_TYPES = {"H": 3, "I": 4, "s": 2}  # by struct's letters; s: text
+_TYPES = {"H": 3, "I": 4, "s": 2}  # codes of TIFF by struct's letters; s: text
 Tags = dict[int, tuple[str, Any]]
 
 
@@ -48,7 +48,7 @@ def xml(
     head: str = "",
     depth: Any = _PLANES,
 ) -> str:
-    """Return OME-XML of 4 planes of 16 x 16; `pixels` stands before the usual attributes."""
+    """Return OME-XML of 4 planes of 16 x 16; `pixels` is inserted before the usual attributes."""
     given = {part.split("=")[0] for part in pixels.split()}
     usual = {
         "DimensionOrder": "XYZCT", "Type": "uint16", "SizeX": _SIZE, "SizeY": _SIZE, "SizeZ": depth,
@@ -64,12 +64,12 @@ def xml(
 
 
 def behind_comment(text: str) -> str:
-    """Return OME-XML that doesn't name itself in its first characters."""
+    """Return OME-XML without its name in the first characters."""
     return f"<!--{'x' * 5000}-->" + text.partition("?>")[2]
 
 
 def with_prefix(text: str) -> str:
-    """Return OME-XML with another name for its namespace, and another namespace."""
+    """Return OME-XML with a prefix for its namespace, and another namespace."""
     text = re.sub(r"<(/?)(?=[A-Z])", r"<\1o:", text.partition("?>")[2])
     return text.replace(f'xmlns="{_NS}"', 'xmlns:o="x"')
 
@@ -81,17 +81,17 @@ def write_tiff(
     strip: bytes | None = None,
     following: int | None = None,
 ) -> None:
-    """Write a classic TIFF by hand, one strip a plane.
+    """Write a classic TIFF by hand, with one strip per plane.
 
-    tags       instead of the usual ones, in every directory
-    strip      of every plane
-    following  where the last directory says that the next one lies; None: nowhere
+    tags       replace the usual ones, in every directory
+    strip      bytes of every plane
+    following  position of the next directory that the last one states; None: there is none
     """
     plane = np.arange(_SIZE * _SIZE, dtype="<u2").tobytes() if strip is None else strip
     content = bytearray(b"II*\0\0\0\0\0")
     text = xml() if text is None else text
     described = (text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass")) + b"\0"
-    link = 4  # where the place of the next directory is to be written
+    link = 4  # where the position of the next directory is written
     for index in range(_PLANES):
         start = len(content)
         content += plane
@@ -161,7 +161,7 @@ def _tags() -> Iterator[Case]:
     yield _made(
         "2^32 each way", "refused", tags=both, text=xml('SizeX="4294967295" SizeY="4294967295"')
     )
-    # so large that a plane still counts as allowed: it must not be taken before it is looked at
+    # A plane of this size is still allowed: its memory must not be allocated before the check.
     large: Tags = {256: ("I", 40000), 257: ("I", 40000), 278: ("I", 40000), 259: ("H", 8)}
     yield _made(
         "planes of 3.2 GB in 600 bytes", "refused", tags=large,
@@ -182,7 +182,7 @@ def _tags() -> Iterator[Case]:
 
 
 def _directories() -> Iterator[Case]:
-    first = 8 + 2 * _SIZE * _SIZE  # where the first directory lies
+    first = 8 + 2 * _SIZE * _SIZE  # position of the first directory
     yield _made("directories in a ring", following=first)
     yield _made("next directory beyond the file", following=0xFFFFFF00)
     yield _made("next directory in the pixels", following=10)
@@ -200,7 +200,7 @@ def _directories() -> Iterator[Case]:
     def absurd(base: Path, folder: Path) -> list[str]:
         write_tiff(folder / "x.ome.tif")
         content = bytearray((folder / "x.ome.tif").read_bytes())
-        struct.pack_into("<I", content, first + 2 + 4, 0xFFFFFFFF)  # the first tag's count
+        struct.pack_into("<I", content, first + 2 + 4, 0xFFFFFFFF)  # count of the first tag
         (folder / "x.ome.tif").write_bytes(content)
         return plan("x.ome.tif")
 
@@ -250,7 +250,7 @@ def _texts() -> Iterator[Case]:
 
 
 def _others() -> Iterator[Case]:
-    """Planes that lie in another file: sound ones, so that whoever opens them is done."""
+    """Planes in another file, which is intact, so that a reader that opens it succeeds."""
     links = {
         "link out": "../bait/x.ome.tif",
         "link within": "own/x.ome.tif",
@@ -307,7 +307,7 @@ def _names() -> Iterator[Case]:
     quoted = {ord(c): f"&#{ord(c)};" for c in '<>&"\n'}
     for name, text in ODD_NAMES.items():
         shown = text.translate(quoted)
-        odd = name in ("nul", "bell", "surrogate")  # which XML can't hold
+        odd = name in ("nul", "bell", "surrogate")  # XML can't hold these
         yield _made(
             f"channel named {name}", "any" if odd else "done", text=xml(channel=f'Name="{shown}"')
         )

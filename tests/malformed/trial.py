@@ -1,9 +1,10 @@
-"""Run cases, each in a process of its own, and say what is wrong with how they end.
+"""Run cases, each in a separate process, and report what is wrong with how they end.
 
-The process is forked from one that has the package imported already, so a case costs what it does
-and not its imports. Demanded of every case: no traceback, no hang, bounded memory (peak resident
-size), nothing written or changed outside OUT, no remains inside; and either exit code 0 with a
-result that is sound, or another one with exactly one line of ours that says why.
+The process is a fork of one that has imported the package, so a case costs no imports. Every case
+must end without a traceback or a hang, in bounded memory (peak resident size), and must write or
+change nothing outside OUT and leave no temporary files inside. It must end either with exit code 0
+and a sound result, or with another exit code and exactly one line of StereoCell that states the
+reason.
 """
 
 import contextlib
@@ -32,23 +33,24 @@ from typing import Any
 from malformed.cases import Case
 from support import ctrl_c
 
-CPU_S, WALL_S = 10.0, 40.0  # the second for what waits; other processes may have the cores
+# s; WALL_S applies to cases that wait, and is longer because other processes may use the cores
+CPU_S, WALL_S = 10.0, 40.0
 PEAK_MB = 1000
 _SEED = 5
 _LEFT_OUT = ("alphawrap", "__main__")
-# what commands tell on the way, on stderr: "units: 1/4 r0_c0/F", "plan: 0.2 s"
+# progress that commands print on stderr: "units: 1/4 r0_c0/F", "plan: 0.2 s"
 _PROGRESS = re.compile(
     r"(plan|windows|evidence|components|objects|iso-values|units|stage|bundle|report|check|tissue|source)\b"
 )
 _REFUSAL = "stereocell: "
 _FAILED = re.compile(r"^\w+: \d+ of \d+ failed$")
-_BUG = re.compile(r": [A-Z]\w+(Error|Exception): ")  # of a unit: the engine tells it in words
-_USAGE = re.compile(r"stereocell( \w+)?: error: ")  # argparse's, below its usage
+_BUG = re.compile(r": [A-Z]\w+(Error|Exception): ")  # of a unit: the engine reports it as text
+_USAGE = re.compile(r"stereocell( \w+)?: error: ")  # message of argparse, below its usage
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a case ended. code: of the command's exit; fault: what is wrong; empty: nothing."""
+    """How a case ended. code: the command's exit code; fault: what is wrong; empty: nothing."""
 
     case: Case
     code: int
@@ -59,12 +61,12 @@ class Outcome:
 
 
 def import_all() -> None:
-    """Import the package, so that forks need not."""
+    """Import the package, so that forks have it already."""
     import_package("stereocell")
 
 
 def import_package(name: str) -> None:
-    """Import a package and all below it."""
+    """Import a package and all its modules."""
     package = importlib.import_module(name)
     for module in pkgutil.walk_packages(package.__path__, f"{name}."):
         if not module.name.endswith(_LEFT_OUT):
@@ -86,7 +88,7 @@ def run_in_child(function: Any, *arguments: Any) -> None:
 
 
 def run_command(arguments: list[str]) -> int:
-    """Run a command as a shell would: return its exit code, let bugs through."""
+    """Run a command as a shell would: return its exit code, and let bugs through."""
     from stereocell.cli.__main__ import main
 
     try:
@@ -98,7 +100,7 @@ def run_command(arguments: list[str]) -> int:
 def run_cases(
     cases: Sequence[Case], base: Path, work: Path, jobs: int = 1, keep: bool = False
 ) -> Iterator[Outcome]:
-    """Yield an outcome for each case, as they end; `jobs` run at a time below `work`."""
+    """Yield each case's outcome when it ends; `jobs` cases run at a time below `work`."""
     waiting = list(cases)[::-1]
     running: dict[int, tuple[Case, Path, float, str]] = {}
     while waiting or running:
@@ -113,7 +115,7 @@ def run_cases(
             if done:
                 del running[pid]
                 with contextlib.suppress(ProcessLookupError):
-                    os.killpg(pid, signal.SIGKILL)  # what it left behind
+                    os.killpg(pid, signal.SIGKILL)  # processes that it left running
                 yield _outcome(case, folder, status, used, why, time.monotonic() - start)
                 if not keep:
                     shutil.rmtree(folder, ignore_errors=True)
@@ -124,7 +126,7 @@ def run_cases(
 
 
 def _excess(pid: int, seconds: float) -> str:
-    """Return why a process is to be ended before it harms the machine, if it is."""
+    """Return why a process must be ended before it harms the machine; empty: it needn't."""
     if seconds > WALL_S:
         return f"hang: not done after {WALL_S:g} s"
     with contextlib.suppress(OSError):
@@ -155,12 +157,12 @@ def _start(case: Case, base: Path, folder: Path) -> int:
 
 
 def _in_child(case: Case, base: Path, folder: Path) -> None:
-    place = folder / "place"  # where all happens: the input, OUT, and what is none of its business
+    place = folder / "place"  # holds the input, OUT, and files that the command must not touch
     (place / "bait").mkdir(parents=True)
     (place / "bait" / "secret.txt").write_text("the secret of the bait")
     os.chdir(place)
     random.seed(_SEED)
-    warnings.simplefilter("ignore")  # of who makes the case
+    warnings.simplefilter("ignore")  # warnings while the case is made
     arguments = case.make(base, place)
     shown = []
     for number, name in ((1, "stdout"), (2, "stderr")):
@@ -171,7 +173,7 @@ def _in_child(case: Case, base: Path, folder: Path) -> None:
         setattr(sys, name, io.TextIOWrapper(raw, "utf-8", errors, write_through=True))
         shown.append(folder / name)
     _usual_warnings()
-    if arguments[0] == "serve":  # which ends by Ctrl+C
+    if arguments[0] == "serve":  # Ctrl+C ends it
         threading.Thread(target=_visit, args=(shown[0],), daemon=True).start()
     before, start = _look(place), time.monotonic()
     fault = ""
@@ -200,7 +202,7 @@ def _in_child(case: Case, base: Path, folder: Path) -> None:
 
 
 def _visit(stdout: Path) -> None:
-    """Ask a server for what it has and has not, then end it as Ctrl+C does."""
+    """Ask a server for existing and absent files, then end it like Ctrl+C."""
     end = time.monotonic() + 5
     while time.monotonic() < end:
         address = re.match(r"http://\S+/", stdout.read_text("utf-8", "replace"))
@@ -214,7 +216,7 @@ def _visit(stdout: Path) -> None:
 
 
 def _usual_warnings() -> None:
-    """As a shell's Python has them."""
+    """Reset warnings to the defaults of a shell's Python."""
     warnings.resetwarnings()
     for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
         warnings.simplefilter("ignore", category)
@@ -235,7 +237,7 @@ def _find_fault(case: Case, arguments: list[str], code: int, stdout: str, stderr
         return "" if code == 2 else f"usage and exit code {code}"
     elif code:
         refusals = [text for text in lines if text.startswith(_REFUSAL)]
-        if refusals and _FAILED.search(lines[-1]):  # a line for each reason that units failed for
+        if refusals and _FAILED.search(lines[-1]):  # one line for each reason why units failed
             lines = lines[: lines.index(refusals[0]) + 1]
         if _BUG.search(stderr):
             return f"a bug of ours: {stderr[-300:]}"
@@ -255,7 +257,7 @@ def _find_fault(case: Case, arguments: list[str], code: int, stdout: str, stderr
 
 
 def _find_unsound(arguments: list[str]) -> str:
-    """Return what is wrong with the result of a command that says it is done."""
+    """Return what is wrong with the result of a command that reports success."""
     from stereocell.storage.json_files import read_json
 
     if arguments[0] in ("plan", "build") and "list" not in arguments:
@@ -274,7 +276,7 @@ Listing = dict[str, tuple[int, int]]
 
 
 def _look(folder: Path) -> Listing:
-    """Return the size and time of change of all below a folder."""
+    """Return the size and modification time of everything below a folder."""
     found = {}
     for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
         status = path.lstat()

@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""USD: layers over the stage that lie, cycle, or lead out of its folder; exported and checked."""
+"""USD: layers over the stage that lie, form cycles, or lead out of its folder; exported and checked."""
 
 import os
 from collections.abc import Iterator

@@ -1,5 +1,5 @@
 # ruff: noqa: E501  (tables of cases)
-"""OME-Zarr: metadata that lie, paths that lead elsewhere, chunks that are none or too much."""
+"""OME-Zarr: metadata that lie, paths that lead elsewhere, chunks that are absent or too large."""
 
 import gzip
 import json
@@ -14,7 +14,7 @@ from malformed.cases import ODD_NAMES, Case, Change, copied, edit_json, nested, 
 
 KIND = "zarr"
 _BAIT = "bait.zarr"
-_HUGE = 4 << 30  # bytes that a bomb unpacks to
+_HUGE = 4 << 30  # bytes that a bomb decompresses to
 _BLOCK = 1 << 20
 Spoil = Callable[[Path], None]
 
@@ -73,7 +73,7 @@ _ARRAY: dict[str, tuple[Change, str]] = {
         for kind in ("int64", "uint64", "float64", "complex64", "bool", "string", "r24", "", None,
                      7, {"name": "numpy.datetime64"}, ["uint8"])
     },
-    "data_type float16": (put("data_type", "float16"), "any"),  # as wide as the file's uint16
+    "data_type float16": (put("data_type", "float16"), "any"),  # the same size as the file's uint16
     "shape of 10^6 each way": (put("shape", [2, 10**6, 10**6, 10**6]), "any"),
     "shape and chunks of 10^6 each way": (
         lambda c: c.update(shape=[2, 10**6, 10**6, 10**6], chunk_grid=_grid([1, 10**6, 10**6, 10**6])),
@@ -318,7 +318,7 @@ def _replace(path: Path, make: Callable[[Path], None]) -> None:
 
 
 def _deflated(wbits: int) -> bytes:
-    """Return zeros, deflated: one block of them over and over, as nothing refers to what was."""
+    """Return deflated zeros: one block repeated, since none refers to earlier ones."""
     packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
     first = packer.compress(bytes(_BLOCK)) + packer.flush(zlib.Z_FULL_FLUSH)
     again = packer.compress(bytes(_BLOCK)) + packer.flush(zlib.Z_FULL_FLUSH)
@@ -326,7 +326,7 @@ def _deflated(wbits: int) -> bytes:
 
 
 def _zstd_zeros(head: bytes) -> bytes:
-    """Return a frame of blocks that are 128 KB of one byte each."""
+    """Return a frame of blocks that are each 128 KB of one byte value."""
     runs = b"".join(struct.pack("<I", (1 << 17) << 3 | 2)[:3] + b"\0" for _ in range(_HUGE >> 17))
     return b"\x28\xb5\x2f\xfd" + head + runs + b"\x01\0\0"
 
@@ -338,7 +338,7 @@ def _chunks() -> Iterator[Case]:
         def spoil(path: Path) -> None:
             for other in (path / "0/c").rglob("*"):
                 if other.is_file():
-                    other.unlink()  # chunks that aren't there are zeros
+                    other.unlink()  # absent chunks are zeros
             edit_json(
                 path / "0/zarr.json",
                 put("codecs", [{"name": "bytes", "configuration": {"endian": "little"}}, codec]),

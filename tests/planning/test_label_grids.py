@@ -155,9 +155,9 @@ def test_labels_follow_the_image_s_point_in_time(tmp_path: Path) -> None:
     found = lay(film, moving, 1)
     source = found.labels[0].open()
     np.testing.assert_array_equal(source.read(source.dataset.levels[0].box), NUMBERS[::-1])
-    assert found.notes == ("labels 'cells': 2 points in time; building --time 1",)
+    assert found.notes == ("labels 'cells': 2 time points; building --time 1",)
     assert "one point in time, laid on --time 1 of 2" in lay(film, still, 1).notes[0]
-    assert "2 points in time; building --time 0" in lay(still, moving).notes[0]
+    assert "2 time points; building --time 0" in lay(still, moving).notes[0]
     longer = calibrated(tmp_path / "longer.tif", np.stack([NUMBERS] * 3), axes="TZYX")
     with pytest.raises(SourceError, match="found 2 points in time, expected the image's --time 2"):
         lay(longer, moving, 2)

@@ -44,7 +44,7 @@ def write_shards(path: Path) -> Path:
 
 
 def write_hdf5(path: Path, count: int) -> Path:
-    """Write the first chunks of a dataset of eight."""
+    """Write some of the eight chunks of a dataset."""
     with h5py.File(path, "w") as file:
         data = file.create_dataset("raw", BODY.shape, "u2", chunks=(2, 48, 36), fillvalue=9)
         data[: 2 * count] = BODY[: 2 * count]
@@ -112,7 +112,7 @@ def test_a_level_without_any_chunk_is_refused(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_chunks_that_ranges_touch_are_counted_as_a_list_of_them_has_them(seed: int) -> None:
+def test_counting_touched_chunks_agrees_with_listing_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ranges = [range(int(a), int(a + rng.integers(1, 9))) for a in rng.integers(0, 60, 7)]
     touched = {voxel // 4 for one in ranges for voxel in one}

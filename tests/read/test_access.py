@@ -1,4 +1,4 @@
-"""What a window fetches, and from where: chunks, http, S3, any address of fsspec."""
+"""Which chunks a window fetches from a disk, http, S3 or any other address of fsspec."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ from support.recorded_service import serving
 BOX = Box((1, 3, 5), (4, 30, 21))
 FORMATS = ("tiny_zarr_04", "tiny_zarr_05", "tiny_tiff")
 
-# Laziness: chunks are (2, 16, 16) in the fixtures.
+# Reading on request: chunks are (2, 16, 16) in the fixtures.
 
 
 @pytest.mark.parametrize("fixture", ["tiny_zarr_04", "tiny_zarr_05"])
@@ -56,7 +56,7 @@ def test_only_the_tiles_that_a_box_touches_are_decoded(
     dataset = read.open(tiny_tiff)
     assert decoded == []
     dataset.read(1, Box((2, 16, 0), (4, 32, 17)))
-    # c, z, y, x of the tiles; the key's spelling is the store's own (Zarr v2 or v3)
+    # Indices of the tiles along c, z, y, x. Zarr v2 and v3 spell the keys differently.
     tiles = {tuple(int(n) for n in re.findall(r"\d+", key))[:4] for key in decoded}
     assert tiles == {(1, 2, 1, 0), (1, 2, 1, 1), (1, 3, 1, 0), (1, 3, 1, 1)}
     assert len(decoded) == 4
@@ -67,7 +67,7 @@ def test_only_the_tiles_that_a_box_touches_are_decoded(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fixture", FORMATS)
-def test_http_gives_what_the_disk_gives(
+def test_http_gives_the_same_voxels_as_the_disk(
     fixture: str, request: pytest.FixtureRequest, serve: Callable[[Path], Server]
 ) -> None:
     path: Path = request.getfixturevalue(fixture)
@@ -96,7 +96,7 @@ def test_a_remote_window_doesnt_fetch_the_whole_tiff(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fixture", FORMATS)
-def test_s3_gives_what_the_disk_gives(
+def test_s3_gives_the_same_voxels_as_the_disk(
     fixture: str, request: pytest.FixtureRequest, s3_bucket: Path
 ) -> None:
     path: Path = request.getfixturevalue(fixture)
@@ -129,7 +129,7 @@ def test_any_address_that_fsspec_knows_works(fixture: str, request: pytest.Fixtu
 def test_a_public_host_does_not_redirect_into_a_private_network(
     fixture: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """127.0.0.2 stands for a private host here, and 127.0.0.1 for a public one."""
+    """127.0.0.2 plays a private host here, and 127.0.0.1 a public one."""
     path: Path = request.getfixturevalue(fixture)
     files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
     with serving() as public, serving("127.0.0.2") as private:
@@ -138,11 +138,11 @@ def test_a_public_host_does_not_redirect_into_a_private_network(
             private.put(name, file.read_bytes())
             public.redirect(name, f"{private.url}{name}")
         address = f"{public.url}/{path.name}"
-        if fixture != "tiny_tiff":  # whose reader needs ranges
+        if fixture != "tiny_tiff":  # the reader of TIFF needs ranges
             assert read.open(address).fingerprint == read.open(path).fingerprint
         private.asked.clear()
         monkeypatch.setattr(public_hosts, "is_public", lambda number: number == "127.0.0.1")
-        # fsspec leaves out the reason where it opens a TIFF
+        # fsspec doesn't report the reason where it opens a TIFF.
         words = "not reachable" if fixture == "tiny_tiff" else "private network"
         with pytest.raises(SourceError, match=words):
             read.open(address)
@@ -158,7 +158,7 @@ def test_secrets_in_an_address_are_not_shown() -> None:
 
 
 @pytest.mark.parametrize("name", ["a:b.ome.tif", "c:", "s3:a.ome.tif", "in:1/out:2"])
-def test_a_colon_alone_makes_no_address(
+def test_a_colon_alone_does_not_make_an_address(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -192,7 +192,7 @@ def test_out_inside_the_input_is_wrong_usage(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "v.ome.zarr").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "v.ome.zarr")
-    with pytest.raises(UsageError, match=r"OUT is .*, inside the input .*, expected a folder else"):
+    with pytest.raises(UsageError, match=r"OUT is .*, inside the input .*; expected a folder else"):
         require_apart(source, Path(out))
 
 
@@ -205,7 +205,7 @@ def test_out_inside_the_input_is_wrong_usage(
         ("s3://bucket/v.ome.zarr", "s3:/bucket/v.ome.zarr"),
     ],
 )
-def test_out_beside_the_input_is_fine(
+def test_out_beside_the_input_is_accepted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str, out: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

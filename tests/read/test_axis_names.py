@@ -1,4 +1,4 @@
-"""Names of axes in HDF5, Zarr and N5 by each attribute and word that writers use."""
+"""Names of axes in HDF5, Zarr and N5, in each attribute and word that writers use."""
 
 from pathlib import Path
 from typing import Any
@@ -104,7 +104,7 @@ def test_units_of_an_hdf5_dataset_may_be_one_text_or_one_for_each_axis(
      ("cols", "rows", "slices")],
 )  # fmt: skip
 @pytest.mark.parametrize("kind", ["hdf5", "zarr"])
-def test_words_of_photography_and_of_the_earth_are_axes(
+def test_words_of_photography_and_earth_science_name_axes(
     tmp_path: Path, kind: str, names: tuple[str, ...]
 ) -> None:
     if kind == "hdf5":
@@ -141,7 +141,7 @@ def test_names_of_axes_that_python_writes_into_n5_are_slowest_first(tmp_path: Pa
     require_phantom(read.open(path))
 
 
-def test_axes_that_funlib_marks_as_none_of_space_are_channels(tmp_path: Path) -> None:
+def test_axes_that_funlib_marks_as_not_spatial_are_channels(tmp_path: Path) -> None:
     zarr.create_array(
         tmp_path / "a.zarr", data=np.stack([f_phantom(), f_phantom() + 1]), chunks=(1, 16, 16, 16),
         zarr_format=2, attributes={
@@ -156,7 +156,7 @@ def test_axes_that_funlib_marks_as_none_of_space_are_channels(tmp_path: Path) ->
 
 @pytest.mark.parametrize("kind", ["hdf5", "zarr"])
 def test_a_name_that_means_an_axis_keeps_it_beside_others(tmp_path: Path, kind: str) -> None:
-    """The depth is the last dimension, and the others have names that mean no axes."""
+    """The depth is the last dimension; the names of the others mean no axes."""
     names = ["Alpha", "Beta", "depth"]
     if kind == "hdf5":
         path = write_netcdf(tmp_path / "a.nc", {name: {"units": "um"} for name in names}, "yxz")

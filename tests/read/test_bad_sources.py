@@ -1,4 +1,4 @@
-"""Sources that can't be built: one line says what, where, and what was expected."""
+"""Sources that can't be built: one line says what was found, where, and what was expected."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def read_whole(source: str | Path, **options: Any) -> None:
 
 
 def refusal(source: str | Path, **options: Any) -> str:
-    """Open `source`, read it whole, and return the line of the SourceError that must come."""
+    """Open `source`, read all of it, and return the line of the SourceError that must be raised."""
     with pytest.raises(SourceError) as caught:
         read_whole(source, **options)
     line = str(caught.value)
@@ -54,7 +54,7 @@ def edit(file: Path, change: Callable[[Any], None]) -> None:
 
 
 def zarr_with(change: Callable[[Any], None], file: str = "zarr.json") -> Maker:
-    """Return a maker of an OME-Zarr 0.5 whose JSON `file` is changed."""
+    """Return a function that makes an OME-Zarr 0.5 with a changed JSON `file`."""
 
     def make(folder: Path) -> Path:
         path = write_ome_zarr(folder / "bad.zarr", [SMALL])
@@ -65,12 +65,12 @@ def zarr_with(change: Callable[[Any], None], file: str = "zarr.json") -> Maker:
 
 
 def multiscale(change: Callable[[Any], None]) -> Maker:
-    """Return a maker of an OME-Zarr 0.5 whose first multiscale is changed."""
+    """Return a function that makes an OME-Zarr 0.5 with a changed first multiscale."""
     return zarr_with(lambda content: change(content["attributes"]["ome"]["multiscales"][0]))
 
 
 def scale(*values: float) -> Maker:
-    """Return a maker of an OME-Zarr with that scale (z, y, x)."""
+    """Return a function that makes an OME-Zarr with this scale (z, y, x)."""
 
     def change(image: Any) -> None:
         image["datasets"][0]["coordinateTransformations"][0]["scale"] = list(values)
@@ -121,7 +121,7 @@ def complex_tiff(folder: Path) -> Path:
 
 
 def incomplete_tiff(folder: Path) -> Path:
-    """An OME-XML that promises two planes more than the file holds."""
+    """Write a TIFF whose OME-XML promises two planes more than the file holds."""
     path = write_ome_tiff(folder / "few.ome.tif", SMALL)
     xml = tifffile.tiffcomment(path).replace('SizeZ="6"', 'SizeZ="8"')
     tifffile.tiffcomment(path, xml.encode())
@@ -153,7 +153,7 @@ CASES: dict[str, tuple[Maker, str]] = {
         r"found a file \(a text file\), expected a folder of OME-Zarr",
     ),
     "empty folder as Zarr": (folder_named("bad.zarr"), "zarr.json"),
-    "folder as TIFF": (folder_named("bad.ome.tif"), "is a folder, expected a file"),
+    "folder as TIFF": (folder_named("bad.ome.tif"), "found a folder, expected a file"),
     "TIFF without spacing": (plain_tiff, "voxel size: not found.*--spacing-um z,y,x"),
     "flat RGB TIFF": (rgb_tiff, r"at least 2 planes.*a flat image of 3 channels\)"),
     "TIFF with missing planes": (incomplete_tiff, "found 6 planes, expected 8"),
@@ -195,14 +195,14 @@ CASES: dict[str, tuple[Maker, str]] = {
     ),
     "axis twice": (
         multiscale(lambda image: image["axes"].__setitem__(0, image["axes"][1])),
-        "axes y, y, x name one twice",
+        "axes y, y, x: two have the same name",
     ),
     "axes too few": (multiscale(lambda image: image["axes"].pop(0)), "axes"),
     "no levels": (multiscale(lambda image: image.update(datasets=[])), "datasets: found none"),
     "level not there": (missing_level, "level '0'"),
     "levels that grow": (growing_levels, "shape .* of level 1"),
     "levels of two dtypes": (mixed_dtypes, "dtype of level 1: found float32"),
-    "flat Zarr": (zarr_of(SMALL[0], "yx"), "at least 2 planes: no axis z"),
+    "flat Zarr": (zarr_of(SMALL[0], "yx"), "at least 2 planes: found no axis z"),
     "Zarr of one plane": (zarr_of(SMALL[:1]), "at least 2 planes: found 1 along z"),
     "complex Zarr": (zarr_of(SMALL.astype(np.complex64)), "found complex64, expected uint8"),
     "negative spacing": (scale(-0.5, 1, 1), "voxel size z of level 0: found -0.5 um"),
@@ -252,7 +252,9 @@ CASES: dict[str, tuple[Maker, str]] = {
 
 
 @pytest.mark.parametrize("suffix", ["tar", "zip", "xz", "tar.gz"])
-def test_a_packed_file_is_to_be_unpacked(suffix: str, tmp_path: Path) -> None:
+def test_a_compressed_file_is_refused_with_the_advice_to_unpack_it(
+    suffix: str, tmp_path: Path
+) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "scan.dcm").write_bytes(b"an image")
     packings = {"tar": "tar", "zip": "zip", "xz": "xztar", "tar.gz": "gztar"}
@@ -264,20 +266,20 @@ def test_a_packed_file_is_to_be_unpacked(suffix: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+def test_a_bad_source_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
     make, message = CASES[name]
     assert re.search(message, refusal(make(tmp_path)))
 
 
 @pytest.mark.parametrize("time", [-1, 3])
-def test_time_out_of_range(tmp_path: Path, time: int) -> None:
+def test_a_time_out_of_range_is_refused(tmp_path: Path, time: int) -> None:
     path = write_ome_zarr(tmp_path / "t.zarr", [np.stack([SMALL] * 3)], axes="tzyx")
     with pytest.raises(UsageError, match=f"--time: found {time}, expected 0 to 2"):
         read.open(path, time=time)
 
 
 def early_xml_tiff(path: Path, **options: Any) -> Path:
-    """OME-TIFF with its XML in front, so that a cut costs planes and not the metadata."""
+    """Write OME-TIFF with its XML first, so that a cut costs planes and not the metadata."""
     depth, height, width = SMALL.shape
     xml = (
         '<OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image ID="Image:0">'
@@ -296,7 +298,7 @@ def early_xml_tiff(path: Path, **options: Any) -> Path:
 
 @pytest.mark.parametrize("compression", [None, "zlib", "zstd", "lzw", "jpeg2000"])
 @pytest.mark.parametrize("tile", [None, (16, 16)])
-def test_tiff_cut_short_anywhere(
+def test_a_tiff_that_is_cut_short_anywhere_is_refused(
     tmp_path: Path, compression: str | None, tile: tuple[int, int] | None
 ) -> None:
     whole = early_xml_tiff(tmp_path / "whole.ome.tif", compression=compression, tile=tile)
@@ -310,7 +312,7 @@ def test_tiff_cut_short_anywhere(
         refusal(short)
 
 
-def test_tiff_that_ends_with_its_xml_cut_short(tmp_path: Path) -> None:
+def test_a_tiff_that_ends_within_its_xml_is_refused(tmp_path: Path) -> None:
     content = write_ome_tiff(tmp_path / "whole.ome.tif", SMALL).read_bytes()
     short = tmp_path / "short.ome.tif"
     for kept in (len(content) // 2, len(content) - 40, len(content) - 1):
@@ -318,7 +320,7 @@ def test_tiff_that_ends_with_its_xml_cut_short(tmp_path: Path) -> None:
         refusal(short)
 
 
-def test_tiff_with_garbled_tiles(tmp_path: Path) -> None:
+def test_a_tiff_with_damaged_tiles_is_refused(tmp_path: Path) -> None:
     path = early_xml_tiff(tmp_path / "x.ome.tif", compression="zlib", tile=(16, 16))
     with tifffile.TiffFile(path) as tiff:
         start = tiff.pages[3].dataoffsets[4]  # type: ignore[union-attr]
@@ -343,7 +345,7 @@ COMPRESSORS = {
 
 
 @pytest.mark.parametrize("name", COMPRESSORS)
-def test_zarr_chunk_cut_short(tmp_path: Path, name: str) -> None:
+def test_a_zarr_chunk_that_is_cut_short_is_refused(tmp_path: Path, name: str) -> None:
     version, compressor = COMPRESSORS[name]
     path = write_ome_zarr(
         tmp_path / "c.zarr", [SMALL], version=version, compressors=compressor, chunks=(3, 24, 24)
@@ -355,11 +357,11 @@ def test_zarr_chunk_cut_short(tmp_path: Path, name: str) -> None:
     for kept in (0, 3, len(content) // 2, len(content) - 1):
         chunk.write_bytes(content[:kept])
         assert "channel 'Channel0', level 0" in refusal(path)
-        dataset.read(0, Box((0, 0, 0), (3, 24, 24)))  # the chunks beside it are well
+        dataset.read(0, Box((0, 0, 0), (3, 24, 24)))  # the neighbouring chunks are intact
 
 
 @pytest.mark.parametrize("version", ["0.4", "0.5"])
-def test_zarr_metadata_cut_short(tmp_path: Path, version: str) -> None:
+def test_zarr_metadata_that_are_cut_short_are_refused(tmp_path: Path, version: str) -> None:
     files = ("zarr.json", "0/zarr.json") if version == "0.5" else (".zattrs", "0/.zarray")
     for file in files:
         path = write_ome_zarr(tmp_path / "m.zarr", [SMALL], version=version)
@@ -370,22 +372,24 @@ def test_zarr_metadata_cut_short(tmp_path: Path, version: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["missing.zarr", "missing.ome.tif"])
-def test_addresses_without_an_image(
+def test_addresses_without_an_image_are_refused(
     tmp_path: Path, serve: Callable[[Path], Server], name: str
 ) -> None:
     assert "not found, or not reachable" in refusal(f"{serve(tmp_path).url}/{name}")
-    refusal(f"http://127.0.0.1:9/{name}")  # nobody answers
+    refusal(f"http://127.0.0.1:9/{name}")  # no server listens on this port
     refusal(f"nosuchprotocol://host/{name}")
 
 
 @pytest.mark.slow
-def test_s3_without_the_object(s3_bucket: Path) -> None:
+def test_a_missing_s3_object_is_refused(s3_bucket: Path) -> None:
     assert s3_bucket.is_dir()
     refusal("s3://bucket/missing.zarr")
     refusal("s3://bucket/missing.ome.tif")
 
 
-def test_a_source_without_rights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_source_without_read_permission_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = write_ome_tiff(tmp_path / "secret.ome.tif", f_phantom())
 
     def refuse(*args: Any, **kwargs: Any) -> None:
@@ -396,7 +400,7 @@ def test_a_source_without_rights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_host_that_sends_no_parts_of_files_is_named_as_the_reason(tmp_path: Path) -> None:
-    """Python's own server is such a host; files that fit into one read need no parts."""
+    """Python's own server is such a host; files that fit into one read don't need parts."""
     planes = np.random.default_rng(0).integers(0, 1000, (16, 512, 512), dtype=np.uint16)
     axes = {"axes": "ZYX", **dict.fromkeys(("PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"), 1)}
     tifffile.imwrite(tmp_path / "large.ome.tif", planes, compression="zlib", metadata=axes)

@@ -27,7 +27,7 @@ def write(path: Path, version: Any = 3, voxels: Any = None, **options: Any) -> P
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", ["a.zarr", "it's an array"])
-def test_an_array_is_a_volume(tmp_path: Path, version: int, name: str) -> None:
+def test_an_array_is_read_as_a_volume(tmp_path: Path, version: int, name: str) -> None:
     path = write(tmp_path / name, version)
     dataset = read.open(path, spacing_um=SIZE_UM)
     box = Box((1, 7, 3), (9, 30, 20))
@@ -55,7 +55,7 @@ def test_axes_come_from_names_of_dimensions_or_the_user(tmp_path: Path, version:
         assert dataset.notes == ()
     with pytest.raises(SourceError, match="--axes zyxc"):
         read.open(bare, spacing_um=SIZE_UM)
-    with pytest.raises(UsageError, match=r"--axes zyx: found axes .* long, expected 4 letters"):
+    with pytest.raises(UsageError, match=r"--axes zyx: .* of length .*, expected 4 letters"):
         read.open(bare, axes="zyx")
 
 
@@ -63,7 +63,7 @@ def test_a_group_of_several_arrays_lists_them(tmp_path: Path) -> None:
     zarr.open_group(tmp_path / "g.zarr", mode="w")
     write(tmp_path / "g.zarr" / "raw")
     dataset = read.open(tmp_path / "g.zarr", spacing_um=SIZE_UM)
-    assert "array raw, the only one" in dataset.notes[0]
+    assert "array raw: the only volume" in dataset.notes[0]
     zarr.open_group(tmp_path / "g.zarr" / "deep", mode="w")
     write(tmp_path / "g.zarr" / "deep" / "label")
     (tmp_path / "g.zarr" / "notes.txt").write_text("of no array")
@@ -81,15 +81,17 @@ def test_axes_of_an_ome_zarr_are_its_own(tiny_zarr_05: Path) -> None:
 def test_a_level_of_an_image_names_the_image(tmp_path: Path, version: str) -> None:
     both = np.stack([f_phantom(), f_phantom() + 1])
     image = write_ome_zarr(tmp_path / "a b.zarr", [both], "czyx", version)
-    with pytest.raises(SourceError, match=rf"a level of an OME-Zarr image, .* as {image} "):
+    with pytest.raises(
+        SourceError, match=rf"found a level of an OME-Zarr image, expected the image: {image} "
+    ):
         read.open(image / "0", spacing_um=SIZE_UM)
     dataset = read.open(image / "0", spacing_um=SIZE_UM, axes="czyx")
     np.testing.assert_array_equal(dataset.read(1, dataset.levels[0].box).voxels, f_phantom() + 1)
 
 
-def test_named_axes_without_z_are_not_taken_for_others(tmp_path: Path) -> None:
+def test_named_axes_without_z_are_not_read_as_others(tmp_path: Path) -> None:
     named = write(tmp_path / "a.zarr", dimension_names=list("tyx"))
-    with pytest.raises(SourceError, match=r"one plane .*: found axes t, y, x, .* --axes zyx takes"):
+    with pytest.raises(SourceError, match=r"one plane .*: found axes t, y, x, .* --axes zyx reads"):
         read.open(named, spacing_um=SIZE_UM)
     assert read.open(named, spacing_um=SIZE_UM, axes="zyx").time_points == 1
     flat = write(tmp_path / "b.zarr", voxels=f_phantom()[None, None, :1])
@@ -104,7 +106,7 @@ def test_axes_of_length_1_may_be_left_out(tmp_path: Path, axes: str) -> None:
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
 
-def test_a_damaged_chunk_is_one_line(tmp_path: Path) -> None:
+def test_a_damaged_chunk_is_refused_in_one_line(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zarr")
     chunk = next(file for file in sorted(path.rglob("*")) if file.is_file() and "c" in file.parts)
     chunk.write_bytes(chunk.read_bytes()[:9])
@@ -126,7 +128,7 @@ def test_a_chunk_of_gzip_that_does_not_decode_is_named(tmp_path: Path) -> None:
     array[:] = np.arange(8 * 16 * 16).reshape(8, 16, 16)
     chunk = tmp_path / "a.zarr" / "c" / "1" / "0" / "0"
     content = bytearray(chunk.read_bytes())
-    content[-6] ^= 1  # of its checksum
+    content[-6] ^= 1  # a byte of the checksum
     chunk.write_bytes(content)
     dataset = read.open(tmp_path / "a.zarr", spacing_um=SIZE_UM)
     with pytest.raises(SourceError) as caught:

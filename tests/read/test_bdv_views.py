@@ -70,7 +70,7 @@ ATTRIBUTES = ("channel", "tile", "angle", "illumination", "phase", "displaysetti
 
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
 @pytest.mark.parametrize("attribute", ["tile", "angle", "illumination"])
-def test_views_are_images_of_their_own(tmp_path: Path, kind: str, attribute: str) -> None:
+def test_each_view_is_a_separate_image(tmp_path: Path, kind: str, attribute: str) -> None:
     setups = [
         {"body": BODY + 100 * view + channel, "channel": channel, attribute: view}
         for view in (0, 1)
@@ -94,7 +94,7 @@ def test_a_container_named_by_itself_is_read_by_the_views_of_its_xml(tmp_path: P
     write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY + 1, "tile": 1}])
     dataset = read.open(tmp_path / "a.h5")
     assert len(dataset.channels) == 1
-    assert "--series needs the name of the XML" in dataset.notes[0]
+    assert "to use --series, name the XML as the source" in dataset.notes[0]
 
 
 def test_tiles_of_different_size_are_read_one_by_one(tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_tiles_of_different_size_are_read_one_by_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
-def test_a_spacing_that_stands_in_the_registration_alone_is_read(tmp_path: Path, kind: str) -> None:
+def test_a_spacing_that_only_the_registration_states_is_read(tmp_path: Path, kind: str) -> None:
     path = write(
         tmp_path, [{"body": BODY, "affines": ["1 0 0 0 0 1 0 0 0 0 2.4 0"]}], size="1 1 1",
         kind=kind,
@@ -118,7 +118,7 @@ def test_a_spacing_that_stands_in_the_registration_alone_is_read(tmp_path: Path,
     "affines",
     [
         [PLAIN],
-        ["1 0 0 0 0 1 0 0 0 0 2.5 0"],  # a world of voxels, as BigStitcher has it
+        ["1 0 0 0 0 1 0 0 0 0 2.5 0"],  # a world that counts voxels, as in BigStitcher
         ["1 0 0 7 0 1 0 8 0 0 1 9", PLAIN],
         ["1 0 0 0 0 1 0 0 0 0 1 0"],  # the identity: not registered
         [],
@@ -138,7 +138,7 @@ def test_a_mirror_without_a_scale_keeps_the_voxel_size(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": [affine]}]))
     assert dataset.levels[0].spacing_um == (0.5, 0.2, 0.2)
     np.testing.assert_array_equal(whole(dataset), BODY[:, ::-1])
-    assert len(dataset.notes) == 1  # on the mirror
+    assert len(dataset.notes) == 1  # the note on the mirror
 
 
 def test_the_registration_of_the_chosen_time_point_is_applied(tmp_path: Path) -> None:
@@ -153,7 +153,7 @@ def test_the_registration_of_the_chosen_time_point_is_applied(tmp_path: Path) ->
 
 
 def with_second_time(path: Path, affine: str, missing: str = "") -> Path:
-    """Add a time point, with voxels that are 50 brighter, to a container of HDF5 and its XML."""
+    """Add a time point with voxels that are brighter by 50 to an HDF5 container and its XML."""
     with h5py.File(path.with_suffix(".h5"), "a") as file:
         for name in file["t00000"]:
             file[f"t00001/{name}/0/cells"] = file[f"t00000/{name}/0/cells"][()] + 50
@@ -225,14 +225,14 @@ def test_setups_of_one_channel_are_not_overlaid(tmp_path: Path) -> None:
 def test_setups_without_an_xml_are_channels_with_a_note(tmp_path: Path, kind: str) -> None:
     write(tmp_path, [{"body": BODY, "tile": 0}, {"body": BODY, "tile": 1}], kind=kind).unlink()
     source = tmp_path / ("a.h5" if kind == "hdf5" else "a.n5")
-    with pytest.raises(SourceError, match="states it in an XML, and none lies beside"):
+    with pytest.raises(SourceError, match="states it in an XML, which is not beside"):
         read.open(source)
     dataset = read.open(source, spacing_um=(0.5, 0.2, 0.2))
     assert "whether they are tiles, angles or channels" in dataset.notes[0]
 
 
 def test_transforms_compose_with_the_first_one_applied_last(tmp_path: Path) -> None:
-    """Voxels are doubled along z, then z becomes x and x the reverse of z."""
+    """Voxels are doubled along z, then z becomes x and x becomes reversed z."""
     affines = ["0 0 1 0 0 1 0 0 -1 0 0 40", "0.2 0 0 0 0 0.2 0 0 0 0 1 0"]
     dataset = read.open(write(tmp_path, [{"body": BODY, "affines": affines}]))
     assert dataset.levels[0].spacing_um == (0.2, 0.2, 1.0)
@@ -279,7 +279,7 @@ def test_channels_that_are_registered_apart_are_noted(tmp_path: Path) -> None:
      ("1 0 0 0 0 1 0 0 0 0 2.5 0", (2.5, 1.0, 1.0))],
 )  # fmt: skip
 @pytest.mark.parametrize("kind", ["hdf5", "n5"])
-def test_channels_of_another_scale_or_direction_are_images_of_their_own(
+def test_channels_of_another_scale_or_direction_are_separate_images(
     tmp_path: Path, kind: str, affine: str, spacing: tuple[float, ...]
 ) -> None:
     setups = [
@@ -305,7 +305,10 @@ def test_a_registration_of_no_numbers_is_left_out_with_a_note(tmp_path: Path, te
         {"body": BODY, "channel": 1, "affines": [PLAIN]},
     ]
     dataset = read.open(write(tmp_path, setups))
-    assert any("has no three axes: it is not applied" in note for note in dataset.notes)
+    assert any(
+        "registration don't span three dimensions: it is not applied" in note
+        for note in dataset.notes
+    )
 
 
 def test_a_small_scale_or_angle_between_channels_is_named(tmp_path: Path) -> None:
@@ -338,31 +341,36 @@ def test_levels_that_one_channel_lacks_are_left_out(tmp_path: Path, kind: str) -
 
 
 @pytest.mark.parametrize(
-    ("loader", "way_out"),
+    ("loader", "remedy"),
     [
-        ('<zarr type="relative">a.ome.zarr</zarr>', "name an image in it, as a.ome.zarr/IMAGE"),
+        (
+            '<zarr type="relative">a.ome.zarr</zarr>',
+            "name an image in it, such as a.ome.zarr/IMAGE",
+        ),
         ("<files/>", "name the image files themselves"),
     ],
 )
-def test_other_containers_are_refused_with_a_way_out(
-    tmp_path: Path, loader: str, way_out: str
+def test_other_containers_are_refused_with_a_remedy(
+    tmp_path: Path, loader: str, remedy: str
 ) -> None:
     path = write(tmp_path, [{"body": BODY}])
     (tmp_path / "a.ome.zarr").mkdir()
     (tmp_path / "a.ome.zarr" / ".zgroup").write_text('{"zarr_format": 2}')
     text = path.read_text("utf-8").replace('<file type="relative">a.h5</file>', loader)
     path.write_text(text, "utf-8")
-    with pytest.raises(SourceError, match=way_out):
+    with pytest.raises(SourceError, match=remedy):
         read.open(path)
 
 
 def test_a_registration_without_a_unit_is_a_hint(tmp_path: Path) -> None:
     path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}], size="1 1 1", unit="pixel")
-    with pytest.raises(Exception, match=r"the registration has 0.5,0.2,0.2 \(z,y,x\) without one"):
+    with pytest.raises(
+        Exception, match=r"the registration has 0.5,0.2,0.2 \(z,y,x\) without a unit"
+    ):
         read.open(path)
 
 
-def test_the_xml_that_is_named_counts_among_several(tmp_path: Path) -> None:
+def test_the_xml_that_the_user_names_is_used_among_several(tmp_path: Path) -> None:
     path = write(tmp_path, [{"body": BODY, "affines": [PLAIN]}])
     other = tmp_path / "z.xml"
     other.write_text(path.read_text("utf-8").replace("0 0 0 0 0.5 0", "0 0 0 0 -0.5 0"))

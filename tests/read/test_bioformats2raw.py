@@ -24,9 +24,9 @@ MODULO = (
 
 
 def container(folder: Path, voxels: list[Any], pixels: list[str], annotations: str = "") -> Path:
-    """Write a container of images, and OME-XML with the elements of each image's Pixels.
+    """Write a container of images, and OME-XML with the elements in each image's Pixels.
 
-    An image refers to the annotation of its number.
+    An image refers to the annotation with its own number.
     """
     root = zarr.open_group(folder, mode="w", zarr_format=2)
     root.attrs["bioformats2raw.layout"] = 3
@@ -65,7 +65,7 @@ def test_positions_of_planes_give_the_spacing_where_the_scale_differs(tmp_path: 
 
 
 @pytest.mark.slow
-def test_angles_along_z_are_images_of_their_own(
+def test_angles_along_z_are_separate_images(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored = np.concatenate([BODY, OTHER])
@@ -83,7 +83,7 @@ def test_angles_along_z_are_images_of_their_own(
     assert "level 0: found none of 1 chunks" in capsys.readouterr().err
 
 
-def test_an_annotation_of_another_image_is_not_taken(tmp_path: Path) -> None:
+def test_an_annotation_of_another_image_is_not_used(tmp_path: Path) -> None:
     annotations = MODULO.format(0, 90) + MODULO.format(1, 270)
     stored = np.concatenate([BODY, OTHER])
     path = container(tmp_path / "c.zarr", [stored, stored], ["", ""], annotations)

@@ -1,4 +1,4 @@
-"""Other formats through bioio, of which a stand-in is installed here: it is no dependency."""
+"""Other formats through bioio. A stand-in is installed here, since bioio is not a dependency."""
 
 import sys
 from pathlib import Path
@@ -16,11 +16,11 @@ from support.phantoms import f_phantom
 
 
 class Unsupported(Exception):
-    """As bioio_base.exceptions.UnsupportedFileFormatError is: of no other class."""
+    """Like bioio_base.exceptions.UnsupportedFileFormatError, which has no other base class."""
 
 
 class Nanometer:
-    """As a unit of pint is: its name is its text."""
+    """Like a unit of pint: its text is its name."""
 
     def __str__(self) -> str:
         return "nanometer"
@@ -78,7 +78,7 @@ def test_a_plugin_s_format_is_read_with_its_scenes(tmp_path: Path) -> None:
 def test_a_plugin_s_units_and_both_sizes_count(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As bioio-base has them since 3.0: units of pint, and a scale beside the sizes."""
+    """As in bioio-base since 3.0: units of pint, and a scale beside the sizes."""
     unit = SimpleNamespace(unit=Nanometer())
     units, scale = SimpleNamespace(Z=unit, Y=unit, X=unit), SimpleNamespace(Z=500, Y=200, X=300)
     sizes = SimpleNamespace(Z=500.0, Y=200.0, X=250.0)
@@ -105,7 +105,7 @@ def test_a_negative_voxel_size_is_noted(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.usefixtures("_bioio")
-def test_what_no_plugin_takes_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_no_plugin_reads_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.dv").write_bytes(b"other")
     (tmp_path / "a.xyz").write_bytes(b"other")
     with pytest.raises(SourceError, match="no DV at all; expected a file that a plugin"):
@@ -117,7 +117,7 @@ def test_what_no_plugin_takes_is_one_line(tmp_path: Path) -> None:
         read.open(tmp_path / "a.xyz")
 
 
-def test_without_bioio_the_line_names_it(tmp_path: Path) -> None:
+def test_without_bioio_the_message_names_it(tmp_path: Path) -> None:
     (tmp_path / "a.dv").write_bytes(b"DV")
     with pytest.raises(
         SourceError,

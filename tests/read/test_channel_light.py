@@ -1,4 +1,4 @@
-"""Channels have the colour of their light in a plan: files of tifffile, ome-types, Zeiss, Nikon."""
+"""Channels get the colour of their light in a plan, from tifffile, ome-types, Zeiss and Nikon."""
 
 import json
 import struct
@@ -26,7 +26,7 @@ UM = {"PhysicalSizeX": 0.2, "PhysicalSizeY": 0.2, "PhysicalSizeZ": 0.5}
 
 
 def planned_colors(path: Path) -> list[tuple[float, ...]]:
-    """Return the colours that a plan of a source has."""
+    """Return the channels' colours in the plan of a source."""
     out = path.parent / f"plan of {path.stem}"
     assert main(["plan", str(path), "-o", str(out), "--as", "intensity"]) == 0
     plan = json.loads((out / "plan.json").read_text("utf-8"))
@@ -34,7 +34,7 @@ def planned_colors(path: Path) -> list[tuple[float, ...]]:
 
 
 def write_ome(path: Path, channels: list[Channel]) -> Path:
-    """Write an OME-TIFF whose OME-XML is that of ome-types."""
+    """Write an OME-TIFF with OME-XML from ome-types."""
     depth, height, width = BODY.shape
     pixels = Pixels(
         id="Pixels:0", dimension_order="XYZCT", type="uint16", size_x=width, size_y=height,
@@ -76,7 +76,7 @@ def test_a_channel_of_ome_xml_has_the_colour_of_its_light(
     assert planned_colors(write_ome(tmp_path / "a.ome.tif", [channel])) == [color_of_wavelength(nm)]
 
 
-def test_a_stated_colour_counts_more_than_the_light(tmp_path: Path) -> None:
+def test_a_stated_colour_takes_precedence_over_the_light(tmp_path: Path) -> None:
     channel = Channel(
         id="Channel:0:0", samples_per_pixel=1, color=Color("magenta"), emission_wavelength=519.0
     )
@@ -85,8 +85,8 @@ def test_a_stated_colour_counts_more_than_the_light(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_channels_without_light_take_colours_that_all_eyes_tell_apart(tmp_path: Path) -> None:
-    """Each of the palette, where the file states none, and never one that a dye has already."""
+def test_channels_without_light_get_colours_that_all_eyes_distinguish(tmp_path: Path) -> None:
+    """The colours come from the palette, and none repeats the colour of a dye in the file."""
     lights: list[dict[str, Any]] = [{}, {"emission_wavelength": 461.0}, {}, {}]
     channels = [
         Channel(id=f"Channel:0:{n}", samples_per_pixel=1, name=f"m{n}", **about)
@@ -102,9 +102,9 @@ def test_channels_without_light_take_colours_that_all_eyes_tell_apart(tmp_path: 
 
 
 def with_lights(path: Path, lights: list[tuple[str, float]]) -> Path:
-    """Append to a CZI the metadata that Zeiss's library wrote, with dyes and wavelengths, nm."""
+    """Append metadata with dyes and wavelengths (nm) to a CZI, in the form of Zeiss's library."""
     content = bytearray(path.read_bytes())
-    (at,) = struct.unpack_from("<q", content, 92)  # MetadataPosition of the file's header
+    (at,) = struct.unpack_from("<q", content, 92)  # MetadataPosition in the file's header
     (size,) = struct.unpack_from("<i", content, at + 32)
     text = content[at + 32 + 256 : at + 32 + 256 + size].decode("utf-8")
     for number, (dye, nm) in enumerate(lights):

@@ -51,7 +51,8 @@ def test_missing_names_matter_only_where_channels_are_named(
     assert [channel.color for channel in dataset.channels] == [None, None]
     assert not any(channel.is_named for channel in dataset.channels)
     assert dataset.find_channels(["1"]) == (1,)
-    assert dataset.find_channels(["Channel1", "Channel0"]) == (1, 0)  # as it is shown everywhere
+    # the made-up names that the product shows
+    assert dataset.find_channels(["Channel1", "Channel0"]) == (1, 0)
     expected = "no channel names, expected Channel0 to Channel1, or an index from 0 to 1"
     with pytest.raises(UsageError, match=expected):
         dataset.find_channels(["DNA"])
@@ -75,7 +76,7 @@ def test_a_made_up_name_gives_way_to_a_real_one(tmp_path: Path) -> None:
     assert dataset.find_channels(["Channel1", "Channel1_"]) == (0, 1)
 
 
-def test_equal_names_are_told_apart(tmp_path: Path) -> None:
+def test_equal_names_are_numbered(tmp_path: Path) -> None:
     dataset = _with_names(tmp_path, ["DNA", "CD8", "DNA"])
     assert _names(dataset) == ["DNA (channel 0)", "CD8", "DNA (channel 2)"]
     assert dataset.find_channels(["DNA (channel 2)"]) == (2,)
@@ -83,18 +84,18 @@ def test_equal_names_are_told_apart(tmp_path: Path) -> None:
         dataset.find_channels(["DNA"])
 
 
-def test_names_that_differ_by_case_alone_are_told_apart(tmp_path: Path) -> None:
-    # their files would be one on Windows and macOS
+def test_names_that_differ_only_by_case_are_numbered(tmp_path: Path) -> None:
+    # On Windows and macOS their files would be the same.
     names = _names(_with_names(tmp_path, ["CD3", "cd3", "CD31"]))
     assert names == ["CD3 (channel 0)", "cd3 (channel 1)", "CD31"]
 
 
-def test_names_that_look_told_apart_are_told_apart_too(tmp_path: Path) -> None:
+def test_names_that_look_numbered_already_are_numbered_too(tmp_path: Path) -> None:
     names = _names(_with_names(tmp_path, ["DNA", "DNA (channel 0)", "DNA"]))
     assert len(set(names)) == 3
 
 
-def test_odd_names_are_shown_or_missing(tmp_path: Path) -> None:
+def test_odd_names_are_cleaned_or_count_as_missing(tmp_path: Path) -> None:
     dataset = _with_names(tmp_path, ["\x00\n\ud800", "a\nb\x07", "///", " "])
     assert _names(dataset) == ["Channel0", "a b", "///", "Channel3"]
     assert [channel.is_named for channel in dataset.channels] == [False, True, True, False]

@@ -1,4 +1,4 @@
-"""What is no file of its kind is told in one line, the same for every format."""
+"""A file that is not of its stated kind is refused in one line, the same for every format."""
 
 import gzip
 from collections.abc import Callable
@@ -23,7 +23,7 @@ NAMES = (
     *("a.dcm", "a.png", "a.zarr", "a.n5", "a.companion.ome"),
 )
 LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12\n"
-NIFTI, NAMED = "NIfTI or Analyze", ": if that is what it is meant to be, name it"
+NIFTI, NAMED = "NIfTI or Analyze", ": if it really is that, rename it to end in"
 STUBS = {
     "pointer of Git LFS": (LFS, "`git lfs pull` gets the file"),
     "HTML page": (b"\n<!DOCTYPE html>\n<html><body>Log in</body></html>", "download it again"),
@@ -52,7 +52,7 @@ def refusal(path: Path) -> str:
 
 @pytest.mark.parametrize("stub", list(STUBS))
 @pytest.mark.parametrize("name", NAMES)
-def test_what_stands_in_a_files_place_is_said(tmp_path: Path, name: str, stub: str) -> None:
+def test_a_stub_in_place_of_a_file_is_named(tmp_path: Path, name: str, stub: str) -> None:
     content, remedy = STUBS[stub]
     (tmp_path / name).write_bytes(content)
     line = refusal(tmp_path / name)
@@ -61,14 +61,16 @@ def test_what_stands_in_a_files_place_is_said(tmp_path: Path, name: str, stub: s
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "a.rec"])
-def test_zeros_are_a_copy_that_did_not_finish(tmp_path: Path, name: str) -> None:
+def test_zeros_are_reported_as_an_unfinished_copy(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(bytes(20_000))
     assert "zeros (a copy or a download that did not finish" in refusal(tmp_path / name)
 
 
 @pytest.mark.parametrize("content", [b"", LFS, b"<html>", b"{}"])
 @pytest.mark.parametrize("name", ["a.nii.gz", "a.hdr.gz", "a.mrc.gz"])
-def test_a_packed_file_is_looked_into(tmp_path: Path, name: str, content: bytes) -> None:
+def test_the_content_of_a_compressed_file_is_checked(
+    tmp_path: Path, name: str, content: bytes
+) -> None:
     (tmp_path / name).write_bytes(gzip.compress(content))
     line = refusal(tmp_path / name)
     told = {b"": "nothing", LFS: "a pointer of Git LFS", b"<html>": "an HTML page", b"{}": "JSON"}
@@ -96,13 +98,13 @@ def _packed_nifti(path: Path) -> None:
         (_tiff, "a.nii.gz", "found a TIFF file, expected NIfTI or Analyze, packed by gzip: if"),
         (_tiff, "a.mha", "found a TIFF file, expected MetaImage: if"),
         (_tiff, "a.ims", "found a TIFF file, expected Imaris: if"),
-        (_tiff, "a.dcm", None),  # DICOM's ending goes with any content: the content decides
+        (_tiff, "a.dcm", None),  # any content may end in .dcm, so the content decides
         (_nifti, "a.nii.gz", f"found a NIfTI file, expected {NIFTI}, packed by gzip{NAMED} .nii"),
         (_packed_nifti, "a.nii", f"NIfTI file (gunzip it), expected {NIFTI}{NAMED} .nii.gz"),
         (_nifti, "a.tif", "found a NIfTI file, expected TIFF: if"),
     ],
 )  # fmt: skip
-def test_another_format_under_its_name_says_how_to_name_it(
+def test_a_file_with_the_wrong_ending_is_refused_with_the_right_one(
     tmp_path: Path, make: Callable[[Path], None], name: str, told: str | None
 ) -> None:
     path = tmp_path / name
@@ -118,7 +120,7 @@ def test_another_format_under_its_name_says_how_to_name_it(
 
 
 @pytest.mark.parametrize("name", ["zarr.json", "c/0/0/0"])
-def test_the_files_of_a_zarr_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+def test_git_lfs_pointers_in_a_zarr_are_named(tmp_path: Path, name: str) -> None:
     path = tmp_path / "a.zarr"
     zarr.create_array(str(path), data=f_phantom(), chunks=(4, 24, 18))
     (path / name).write_bytes(LFS)
@@ -127,14 +129,14 @@ def test_the_files_of_a_zarr_in_git_lfs_are_said(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("name", ["attributes.json", "0/0/0"])
-def test_the_files_of_an_n5_in_git_lfs_are_said(tmp_path: Path, name: str) -> None:
+def test_git_lfs_pointers_in_an_n5_are_named(tmp_path: Path, name: str) -> None:
     path = write_n5(tmp_path / "a.n5")
     (path / name).write_bytes(LFS)
     with pytest.raises(SourceError, match="found a pointer of Git LFS"):
         _read_whole(path, spacing_um=(1, 1, 1))
 
 
-def test_a_container_that_an_xml_names_is_looked_at(tmp_path: Path) -> None:
+def test_a_container_that_an_xml_names_is_checked(tmp_path: Path) -> None:
     write_bdv_xml(tmp_path, "a.h5", "nm")
     (tmp_path / "a.h5").write_bytes(LFS)
     (xml,) = tmp_path.glob("*.xml")
@@ -142,12 +144,12 @@ def test_a_container_that_an_xml_names_is_looked_at(tmp_path: Path) -> None:
         read.open(xml)
 
 
-def test_a_link_to_nothing_says_where_it_leads(tmp_path: Path) -> None:
+def test_a_broken_link_is_refused_with_its_target(tmp_path: Path) -> None:
     (tmp_path / "a.tif").symlink_to("gone.tif")
-    assert "a.tif: a link to gone.tif, which isn't there" in refusal(tmp_path / "a.tif")
+    assert "a.tif: a link to gone.tif, which doesn't exist" in refusal(tmp_path / "a.tif")
 
 
-def test_folders_say_what_lies_in_them(tmp_path: Path) -> None:
+def test_a_folder_without_a_format_is_refused_with_its_content(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="found an empty folder"):
         read.open(tmp_path)
     for number in range(3):
@@ -164,13 +166,15 @@ def test_folders_say_what_lies_in_them(tmp_path: Path) -> None:
         (b"\x89PNG\r\n\x1a\n", "one plane"),
     ],
 )
-def test_other_peoples_files_have_a_way_out(tmp_path: Path, head: bytes, told: str) -> None:
+def test_files_of_other_programs_are_refused_with_a_remedy(
+    tmp_path: Path, head: bytes, told: str
+) -> None:
     path = tmp_path / f"a.{'png' if b'PNG' in head else 'mat'}"
     path.write_bytes(head + bytes(600))
     assert told in refusal(path)
 
 
-def test_hdf5_without_a_volume_says_what_it_holds(tmp_path: Path) -> None:
+def test_hdf5_without_a_volume_is_refused_with_its_content(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["flat"] = f_phantom()[0]
         file["names"] = "x"
@@ -179,14 +183,14 @@ def test_hdf5_without_a_volume_says_what_it_holds(tmp_path: Path) -> None:
     assert "/names () object" in line
 
 
-def test_an_mrc_that_ends_in_its_header_says_where(tmp_path: Path) -> None:
+def test_an_mrc_that_ends_in_its_header_is_refused_with_the_byte(tmp_path: Path) -> None:
     with mrcfile.new(tmp_path / "a.mrc") as file:
         file.set_data(f_phantom().astype(np.float32))
     (tmp_path / "b.mrc").write_bytes((tmp_path / "a.mrc").read_bytes()[:500])
     assert "cut short at byte 500" in refusal(tmp_path / "b.mrc")
 
 
-def test_hdf5_behind_a_users_block_is_one(tmp_path: Path) -> None:
+def test_hdf5_after_a_users_block_is_recognised(tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
     with h5py.File(path, "w", userblock_size=512) as file:
         file["raw"] = f_phantom()
@@ -196,7 +200,7 @@ def test_hdf5_behind_a_users_block_is_one(tmp_path: Path) -> None:
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
 
-def test_the_files_of_a_folder_in_git_lfs_are_no_volume(tmp_path: Path) -> None:
+def test_a_folder_of_git_lfs_pointers_is_refused(tmp_path: Path) -> None:
     for z in range(3):
         (tmp_path / f"plane_{z}.png").write_bytes(LFS)
     with pytest.raises(SourceError, match="pointer of Git LFS"):
@@ -205,7 +209,9 @@ def test_the_files_of_a_folder_in_git_lfs_are_no_volume(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", [".czi", ".lif", ".h5", ".ims"])
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_a_file_that_ends_too_soon_says_where(tmp_path: Path, ending: str, share: float) -> None:
+def test_a_file_that_ends_too_soon_is_refused_with_the_byte(
+    tmp_path: Path, ending: str, share: float
+) -> None:
     path = tmp_path / f"a{ending}"
     if ending == ".czi":
         write_czi(path, {None: f_phantom()[None, None]})

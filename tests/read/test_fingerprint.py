@@ -1,4 +1,4 @@
-"""Fingerprints tell datasets apart, at a bounded cost."""
+"""Fingerprints distinguish datasets, at a bounded cost."""
 
 import shutil
 from pathlib import Path
@@ -39,7 +39,7 @@ def test_fingerprint_sees_a_voxel_a_name_a_spacing(
 
 @pytest.mark.slow
 def test_fingerprint_reads_a_bounded_part(tmp_path: Path) -> None:
-    # 240 MB by its header; chunks that were never written are zeros and cost nothing here.
+    # 240 MB by its header. Chunks that were never written are zeros and cost nothing here.
     path = write_ome_zarr(tmp_path / "v.zarr", [np.zeros((4, 8, 8), np.uint8)])
     zarr.create_array(
         str(path / "0"),

@@ -1,4 +1,4 @@
-"""Files of formats that are not read: the refusal names the format and a way out."""
+"""Files of formats that are not read: the refusal names the format and a remedy."""
 
 import pickle
 import sqlite3
@@ -52,7 +52,7 @@ refusal = refusing(read.open)
         ("._a.tif", b"\0\x05\x16\x07\0\2\0\0" + bytes(99), "record of macOS", "no `._`"),
     ],
 )
-def test_the_format_and_the_way_out_are_named(
+def test_the_format_and_the_remedy_are_named(
     tmp_path: Path, name: str, content: bytes, told: str, remedy: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
@@ -91,7 +91,7 @@ def test_a_folder_of_other_images_is_named(tmp_path: Path, ending: str) -> None:
 
 
 @pytest.mark.parametrize("sidecar", ["", "scan.vgi", "scan.raw.info", "scan.info"])
-def test_the_header_that_is_advised_for_bare_voxels_reads_them(
+def test_the_header_that_the_message_suggests_reads_raw_voxels(
     tmp_path: Path, sidecar: str
 ) -> None:
     VOXELS.astype("<u2").tofile(tmp_path / "scan.raw")
@@ -108,7 +108,7 @@ def test_the_header_that_is_advised_for_bare_voxels_reads_them(
     assert sorted(found.ravel().tolist()) == sorted(VOXELS.ravel().tolist())
 
 
-def test_no_ending_stands_for_two_formats() -> None:
+def test_no_ending_belongs_to_two_formats() -> None:
     endings = [ending for one in FOREIGN for ending in one.endings]
     assert len(endings) == len(set(endings))
     assert all(one.remedy for one in FOREIGN)

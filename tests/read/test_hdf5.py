@@ -36,7 +36,7 @@ def test_the_only_volume_is_read_and_named(tmp_path: Path) -> None:
     np.testing.assert_array_equal(whole(dataset), f_phantom())
     assert dataset.levels[0].spacing_um == SIZE_UM
     assert dataset.name == "Ann's µ data"
-    assert dataset.notes[0] == "dataset /a/b/raw, the only volume of the file"
+    assert dataset.notes[0] == "dataset /a/b/raw: the only volume of the file"
     assert "z, y, x are assumed" in dataset.notes[1]
 
 
@@ -50,7 +50,7 @@ def test_a_key_chooses_among_datasets(tmp_path: Path, key: str) -> None:
     assert whole(read.open(f"{path}{key}")).max() == F_BODY
     line = refusal(path)
     assert "/label (16, 48, 36) uint16, /raw (16, 48, 36) uint16" in line
-    assert line.endswith(f"expected one, as {path}:/raw")
+    assert line.endswith(f"expected one, such as {path}:/raw")
     assert "expected one of label, raw" in refusal(f"{path}:/none")
 
 
@@ -69,7 +69,7 @@ def test_axes_come_from_tags_labels_and_the_user(tmp_path: Path) -> None:
         np.testing.assert_array_equal(whole(dataset, 1), body + 1)
         assert not any("assumed" in note for note in dataset.notes)
     assert "--axes zyxc" in refusal(bare)
-    assert "--axes zyx: found axes 16, 48, 36, 2 long, expected 4" in refusal(bare, axes="zyx")
+    assert "--axes zyx: found axes of length 16, 48, 36, 2, expected 4" in refusal(bare, axes="zyx")
     series = write(tmp_path / "t.h5", voxels=stored.transpose(3, 2, 1, 0))
     dataset = read.open(series, axes="txyz", spacing_um=SIZE_UM, time=1)
     np.testing.assert_array_equal(whole(dataset), body + 1)
@@ -90,7 +90,7 @@ def test_sizes_with_a_unit_become_um(
     assert found == pytest.approx(expected)
 
 
-def test_a_size_without_a_unit_is_no_length(tmp_path: Path) -> None:
+def test_a_size_without_a_unit_is_not_a_length(tmp_path: Path) -> None:
     assert "--spacing-um" in refusal(write(tmp_path / "a.h5", resolution=(40.0, 4.0, 4.0)))
 
 
@@ -113,7 +113,7 @@ def test_links_in_the_folder_are_followed_and_others_refused(tmp_path: Path) -> 
         np.testing.assert_array_equal(whole(read.open(f"{path}:/{key}")), f_phantom())
     for key in ("far", "absolute"):
         assert "expected a file in" in refusal(f"{path}:/{key}")
-    assert "in a circle" in refusal(f"{path}:/circle")
+    assert "links form a circle" in refusal(f"{path}:/circle")
     for key in ("outside", "virtual"):
         assert "voxels lie in other files" in refusal(f"{path}:/{key}")
 
@@ -128,7 +128,7 @@ def test_a_filter_of_hdf5plugin_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(whole(read.open(tmp_path / "a.h5")), f_phantom())
 
 
-def test_an_unknown_filter_is_named_with_the_way_out(
+def test_an_unknown_filter_is_named_with_a_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write(tmp_path / "a.h5")
@@ -139,7 +139,7 @@ def test_an_unknown_filter_is_named_with_the_way_out(
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".ims"])
-def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
+def test_an_incomplete_file_is_refused_in_one_line(tmp_path: Path, suffix: str) -> None:
     path = write(tmp_path / "a.h5", voxels=np.zeros((9, 300, 300)))
     content = path.read_bytes()
     for spoilt in (b"", b"no HDF5 at all", content[:512], content[: len(content) // 2]):
@@ -148,7 +148,7 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
     half = f"cut short at byte {len(content) // 2} of {len(content)}"
     assert half in refusal(tmp_path / f"b{suffix}")
     (tmp_path / f"c{suffix}").mkdir()
-    assert "is a folder" in refusal(tmp_path / f"c{suffix}")
+    assert "found a folder" in refusal(tmp_path / f"c{suffix}")
     refusal(write(tmp_path / f"d{suffix}", "flat", np.zeros((40, 30))))
 
 
@@ -189,7 +189,7 @@ def test_imaris_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> Non
         whole(dataset, 1)
 
 
-def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path: Path) -> None:
+def test_bigdataviewer_s_setups_are_channels_of_unsigned_numbers(tmp_path: Path) -> None:
     body = f_phantom() * 60  # beyond int16
     with h5py.File(tmp_path / "a b.h5", "w") as file:
         for setup, time in np.ndindex(2, 2):
@@ -215,7 +215,7 @@ def test_bigdataviewer_s_setups_are_channels_of_numbers_without_a_sign(tmp_path:
     assert "BigDataViewer's axes" in refusal(tmp_path / "a b.h5", axes="zyx")
 
 
-# --- damage to parts of the file that have no checksum
+# --- damage to parts of the file without a checksum
 
 
 F32 = bytes.fromhex("11201f0004000000 00002000 17080017 7f000000")
@@ -224,7 +224,7 @@ U16 = bytes.fromhex("1000000002000000 00001000")
 
 
 def damage(path: Path, part: bytes, offset: int, value: int) -> None:
-    """Set a byte of the only place in a file that holds `part`."""
+    """Set a byte in the only place of a file that holds `part`."""
     content = bytearray(path.read_bytes())
     assert content.count(part) == 1
     content[content.index(part) + offset] = value
@@ -248,15 +248,15 @@ def window_refusal(source: Path) -> str:
     ],
     ids=["bias", "implied bit", "mantissa", "bits"],
 )
-def test_a_number_that_is_described_in_no_standard_way_is_refused(
+def test_a_number_of_a_nonstandard_form_is_refused(
     tmp_path: Path, dtype: str, part: bytes, offset: int, value: int
 ) -> None:
     path = write(tmp_path / "a.h5", voxels=f_phantom().astype(dtype))
     damage(path, part, offset, value)
-    assert "expected an IEEE float or an integer of all bits" in window_refusal(path)
+    assert "expected IEEE floats or integers that use all bits" in window_refusal(path)
 
 
-def test_a_voxel_size_that_is_described_in_no_standard_way_is_refused(tmp_path: Path) -> None:
+def test_a_voxel_size_of_a_nonstandard_form_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.h5", element_size_um=SIZE_UM)
     damage(path, F64, 16, 0xFE)
     assert "attribute 'element_size_um'" in window_refusal(path)
@@ -270,7 +270,7 @@ def test_standard_numbers_of_either_byte_order_are_read(tmp_path: Path, dtype: s
         require_standard(file["raw"].id.get_type(), "raw")
 
 
-def test_numbers_of_few_bits_are_read_where_the_filter_n_bit_packs_them(tmp_path: Path) -> None:
+def test_numbers_of_few_bits_are_read_if_the_filter_n_bit_packs_them(tmp_path: Path) -> None:
     body = f_phantom() % 4096
     with h5py.File(tmp_path / "a.h5", "w") as file:
         twelve_bits = h5py.h5t.STD_U16LE.copy()
@@ -287,7 +287,7 @@ def test_numbers_of_few_bits_are_read_where_the_filter_n_bit_packs_them(tmp_path
 
 
 def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[Any, bytes]:
-    """Write chunks of 8 planes; return the beginning of each one's entry in a B-tree."""
+    """Write chunks of 8 planes; return the first bytes of each chunk's entry in a B-tree."""
     with h5py.File(path, "w", libver=libver) as file:
         raw = file.create_dataset("raw", data=f_phantom(), chunks=(8, 48, 36), **options)
         found: list[Any] = []
@@ -303,12 +303,12 @@ def write_chunks(path: Path, libver: str = "earliest", **options: Any) -> dict[A
 @pytest.mark.parametrize(
     ("offset", "value", "told"),
     [
-        (36, 0x20, "no look-up finds"),  # the place within a voxel, which is always 0
+        (36, 0x20, "no look-up finds"),  # the position within a voxel, which is always 0
         (8, 8, "twice"),
         (8, 16, "off the grid"),
-        (43, 1, "bytes beyond the file"),
+        (43, 1, "bytes beyond the end of the file"),
         (41, 0x3F, "of another chunk"),
-        (4, 1, "another size"),  # the chunk is packed, and the entry says that it isn't
+        (4, 1, "another size"),  # the chunk is compressed, but the entry says that it isn't
     ],
 )
 def test_an_index_of_chunks_that_contradicts_itself_is_refused(
@@ -332,14 +332,14 @@ def test_an_index_of_many_chunks_is_compared_where_a_window_reads(tmp_path: Path
         place, other = (20, 50, 60), (30, 0, 0)
         chunk, shared = (raw.id.get_chunk_info_by_coord(at) for at in (place, other))
     entry = struct.pack("<II5Q", 10, 0, *place, 0, chunk.byte_offset)
-    damage(path, entry, 32, 1)  # the place within a voxel, which is always 0
+    damage(path, entry, 32, 1)  # the position within a voxel, which is always 0
     dataset = read.open(path, spacing_um=SIZE_UM)
     apart, across = Box((0, 0, 0), (19, 100, 100)), Box((19, 48, 58), (22, 56, 63))
     np.testing.assert_array_equal(dataset.read(0, apart).voxels, body[apart.slices])
     with pytest.raises(SourceError, match=r"\(20, 50, 60\): found an entry that no look-up finds"):
         dataset.read(0, across)
     damage(path, struct.pack("<Q", shared.byte_offset), 0, chunk.byte_offset & 0xFF)
-    with pytest.raises(SourceError, match="bytes beyond the file or of another chunk"):
+    with pytest.raises(SourceError, match="bytes beyond the end of the file or of another chunk"):
         read.open(path, spacing_um=SIZE_UM).read(0, apart)
 
 
@@ -377,8 +377,8 @@ def test_a_heap_of_texts_that_makes_hdf5_loop_without_end_is_refused_at_a_time_l
     content = bytearray(path.read_bytes())
     last = content.rindex(b"depth of it\0\0\0\0\0") + 16  # the heap's next object
     if name == "scale":
-        last += 24  # that is the reference to the scale
-    content[last + 8 : last + 16] = bytes(8)  # size of the free space behind
+        last += 24  # that object is the reference to the scale
+    content[last + 8 : last + 16] = bytes(8)  # size of the free space after it
     path.write_bytes(content)
     monkeypatch.setattr(hdf5_texts, "_MOST_S", 1.0)
     line = window_refusal(path)

@@ -88,11 +88,11 @@ def test_axes_and_spacings_follow_each_convention(tmp_path: Path, kind: str, axe
     dataset = read.open(path)
     np.testing.assert_array_equal(whole(dataset), f_phantom())
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
-    assert dataset.notes == (dataset.notes[0],)  # the only volume of the file
+    assert dataset.notes == (dataset.notes[0],)  # the note on the only volume of the file
 
 
 @pytest.mark.parametrize("unit", ["[n_m]", "nm", "nanometers"])
-def test_units_of_emd_have_a_prefix_behind_a_bracket(tmp_path: Path, unit: str) -> None:
+def test_units_of_emd_with_a_prefix_in_brackets_are_read(tmp_path: Path, unit: str) -> None:
     dataset = read.open(write_emd(tmp_path / "a.emd", "xyz", unit))
     expected = [value / 1000 for value in SPACING.values()]
     assert dataset.levels[0].spacing_um == pytest.approx(expected)
@@ -114,20 +114,20 @@ def test_projections_of_data_exchange_are_refused_unless_axes_are_given(tmp_path
     np.testing.assert_array_equal(whole(dataset), f_phantom())
 
 
-def test_a_film_of_velox_is_refused_as_one_plane(tmp_path: Path) -> None:
+def test_a_movie_of_velox_is_refused_as_one_plane(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.emd", "w") as file:
         file["Data/Image/0f3a/Data"] = np.ones((40, 30, 12), np.uint16)
         file["Data/Image/0f3a/Metadata"] = np.zeros((500, 12), np.uint8)
-    with pytest.raises(SourceError, match=r"found axes y, x, t.*--axes yxz takes"):
+    with pytest.raises(SourceError, match=r"found axes y, x, t.*--axes yxz reads"):
         read.open(tmp_path / "a.emd:/Data/Image/0f3a/Data")
 
 
-def test_positions_that_descend_turn_their_axis_round(tmp_path: Path) -> None:
-    """The volume as stored is the mirror image of the one that the positions describe."""
+def test_an_axis_with_descending_positions_is_reversed(tmp_path: Path) -> None:
+    """The positions describe the mirror image of the volume as stored."""
     path = write_netcdf(tmp_path / "a.nc", "zyx", y=positions("y")[::-1])
     dataset = read.open(path)
     np.testing.assert_array_equal(whole(dataset), f_phantom()[:, ::-1])
-    assert "positions of /y descend: that axis is turned round" in dataset.notes[1]
+    assert "positions of /y descend: that axis is reversed" in dataset.notes[1]
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
 
 
@@ -199,7 +199,7 @@ def test_an_array_stored_by_columns_has_its_planes_first_and_its_rows_last(
             opened.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
     dataset = read.open(path, spacing_um=tuple(SPACING.values()))
     np.testing.assert_array_equal(whole(dataset), f_phantom())
-    assert any(f"z, x, y is assumed, as {program} stores" in note for note in dataset.notes)
+    assert any(f"z, x, y is assumed, since {program} stores" in note for note in dataset.notes)
     given = read.open(f"{path}:/{name}", spacing_um=(1, 1, 1), axes="zyx")
     np.testing.assert_array_equal(whole(given), turned("zxy"))
     assert not any("assumed" in note for note in given.notes)
@@ -213,7 +213,7 @@ def test_four_dimensions_of_matlab_ask_for_axes_in_its_order(tmp_path: Path) -> 
         read.open(tmp_path / "a.h5")
 
 
-def test_names_that_are_no_axes_are_quoted_beside_the_assumption(tmp_path: Path) -> None:
+def test_names_that_are_not_axes_are_quoted_with_the_assumption(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         made = file.create_dataset("raw", data=f_phantom())
         for dim, label in zip(made.dims, ("inline", "crossline", "twt"), strict=True):
@@ -222,7 +222,7 @@ def test_names_that_are_no_axes_are_quoted_beside_the_assumption(tmp_path: Path)
     assert "the names inline, crossline, twt are no axes of a volume" in dataset.notes[1]
 
 
-def test_a_volume_of_minc_is_refused_with_the_way_out(tmp_path: Path) -> None:
+def test_a_volume_of_minc_is_refused_with_a_remedy(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.mnc", "w") as file:
         file["minc-2.0/image/0/image"] = f_phantom()
     with pytest.raises(SourceError, match="mnc2nii"):
@@ -254,16 +254,16 @@ def test_dimensions_of_emd_without_names_state_the_spacing(tmp_path: Path) -> No
             del file[f"data/tomography/dim{number}"].attrs["name"]
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
-    assert any("no names of axes: z, y, x are assumed" in note for note in dataset.notes)
+    assert any("the axes have no names: z, y, x are assumed" in note for note in dataset.notes)
 
 
-def test_a_resolution_that_seems_to_be_in_another_order_is_told(tmp_path: Path) -> None:
+def test_a_resolution_that_seems_to_be_in_another_order_is_reported(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         variable = file.create_dataset("ct", data=f_phantom())
         variable.attrs.update({"resolution": [0.25, 0.25, 0.6], "units": "um"})
     dataset = read.open(tmp_path / "a.h5")
     assert dataset.levels[0].spacing_um == pytest.approx((0.25, 0.25, 0.6))
-    assert any("as if it were listed in another order" in note for note in dataset.notes)
+    assert any("its order may differ from that of the axes" in note for note in dataset.notes)
 
 
 def test_edges_of_voxels_state_the_spacing_and_the_direction(tmp_path: Path) -> None:

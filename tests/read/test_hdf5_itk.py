@@ -1,4 +1,4 @@
-"""HDF5 by SimpleITK, compared with the MetaImage that it writes of the same image."""
+"""HDF5 by SimpleITK, compared with the MetaImage that it writes from the same image."""
 
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ def test_an_image_of_itk_lies_in_the_patient_as_its_metaimage(
     assert found.levels[0].spacing_um == pytest.approx(expected.levels[0].spacing_um)
     np.testing.assert_allclose(found.placement, expected.placement, atol=1e-9)
     assert (found.has_sides, expected.has_sides) == (True, True)
-    assert [note for note in found.notes if "mm is assumed, as ITK has it" in note]
+    assert [note for note in found.notes if "mm is assumed, as in files of ITK" in note]
 
 
 def test_values_of_a_voxel_are_channels(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""NRRD, MetaImage, MRC and Imaris that state one thing twice: the note, and the value taken."""
+"""NRRD, MetaImage, MRC and Imaris that state one thing twice: the note, and the value used."""
 
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,7 @@ def spacing_notes(dataset: read.Dataset) -> list[str]:
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 @pytest.mark.parametrize("unit", ["\u00b5m", "microns", "micrometer", "Micrometres", "um"])
 @pytest.mark.parametrize("field", ["units", "space units"])
-def test_the_micrometre_is_known_by_each_spelling(
+def test_each_spelling_of_the_micrometre_is_recognised(
     tmp_path: Path, encoding: str, unit: str, field: str
 ) -> None:
     lengths = "spacings: 0.25 0.2 0.5"
@@ -146,7 +146,7 @@ def test_a_left_handed_space_is_reported(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_names_of_a_field_that_disagree_are_reported_and_read_as_itk_does(
+def test_names_of_a_field_that_disagree_are_reported_and_read_as_in_itk(
     tmp_path: Path, lines: tuple[str, ...], field: str
 ) -> None:
     path = write_meta(tmp_path / "a.mha", *lines)
@@ -160,7 +160,7 @@ def test_names_of_a_field_that_disagree_are_reported_and_read_as_itk_does(
     np.testing.assert_allclose(dataset.placement, expected.placement)
 
 
-def test_a_field_that_is_there_twice_is_reported_and_read_as_itk_does(tmp_path: Path) -> None:
+def test_a_repeated_field_is_reported_and_read_as_in_itk(tmp_path: Path) -> None:
     path = write_meta(tmp_path / "a.mha", "ElementSpacing = 1 1 2", "ElementSpacing = 1 1 5")
     dataset = read.open(path)
     spacing_um = tuple(1000 * mm for mm in sitk.ReadImage(str(path)).GetSpacing())
@@ -169,7 +169,7 @@ def test_a_field_that_is_there_twice_is_reported_and_read_as_itk_does(tmp_path: 
     assert "its last line states 1, 1, 5, an earlier line states 1, 1, 2" in note
 
 
-def test_a_field_that_is_there_twice_with_one_value_needs_no_note(tmp_path: Path) -> None:
+def test_a_repeated_field_with_one_value_needs_no_note(tmp_path: Path) -> None:
     lines = (TURNED, "ElementSpacing = 1 1 2")
     assert read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.0 1 2")).notes == ()
 
@@ -180,7 +180,7 @@ def test_a_spacing_that_nrrd_states_twice_is_refused(tmp_path: Path) -> None:
         read.open(write_nrrd(tmp_path / "a.nrrd", *lines))
 
 
-def test_a_scale_in_the_matrix_is_reported_and_followed_as_itk_does(tmp_path: Path) -> None:
+def test_a_scale_in_the_matrix_is_reported_and_applied_as_in_itk(tmp_path: Path) -> None:
     lines = ("TransformMatrix = 2 0 0 0 2 0 0 0 2", "ElementSpacing = 1 1 2")
     path = write_meta(tmp_path / "a.mha", *lines)
     dataset = read.open(path)
@@ -189,7 +189,7 @@ def test_a_scale_in_the_matrix_is_reported_and_followed_as_itk_does(tmp_path: Pa
     assert max(dataset.levels[0].spacing_um) == 1000 * (end[2] - origin[2]) == 4000
     (note,) = spacing_notes(dataset)
     assert "TransformMatrix times ElementSpacing states 2, 2, 4 mm" in note
-    assert "ElementSpacing alone states 1, 1, 2 mm" in note
+    assert "only ElementSpacing states 1, 1, 2 mm" in note
 
 
 def test_names_of_a_field_that_agree_need_no_note(tmp_path: Path) -> None:
@@ -212,10 +212,10 @@ def test_metaimage_s_unit_of_length_is_followed(tmp_path: Path, unit: str, per: 
     dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1.2 1.3 1.4"))
     found = sorted(dataset.levels[0].spacing_um)
     assert found == pytest.approx([1.2 * per, 1.3 * per, 1.4 * per])
-    assert bool(spacing_notes(dataset)) == (unit == "um")  # too small for a patient
+    assert bool(spacing_notes(dataset)) == (unit == "um")  # the volume is too small for a patient
 
 
-def test_a_scale_of_values_that_itk_leaves_out_is_reported(tmp_path: Path) -> None:
+def test_a_scale_of_values_that_itk_does_not_apply_is_reported(tmp_path: Path) -> None:
     lines = (TURNED, "ElementToIntensityFunctionSlope = 2")
     dataset = read.open(write_meta(tmp_path / "a.mha", *lines, "ElementSpacing = 1 1 1"))
     assert "ElementToIntensityFunctionSlope 2" in dataset.notes[0]
@@ -225,7 +225,7 @@ def test_a_scale_of_values_that_itk_leaves_out_is_reported(tmp_path: Path) -> No
 def test_a_number_of_dimensions_that_contradicts_the_sizes_is_refused(tmp_path: Path) -> None:
     path = write_meta(tmp_path / "a.mha", "ElementSpacing = 1 1 1")
     path.write_bytes(path.read_bytes().replace(b"NDims = 3", b"NDims = 4"))
-    with pytest.raises(SourceError, match="NDims: found 4, but DimSize has 3 numbers"):
+    with pytest.raises(SourceError, match="NDims: found 4, expected 3, the number of sizes"):
         read.open(path)
 
 
@@ -287,7 +287,7 @@ def test_a_pixel_size_of_the_camera_that_differs_is_reported(
         ({"dmin": 0, "dmax": 200}, np.uint8, "dmax 200 states unsigned"),
     ],
 )
-def test_the_sign_of_bytes_follows_what_the_header_states(
+def test_the_sign_of_bytes_follows_the_header(
     tmp_path: Path, fields: dict[str, Any], dtype: Any, words: str
 ) -> None:
     path = write_mrc(tmp_path / "a.mrc", (f_phantom() // 9).astype(np.int8), **fields)
@@ -302,7 +302,7 @@ def test_the_sign_of_bytes_follows_what_the_header_states(
 
 def test_extents_of_imaris_that_contradict_the_microscope_are_reported(tmp_path: Path) -> None:
     path = write_ims(tmp_path / "a.ims", f_phantom()[None].repeat(2, 0))
-    assert read.open(path).notes == ("2 points in time; building --time 0",)
+    assert read.open(path).notes == ("2 time points; building --time 0",)
     with h5py.File(path, "a") as file:
         info = file["DataSetInfo/Image"]
         info.attrs["RecordingEntryPlaneSpacing"] = characters("2.5")
@@ -324,7 +324,7 @@ def test_imaris_without_a_unit_or_a_calibration_is_an_assumption(tmp_path: Path)
     path = write_ims(tmp_path / "a.ims", f_phantom()[None].repeat(2, 0))
     with h5py.File(path, "a") as file:
         del file["DataSetInfo/Image"].attrs["Unit"]
-    assert any("um is assumed, as Imaris" in note for note in read.open(path).notes)
+    assert any("um is assumed, as in files of Imaris" in note for note in read.open(path).notes)
     with h5py.File(path, "a") as file:
         for axis, size in enumerate((36, 48, 16)):
             file["DataSetInfo/Image"].attrs[f"ExtMin{axis}"] = characters("0")
@@ -332,7 +332,7 @@ def test_imaris_without_a_unit_or_a_calibration_is_an_assumption(tmp_path: Path)
     assert "exactly 1 um" in spacing_notes(read.open(path))[0]
 
 
-def test_voxels_behind_those_that_a_header_describes_are_told(tmp_path: Path) -> None:
+def test_voxels_after_those_that_a_header_describes_are_reported(tmp_path: Path) -> None:
     lengths = "ElementSpacing = 0.5 0.7 2"
     paths = [
         write_nrrd(tmp_path / "a.nrrd", "spacings: 1 1 1", 'units: "um" "um" "um"'),
@@ -344,7 +344,7 @@ def test_voxels_behind_those_that_a_header_describes_are_told(tmp_path: Path) ->
     with mrcfile.new(paths[3]) as file:
         file.set_data(f_phantom())
         file.voxel_size = 4.0
-    plane = f_phantom()[:, 0].nbytes  # the smallest one
+    plane = f_phantom()[:, 0].nbytes  # the smallest plane
     for path in paths:
         whole = path.read_bytes()
         for rest, is_told in ((plane - 1, False), (plane, True)):
@@ -379,7 +379,7 @@ def test_a_place_in_the_patient_that_is_not_stated_is_noted(
 
 
 @pytest.mark.parametrize("lines", [("Offset = 3 4 5",), ()])
-def test_a_metaimage_without_an_offset_is_noted_in_a_patient_alone(
+def test_a_metaimage_without_an_offset_is_noted_only_in_a_patient(
     tmp_path: Path, lines: tuple[str, ...]
 ) -> None:
     turned = ("TransformMatrix = 1 0 0 0 1 0 0 0 1",)
@@ -409,11 +409,11 @@ def test_a_size_that_imaris_does_not_state_is_noted(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         for axis in "ZYX":
             del file["DataSet/ResolutionLevel 0/TimePoint 0/Channel 0"].attrs[f"ImageSize{axis}"]
-    assert read.open(path).notes == stated  # /DataSetInfo/Image repeats it
+    assert read.open(path).notes == stated  # /DataSetInfo/Image repeats the size
     with h5py.File(path, "r+") as file:
         for axis in "ZYX":
             del file["DataSetInfo/Image"].attrs[axis]
     (note,) = set(read.open(path).notes) - set(stated)
     assert note.endswith(
-        "not stated, 18, 50, 38 voxels is assumed, as of the dataset with its padding"
+        "not stated, 18, 50, 38 voxels is assumed, the size of the dataset with its padding"
     )

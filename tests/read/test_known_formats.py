@@ -1,4 +1,4 @@
-"""All that is known of a format stands in its own row, and nowhere else."""
+"""Everything that is known about a format is in its own row, and nowhere else."""
 
 import struct
 import subprocess
@@ -105,5 +105,5 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
     (tmp_path / name).write_bytes(head + bytes(600))
     monkeypatch.setattr(extras, "find_spec", lambda library: None)
     for act in (open_source, list_series):
-        with pytest.raises(SourceError, match=rf'expected: pip install "stereocell\[{extra}\]"'):
+        with pytest.raises(SourceError, match=rf'with: pip install "stereocell\[{extra}\]"'):
             act(tmp_path / name)

@@ -1,4 +1,4 @@
-"""Label maps as their files have them: numbers of any kind, names, colours and columns."""
+"""Label maps in their files' own form: numbers of any kind, names, colours and columns."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_numbers_of_any_kind_are_the_stored_ones(tmp_path: Path, dtype: str) -> 
 
 
 @pytest.mark.parametrize("dtype", ["int8", "int32", "float64"])
-def test_minus_one_and_nan_are_no_object(tmp_path: Path, dtype: str) -> None:
+def test_minus_one_and_nan_mean_no_object(tmp_path: Path, dtype: str) -> None:
     stored = np.full((5, 6, 7), 5, dtype)
     stored[0, 0, 0] = -1
     if dtype == "float64":
@@ -54,7 +54,7 @@ def test_minus_one_and_nan_are_no_object(tmp_path: Path, dtype: str) -> None:
 
 
 @pytest.mark.parametrize("dtype", ["int8", "int32", "int64", "float32"])
-def test_a_background_below_0_is_no_object_where_the_user_names_it(
+def test_a_background_below_0_means_no_object_if_the_user_names_it(
     tmp_path: Path, dtype: str
 ) -> None:
     least = -128 if dtype == "int8" else -(2**31)
@@ -64,14 +64,16 @@ def test_a_background_below_0_is_no_object_where_the_user_names_it(
     box = labels.dataset.levels[0].box
     found = replace(labels, background=least).read(box)
     assert found.tolist() == np.where(stored < 0, 0, stored).astype(int).tolist()
-    with pytest.raises(SourceError, match=f"found {least}, .*: --background {least} if it is"):
+    with pytest.raises(
+        SourceError, match=f"found {least}, .*: give --background {least} if it marks"
+    ):
         labels.read(box)
     with pytest.raises(SourceError, match=f"found {least}"):
         replace(labels, background=-(2**53)).read(box)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_numbers_that_a_float_can_t_tell_apart_are_refused_with_the_reason(
+def test_numbers_that_a_float_can_t_distinguish_are_refused_with_the_reason(
     tmp_path: Path, dtype: str
 ) -> None:
     stored = np.full((5, 6, 7), 2.0**53 + 2, dtype)
@@ -83,7 +85,7 @@ def test_numbers_that_a_float_can_t_tell_apart_are_refused_with_the_reason(
 
 
 @pytest.mark.parametrize(("value", "told"), [(-2, "found -2"), (0.5, "found 0.5"), (np.inf, "inf")])
-def test_other_numbers_are_no_labels(tmp_path: Path, value: float, told: str) -> None:
+def test_other_numbers_are_refused_as_labels(tmp_path: Path, value: float, told: str) -> None:
     stored = np.full((5, 6, 7), 5, np.float32)
     stored[1, 1, 1] = value
     tifffile.imwrite(tmp_path / "l.tif", stored, metadata={"axes": "ZYX"})
@@ -93,7 +95,7 @@ def test_other_numbers_are_no_labels(tmp_path: Path, value: float, told: str) ->
 
 
 @pytest.mark.parametrize("version", ["0.4", "0.5"])
-def test_ngff_says_colours_and_columns(tmp_path: Path, version: str) -> None:
+def test_colours_and_columns_of_ngff_are_read(tmp_path: Path, version: str) -> None:
     about: dict[str, Any] = {
         "version": version,
         "colors": [{"label-value": 3, "rgba": [255, 0, 128, 255]}, {"label-value": 4}],
@@ -129,12 +131,12 @@ def test_ngff_says_colours_and_columns(tmp_path: Path, version: str) -> None:
 @pytest.mark.parametrize(
     "odd", [None, [], {"colors": 3}, {"properties": [1, {"label-value": "x"}]}]
 )
-def test_ngff_that_says_nothing_of_use(odd: Any) -> None:
+def test_useless_label_metadata_of_ngff_are_ignored(odd: Any) -> None:
     found = notes_of_ngff(odd)
     assert (found.names, found.colors, found.columns) == ({}, {}, {})
 
 
-def test_nifti_says_the_names_of_its_label_table(tmp_path: Path) -> None:
+def test_names_in_the_label_table_of_a_nifti_are_read(tmp_path: Path) -> None:
     image = nibabel.Nifti1Image(np.ones((4, 5, 6), np.uint8), np.eye(4))
     image.header.extensions.append(nibabel.nifti1.Nifti1Extension(0, TABLE.replace(b"\x00", b"")))
     nibabel.save(image, tmp_path / "organs.nii.gz")
@@ -153,5 +155,5 @@ def test_nifti_says_the_names_of_its_label_table(tmp_path: Path) -> None:
         b"\xff\xfe<Label",
     ],
 )
-def test_a_table_that_is_none_names_nothing(content: bytes) -> None:
+def test_an_invalid_label_table_is_ignored(content: bytes) -> None:
     assert notes_of_nifti([content]).names == {}

@@ -1,4 +1,4 @@
-"""Reading writes no file, so that a kill or a full disk in between leaves nothing half-written."""
+"""Reading writes no file, so a killed process or a full disk leaves nothing half-written."""
 
 import tempfile
 import zipfile

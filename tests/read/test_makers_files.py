@@ -32,7 +32,7 @@ refusal = refusing(read_voxels, SourceError, UsageError)
 
 
 def five(body: NDArray[Any]) -> NDArray[Any]:
-    """Return (t, c, z, y, x), 2 and 2 of a body, all different."""
+    """Return (t, c, z, y, x) with 2 times and 2 channels of a body, all different."""
     return np.stack([np.stack([body + 10 * t + c for c in (0, 1)]) for t in (0, 1)])
 
 
@@ -73,7 +73,7 @@ def test_scenes_of_a_czi_are_series(tmp_path: Path, capsys: pytest.CaptureFixtur
     [
         (16, "stored size"),
         (4, "axis X start"),
-        (-1, "axis"),  # the axis' own name
+        (-1, "axis"),  # the axis's own name
         (None, "compression"),
     ],
 )
@@ -101,7 +101,7 @@ def test_a_czi_whose_directory_leads_to_no_tile_is_refused(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> None:
+def test_missing_tiles_of_a_czi_are_reported_with_their_share(tmp_path: Path) -> None:
     path = tmp_path / "a.czi"
     body = five(f_phantom())
     assert not any("tiles" in note for note in read.open(write_czi(path, {None: body})).notes)
@@ -121,7 +121,7 @@ def test_tiles_that_a_czi_lacks_are_told_with_their_share(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path) -> None:
+def test_a_czi_without_tiles_at_a_time_point_is_refused_there(tmp_path: Path) -> None:
     path = tmp_path / "a.czi"
     with czi.create_czi(str(path)) as file:
         for t, z in np.ndindex(3, 16):
@@ -129,30 +129,30 @@ def test_a_czi_without_tiles_at_a_point_in_time_is_refused_there(tmp_path: Path)
                 data = np.ascontiguousarray(f_phantom()[z][..., None])
                 file.write(data=data, plane={"T": t, "C": 0, "Z": z})
     whole(read.open(path, time=2, spacing_um=SIZE_UM))
-    assert "time point 1: found no tile" in refusal(path, time=1, spacing_um=SIZE_UM)
+    assert "time point 1: found none of 16 tiles" in refusal(path, time=1, spacing_um=SIZE_UM)
 
 
 @pytest.mark.slow
-def test_a_czi_whose_metadata_state_more_than_its_tiles_is_told(tmp_path: Path) -> None:
+def test_a_czi_whose_metadata_state_more_than_its_tiles_is_reported(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = path.read_bytes()
     assert content.count(b"<SizeZ>16<") == 1
     path.write_bytes(content.replace(b"<SizeZ>16<", b"<SizeZ>24<"))
     (note,) = (note for note in read.open(path).notes if "metadata" in note)
-    assert note.startswith("the metadata state 24 along Z, and tiles are there for 16")
+    assert note.startswith("the metadata state 24 along Z, but there are tiles for 16")
 
 
 @pytest.mark.slow
-def test_a_czi_whose_metadata_state_phases_that_are_not_there_is_told(tmp_path: Path) -> None:
+def test_a_czi_whose_metadata_state_missing_phases_is_reported(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     content = path.read_bytes()
     path.write_bytes(content.replace(b"<SizeZ>16</SizeZ>", b"<SizeH>16</SizeH>"))
     (note,) = (note for note in read.open(path).notes if "metadata" in note)
-    assert note.startswith("the metadata state 16 along H (phases), and tiles are there for 1")
+    assert note.startswith("the metadata state 16 along H (phases), but there are tiles for 1")
 
 
 def with_metadata(path: Path, old: bytes, new: bytes) -> None:
-    """Replace XML of a CZI; spaces before its last tag keep the length."""
+    """Replace XML in a CZI; spaces before its last tag keep the length."""
     content = path.read_bytes()
     start = content.index(b"<ImageDocument")
     end = content.index(b"</ImageDocument>", start)
@@ -164,7 +164,7 @@ def with_metadata(path: Path, old: bytes, new: bytes) -> None:
 
 
 @pytest.mark.slow
-def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_told(tmp_path: Path) -> None:
+def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_reported(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     interval = b"<Dimensions><Z><Positions><Interval><Increment>9<"
     interval += b"/Increment></Interval></Positions></Z>"
@@ -172,11 +172,11 @@ def test_an_interval_of_a_czi_that_contradicts_its_scaling_is_told(tmp_path: Pat
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
     (note,) = (note for note in dataset.notes if "spacing along z" in note)
-    assert "the interval of the planes states 9 um: Scaling is used" in note
+    assert "the interval between planes states 9 um: Scaling is used" in note
 
 
 @pytest.mark.slow
-def test_a_distance_of_a_czi_that_is_stated_twice_is_told(tmp_path: Path) -> None:
+def test_a_distance_of_a_czi_that_is_stated_twice_is_reported(tmp_path: Path) -> None:
     path = write_czi(tmp_path / "a.czi", {None: five(f_phantom())})
     twice = b'</Distance><Distance Id="X"><Value>0.5</Value></Distance></Items>'
     with_metadata(path, b"</Distance></Items>", twice)
@@ -209,7 +209,7 @@ def test_lif_whose_planes_were_taken_downwards_is_noted(tmp_path: Path) -> None:
     path.write_bytes(content.replace(upwards, downwards))
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(SIZE_UM)
-    assert "place along z falls from 0 to -7.5 um" in dataset.notes[0]
+    assert "position along z falls from 0 to -7.5 um" in dataset.notes[0]
 
 
 @pytest.mark.parametrize("axes", ["TCZYX", "CTZYX", "TZCYX", "YCTZX"])
@@ -291,7 +291,7 @@ def test_a_lif_without_lengths_asks_for_them(tmp_path: Path) -> None:
 def test_a_lif_that_holds_less_than_its_xml_states_is_refused(
     tmp_path: Path, change: str, words: str
 ) -> None:
-    """The library would read the planes of the next image."""
+    """The library would read on into the planes of the next image."""
     images = {"a": ("ZYX", f_phantom()), "b": ("ZYX", f_phantom()[:9].copy())}
     path = write_lif(tmp_path / "a.lif", images)
     other = change.replace('"16"', '"24"').replace("55296", "99999")
@@ -301,7 +301,7 @@ def test_a_lif_that_holds_less_than_its_xml_states_is_refused(
     np.testing.assert_array_equal(whole(read.open(path, series=2)), f_phantom()[:9])
 
 
-def test_a_lif_that_holds_more_than_its_xml_states_is_told(tmp_path: Path) -> None:
+def test_a_lif_that_holds_more_than_its_xml_states_is_reported(tmp_path: Path) -> None:
     path = write_lif(tmp_path / "a.lif", {"a": ("ZYX", f_phantom())})
     fewer = 'NumberOfElements="12"'.encode("utf-16-le")
     path.write_bytes(path.read_bytes().replace('NumberOfElements="16"'.encode("utf-16-le"), fewer))
@@ -347,7 +347,7 @@ def test_an_nd2_without_a_length_asks_for_it(
     ("high", "note"),
     [
         (2.0 * (SMALL.shape[2] - 1), ""),
-        (2.0 * (SMALL.shape[2] - 1) + 1.5, ""),  # a range that is no multiple of the step
+        (2.0 * (SMALL.shape[2] - 1) + 1.5, ""),  # a range that is not a multiple of the step
         (3.0 * 2.0 * (SMALL.shape[2] - 1), "dZStep of the Z loop states 2 um, its range from"),
     ],
 )
@@ -368,7 +368,7 @@ def test_planes_of_an_nd2_that_were_taken_downwards_are_noted(tmp_path: Path) ->
     assert read.open(path).notes == ()
     write_nd2(path, SMALL, (2.0, 1.0, 1.0), depth_loop={"iType": 4})
     (note,) = read.open(path).notes
-    assert "taken from the top to the bottom" in note
+    assert "taken from top to bottom" in note
 
 
 def test_a_line_scan_of_an_nd2_is_refused(tmp_path: Path) -> None:
@@ -392,16 +392,16 @@ def test_nd2_has_positions_times_and_channels(tmp_path: Path, is_packed: bool) -
     assert not any("missing" in note for note in dataset.notes)
 
 
-def test_frames_that_an_nd2_lacks_are_told_or_refused(tmp_path: Path) -> None:
+def test_missing_frames_of_an_nd2_are_reported_or_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.nd2"
-    write_nd2(path, ND2, ND2_UM, without=range(60, 64))  # of the last point in time
+    write_nd2(path, ND2, ND2_UM, without=range(60, 64))  # frames of the last time point
     np.testing.assert_array_equal(whole(read.open(path)), f_phantom())
     whole(read.open(path, time=1))
     (note,) = (note for note in read.open(path, series=2).notes if "missing" in note)
-    assert note == "4 of 32 frames (12.50%) are missing, all at other points in time"
+    assert note == "4 of 32 frames (12.50%) are missing, all at other time points"
     line = refusal(path, series=2, time=1)
     assert "time point 1: found 12 of 16 frames" in line
-    assert line.endswith("--time 0 is whole")
+    assert line.endswith("--time 0 is complete")
     write_nd2(path, ND2[:1], ND2_UM, without=[5])
     assert "time point 0: found 15 of 16 frames" in refusal(path)
 
@@ -410,12 +410,12 @@ def test_frames_that_an_nd2_lacks_are_told_or_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("part", "offset", "words"),
     [
-        (b"\xda\xce\xbe\n", 0, "no frame of that number"),
-        (b"ImageDataSeq|3!", 13, "no frame of that number"),
+        (b"\xda\xce\xbe\n", 0, "another chunk"),
+        (b"ImageDataSeq|3!", 13, "another chunk"),
         (b"", 12, "the frame ends at"),
     ],
 )
-def test_a_frame_that_is_not_where_an_nd2_s_map_says_is_refused(
+def test_a_frame_that_is_not_where_the_map_of_an_nd2_says_is_refused(
     tmp_path: Path, is_packed: bool, part: bytes, offset: int, words: str
 ) -> None:
     path = tmp_path / "a.nd2"
@@ -439,7 +439,7 @@ def test_a_frame_of_fewer_bytes_than_an_nd2_states_is_refused(tmp_path: Path) ->
 
 
 @pytest.mark.skipif("STEREOCELL_DATA" not in os.environ, reason="STEREOCELL_DATA is not set")
-def test_a_real_nd2_is_read_as_its_library_does() -> None:
+def test_a_real_nd2_is_read_as_by_its_library() -> None:
     import nd2
 
     path = Path(os.environ["STEREOCELL_DATA"]) / "nd2" / "cluster.nd2"
@@ -450,10 +450,10 @@ def test_a_real_nd2_is_read_as_its_library_does() -> None:
     np.testing.assert_array_equal(whole(dataset, 1), expected[2, :, 1])
 
 
-# all three
+# all three formats
 
 
-def test_an_nd2_without_its_end_is_cut_short(tmp_path: Path) -> None:
+def test_an_nd2_without_its_end_is_refused_as_cut_short(tmp_path: Path) -> None:
     pytest.importorskip("nd2")
     (tmp_path / "a.nd2").write_bytes(b"\xda\xce\xbe\n" + bytes(5000))
     with pytest.raises(SourceError, match="cut short at byte 5004, or never closed"):
@@ -463,7 +463,7 @@ def test_an_nd2_without_its_end_is_cut_short(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("suffix", "library"), [("czi", "pylibCZIrw"), ("lif", "liffile"), ("nd2", "nd2")]
 )
-def test_without_its_extra_a_format_says_how_to_get_it(
+def test_without_its_extra_a_format_names_the_command_that_installs_it(
     tmp_path: Path, suffix: str, library: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
@@ -473,7 +473,7 @@ def test_without_its_extra_a_format_says_how_to_get_it(
 
 
 @pytest.mark.parametrize("suffix", ["czi", "lif", "nd2"])
-def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
+def test_an_incomplete_file_is_refused_in_one_line(tmp_path: Path, suffix: str) -> None:
     good = b"no image at all"
     if suffix == "czi":
         good = write_czi(tmp_path / "good.czi", {None: f_phantom()[None, None]}).read_bytes()
@@ -483,7 +483,7 @@ def test_what_is_no_whole_file_is_one_line(tmp_path: Path, suffix: str) -> None:
         (tmp_path / f"a.{suffix}").write_bytes(content)
         refusal(tmp_path / f"a.{suffix}")
     (tmp_path / f"b.{suffix}").mkdir()
-    assert "is a folder" in refusal(tmp_path / f"b.{suffix}")
+    assert "found a folder" in refusal(tmp_path / f"b.{suffix}")
 
 
 def test_a_format_of_one_image_has_no_series(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def write(path: Path, voxels: Any = None, **fields: Any) -> Path:
 
 @pytest.mark.parametrize("name", ["a.mrc", "it's a µ tomogram.REC", "a.map.gz", "a.mrc.bz2"])
 @pytest.mark.parametrize("dtype", [np.int16, np.uint16, np.float32])
-def test_rows_run_upwards_so_y_is_turned_round(tmp_path: Path, name: str, dtype: Any) -> None:
+def test_rows_run_upwards_so_y_is_reversed(tmp_path: Path, name: str, dtype: Any) -> None:
     path = write(tmp_path / "plain", f_phantom().astype(dtype))
     pack = {".gz": gzip.compress, ".bz2": bz2.compress}.get(Path(name).suffix, bytes)
     (tmp_path / name).write_bytes(pack(path.read_bytes()))
@@ -58,7 +58,7 @@ def test_columns_rows_and_sections_lie_along_any_axes(
     assert dataset.levels[0].spacing_um == pytest.approx((1e-3, 8e-4, 4e-4))
 
 
-# mrcfile swaps its header in a way that NumPy 2.5 deprecates
+# mrcfile swaps the bytes of its header in a way that NumPy 2.5 deprecates
 @pytest.mark.filterwarnings("ignore:Setting the dtype on a NumPy array:DeprecationWarning")
 def test_big_endian_and_an_extended_header_are_read(tmp_path: Path) -> None:
     with mrcfile.new(tmp_path / "a.mrc") as file:
@@ -71,7 +71,7 @@ def test_big_endian_and_an_extended_header_are_read(tmp_path: Path) -> None:
 
 
 def test_bytes_of_imod_have_a_sign_where_its_flag_says_so(tmp_path: Path) -> None:
-    voxels = (f_phantom() // 5).astype(np.uint8)  # 20 and 200
+    voxels = (f_phantom() // 5).astype(np.uint8)  # values 20 and 200
     path = write(tmp_path / "a.mrc", voxels.view(np.int8))
     content = bytearray(path.read_bytes())
     content[152:160] = np.array([1146047817, 0], "<i4").tobytes()
@@ -81,9 +81,9 @@ def test_bytes_of_imod_have_a_sign_where_its_flag_says_so(tmp_path: Path) -> Non
     np.testing.assert_array_equal(whole(dataset), voxels[:, ::-1])
 
 
-def test_a_stack_of_images_is_told(tmp_path: Path) -> None:
+def test_a_stack_of_images_is_reported(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path / "a.mrc", ispg=0, mz=1, cella=(144.0, 384.0, 10.0)))
-    assert dataset.notes == ("the header says a stack of images: taken for one volume",)
+    assert dataset.notes == ("the header states a stack of images: read as one volume",)
 
 
 def test_a_stack_of_volumes_has_a_volume_for_each_point_in_time(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_a_stack_of_volumes_has_a_volume_for_each_point_in_time(tmp_path: Path) 
     assert any("a stack of 2 volumes of 16 sections" in note for note in dataset.notes)
 
 
-def test_a_cell_whose_axes_are_not_at_right_angles_is_told(tmp_path: Path) -> None:
+def test_a_cell_whose_axes_are_not_at_right_angles_is_reported(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path / "a.mrc", cellb=(90, 90, 120)))
     assert any("found 90, 90, 120 degrees, expected 90 each" in note for note in dataset.notes)
     assert read.open(write(tmp_path / "b.mrc", cellb=(0, 0, 0))).notes == ()
@@ -117,9 +117,7 @@ def test_a_cell_whose_axes_are_not_at_right_angles_is_told(tmp_path: Path) -> No
         ({"nsymbt": -5000}, "expected"),
     ],
 )
-def test_fields_out_of_order_are_named(
-    tmp_path: Path, fields: dict[str, Any], message: str
-) -> None:
+def test_invalid_fields_are_named(tmp_path: Path, fields: dict[str, Any], message: str) -> None:
     path = write(tmp_path / "a.mrc")
     header = np.frombuffer(path.read_bytes()[:1024], mrcfile.dtypes.HEADER_DTYPE).copy()
     for name, value in fields.items():
@@ -130,8 +128,8 @@ def test_fields_out_of_order_are_named(
     assert "\n" not in str(caught.value)
 
 
-def test_a_map_of_another_ending_is_known_by_its_content(tmp_path: Path) -> None:
-    """IMOD ends a tilt series in .st, and an aligned one in .ali."""
+def test_a_map_with_another_ending_is_recognised_by_its_content(tmp_path: Path) -> None:
+    """IMOD names a tilt series .st, and an aligned one .ali."""
     with mrcfile.new(tmp_path / "a.mrc") as file:
         file.set_data(np.arange(4 * 5 * 6, dtype=np.int16).reshape(4, 5, 6))
         file.voxel_size = 10.0
@@ -143,7 +141,7 @@ def test_a_map_of_another_ending_is_known_by_its_content(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("content", [b"", b"no map", bytes(2000), b"\x1f\x8bno gzip"])
-def test_what_is_no_map_is_one_line(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_map_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.mrc").write_bytes(content)
     with pytest.raises(SourceError, match="expected"):
         read.open(tmp_path / "a.mrc")
@@ -152,5 +150,5 @@ def test_what_is_no_map_is_one_line(tmp_path: Path, content: bytes) -> None:
     with pytest.raises(SourceError, match="dcm2niix"):
         read.open(tmp_path / "c.rec")
     (tmp_path / "b.mrc").mkdir()
-    with pytest.raises(SourceError, match="is a folder"):
+    with pytest.raises(SourceError, match="found a folder"):
         read.open(tmp_path / "b.mrc")

@@ -1,4 +1,4 @@
-"""N5, written by tensorstore: blocks, codecs, pyramids, BigDataViewer's containers."""
+"""N5 written by tensorstore: blocks, codecs, pyramids, containers of BigDataViewer."""
 
 import bz2
 import json
@@ -42,14 +42,14 @@ def test_every_codec_and_number_is_read(tmp_path: Path, packing: str, dtype: str
 
 
 @pytest.mark.parametrize("size", [0, 3, 5])
-def test_a_block_of_fewer_voxels_than_its_place_takes_is_refused(tmp_path: Path, size: int) -> None:
+def test_a_block_with_too_few_voxels_for_its_place_is_refused(tmp_path: Path, size: int) -> None:
     path = write(tmp_path / "a.n5", packing={"type": "raw"}, **NM)
     block = path / "1" / "0" / "0"
     content = bytearray(block.read_bytes())
     assert struct.unpack_from(">3I", content, 4) == (16, 12, 8)
     struct.pack_into(">I", content, 4 + 8, size)
     block.write_bytes(content[: 16 + 16 * 12 * size * 2])
-    assert f"a block of ({size}, 12, 16) voxels, fewer than the (8, 12, 16)" in refusal(path)
+    assert f"a block of ({size}, 12, 16) voxels, fewer than (8, 12, 16)" in refusal(path)
 
 
 def test_an_absent_block_is_zero(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_a_pyramid_has_its_levels(tmp_path: Path, stated: str) -> None:
     assert dataset.levels[1].spacing_um == pytest.approx((0.5, 0.4, 0.5))
     np.testing.assert_array_equal(dataset.read(0, Box((0, 0, 0), (9, 9, 9)), 1).voxels,
                                   body[:9, :18:2, :18:2])  # fmt: skip
-    # one level by itself takes the spacing of its group, for level 0
+    # A single level takes the spacing of its group, which is that of level 0.
     assert read.open(tmp_path / "p.n5" / "s0").levels[0].spacing_um == pytest.approx(SIZE_UM)
 
 
@@ -120,9 +120,9 @@ def test_the_xml_itself_opens_its_container_if_it_is_in_the_folder(tmp_path: Pat
     (tmp_path / "home" / "a.n5").rename(tmp_path / "a.n5")
     assert "not found" in refusal(tmp_path / "home" / "b.xml")
     (tmp_path / "home" / "a.n5").symlink_to("../a.n5")
-    assert "expected a container in" in refusal(tmp_path / "home" / "b.xml")
+    assert "expected a container inside" in refusal(tmp_path / "home" / "b.xml")
     (tmp_path / "home" / "c.xml").write_text("<SpimData><other/></SpimData>")
-    assert "found no file of HDF5 or N5" in refusal(tmp_path / "home" / "c.xml")
+    assert "found no HDF5 or N5 file" in refusal(tmp_path / "home" / "c.xml")
     (tmp_path / "home" / "d.xml").write_text("<SpimData><other>")
     refusal(tmp_path / "home" / "d.xml")
 
@@ -172,7 +172,7 @@ def test_links_out_of_the_folder_are_refused(tmp_path: Path, place: str) -> None
 
 
 @pytest.mark.parametrize("packing", ["raw", "gzip", "bzip2", "xz", "blosc", "zstd"])
-def test_a_block_cut_short_is_one_line(tmp_path: Path, packing: str) -> None:
+def test_a_block_that_is_cut_short_is_refused_in_one_line(tmp_path: Path, packing: str) -> None:
     form = {"cname": "zstd", "clevel": 5, "shuffle": 0} if packing == "blosc" else {}
     path = write(tmp_path / "a.n5", packing={"type": packing, **form}, **NM)
     block = path / "0" / "0" / "0"
@@ -185,7 +185,7 @@ def test_a_block_cut_short_is_one_line(tmp_path: Path, packing: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
+def test_a_decompression_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
     path = write(tmp_path / "a.n5", packing={"type": "bzip2"}, **NM)
     block = path / "0" / "0" / "0"
     block.write_bytes(block.read_bytes()[:16] + bz2.compress(bytes(1 << 27)))
@@ -201,15 +201,13 @@ def test_a_bomb_unpacks_no_further_than_its_block(tmp_path: Path) -> None:
         ("blockSize", [16, 12], "blockSize"),
         ("blockSize", [1 << 20, 1 << 20, 1 << 20], "GiB"),
         ("dataType", "object", "dataType"),
-        ("compression", {"type": "jpeg"}, "compression 'jpeg'"),
+        ("compression", {"type": "jpeg"}, "compression: found 'jpeg'"),
         ("pixelResolution", {"dimensions": "wide", "unit": "nm"}, "--spacing-um"),
         ("pixelResolution", {"dimensions": [10**400] * 3, "unit": "nm"}, "found inf um"),
         ("downsamplingFactors", [10**400] * 3, "found inf um"),
     ],
 )
-def test_fields_out_of_order_are_named(
-    tmp_path: Path, field: str, value: Any, message: str
-) -> None:
+def test_invalid_fields_are_named(tmp_path: Path, field: str, value: Any, message: str) -> None:
     path = write(tmp_path / "a.n5", **NM)
     about = path / "attributes.json"
     fields = json.loads(about.read_text("utf-8")) | {field: value}
@@ -219,7 +217,7 @@ def test_fields_out_of_order_are_named(
     assert message in refusal(path)
 
 
-def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
+def test_attributes_that_are_not_a_table_are_refused_in_one_line(tmp_path: Path) -> None:
     for index, text in enumerate(("", "[]", "{", "[" * 100_000)):
         (tmp_path / f"{index}.n5").mkdir()
         (tmp_path / f"{index}.n5" / "attributes.json").write_text(text)
@@ -228,7 +226,7 @@ def test_attributes_that_are_no_table_are_one_line(tmp_path: Path) -> None:
     assert "no dataset" in refusal(tmp_path / "empty.n5")
 
 
-def test_a_file_in_place_of_a_folder_is_one_line(tmp_path: Path) -> None:
+def test_a_file_in_place_of_a_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.n5").write_bytes(b"packed")
     assert "found a file (a text file), expected a folder of N5" in refusal(tmp_path / "a.n5")
 
@@ -241,14 +239,14 @@ CONTRADICTIONS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("kind", CONTRADICTIONS)
-def test_two_fields_of_spacing_that_disagree_are_told(tmp_path: Path, kind: str) -> None:
+def test_two_spacing_fields_that_disagree_are_reported(tmp_path: Path, kind: str) -> None:
     dataset = read.open(write(tmp_path / "a.n5", **CONTRADICTIONS[kind]))
     (note,) = [note for note in dataset.notes if "voxel spacing along" in note]
     assert note.startswith("voxel spacing along z:")
     assert {"1 um", "0.5 um"} <= set(re.findall(r"states (.*? um)", note))
 
 
-def test_spacing_of_a_group_that_disagrees_with_its_dataset_is_told(tmp_path: Path) -> None:
+def test_a_group_spacing_that_disagrees_with_its_dataset_is_reported(tmp_path: Path) -> None:
     write(tmp_path / "p.n5" / "s0", f_phantom(), **NM)
     group = {"resolution": [0.25, 0.2, 1], "units": ["um"] * 3, "scale_factor": 2}
     (tmp_path / "p.n5" / "attributes.json").write_text(json.dumps(group))
@@ -270,7 +268,7 @@ def test_axes_of_cosem_s_transform_are_slowest_first(tmp_path: Path) -> None:
                for note in read.open(path).notes)  # fmt: skip
 
 
-def test_axes_that_list_z_first_are_told_to_make_x_the_slowest(tmp_path: Path) -> None:
+def test_axes_that_list_z_first_are_noted_to_make_x_the_slowest(tmp_path: Path) -> None:
     path = write(tmp_path / "a.n5", axes=["z", "y", "x"])
     dataset = read.open(path, spacing_um=SIZE_UM)
     assert any("N5 lists the fastest axis first" in note for note in dataset.notes)

@@ -19,7 +19,7 @@ HALF = BODY[::2, ::2, ::2]
 UM = {"z": 0.5, "y": 0.2, "x": 0.2}
 
 
-def test_a_level_of_a_scale_that_its_shape_contradicts_covers_the_same_field(
+def test_a_level_whose_scale_contradicts_its_shape_covers_the_same_field(
     tmp_path: Path,
 ) -> None:
     scales = [UM, {"z": 0.5, "y": 0.4, "x": 0.4}]
@@ -32,7 +32,7 @@ def test_a_level_of_a_scale_that_its_shape_contradicts_covers_the_same_field(
 
 
 @pytest.mark.parametrize("rounded", [np.floor, np.ceil])
-def test_rounding_of_shapes_is_no_contradiction(rounded: Any) -> None:
+def test_rounding_of_shapes_is_not_a_contradiction(rounded: Any) -> None:
     shape, grids = (25, 301, 97), []
     for level in range(6):
         factor = 2.0**level
@@ -44,7 +44,7 @@ def test_rounding_of_shapes_is_no_contradiction(rounded: Any) -> None:
     assert notes == ()
 
 
-def test_a_stated_spacing_stays_where_the_shape_gives_no_whole_factor() -> None:
+def test_a_stated_spacing_stays_if_the_shape_gives_no_whole_factor() -> None:
     grids = [Grid((30, 100, 100), (1.0, 1.0, 1.0)), Grid((20, 50, 50), (1.0, 2.0, 2.0))]
     settled, notes = settle_levels(grids)
     assert settled[1].spacing_um == (1.0, 2.0, 2.0)
@@ -52,7 +52,7 @@ def test_a_stated_spacing_stays_where_the_shape_gives_no_whole_factor() -> None:
 
 
 def rename(path: Path, names: Any, version: str) -> Path:
-    """Write the level again with names of its dimensions."""
+    """Write the level again with names for its dimensions."""
     named: Any = {"dimension_names": names} if version == "0.5" else {}
     zarr_format: Any = 3 if version == "0.5" else 2
     array = zarr.create_array(
@@ -125,7 +125,7 @@ def test_the_one_image_of_a_container_is_planned_with_all_its_chunks(
 
 
 def container(tmp_path: Path, physical: str, **options: Any) -> Path:
-    """Write a container as bioformats2raw does, with the OME-XML of what it converted."""
+    """Write a container as bioformats2raw does, with the OME-XML of the converted file."""
     root = zarr.open_group(tmp_path / "c.zarr", mode="w", zarr_format=2)
     root.attrs["bioformats2raw.layout"] = 3
     path = write_ome_zarr(tmp_path / "c.zarr" / "0", [BODY], version="0.4", **options)
@@ -183,7 +183,7 @@ def test_orientations_of_axes_give_the_sides(tmp_path: Path) -> None:
         dataset.read(0, coarse.box, 1).voxels, HALF.transpose(1, 0, 2)[:, ::-1, ::-1]
     )
     assert dataset.levels[0].spacing_um == (0.2, 0.5, 0.2)
-    # y and x run backwards, so that their first canonical voxels are the last stored ones.
+    # y and x are reversed, so their first canonical voxels are the last stored ones.
     last_fine = np.array([2.0, -(1 + 15 * 0.5), -(3 + 35 * 0.2)])
     last_coarse = np.array([2.1, -(1.25 + 7 * 1.0), -(3.1 + 17 * 0.4)])
     assert coarse.origin_um == pytest.approx(tuple(last_coarse - last_fine))
@@ -200,7 +200,7 @@ def test_orientations_of_axes_give_the_sides(tmp_path: Path) -> None:
         ("proximal-to-distal", "posterior-to-anterior", "left-to-right"),
     ],
 )
-def test_orientations_that_name_no_three_directions_are_noted(
+def test_orientations_without_three_directions_are_noted(
     tmp_path: Path, values: tuple[str, ...]
 ) -> None:
     dataset = read.open(orient(write_ome_zarr(tmp_path / "a.zarr", [BODY]), *values))
@@ -233,7 +233,7 @@ def test_the_second_image_of_a_group_is_a_series(tmp_path: Path) -> None:
         read.open(path, series=3)
 
 
-def test_a_second_image_that_is_no_volume_is_listed(tmp_path: Path) -> None:
+def test_a_second_image_that_is_not_a_volume_is_listed(tmp_path: Path) -> None:
     path = write_ome_zarr(tmp_path / "a.zarr", [BODY])
     group = zarr.open_group(path, mode="r+")
     ome: Any = group.attrs["ome"]
@@ -245,7 +245,7 @@ def test_a_second_image_that_is_no_volume_is_listed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("stored", "image", "group", "told"),
     [
-        (2, "0.5", None, "0.5 is stated, which is stored as Zarr v3, but the files are Zarr v2"),
+        (2, "0.5", None, "0.5 is stated, which uses Zarr v3, but the files are Zarr v2"),
         (3, "0.4", "0.5", "`version` of the image states 0.4, `version` of the group states 0.5"),
         (2, "0.4", None, ""),
         (3, None, "0.5", ""),

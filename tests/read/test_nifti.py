@@ -34,12 +34,12 @@ def test_every_voxel_lies_where_the_scene_has_it(
 ) -> None:
     affine = grid(plane, rotation=OBLIQUE, shift=(4, -3, 2))
     dataset = read.open(write(tmp_path / f"Jane_Doe{suffix}", affine, scene_on(affine), form))
-    assert error(dataset) < 0.55  # whole numbers; a qform is of float32
+    assert error(dataset) < 0.55  # whole numbers; a qform is float32
     assert (dataset.name, dataset.modality, dataset.notes) == ("NIfTI", "", ())
     assert dataset.dtype == np.int16
 
 
-def test_a_left_handed_grid_is_no_mirror_image(tmp_path: Path) -> None:
+def test_a_left_handed_grid_is_not_mirrored(tmp_path: Path) -> None:
     affine = grid("coronal", rotation=OBLIQUE)
     affine[:3, 3] += (SHAPE[2] - 1) * affine[:3, 2]
     affine[:3, 2] *= -1
@@ -47,7 +47,7 @@ def test_a_left_handed_grid_is_no_mirror_image(tmp_path: Path) -> None:
     assert error(read.open(write(tmp_path / "a.nii", affine, scene_on(affine)))) <= 0.51
 
 
-def test_the_sform_goes_before_the_qform(tmp_path: Path) -> None:
+def test_the_sform_takes_precedence_over_the_qform(tmp_path: Path) -> None:
     affine = grid(rotation=OBLIQUE)
     nifti = nibabel.Nifti1Image(scene_on(affine), None)
     nifti.header.set_xyzt_units("mm")
@@ -57,7 +57,7 @@ def test_the_sform_goes_before_the_qform(tmp_path: Path) -> None:
     assert error(read.open(tmp_path / "a.nii")) < 0.55
 
 
-def test_without_sform_and_qform_the_guess_is_told(tmp_path: Path) -> None:
+def test_without_sform_and_qform_the_guess_is_noted(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path / "a.nii", grid(), scene_on(grid()), form="none"))
     assert any("neither sform nor qform" in note for note in dataset.notes)
 
@@ -96,7 +96,7 @@ def test_slope_and_intercept_apply_and_whole_numbers_stay_whole(
     assert np.array_equal(np.sort(whole(dataset).ravel()), expected)
 
 
-def test_points_in_time_are_chosen(tmp_path: Path) -> None:
+def test_time_points_are_chosen(tmp_path: Path) -> None:
     affine = grid("coronal")
     series = np.stack([scene_on(affine), scene_on(affine) + 5], axis=-1)
     path = write(tmp_path / "a.nii.gz", affine, series)
@@ -118,8 +118,8 @@ def test_skew_axes_are_resampled_onto_an_orthogonal_grid(tmp_path: Path) -> None
     assert wrong < 3 * interpolation_bound(2.5)  # along three axes
 
 
-def test_nan_is_the_smallest_finite_value_and_is_told(tmp_path: Path) -> None:
-    """A brain that was cut out has NaN all round."""
+def test_nan_is_read_as_the_smallest_finite_value_and_is_noted(tmp_path: Path) -> None:
+    """An extracted brain is surrounded by NaN."""
     values = sample(grid(), SHAPE).astype(np.float32) + 7
     bare = values.copy()
     bare[:, :5] = np.nan
@@ -130,12 +130,12 @@ def test_nan_is_the_smallest_finite_value_and_is_told(tmp_path: Path) -> None:
     write(tmp_path / "b.nii.gz", grid(), expected)
     voxels = whole(read.open(tmp_path / "b.nii.gz"))
     assert np.array_equal(whole(dataset), voxels)
-    box = Box((0, 3, 2), (6, 9, 20))  # NaN alone
+    box = Box((0, 3, 2), (6, 9, 20))  # only NaN
     part = read.open(tmp_path / "a.nii.gz").read(0, box).voxels
     assert np.array_equal(part, voxels[box.slices])
 
 
-def test_nan_is_told_of_the_point_in_time_that_is_read(tmp_path: Path) -> None:
+def test_nan_is_noted_for_the_time_point_that_is_read(tmp_path: Path) -> None:
     values = np.stack([sample(grid(), SHAPE)] * 2, axis=-1).astype(np.float32)
     values[3, 4, 5, 1] = np.nan
     path = write(tmp_path / "a.nii", grid(), values)
@@ -143,7 +143,7 @@ def test_nan_is_told_of_the_point_in_time_that_is_read(tmp_path: Path) -> None:
     assert any("1 voxels are NaN" in note for note in read.open(path, time=1).notes)
 
 
-def test_a_spacing_of_0_is_told(tmp_path: Path) -> None:
+def test_a_spacing_of_0_is_noted(tmp_path: Path) -> None:
     """nibabel reads it as 1."""
     image = nibabel.Nifti1Image(np.zeros((4, 5, 6), np.uint8), None)
     image.header.set_zooms((2.0, 2.0, 2.0))
@@ -155,7 +155,7 @@ def test_a_spacing_of_0_is_told(tmp_path: Path) -> None:
     assert sorted(dataset.levels[0].spacing_um) == [1000, 2000, 2000]
 
 
-def test_infinity_is_read_as_nan_is(tmp_path: Path) -> None:
+def test_infinity_is_read_like_nan(tmp_path: Path) -> None:
     values = sample(grid(), SHAPE).astype(np.float32)
     values[1, 2, 3], values[0, 0, 0], values[4, 4, 4] = np.inf, np.nan, -np.inf
     dataset = read.open(write(tmp_path / "a.nii", grid(), values))
@@ -167,7 +167,7 @@ def test_infinity_is_read_as_nan_is(tmp_path: Path) -> None:
 
 
 def patch(path: Path, start: int, values: NDArray[Any]) -> None:
-    """Overwrite what the header has at a place, packed or not."""
+    """Overwrite values at a place in the header, compressed or not."""
     is_packed = path.suffix == ".gz"
     content = gzip.decompress(path.read_bytes()) if is_packed else path.read_bytes()
     changed = content[:start] + values.tobytes() + content[start + values.nbytes :]
@@ -184,7 +184,7 @@ def empty(path: Path) -> None:
 
 
 def a_little_too_large(path: Path) -> None:
-    """A header that claims 1 MiB more than 4 GiB, and little behind it."""
+    """Write a header that claims 1 MiB more than 4 GiB, with little behind it."""
     nifti = nibabel.Nifti1Image(np.zeros((4, 5, 6), np.uint8), np.eye(4))
     nibabel.save(nifti, path)
     patch(path, 42, np.array([1024, 1024, 4097], "<i2"))  # dim
@@ -233,7 +233,7 @@ def huge(path: Path) -> None:
         (colours, "datatype"),
         (flat, "dim: found"),
         (vectors, "dim: found"),
-        (collapsed, "three axes"),
+        (collapsed, "three independent axes"),
         (huge, "expected at most 4 GiB|cut short"),
         (a_little_too_large, "found 4.01 GiB, expected at most 4 GiB|cut short"),
         (stretched, "beyond float32"),
@@ -241,7 +241,7 @@ def huge(path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
-def test_what_is_no_volume_is_refused_in_one_line(
+def test_a_file_that_is_not_a_volume_is_refused_in_one_line(
     tmp_path: Path, make: Any, words: str, suffix: str
 ) -> None:
     if suffix == ".nii.gz" and make in (huge,):
@@ -255,8 +255,8 @@ def test_what_is_no_volume_is_refused_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
-def test_garbled_files_raise_nothing_else(tmp_path: Path, suffix: str) -> None:
-    """Bytes are changed at random; a file opens all the same, or is refused in one line."""
+def test_garbled_files_open_or_raise_a_source_error(tmp_path: Path, suffix: str) -> None:
+    """Bytes are changed at random. A file still opens, or is refused in one line."""
     random = np.random.default_rng(0)
     path = write(tmp_path / f"a{suffix}", grid(), scene_on(grid()))
     content = np.frombuffer(path.read_bytes(), np.uint8)
@@ -274,7 +274,7 @@ def test_garbled_files_raise_nothing_else(tmp_path: Path, suffix: str) -> None:
 def test_labels_that_the_header_states_end_the_plan(
     tmp_path: Path, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A mask of one object, which the voxels alone would not tell for labels."""
+    """A mask of one object, which the voxels alone would not reveal as labels."""
     voxels = np.zeros(SHAPE, np.uint8)
     voxels[5:12, 5:12, 5:12] = 1
     nifti = nibabel.Nifti1Image(voxels, np.diag([2.0, 2.0, 2.0, 1.0]))
@@ -293,14 +293,14 @@ def test_labels_that_the_header_states_end_the_plan(
     assert main(["plan", source, "-o", out, "--as", "intensity"]) == 0
 
 
-def test_values_on_a_surface_are_told_as_such(tmp_path: Path) -> None:
+def test_values_on_a_surface_are_named_in_the_refusal(tmp_path: Path) -> None:
     axes = (
         nibabel.cifti2.ScalarAxis(["a"]),
         nibabel.cifti2.BrainModelAxis.from_surface(np.arange(5), 9, name="CortexLeft"),
     )
     image = nibabel.cifti2.Cifti2Image(np.ones((1, 5), np.float32), axes)
     nibabel.save(image, tmp_path / "s.dscalar.nii")
-    with pytest.raises(SourceError, match="CIFTI, values on surfaces"):
+    with pytest.raises(SourceError, match=r"found CIFTI \(values on surfaces"):
         read.open(tmp_path / "s.dscalar.nii")
     gifti = nibabel.gifti.GiftiImage()
     nibabel.save(gifti, tmp_path / "LEFT.SURF.gii")
@@ -308,7 +308,7 @@ def test_values_on_a_surface_are_told_as_such(tmp_path: Path) -> None:
         read.open(tmp_path / "LEFT.SURF.gii")
 
 
-def test_several_values_at_each_voxel_are_refused_in_the_field_s_words(tmp_path: Path) -> None:
+def test_several_values_at_each_voxel_are_refused_in_the_terms_of_the_field(tmp_path: Path) -> None:
     affine = np.diag([2.0, 2, 2, 1])
     colors = np.zeros((4, 5, 6), [("R", "u1"), ("G", "u1"), ("B", "u1")])
     nibabel.save(nibabel.Nifti1Image(colors, affine), tmp_path / "a.nii")
@@ -316,5 +316,5 @@ def test_several_values_at_each_voxel_are_refused_in_the_field_s_words(tmp_path:
         read.open(tmp_path / "a.nii")
     vectors = np.zeros((4, 5, 6, 1, 3), np.float32)
     nibabel.save(nibabel.Nifti1Image(vectors, affine), tmp_path / "b.nii")
-    with pytest.raises(SourceError, match="3 values at each voxel: save one of them alone"):
+    with pytest.raises(SourceError, match="3 values at each voxel: save only one of them"):
         read.open(tmp_path / "b.nii")

@@ -1,4 +1,4 @@
-"""Headers of NIfTI, Analyze and MGH that state one thing twice: the note, and the value taken."""
+"""Headers of NIfTI, Analyze and MGH that state one thing twice: the note, and the value used."""
 
 import gzip
 import struct
@@ -17,12 +17,12 @@ from support.dicom_reading import whole
 from support.phantoms import f_phantom
 
 SPACING = (0.5, 0.7, 2.0)  # mm along x, y, z as stored
-# places in the header of NIfTI-1, in bytes
+# positions in the header of NIfTI-1, in bytes
 PIXDIM, SLOPE, UNITS, QFORM_CODE, QUATERN, SROW = 76, 112, 123, 252, 256, 280
 
 
 def write(path: Path, spacing: tuple[float, ...] = SPACING) -> Path:
-    """Write the phantom by SimpleITK, which states sform, qform and pixdim alike."""
+    """Write the phantom with SimpleITK, which states the same in sform, qform and pixdim."""
     image = sitk.GetImageFromArray(f_phantom().astype(np.int16))
     image.SetSpacing(spacing)
     sitk.WriteImage(image, str(path))
@@ -76,7 +76,7 @@ def test_forms_that_run_in_other_directions_are_reported(
     )
 
 
-def test_forms_that_are_turned_against_each_other_are_reported(tmp_path: Path) -> None:
+def test_forms_that_are_rotated_to_each_other_are_reported(tmp_path: Path) -> None:
     angle = np.radians(12.0)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0]])
     affine = ras(-0.5, -0.7, 2.0)
@@ -86,19 +86,19 @@ def test_forms_that_are_turned_against_each_other_are_reported(tmp_path: Path) -
     assert note == "orientation: sform and qform differ by 12 degrees: sform is used"
 
 
-def test_an_sform_of_zeros_is_passed_over(tmp_path: Path) -> None:
+def test_an_sform_of_zeros_is_skipped(tmp_path: Path) -> None:
     expected = read.open(write(tmp_path / "a.nii"))
     dataset = read.open(set_sform(write(tmp_path / "b.nii"), np.zeros((4, 4))))
     np.testing.assert_array_equal(whole(dataset), whole(expected))
     assert dataset.levels == expected.levels
     assert dataset.placement == expected.placement
-    assert dataset.notes == ("sform: found no three axes: qform is used",)
+    assert dataset.notes == ("sform: its axes don't span three dimensions: qform is used",)
 
 
 def test_a_missing_unit_is_an_assumption_with_its_remedy(tmp_path: Path) -> None:
     dataset = read.open(patch(write(tmp_path / "a.nii"), UNITS, np.zeros(1, "u1")))
     assert dataset.notes == (
-        "unit of length: not stated, mm is assumed, as most programs of NIfTI do; "
+        "unit of length: not stated, mm is assumed, as in most programs for NIfTI; "
         "--spacing-um z,y,x replaces it",
     )
 
@@ -115,7 +115,7 @@ def test_sizes_that_no_scanner_has_are_reported(
 ) -> None:
     (note,) = read.open(write(tmp_path / "a.nii", spacing)).notes
     assert words in note
-    assert "is its unit another one?" in note
+    assert "is its unit wrong?" in note
 
 
 @pytest.mark.parametrize("slope", [0, np.nan])
@@ -128,10 +128,10 @@ def test_an_intercept_that_the_slope_turns_off_is_reported(tmp_path: Path, slope
     )
 
 
-def test_a_quaternion_that_is_no_rotation_is_left_out_or_named(tmp_path: Path) -> None:
+def test_a_quaternion_that_is_not_a_rotation_is_left_out_or_named(tmp_path: Path) -> None:
     impossible = np.array([0.9, 0.9], "<f4")
     path = patch(write(tmp_path / "a.nii"), QUATERN, impossible)
-    assert "qform: found no three axes: sform is used" in read.open(path).notes
+    assert "qform: its axes don't span three dimensions: sform is used" in read.open(path).notes
     image = nibabel.Nifti1Image(f_phantom().astype(np.int16), np.diag([2.0, 2, 2, 1]))
     image.set_qform(image.affine, 1)
     image.set_sform(None, 0)
@@ -140,17 +140,17 @@ def test_a_quaternion_that_is_no_rotation_is_left_out_or_named(tmp_path: Path) -
         read.open(patch(tmp_path / "b.nii", QUATERN, impossible))
 
 
-def test_an_intercept_that_is_no_number_is_refused_by_its_field(tmp_path: Path) -> None:
+def test_an_intercept_that_is_not_a_number_is_refused_with_its_field(tmp_path: Path) -> None:
     path = patch(write(tmp_path / "a.nii"), SLOPE, np.array([2, np.nan], "<f4"))
-    with pytest.raises(SourceError, match="scl_inter: found no finite number beside a scl_slope"):
+    with pytest.raises(SourceError, match="scl_inter: found no finite number beside scl_slope"):
         read.open(path)
 
 
-def test_a_fourth_axis_of_frequencies_is_no_time(tmp_path: Path) -> None:
+def test_a_fourth_axis_of_frequencies_is_not_time(tmp_path: Path) -> None:
     image = nibabel.Nifti1Image(np.zeros((4, 5, 6, 3), np.uint8), np.diag([2.0, 2, 2, 1]))
     image.header.set_xyzt_units("mm", "ppm")
     nibabel.save(image, tmp_path / "a.nii")
-    assert "axis t: xyzt_units states ppm, so its 3 volumes are no points in time" in (
+    assert "axis t: xyzt_units states ppm, so its 3 volumes are not time points" in (
         read.open(tmp_path / "a.nii").notes
     )
 
@@ -169,7 +169,7 @@ def test_spm_s_matrix_that_contradicts_the_header_is_reported(tmp_path: Path) ->
 
 
 def mgh(voxels_zyx: NDArray[Any], kind: int, *, is_placed: bool = True) -> bytes:
-    """Return a file of MGH, byte by byte after FreeSurfer's page of the format."""
+    """Return a file of MGH, byte by byte after FreeSurfer's page on the format."""
     depth, height, width = voxels_zyx.shape
     head = struct.pack(">7i", 1, width, height, depth, 1, kind, 0)
     head += struct.pack(">h", int(is_placed))

@@ -1,4 +1,4 @@
-"""NumPy's .npy is read a window at a time, in either order, and says what it doesn't state."""
+"""NumPy's .npy is read a window at a time, in either order; what it doesn't state is noted."""
 
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ def put(folder: Path, voxels: NDArray[Any], **options: Any) -> Path:
 @pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("dtype", ["<u2", ">u2", "u1", ">i2", ">f4", "<f8"])
 @pytest.mark.parametrize("voxels", [BODY % 251, BOTH % 251], ids=["zyx", "czyx"])
-def test_windows_are_those_of_numpy(
+def test_windows_agree_with_numpy(
     tmp_path: Path, voxels: NDArray[Any], dtype: str, order: Any
 ) -> None:
     path = put(tmp_path, np.asarray(voxels, dtype, order=order))
@@ -41,11 +41,11 @@ def test_windows_are_those_of_numpy(
         assert found.dtype.isnative
 
 
-def test_a_window_reads_its_own_planes_and_no_others(tmp_path: Path) -> None:
+def test_a_window_reads_only_its_own_planes(tmp_path: Path) -> None:
     path = put(tmp_path, BODY)
     dataset = read.open(path, spacing_um=SPACING_UM)
     with open(path, "r+b") as file:
-        file.truncate(path.stat().st_size - BODY[0].nbytes)  # its last plane
+        file.truncate(path.stat().st_size - BODY[0].nbytes)  # without its last plane
     assert (dataset.read(0, BOX).voxels == BODY[BOX.slices]).all()
     with pytest.raises(SourceError, match="expected chunks that are whole"):
         dataset.read(0, dataset.levels[0].box)
@@ -75,7 +75,7 @@ def test_axes_are_assumed_with_a_note_or_given(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.filterwarnings("ignore:Stored array in format:UserWarning")
-def test_an_array_that_is_no_volume_is_refused_in_a_line(
+def test_an_array_that_is_not_a_volume_is_refused_in_one_line(
     tmp_path: Path, voxels: NDArray[Any], words: str
 ) -> None:
     with pytest.raises(SourceError, match=words) as caught:
@@ -95,11 +95,13 @@ def test_a_damaged_file_is_refused_in_a_line(tmp_path: Path) -> None:
         read.open(path)
 
 
-def test_the_format_is_known_by_its_first_bytes_and_at_an_address(tmp_path: Path) -> None:
+def test_the_format_is_recognised_by_its_first_bytes_and_at_an_address(tmp_path: Path) -> None:
     path = put(tmp_path, BODY)
     other = path.rename(tmp_path / "f.dat")
     assert read.open(other, spacing_um=SPACING_UM).levels[0].shape == BODY.shape
-    with pytest.raises(SourceError, match=r"f\.tif: found a NumPy array, .* name it \.npy"):
+    with pytest.raises(
+        SourceError, match=r"f\.tif: found a NumPy array, .* rename it to end in \.npy"
+    ):
         read.open(other.rename(tmp_path / "f.tif"))
     with pytest.raises(SourceError, match=r"NumPy's \.npy at an address, expected a path on this"):
         read.open("s3://bucket/f.npy")

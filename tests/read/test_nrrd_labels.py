@@ -15,7 +15,7 @@ SPACING = {"z": 0.5, "y": 0.2, "x": 0.25}  # um
 
 
 def write(path: Path, order: str, labels: list[str], **fields: Any) -> Path:
-    """Write the phantom with axes in an order, fastest first, as pynrrd has it."""
+    """Write the phantom with axes in an order, fastest first, with pynrrd."""
     voxels = np.ascontiguousarray(f_phantom().transpose(["zyx".index(axis) for axis in order]))
     about = {"spacings": [SPACING[axis] for axis in order], "units": ["um"] * 3, **fields}
     nrrd.write(str(path), voxels, {"encoding": "raw", "labels": labels, **about})
@@ -44,7 +44,7 @@ def test_labels_of_the_usual_order_or_of_no_axes_need_no_note(
     assert dataset.notes == ()
 
 
-def test_labels_tell_time_and_channels_from_the_axes_of_space(tmp_path: Path) -> None:
+def test_labels_distinguish_time_and_channels_from_the_axes_of_space(tmp_path: Path) -> None:
     voxels = np.stack([f_phantom(), f_phantom() + 1]).transpose(0, 3, 2, 1)
     about = {"spacings": [1.0, 0.25, 0.2, 0.5], "units": ["", "um", "um", "um"]}
     for label in ("t", "c"):
@@ -65,10 +65,10 @@ def test_labels_that_contradict_a_patient_s_directions_are_noted(tmp_path: Path)
     assert "space directions states x, y, z, labels states z, y, x" in note
 
 
-def test_a_negative_spacing_is_noted_and_its_size_taken(tmp_path: Path) -> None:
+def test_a_negative_spacing_is_noted_and_its_size_used(tmp_path: Path) -> None:
     steps = [SPACING["x"], -SPACING["y"], SPACING["z"]]
     dataset = read.open(write(tmp_path / "a.nrrd", "xyz", ["x", "y", "z"], spacings=steps))
     np.testing.assert_array_equal(whole(dataset), f_phantom())
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
     (note,) = dataset.notes
-    assert note.startswith("spacings: found 0.25 -0.2 0.5, of which one is negative")
+    assert note.startswith("spacings: found 0.25 -0.2 0.5, one of which is negative")

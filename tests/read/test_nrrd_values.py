@@ -1,4 +1,4 @@
-"""Values at each voxel of NRRD: diffusion, vectors, tensors and colours are named."""
+"""Values at each voxel of NRRD: diffusion, vectors, tensors and colours get names."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ SPACE = {"space": "left-posterior-superior", "space origin": [0, 0, 0]}
 
 
 def write(path: Path, constants: list[float], kind: str, axis: int, **fields: Any) -> read.Dataset:
-    """Write one image a constant along an axis of the file (0: the fastest), and open it."""
+    """Write one image per constant along an axis of the file (0: the fastest), and open it."""
     voxels = np.zeros((*SHAPE, len(constants)), np.int16) + np.array(constants, np.int16)
     voxels[1, 2, 3] += 500
     directions: list[Any] = [[2.0, 0, 0], [0, 2.0, 0], [0, 0, 2.0]]
@@ -28,7 +28,7 @@ def write(path: Path, constants: list[float], kind: str, axis: int, **fields: An
 
 
 def levels(path: Path) -> list[int]:
-    """Return the constant of each point in time."""
+    """Return the constant of each time point."""
     found = []
     for time in range(read.open(path).time_points):
         dataset = read.open(path, time=time)
@@ -46,7 +46,7 @@ def diffusion(gradients: tuple[str, ...]) -> dict[str, str]:
 
 @pytest.mark.parametrize("axis", [0, 3])
 @pytest.mark.parametrize("encoding", ["raw", "gzip"])
-def test_images_of_diffusion_are_points_in_time_with_their_b_values(
+def test_images_of_diffusion_are_time_points_with_their_b_values(
     tmp_path: Path, axis: int, encoding: str
 ) -> None:
     path = tmp_path / "a.nrrd"
@@ -76,11 +76,11 @@ def test_b_matrices_state_b_values(tmp_path: Path) -> None:
     assert any("b 0 s/mm2 at 0, b 800 s/mm2 at 1" in note for note in dataset.notes)
 
 
-def test_gradients_that_lack_are_said(tmp_path: Path) -> None:
+def test_missing_gradients_are_noted(tmp_path: Path) -> None:
     fields = diffusion(GRADIENTS[:3])
     dataset = write(tmp_path / "a.nrrd", [0, 10, 20, 30], "list", 3, **fields)
     assert dataset.time_points == 4
-    assert any("DWMRI_gradient states 3 of them" in note for note in dataset.notes)
+    assert any("DWMRI_gradient states only 3 of them" in note for note in dataset.notes)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_parts_of_a_value_are_named_channels(
     assert note in dataset.notes
 
 
-def test_values_of_no_known_kind_are_said(tmp_path: Path) -> None:
+def test_values_of_an_unknown_kind_are_noted(tmp_path: Path) -> None:
     dataset = write(tmp_path / "a.nrrd", [1, 2, 3, 4], "list", 0)
     assert "4 values at each voxel (kind list) are read as channels" in dataset.notes
 
@@ -122,7 +122,7 @@ def test_b_values_beside_a_nifti_name_its_images(
     assert "b 0 s/mm2 at 0" in note
 
 
-def test_b_values_of_another_number_of_images_are_said(tmp_path: Path) -> None:
+def test_b_values_for_another_number_of_images_are_noted(tmp_path: Path) -> None:
     path = tmp_path / "dwi.nii"
     nibabel.save(nibabel.Nifti1Image(np.ones((*SHAPE, 3), np.int16), np.eye(4)), path)
     (tmp_path / "dwi.bval").write_text("0 1000", "utf-8")

@@ -1,4 +1,4 @@
-"""Numbers that builds don't take are read as ones that they do, and a note says what is lost."""
+"""Number types that builds don't accept are converted, and a note says what is lost."""
 
 from pathlib import Path
 from typing import Any
@@ -78,7 +78,7 @@ def test_the_type_of_a_build_and_a_note(tmp_path: Path, kind: str, suffix: str) 
 
 
 @pytest.mark.parametrize("kind", ["uint8", "uint16", "int16", "float32"])
-def test_what_a_build_takes_stays_as_it_is(tmp_path: Path, kind: str) -> None:
+def test_types_that_builds_accept_are_not_converted(tmp_path: Path, kind: str) -> None:
     dataset = read.open(write(tmp_path, values(kind), ".zarr"))
     assert dataset.notes == ()
     assert dataset.dtype == dataset.stored_dtype == kind
@@ -93,7 +93,7 @@ def test_labels_of_a_nifti_keep_numbers_that_float32_rounds(tmp_path: Path) -> N
     assert dataset.dtype == np.float32
 
 
-def test_a_float64_beyond_float32_is_told(tmp_path: Path) -> None:
+def test_a_float64_beyond_float32_is_refused(tmp_path: Path) -> None:
     stored = values("float64")
     stored[1, 2, 3] = 1e300
     dataset = read.open(write(tmp_path, stored, ".ome.tif"))

@@ -49,7 +49,7 @@ def image(number: int, blocks: Sequence[TiffData]) -> Image:
 
 
 def described(blocks: Sequence[TiffData], own: int | None = None, more: Any = ()) -> str:
-    """Return the OME-XML of a file whose own UUID has a number; None: it states none."""
+    """Return the OME-XML of a file whose own UUID has this number; None: it states none."""
     root = OME(uuid=uuid(own) if own is not None else None, images=[image(0, blocks), *more])
     return str(root.to_xml())
 
@@ -66,8 +66,8 @@ def write_set(
 ) -> None:
     """Write the two halves of the phantom, which the OME-XML names by two UUIDs from `first` on.
 
-    stated  the UUID that each file states
-    names   of the files on the disk
+    stated  UUID that each file states
+    names   names of the files on the disk
     """
     folder.mkdir(exist_ok=True)
     blocks = [block(8 * i, name, i + first) for i, name in enumerate(NAMES)]
@@ -98,8 +98,8 @@ def test_a_file_of_another_set_under_the_right_name_is_refused(tmp_path: Path, n
     write_set(tmp_path / "other", (3, 4), first=3)
     shutil.copy(tmp_path / "other" / "b.ome.tif", tmp_path)
     line = refusal(tmp_path / "a.ome.tif")
-    assert "UUID FileName 'b.ome.tif': found a file of UUID" in line
-    assert "it is a file of another set" in line
+    assert "UUID FileName 'b.ome.tif': found a file with UUID" in line
+    assert "the file belongs to another set" in line
     refusal(tmp_path / name)
 
 
@@ -113,7 +113,7 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_a_copy_of_a_file_in_the_place_of_another_one_is_refused(tmp_path: Path) -> None:
     write_set(tmp_path)
     shutil.copy(tmp_path / "a.ome.tif", tmp_path / "b.ome.tif")
-    assert "in another file's place" in refusal(tmp_path / "a.ome.tif")
+    assert "replaces another file" in refusal(tmp_path / "a.ome.tif")
 
 
 @pytest.mark.parametrize("names", [("a.ome.tif", "c.ome.tif"), ("b.ome.tif", "a.ome.tif")])
@@ -150,7 +150,7 @@ def test_a_uuid_that_two_files_share_is_refused(tmp_path: Path) -> None:
     assert "found the files 'a.ome.tif' and 'b.ome.tif', expected one file" in line
 
 
-def test_uuids_without_a_text_are_taken_by_the_names_of_their_files(tmp_path: Path) -> None:
+def test_empty_uuids_are_accepted_by_the_names_of_their_files(tmp_path: Path) -> None:
     blocks = [block(8 * i, name, i + 1) for i, name in enumerate(NAMES)]
     text = described(blocks).replace(uuid(1), "").replace(uuid(2), "")
     for name, half in zip(NAMES, (BODY[:8], BODY[8:]), strict=True):
@@ -196,7 +196,7 @@ def test_a_plane_that_the_ome_xml_names_twice_alike_is_read(tmp_path: Path) -> N
     whole(tmp_path / "a.ome.tif")
 
 
-def test_an_image_without_planes_leaves_those_of_the_next_one(tmp_path: Path) -> None:
+def test_an_image_without_planes_does_not_take_those_of_the_next_one(tmp_path: Path) -> None:
     second = image(1, [block(0, count=16)])
     write(tmp_path / "a.ome.tif", BODY, described([], more=[second]))
     (note,) = whole(tmp_path / "a.ome.tif").notes
@@ -261,7 +261,7 @@ def test_a_file_that_a_companion_knows_by_another_uuid_is_refused(
 ) -> None:
     write_companion_set(tmp_path, (1, 5))
     line = refusal(tmp_path / name)
-    assert "UUID FileName 'b.ome.tif': found a file of UUID" in line
+    assert "UUID FileName 'b.ome.tif': found a file with UUID" in line
 
 
 def test_a_companion_of_another_set_is_refused(tmp_path: Path) -> None:
@@ -269,7 +269,7 @@ def test_a_companion_of_another_set_is_refused(tmp_path: Path) -> None:
     assert "it describes another set" in refusal(tmp_path / "a.ome.tif")
 
 
-def test_a_companion_is_read_whatever_its_files_describe(tmp_path: Path) -> None:
+def test_a_companion_is_read_regardless_of_the_xml_in_its_files(tmp_path: Path) -> None:
     write_companion_set(tmp_path)
     for name, half in zip(NAMES, (BODY[:8], BODY[8:]), strict=True):
         tifffile.imwrite(tmp_path / name, half, ome=False, metadata=None)

@@ -1,4 +1,4 @@
-"""OME-XML as other programs write it."""
+"""OME-XML in the forms that other programs write."""
 
 import pytest
 
@@ -14,7 +14,8 @@ def images(inside: str, namespace: str = NS):  # type: ignore[no-untyped-def]
 
 def test_spacing_names_and_colours_are_read() -> None:
     first, second = images(
-        '<Instrument ID="Microscope"/>'  # an identifier that the schema forbids: Micro-Manager's
+        # an identifier that the schema forbids, written by Micro-Manager
+        '<Instrument ID="Microscope"/>'
         '<Image ID="0"><Pixels PhysicalSizeX="200" PhysicalSizeXUnit="nm" PhysicalSizeY="0.2" '
         'PhysicalSizeZ="0.001" PhysicalSizeZUnit="mm">'
         '<Channel Name=" DAPI " Color="65535"/><Channel Color="-16776961"/><Channel/>'
@@ -28,7 +29,7 @@ def test_spacing_names_and_colours_are_read() -> None:
 
 
 @pytest.mark.parametrize("version", ["2016-06", "2013-06", "2008-09"])
-def test_every_version_s_namespace_is_one(version: str) -> None:
+def test_the_namespace_of_every_version_is_accepted(version: str) -> None:
     found = images('<Image><Pixels><Channel Name="A"/></Pixels></Image>', NS[:-7] + version)
     assert found[0].names == ("A",)
 
@@ -40,7 +41,7 @@ def test_every_version_s_namespace_is_one(version: str) -> None:
         ('<Image><Pixels><Channel Color="red"/></Pixels></Image>', "Channel Color: found 'red'"),
     ],
 )
-def test_what_is_no_metadata_is_named(inside: str, told: str) -> None:
+def test_invalid_metadata_are_refused_with_their_field(inside: str, told: str) -> None:
     with pytest.raises(SourceError, match=told):
         images(inside)
 
@@ -55,6 +56,6 @@ def test_what_is_no_metadata_is_named(inside: str, told: str) -> None:
         ('<!DOCTYPE x [<!ENTITY a "b">]><OME/>', "found a DOCTYPE"),
     ],
 )
-def test_text_that_is_none_is_refused(text: str, told: str) -> None:
+def test_text_that_is_not_ome_xml_is_refused(text: str, told: str) -> None:
     with pytest.raises(SourceError, match=told):
         parse(text, "x.tif")

@@ -1,4 +1,4 @@
-"""Readers against files written by zarr and tifffile directly: axes, dtypes, units, levels."""
+"""Readers of files that zarr and tifffile wrote directly: axes, dtypes, units, levels."""
 
 from itertools import permutations
 from pathlib import Path
@@ -30,7 +30,7 @@ def in_order(czyx: NDArray[Any], axes: str) -> NDArray[Any]:
 
 
 @pytest.mark.parametrize("fixture", FORMATS)
-def test_metadata_and_voxels_are_those_written(
+def test_metadata_and_voxels_are_read_as_written(
     fixture: str, request: pytest.FixtureRequest, voxels: NDArray[np.uint16]
 ) -> None:
     dataset = read.open(request.getfixturevalue(fixture))
@@ -53,7 +53,7 @@ def test_metadata_and_voxels_are_those_written(
         assert volume.origin_um == pytest.approx((0.5, 0.6, 1.0))
     coarse = dataset.read(1, Box((0, 2, 4), (6, 20, 28)), level=1)
     np.testing.assert_array_equal(coarse.voxels, voxels[1, :, 4::2, 8::2])
-    # A coarse voxel stands for a block of fine ones, so its centre lies half a fine voxel further.
+    # A coarse voxel averages a block of fine ones, so its centre lies half a fine voxel farther.
     assert coarse.origin_um == pytest.approx((0.0, 2 * 0.4 + 0.1, 4 * 0.4 + 0.1))
 
 
@@ -84,7 +84,7 @@ def test_tiff_planes_in_any_order_give_the_same_f(tmp_path: Path, order: str) ->
     path = write_ome_tiff(tmp_path / "f.ome.tif", stored, axes=order + "YX")
     dataset = read.open(path, time=2)
     assert dataset.time_points == 3
-    assert dataset.notes == ("3 points in time; building --time 2",)
+    assert dataset.notes == ("3 time points; building --time 2",)
     volume = dataset.read(1, dataset.levels[0].box)
     np.testing.assert_array_equal(volume.voxels, tczyx[2, 1])
 
@@ -162,7 +162,7 @@ def test_odd_sizes_halve_to_a_whole_factor(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".zarr", ".ome.tif"])
-def test_a_given_spacing_stands_in_for_a_missing_one(tmp_path: Path, suffix: str) -> None:
+def test_a_given_spacing_replaces_a_missing_one(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"f{suffix}"
     if suffix == ".zarr":
         write_ome_zarr(path, [f_phantom()], units={})
@@ -180,7 +180,9 @@ def test_a_given_spacing_must_be_a_length(tiny_tiff: Path, bad: tuple[float, flo
 
 
 @pytest.mark.parametrize("fixture", FORMATS)
-def test_a_window_out_of_range_is_a_bug(fixture: str, request: pytest.FixtureRequest) -> None:
+def test_a_window_out_of_range_raises_a_value_error(
+    fixture: str, request: pytest.FixtureRequest
+) -> None:
     dataset = read.open(request.getfixturevalue(fixture))
     for channel, box, level in (
         (2, BOX, 0),
@@ -204,10 +206,10 @@ def test_absent_chunks_are_the_fill_value(tiny_zarr_05: Path, path: str) -> None
     assert volume.voxels[:, :, 16].all()
 
 
-def test_absent_chunks_of_an_array_that_is_gone_are_no_fill_value(tiny_zarr_05: Path) -> None:
+def test_chunks_of_a_removed_array_are_not_read_as_fill_value(tiny_zarr_05: Path) -> None:
     dataset = read.open(tiny_zarr_05)
     (tiny_zarr_05 / "0").rename(tiny_zarr_05 / "elsewhere")
-    with pytest.raises(SourceError, match=r"0/zarr.json is gone since it was opened"):
+    with pytest.raises(SourceError, match=r"0/zarr.json was removed after it was opened"):
         dataset.read(0, Box((0, 0, 0), (2, 16, 17)))
 
 
@@ -215,7 +217,7 @@ def test_pages_of_a_file_are_closed(tiny_tiff: Path) -> None:
     dataset = read.open(tiny_tiff)
     assert dataset.on_close is not None
     dataset.on_close()
-    del dataset  # a second close does no harm; an open file would be a ResourceWarning
+    del dataset  # closing twice does no harm; an open file would be a ResourceWarning
 
 
 def test_unused_units_of_time_and_channel_do_no_harm(tmp_path: Path) -> None:
@@ -250,7 +252,7 @@ def test_further_images_are_noted(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_format_is_told_by_the_first_bytes_where_the_name_says_nothing(tmp_path: Path) -> None:
+def test_a_format_is_recognised_by_the_first_bytes_if_the_name_is_unknown(tmp_path: Path) -> None:
     body = f_phantom()
     tifffile.imwrite(tmp_path / "a.dat", body, photometric="minisblack")
     nrrd.write(str(tmp_path / "b.nrrd"), body, index_order="C")
@@ -264,7 +266,7 @@ def test_a_format_is_told_by_the_first_bytes_where_the_name_says_nothing(tmp_pat
         np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, body)
 
 
-def test_a_folder_of_planes_beside_other_files_is_planes(tmp_path: Path) -> None:
+def test_a_folder_of_planes_and_other_files_is_read_as_planes(tmp_path: Path) -> None:
     folder = tmp_path / "export.lif"
     folder.mkdir()
     for z, plane in enumerate(f_phantom()):
@@ -275,15 +277,17 @@ def test_a_folder_of_planes_beside_other_files_is_planes(tmp_path: Path) -> None
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, f_phantom())
 
 
-def test_an_address_of_a_format_on_this_machine_is_to_be_copied() -> None:
+def test_an_address_of_a_local_format_is_refused_with_the_advice_to_copy() -> None:
     with pytest.raises(SourceError, match="CZI at an address, expected a path on this machine"):
         read.open("https://nowhere.invalid/a.czi")
 
 
-def test_bare_voxels_name_their_header(tmp_path: Path) -> None:
+def test_raw_voxels_are_refused_with_the_name_of_their_header(tmp_path: Path) -> None:
     (tmp_path / "a.raw").write_bytes(bytes(range(100)))
     with pytest.raises(SourceError, match="unknown format: found"):
         read.open(tmp_path / "a.raw")
     (tmp_path / "a.mhd").write_text("NDims = 3")
-    with pytest.raises(SourceError, match=r"found the voxels of a\.mhd, expected that file"):
+    with pytest.raises(
+        SourceError, match=r"found the voxels that a\.mhd describes, expected that header file"
+    ):
         read.open(tmp_path / "a.raw")

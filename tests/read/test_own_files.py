@@ -1,6 +1,6 @@
-"""A source comes from a stranger: what it names is read only if it lies in its own folder or below.
+"""A source comes from a stranger: files that it names are read only if they lie in its own folder.
 
-Each bait is a sound file, so that a reader that opens it ends well, and the test fails.
+Each bait is a sound file, so a reader that opens it succeeds, and the test fails.
 """
 
 import json
@@ -30,7 +30,7 @@ refusal = refusing(read_levels)
 
 
 def tiff_of(path: Path, name: str, written: Callable[[str], str] = str) -> Path:
-    """Write an OME-TIFF whose planes lie in another file, its OME-XML otherwise written."""
+    """Write an OME-TIFF whose planes lie in another file; `written` changes its OME-XML."""
     planes = f'<TiffData IFD="0" PlaneCount="4"><UUID FileName="{name}">{_ID.format(1)}</UUID>'
     text = xml(inside=f"{planes}</TiffData>").replace("<OME ", f'<OME UUID="{_ID.format(2)}" ')
     path.parent.mkdir(exist_ok=True)
@@ -40,7 +40,7 @@ def tiff_of(path: Path, name: str, written: Callable[[str], str] = str) -> Path:
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
-    """A source's folder, with an apostrophe in its name; beside it `other` holds a sound TIFF."""
+    """A source's folder, with an apostrophe in its name. Beside it, `other` holds a sound TIFF."""
     (tmp_path / "other").mkdir()
     write_tiff(tmp_path / "other" / "secret.ome.tif")
     folder = tmp_path / "Ann's data"
@@ -66,7 +66,7 @@ def test_planes_elsewhere_are_refused_however_the_file_names_its_kind(
     assert "UUID FileName '../other/secret.ome.tif'" in refusal(source)
 
 
-def test_no_file_is_opened_by_a_text_that_only_ends_as_ome_xml_does(home: Path) -> None:
+def test_no_file_is_opened_for_a_text_that_only_ends_like_ome_xml(home: Path) -> None:
     write_tiff(home.parent / "other" / "secret.ome.tif", strip=b"\7" * 512)
     source = tiff_of(home / "x.tif", "../other/secret.ome.tif", lambda text: "scan 1\n" + text)
     dataset = read.open(source, spacing_um=(1, 1, 1))
@@ -176,7 +176,7 @@ def test_slices_by_links_out_of_the_folder_are_refused_without_their_names(home:
     bait = paths[2].rename(home / "Doe^Jane.dcm")
     paths[2].symlink_to(bait)
     line = refusal(home / "s")
-    assert "file 3 of 6 in the order of names: is a link that leads out of the folder" in line
+    assert "file 3 of 6 in the order of names: found a link that leads out of the folder" in line
     assert "Doe" not in line
     assert paths[2].name not in line
 
@@ -214,7 +214,7 @@ def test_a_dicomdir_s_references_are_not_followed(home: Path) -> None:
 
 @pytest.mark.parametrize("name", ["x.ome.tif", "x.nii", "x.nii.gz", "x.dcm", "x.zarr"])
 @pytest.mark.parametrize("kind", ["pipe", "device"])
-def test_a_pipe_or_a_device_is_no_source(home: Path, name: str, kind: str) -> None:
+def test_a_pipe_or_a_device_is_refused_as_a_source(home: Path, name: str, kind: str) -> None:
     path = home / name
     os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
     assert re.search(r"is no regular file, expected one$", refusal(path))

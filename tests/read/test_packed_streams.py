@@ -1,4 +1,4 @@
-"""Every packed stream is read to its checksum, and damage is refused in one line."""
+"""Every compressed stream is read to its checksum, and damage is refused in one line."""
 
 import bz2
 import gzip
@@ -46,7 +46,7 @@ from support.reading import refusing
 
 
 def zstd_stream(raw: bytes) -> bytes:
-    """Return a frame that does not state its size, as Java's streams write it."""
+    """Return a frame that does not state its size, like Java's streams."""
     packer = zstandard.ZstdCompressor(write_checksum=True).compressobj()
     return packer.compress(raw) + packer.flush()
 
@@ -60,7 +60,7 @@ NONE = 0  # the stream has no checksum: a flipped byte gives other voxels, or th
 
 
 class Row(NamedTuple):
-    """A packed format, and the distance of its checksum from the stream's end in bytes."""
+    """A compressed format, and the distance of its checksum from the stream's end in bytes."""
 
     write: Callable[[Path], Stream]
     checksum_at: int
@@ -167,7 +167,7 @@ def test_damage_in_a_packed_file_is_refused_in_one_line(tmp_path: Path, name: st
     flipped[(stream.start + stream.stop) // 2] ^= 0x10
     stream.file.write_bytes(flipped)
     if row.checksum_at == NONE:
-        with suppress(SourceError):  # either outcome is right, and any other error is a fault
+        with suppress(SourceError):  # both outcomes are right, and any other error is a fault
             digest(stream.source)
     else:
         refusal(stream.source)
@@ -260,8 +260,6 @@ def test_damage_in_a_page_of_parquet_is_refused(tmp_path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0x10
     path.write_bytes(content)
-    again = (
-        r"\.parquet: damaged \(the library says: .*\), expected a Parquet file that is whole: copy"
-    )
+    again = r"\.parquet: damaged \(the library says: .*\), expected a complete Parquet file: copy"
     with pytest.raises(SourceError, match=again):
         read_table(str(path), "label", (), "cells")

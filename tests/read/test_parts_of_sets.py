@@ -73,7 +73,7 @@ def test_the_share_of_pages_that_the_ome_xml_leaves_out_is_reported(tmp_path: Pa
 
 
 @pytest.mark.parametrize("compression", [None, "zlib"])
-def test_pages_that_imagej_s_description_does_not_count_are_told(
+def test_pages_that_imagej_s_description_does_not_count_are_reported(
     tmp_path: Path, compression: str | None
 ) -> None:
     path = tmp_path / "a.tif"
@@ -117,7 +117,7 @@ def test_tiles_that_a_smaller_level_does_not_store_are_reported(tmp_path: Path) 
 
 
 def write_set(folder: Path) -> list[Path]:
-    """Write OME-TIFF as two files of eight planes, each with the OME-XML of both."""
+    """Write an OME-TIFF as two files of eight planes, each with the OME-XML of both."""
     names = ["a.ome.tif", "b.ome.tif"]
     planes = "".join(
         f'<TiffData FirstZ="{8 * i}" IFD="0" PlaneCount="8"><UUID FileName="{name}">urn:uuid:{i}'
@@ -188,7 +188,7 @@ def count_times(file: h5py.File) -> None:
         ),
         (
             lose("DataSet/ResolutionLevel 0/TimePoint 0/Channel 0"),
-            "found 0 of Channel|found Channel 1 and no Channel 0",
+            "found 0 groups Channel|found Channel 1 and no Channel 0",
         ),
         (lose("DataSet/ResolutionLevel 0/TimePoint 0"), "TimePoint"),
         (lose("DataSet/ResolutionLevel 0"), "ResolutionLevel"),
@@ -296,7 +296,7 @@ def test_views_of_bigdataviewer_are_compared_with_its_xml(
         assert len(whole(path).channels) == 3
 
 
-def test_a_group_with_a_huge_number_is_refused_without_a_list_of_those_before(
+def test_a_group_with_a_huge_number_is_refused_without_listing_smaller_ones(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "a.h5"

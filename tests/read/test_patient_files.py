@@ -30,7 +30,7 @@ def scene_on(affine: NDArray[np.float64], dtype: Any = np.int16) -> NDArray[Any]
 
 
 def write(path: Path, affine: NDArray[np.float64], voxels: Any, *, compress: bool = False) -> Path:
-    """Write (i, j, k) voxels, or (i, j, k, c), whose affine is of LPS, by SimpleITK."""
+    """Write (i, j, k) voxels, or (i, j, k, c), with an affine to LPS, with SimpleITK."""
     order = (2, 1, 0, 3)[: voxels.ndim]
     image = sitk.GetImageFromArray(voxels.transpose(order), isVector=voxels.ndim == 4)
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
@@ -60,7 +60,7 @@ def test_every_voxel_lies_where_the_scene_has_it(
 
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd"])
-def test_a_left_handed_grid_is_no_mirror_image(tmp_path: Path, suffix: str) -> None:
+def test_a_left_handed_grid_is_not_mirrored(tmp_path: Path, suffix: str) -> None:
     affine = grid("coronal", rotation=OBLIQUE)
     affine[:3, 3] += (SHAPE[2] - 1) * affine[:3, 2]
     affine[:3, 2] *= -1
@@ -68,7 +68,7 @@ def test_a_left_handed_grid_is_no_mirror_image(tmp_path: Path, suffix: str) -> N
 
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd"])
-def test_a_window_is_the_part_of_the_whole(tmp_path: Path, suffix: str) -> None:
+def test_a_window_equals_that_part_of_the_whole(tmp_path: Path, suffix: str) -> None:
     affine = grid("sagittal")
     dataset = read.open(write(tmp_path / f"a{suffix}", affine, scene_on(affine)))
     box = Box((3, 2, 5), (11, 14, 17))
@@ -76,7 +76,7 @@ def test_a_window_is_the_part_of_the_whole(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_several_values_a_voxel_are_channels(tmp_path: Path, suffix: str) -> None:
+def test_several_values_per_voxel_are_channels(tmp_path: Path, suffix: str) -> None:
     affine = grid()
     both = np.stack([scene_on(affine), scene_on(affine) + 7], axis=-1)
     dataset = read.open(write(tmp_path / f"a{suffix}", affine, both))
@@ -87,7 +87,7 @@ def test_several_values_a_voxel_are_channels(tmp_path: Path, suffix: str) -> Non
 
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd"])
-def test_points_in_time_are_chosen(tmp_path: Path, suffix: str) -> None:
+def test_time_points_are_chosen(tmp_path: Path, suffix: str) -> None:
     voxels = np.stack([f_phantom(), f_phantom() + 9])
     if suffix == ".nrrd":
         header = {"space": "left-posterior-superior-time", "kinds": ["domain"] * 3 + ["time"]}
@@ -131,7 +131,7 @@ def test_a_nrrd_whose_voxels_lie_in_several_files_is_refused(tmp_path: Path, fil
     assert "data file: found a list of files, expected one" in refusal(tmp_path / "a.nhdr")
 
 
-def test_a_nrrd_of_no_body_is_a_stack_as_stored(tmp_path: Path) -> None:
+def test_a_nrrd_without_anatomical_axes_is_a_stack_as_stored(tmp_path: Path) -> None:
     header = {"space dimension": 3, "space units": ["microns"] * 3}
     header |= {"space directions": np.diag([0.25, 0.2, 0.5])}  # type: ignore[dict-item]
     nrrd.write(str(tmp_path / "My brain.nrrd"), f_phantom(), header, index_order="C")
@@ -173,7 +173,7 @@ def test_pairs_are_read_by_either_name(tmp_path: Path, kind: str, named: str) ->
         for file in list(tmp_path.iterdir()):
             file.rename(file.with_name(file.name.upper()))
     dataset = read.open(tmp_path / named)
-    if kind != "analyze":  # which holds no place
+    if kind != "analyze":  # Analyze states no place
         assert error(dataset) <= 0.51
     assert dataset.name == ("NIfTI" if kind == "nifti pair" else "Analyze")
     assert any("states no orientation" in note for note in dataset.notes) == (kind != "nifti pair")
@@ -201,7 +201,9 @@ def test_voxels_elsewhere_are_refused(tmp_path: Path, suffix: str, named: str) -
 
 
 @pytest.mark.parametrize("suffix", HEADS)
-def test_voxels_beside_the_header_are_read_and_must_be_whole(tmp_path: Path, suffix: str) -> None:
+def test_voxels_beside_the_header_are_read_and_must_be_complete(
+    tmp_path: Path, suffix: str
+) -> None:
     path = tmp_path / f"a{suffix}"
     path.write_text(HEADS[suffix].format("b c.raw"))
     assert "not found" in refusal(path)
@@ -219,7 +221,9 @@ def test_voxels_beside_the_header_are_read_and_must_be_whole(tmp_path: Path, suf
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd"])
 @pytest.mark.parametrize("compress", [False, True])
-def test_a_file_cut_short_is_one_line(tmp_path: Path, suffix: str, compress: bool) -> None:
+def test_a_file_that_is_cut_short_is_refused_in_one_line(
+    tmp_path: Path, suffix: str, compress: bool
+) -> None:
     affine = grid()
     path = write(tmp_path / f"a{suffix}", affine, scene_on(affine), compress=compress)
     content = path.read_bytes()
@@ -228,11 +232,11 @@ def test_a_file_cut_short_is_one_line(tmp_path: Path, suffix: str, compress: boo
         refusal(path)
     path.unlink()
     path.mkdir()
-    assert "is a folder" in refusal(path)
+    assert "found a folder" in refusal(path)
 
 
 @pytest.mark.slow
-def test_a_bomb_unpacks_no_further_than_the_header_says(tmp_path: Path) -> None:
+def test_a_decompression_bomb_unpacks_no_further_than_the_header_states(tmp_path: Path) -> None:
     head = HEADS[".nhdr"].replace("raw\ndata file: {}", "bzip2\n").encode()
     (tmp_path / "a.nrrd").write_bytes(head + bz2.compress(bytes(1 << 26)))
     assert whole(read.open(tmp_path / "a.nrrd")).shape == (5, 6, 4)
@@ -246,18 +250,23 @@ def test_a_bomb_unpacks_no_further_than_the_header_says(tmp_path: Path) -> None:
         (".mhd", "MET_UCHAR", "MET_STRING", "ElementType: found MET_STRING"),
         (".mhd", "ElementSpacing = 1 1 1\n", "", "ElementSpacing: not found"),
         (".mhd", "1 1 1", "1 nan 1", "ElementSpacing: found '1 nan 1'"),
-        (".mhd", "NDims", "TransformMatrix = 1 0 0 1 0 0 0 0 1\nNDims", "no three axes"),
+        (
+            ".mhd",
+            "NDims",
+            "TransformMatrix = 1 0 0 1 0 0 0 0 1\nNDims",
+            "don't span three dimensions",
+        ),
         (".nhdr", "sizes: 4 5 6", "sizes: 4 5 0", "sizes"),
         (".nhdr", "uint8", "block", "type: found 'block'"),
         (".nhdr", "encoding: raw", "encoding: hex", "encoding: found 'hex'"),
         (".nhdr", "(0,0,1)", "none", "found 2 axes of space"),
-        (".nhdr", "(0,0,1)", "(0,1,0)", "no three axes"),
+        (".nhdr", "(0,0,1)", "(0,1,0)", "don't span three dimensions"),
         (".nhdr", "LPS", "left-right-superior", "expected three axes of the body"),
         (".nhdr", "NRRD0004", "NRRD9999", "expected an NRRD file"),
         (".nhdr", "type: uint8\n", "", "'type' is missing"),
     ],
 )
-def test_fields_out_of_order_are_named(
+def test_invalid_fields_are_named(
     tmp_path: Path, suffix: str, old: str, new: str, message: str
 ) -> None:
     (tmp_path / "b.raw").write_bytes(bytes(120))

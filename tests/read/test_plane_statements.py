@@ -22,7 +22,7 @@ GDAL = (
 
 
 def write_planes(folder: Path, **of_half: Any) -> Path:
-    """Write BODY plane by plane for ImageJ; the second half has other metadata or resolution."""
+    """Write BODY plane by plane like ImageJ; the second half has other metadata or resolution."""
     folder.mkdir(exist_ok=True)
     for z, plane in enumerate(BODY):
         options: dict[str, Any] = {"resolution": (4.0, 5.0), "metadata": {"unit": "um"}}
@@ -66,7 +66,7 @@ def test_planes_whose_zero_is_white_are_noted_and_not_mixed(tmp_path: Path) -> N
         tifffile.imwrite(path, plane, photometric="miniswhite", metadata=None)
     assert any("0 is white" in note for note in read.open(tmp_path, spacing_um=UM).notes)
     tifffile.imwrite(tmp_path / "a_z00.tif", BODY[0], photometric="minisblack", metadata=None)
-    with pytest.raises(SourceError, match="15 of 16 planes whose 0 is white"):
+    with pytest.raises(SourceError, match="0 for white in 15 of 16 planes"):
         read.open(tmp_path, spacing_um=UM)
 
 
@@ -100,13 +100,13 @@ def test_voxel_sizes_of_stacks_are_compared(tmp_path: Path) -> None:
     assert any("a_c1.tif states 1 um: a_c0.tif is used" in note for note in dataset.notes)
 
 
-def test_stacks_of_unlike_depth_are_refused_with_their_sizes(tmp_path: Path) -> None:
+def test_stacks_of_different_depth_are_refused_with_their_sizes(tmp_path: Path) -> None:
     path = write_stacks(tmp_path, [BODY, BODY[:8]], [{}, {}])
     with pytest.raises(SourceError, match=r"found 8 x 48 x 36 voxels .* expected 16 x 48 x 36"):
         read.open(path)
 
 
-def test_pages_of_unlike_orientation_are_refused(tmp_path: Path) -> None:
+def test_pages_of_different_orientation_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.tif"
     with tifffile.TiffWriter(path) as writer:
         for z, plane in enumerate(BODY):
@@ -138,7 +138,7 @@ def test_the_scale_of_gdal_is_applied(tmp_path: Path, slope: float) -> None:
     assert any(f"SCALE {slope:g} and OFFSET -1024 of GDAL" in note for note in dataset.notes)
 
 
-def test_the_missing_value_of_gdal_is_no_measurement(tmp_path: Path) -> None:
+def test_the_missing_value_of_gdal_is_not_a_measurement(tmp_path: Path) -> None:
     stored = BODY.astype(np.float32) + 5
     stored[3, :4] = -9999
     path = tmp_path / "a.tif"

@@ -1,4 +1,4 @@
-"""Folders of planes: how names are read, and voxels against what other libraries wrote."""
+"""Folders of planes: how names are read, and voxels compared with what other libraries wrote."""
 
 import struct
 from collections.abc import Callable
@@ -109,7 +109,9 @@ def test_names_are_understood(tmp_path: Path, form: str) -> None:
         ("folders of words", ["green", "red"]),
     ],
 )
-def test_channels_have_the_words_of_the_names(tmp_path: Path, form: str, names: list[str]) -> None:
+def test_channels_are_called_by_the_words_in_the_names(
+    tmp_path: Path, form: str, names: list[str]
+) -> None:
     pixels = volume(10, 14)
     label = {"words": lambda c, z: f"cells {('DAPI', 'GFP')[c]} {z}.tif"}.get(form, NAMES[form])
     folder = fill(tmp_path, {label(c, z): pixels for c in range(2) for z in range(3)})
@@ -117,7 +119,7 @@ def test_channels_have_the_words_of_the_names(tmp_path: Path, form: str, names: 
     assert [channel.name for channel in dataset.channels] == names
 
 
-def test_points_in_time_are_told_by_t(tmp_path: Path) -> None:
+def test_time_points_are_recognised_by_the_letter_t(tmp_path: Path) -> None:
     stored = volume(3, 4, 10, 14)
     folder = fill(tmp_path, {f"x_t{t}_z{z}.tif": stored[t, z] for t in range(3) for z in range(4)})
     dataset = read.open(folder, time=2, spacing_um=GIVEN)
@@ -201,7 +203,7 @@ def test_a_folder_of_one_stack_is_read_as_the_stack(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_all(read.open(tmp_path, spacing_um=GIVEN))[0], stored)
 
 
-def test_series_of_the_names_are_listed_and_chosen(tmp_path: Path) -> None:
+def test_series_in_the_names_are_listed_and_chosen(tmp_path: Path) -> None:
     stored = volume(2, 3, 10, 14)
     names = {f"x_Series00{s}_z{z}.tif": stored[s, z] for s in range(2) for z in range(3)}
     folder = fill(tmp_path, names)
@@ -215,7 +217,7 @@ def test_series_of_the_names_are_listed_and_chosen(tmp_path: Path) -> None:
     assert "expected 1 to 2" in refusal(folder, UsageError, series=3)
 
 
-def test_a_pattern_tells_names_apart(tmp_path: Path) -> None:
+def test_a_pattern_explains_the_names(tmp_path: Path) -> None:
     stored = volume(2, 3, 10, 14)
     names = {f"{z} of day 1, ({c}) [x].tif": stored[c, z] for c in range(2) for z in range(3)}
     folder = fill(tmp_path, names)
@@ -225,19 +227,19 @@ def test_a_pattern_tells_names_apart(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_all(other), stored.transpose(1, 0, 2, 3))
     alone = read.open(folder, pattern="{z} of day 1, (1) [x].tif", spacing_um=GIVEN)
     np.testing.assert_array_equal(read_all(alone)[0], stored[1])
-    assert "3 files whose names the pattern doesn't fit left out" in alone.notes
+    assert "3 files whose names don't fit the pattern left out" in alone.notes
 
 
 @pytest.mark.parametrize(
     ("pattern", "told"),
     [
-        ("y_{z}.tif", "none of 3 files matches, as 'x_z0.tif'"),
+        ("y_{z}.tif", "none of 3 files matches, such as 'x_z0.tif'"),
         ("x_z{n}.tif", "{n} is unknown"),
         ("{z}{z}", "expected a name with {z}"),
         ("(((", "none of 3 files matches"),
     ],
 )
-def test_a_pattern_that_fits_nothing_is_told(tmp_path: Path, pattern: str, told: str) -> None:
+def test_a_pattern_that_fits_nothing_is_refused(tmp_path: Path, pattern: str, told: str) -> None:
     folder = fill(tmp_path, {f"x_z{z}.tif": volume(4, 4) for z in range(3)})
     assert told in refusal(folder, UsageError, pattern=pattern)
 
@@ -260,17 +262,17 @@ def test_missing_planes_are_refused_by_name(tmp_path: Path) -> None:
         ([f"x_z{z}.tif" for z in (10, 11, 12)], "3 planes (10 to 12)"),
     ],
 )
-def test_numbers_that_no_name_has_are_told(tmp_path: Path, names: list[str], told: str) -> None:
+def test_numbers_that_no_name_has_are_noted(tmp_path: Path, names: list[str], told: str) -> None:
     folder = fill(tmp_path, dict.fromkeys(names, volume(4, 4)))
     notes = read.open(folder, spacing_um=GIVEN).notes
     assert any(told in note for note in notes), notes
 
 
-def test_numbers_that_are_no_row_are_refused(tmp_path: Path) -> None:
+def test_numbers_that_are_not_consecutive_are_refused(tmp_path: Path) -> None:
     for numbers in ((1, 2, 900_000_000_000), (20240101, 31, 7), (1, 2, 4, 10**30)):
         folder = fill(tmp_path / str(numbers), {f"x{n}.tif": volume(4, 4) for n in numbers})
         line = refusal(folder)
-        assert "missing" in line or "expected numbers in a row" in line
+        assert "missing" in line or "expected consecutive numbers" in line
 
 
 def test_two_files_of_one_plane_are_refused(tmp_path: Path) -> None:
@@ -294,10 +296,13 @@ def test_planes_that_differ_are_named(tmp_path: Path, odd: NDArray[Any], told: s
     assert "'z3.tif'" in line
 
 
-def test_files_that_are_no_volume_are_refused(tmp_path: Path) -> None:
+def test_files_that_do_not_form_a_volume_are_refused(tmp_path: Path) -> None:
     flat = fill(tmp_path / "flat", {"DAPI.tif": volume(4, 4), "GFP.tif": volume(4, 4)})
     assert "no number in their names that counts planes" in refusal(flat)
-    for names, told in ((("a b", "c", "d e f"), "named alike"), (("p1", "p2"), "make no volume")):
+    for names, told in (
+        (("a b", "c", "d e f"), "named alike"),
+        (("p1", "p2"), "show a volume"),
+    ):
         mixed = tmp_path / names[0]
         mixed.mkdir()
         for name in names:
@@ -306,7 +311,7 @@ def test_files_that_are_no_volume_are_refused(tmp_path: Path) -> None:
         assert told in refusal(mixed)
 
 
-def test_other_kinds_of_images_are_left_out_and_told(tmp_path: Path) -> None:
+def test_other_kinds_of_images_are_left_out_and_noted(tmp_path: Path) -> None:
     stored = volume(5, 10, 14)
     fill(tmp_path, {f"z{z}.tif": stored[z] for z in range(5)})
     fill(tmp_path, {"overview.png": volume(4, 4, dtype="uint8")}, png)
@@ -317,15 +322,15 @@ def test_other_kinds_of_images_are_left_out_and_told(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_all(dataset)[0], stored)
     told = " | ".join(dataset.notes)
     for words in (
-        "1 images in folders below left out",
-        "7 TIFF are read, 1 others left out",
-        "1 thumbnails left out",
-        "1 file that is named otherwise left out",
+        "1 image in folders below left out",
+        "7 TIFF are read, 1 other left out",
+        "1 thumbnail left out",
+        "1 file with another name left out",
     ):
         assert words in told
 
 
-def test_a_plane_that_is_cut_short_or_no_image_is_named(tmp_path: Path) -> None:
+def test_a_plane_that_is_cut_short_or_not_an_image_is_named(tmp_path: Path) -> None:
     for suffix, write in (("tif", tiff), ("png", png), ("jpg", pillow)):
         for spoilt in (0.0, 0.3, 0.9):
             folder = tmp_path / f"{suffix}{spoilt}"
@@ -345,7 +350,7 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
     assert "'z3.tif': leads to" in refusal(folder)
 
 
-def test_a_png_that_claims_much_takes_no_memory(tmp_path: Path) -> None:
+def test_a_png_that_claims_a_huge_size_takes_no_memory(tmp_path: Path) -> None:
     folder = fill(tmp_path, {f"z{z}.png": volume(4, 4, dtype="uint8") for z in range(3)}, png)
     for path in folder.iterdir():
         content = bytearray(path.read_bytes())
@@ -383,8 +388,8 @@ def test_a_folder_of_dicom_with_pictures_stays_dicom(tmp_path: Path) -> None:
     assert "no DICOM image" in refusal(tmp_path)
 
 
-def test_a_folder_of_planes_tells_what_else_it_holds(tmp_path: Path) -> None:
-    """A preview beside a NIfTI must not be taken for the volume without a word."""
+def test_other_formats_in_a_folder_of_planes_are_noted(tmp_path: Path) -> None:
+    """A preview beside a NIfTI must not silently be read as the volume."""
     (tmp_path / "head.nii.gz").touch()
     png(tmp_path / "preview.png", np.zeros((8, 9), np.uint8))
     with pytest.raises(SourceError, match=r"by its own name \(1 NIfTI or Analyze\)"):
@@ -393,4 +398,4 @@ def test_a_folder_of_planes_tells_what_else_it_holds(tmp_path: Path) -> None:
         png(tmp_path / f"z{number}.png", np.zeros((8, 9), np.uint8))
     (tmp_path / "preview.png").unlink()
     notes = read.open(tmp_path, spacing_um=(1, 1, 1)).notes
-    assert any("holds 1 NIfTI or Analyze too" in note for note in notes)
+    assert any("also holds 1 NIfTI or Analyze" in note for note in notes)

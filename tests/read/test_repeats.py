@@ -1,4 +1,4 @@
-"""A field that a file states twice with different values is one note, and the reader's choice."""
+"""A field that a file states twice with different values gives one note, and one value is used."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ def write_zarr(folder: Path, version: int) -> Path:
 
 
 def repeat(file: Path, key: str, earlier: Any) -> None:
-    """State a key of a JSON file once more, before its first place, with another value."""
+    """Repeat a key of a JSON file before its first place, with another value."""
     text = file.read_text("utf-8")
     before = f'"{key}": {json.dumps(earlier)}, '
     assert f'"{key}":' in text
@@ -44,13 +44,13 @@ def test_a_key_of_zarr_that_is_stated_twice_is_one_note(tmp_path: Path, version:
     file = write_zarr(tmp_path / "a.zarr", version)
     repeat(file, "multiscales", multiscales([9, 1, 1]))
     dataset = read.open(tmp_path / "a.zarr")
-    assert dataset.levels[0].spacing_um == (2, 1, 1)  # as json, and so zarr, reads it
+    assert dataset.levels[0].spacing_um == (2, 1, 1)  # json, and so zarr, reads this value
     (note,) = [one for one in dataset.notes if "multiscales" in one]
-    assert f"key multiscales of {file.name}, which stands there 2 times" in note
+    assert f"key multiscales of {file.name}, which is there 2 times" in note
     assert "its last value is used" in note
 
 
-def test_an_array_of_zarr_is_looked_at_too(tmp_path: Path) -> None:
+def test_an_array_of_zarr_is_checked_too(tmp_path: Path) -> None:
     write_zarr(tmp_path / "a.zarr", 2)
     repeat(tmp_path / "a.zarr" / "0" / ".zarray", "fill_value", 7)
     notes = read.open(tmp_path / "a.zarr").notes
@@ -64,7 +64,7 @@ def test_a_key_that_is_stated_twice_with_one_value_needs_no_note(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_keys_of_n5_and_of_vigra_are_looked_at(tmp_path: Path) -> None:
+def test_keys_of_n5_and_of_vigra_are_checked(tmp_path: Path) -> None:
     folder = tmp_path / "a.n5" / "s0"
     (folder / "0" / "0").mkdir(parents=True)
     header = np.array([0, 3], ">u2").tobytes() + np.array([8, 8, 4], ">u4").tobytes()
@@ -85,7 +85,7 @@ def test_keys_of_n5_and_of_vigra_are_looked_at(tmp_path: Path) -> None:
             '[{"key": "z", "resolution": 2}, {"key": "y"}, {"key": "x"}]}'
         )
     notes = read.open(tmp_path / "a.h5", spacing_um=(2, 1, 1)).notes
-    assert sum("of axistags, which stands there 2 times" in note for note in notes) == 2
+    assert sum("of axistags, which is there 2 times" in note for note in notes) == 2
 
 
 def ome_xml(pixels: str) -> str:
@@ -114,9 +114,7 @@ PLANES = '<Plane TheZ="0" TheC="0" TheT="0" PositionZ="{}"/>'
         (pixels_with(2, '<Channel ID="Channel:0:0" Name="B"/>'), "element Channel in Pixels"),
     ],
 )
-def test_an_element_of_ome_xml_that_may_stand_once_is_one_note(
-    tmp_path: Path, pixels: str, words: str
-) -> None:
+def test_a_repeated_element_of_ome_xml_is_one_note(tmp_path: Path, pixels: str, words: str) -> None:
     path = tmp_path / "a.ome.tif"
     tifffile.imwrite(
         path, VOXELS, description=ome_xml(pixels), metadata=None, photometric="minisblack"
@@ -128,7 +126,7 @@ def test_an_element_of_ome_xml_that_may_stand_once_is_one_note(
     assert "the first one is used" in note
 
 
-def test_nothing_is_recorded_where_nobody_asks() -> None:
+def test_nothing_is_recorded_outside_a_collection() -> None:
     assert load_json('{"a": 1, "a": 2}', "x") == {"a": 2}
     with collected() as notes:
         assert load_json('{"a": [1, 2], "a": [1, 3], "b": 1, "b": 1}', "x") == {"a": [1, 3], "b": 1}

@@ -34,7 +34,7 @@ def test_slices_have_the_voxel_size_of_their_log(tmp_path: Path, ending: str) ->
     dataset = scan(tmp_path / "s", ending, LOG.format("", "Pixel Size (um)=9.92\n"))
     assert dataset.levels[0].spacing_um == pytest.approx((9.92, 9.92, 9.92))
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, VOXELS)
-    assert "the voxel size is that of the scanner's log: 9.92 um" in dataset.notes
+    assert "the voxel size comes from the scanner's log: 9.92 um" in dataset.notes
     assert not any("Ann Other" in note for note in dataset.notes)
 
 
@@ -61,7 +61,7 @@ def test_numbers_of_slices_count_lines_of_the_camera(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("count", "is_told"), [(48, True), (len(VOXELS), False)])
-def test_a_log_that_counts_other_slices_is_told(tmp_path: Path, count: int, is_told: bool) -> None:
+def test_a_log_that_counts_other_slices_is_noted(tmp_path: Path, count: int, is_told: bool) -> None:
     lines = f"Sections Count={count}\nPixel Size (um)=9.92\n"
     dataset = scan(tmp_path / "s", ".bmp", LOG.format("", lines))
     told = f"found {len(VOXELS)} images, and the log states {count}"

@@ -1,4 +1,4 @@
-"""Values that a source states more than once: the most trusted one is taken, and a note says so."""
+"""Values that a source states more than once: the most trusted one is used, and a note says so."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def test_a_measured_value_is_trusted_more_than_a_field() -> None:
     )
 
 
-def test_a_user_is_told_of_no_contradiction_that_their_value_settles() -> None:
+def test_a_contradiction_that_the_user_s_own_value_settles_needs_no_note() -> None:
     given = Statement(2.0, "--spacing-um", Trust.GIVEN)
     assert settle(_SPACING_Z, [Statement(1.0, "PhysicalSizeZ"), given]).notes == ()
 

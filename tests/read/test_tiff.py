@@ -18,7 +18,8 @@ from stereocell.read.spacing import Triple
 from support.tiff_files import write_lsm, write_ndtiff, write_stk
 
 GIVEN: Triple = (2.0, 1.0, 1.0)
-SIZES = {"T": 3, "Z": 5, "C": 2, "Y": 12, "X": 14, "S": 3}  # 3 or 4 planes tifffile takes for RGB
+# tifffile would take 3 or 4 planes for RGB
+SIZES = {"T": 3, "Z": 5, "C": 2, "Y": 12, "X": 14, "S": 3}
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -58,7 +59,7 @@ def hold_voxels(dataset: read.Dataset, stored: NDArray[Any], axes: str) -> None:
 @pytest.mark.parametrize("axes", ["ZYX", "ZCYX", "TZYX", "TZCYX"])
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
 @pytest.mark.parametrize("unit", ["micron", "\\u00B5m", "um"])
-def test_imagej_hyperstacks(tmp_path: Path, axes: str, dtype: str, unit: str) -> None:
+def test_imagej_hyperstacks_are_read(tmp_path: Path, axes: str, dtype: str, unit: str) -> None:
     stored = counted(axes, dtype)
     path = tmp_path / "a stack's \u00b5.TIF"
     tifffile.imwrite(
@@ -69,11 +70,11 @@ def test_imagej_hyperstacks(tmp_path: Path, axes: str, dtype: str, unit: str) ->
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.25, 0.2))
     assert dataset.time_points == (3 if "T" in axes else 1)
     assert len(dataset.channels) == (2 if "C" in axes else 1)
-    assert not any("doesn't say" in note for note in dataset.notes)
+    assert not any("doesn't state" in note for note in dataset.notes)
     hold_voxels(dataset, stored, axes)
 
 
-def test_imagej_colours_and_names_of_channels(tmp_path: Path) -> None:
+def test_imagej_colours_and_names_of_channels_are_read(tmp_path: Path) -> None:
     ramp, none = np.arange(256, dtype=np.uint8), np.zeros(256, np.uint8)
     path = tmp_path / "x.tif"
     tifffile.imwrite(
@@ -96,7 +97,7 @@ def test_imagej_colours_and_names_of_channels(tmp_path: Path) -> None:
         [str(i) for i in range(10)],
     ],
 )
-def test_labels_of_slices_are_no_names(tmp_path: Path, labels: list[str]) -> None:
+def test_labels_of_slices_are_not_names_of_channels(tmp_path: Path, labels: list[str]) -> None:
     path = tmp_path / "x.tif"
     metadata = {"axes": "ZCYX", "Labels": labels, "Info": "Patient = Jane Doe"}
     tifffile.imwrite(path, counted("ZCYX"), imagej=True, metadata=metadata)
@@ -115,7 +116,9 @@ def test_labels_of_slices_are_no_names(tmp_path: Path, labels: list[str]) -> Non
         ({"unit": "um", "spacing": 0.0}, "voxel size z of level 0: found 0 um"),
     ],
 )
-def test_imagej_s_spacing_in_part(tmp_path: Path, metadata: dict[str, Any], told: str) -> None:
+def test_an_incomplete_spacing_of_imagej_is_reported(
+    tmp_path: Path, metadata: dict[str, Any], told: str
+) -> None:
     path = tmp_path / "x.tif"
     metadata = {"axes": "ZYX", **metadata}
     tifffile.imwrite(path, counted("ZYX"), imagej=True, resolution=(5.0, 4.0), metadata=metadata)
@@ -123,8 +126,8 @@ def test_imagej_s_spacing_in_part(tmp_path: Path, metadata: dict[str, Any], told
     assert read.open(path, spacing_um=GIVEN).levels[0].spacing_um == GIVEN
 
 
-def test_imagej_s_stack_behind_one_directory(tmp_path: Path) -> None:
-    """Over 4 GB ImageJ writes one directory, and says in words how many planes follow."""
+def test_a_stack_of_imagej_with_one_directory_is_read(tmp_path: Path) -> None:
+    """Over 4 GB ImageJ writes one directory, and its description states how many planes follow."""
     stored = counted("TZCYX").astype(">u2")
     path = tmp_path / "big.tif"
     words = "ImageJ=1.54f\nimages=30\nchannels=2\nslices=5\nframes=3\nhyperstack=true\n"
@@ -147,7 +150,7 @@ def test_imagej_s_stack_behind_one_directory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("byteorder", ["<", ">"])
 @pytest.mark.parametrize("options", [{}, {"compression": "zlib"}, {"tile": (16, 16)}])
 @pytest.mark.parametrize("suffix", [".tif", ".TIFF", ".btf", ".tf8", ".dat"])
-def test_pages_of_no_kind_are_slices_and_a_note_says_so(
+def test_pages_of_unknown_kind_are_slices_and_a_note_says_so(
     tmp_path: Path, bigtiff: bool, byteorder: Any, options: dict[str, Any], suffix: str
 ) -> None:
     stored = counted("ZYX")
@@ -157,11 +160,11 @@ def test_pages_of_no_kind_are_slices_and_a_note_says_so(
             writer.write(plane, metadata=None, contiguous=False, **options)
     dataset = read.open(path, spacing_um=GIVEN)
     hold_voxels(dataset, stored, "ZYX")
-    assert dataset.notes == ("the file doesn't say what its pages are: read as 5 slices along z",)
+    assert dataset.notes == ("the file doesn't state what its pages are: read as 5 slices along z",)
 
 
 @pytest.mark.parametrize("axes", ["ZYX", "CZYX", "TZCYX", "ZTYX", "ZYXS", "CYXZ"])
-def test_tifffile_s_own_axes(tmp_path: Path, axes: str) -> None:
+def test_axes_that_tifffile_writes_are_read(tmp_path: Path, axes: str) -> None:
     stored = counted(axes, "uint8" if "S" in axes else "uint16")
     path = tmp_path / "x.tif"
     metadata = {"axes": axes, "spacing": 0.5, "unit": "um"}
@@ -190,12 +193,12 @@ def test_two_unknown_axes_are_planes_and_few_channels(
     stored = np.arange(np.prod(shape), dtype=np.uint16).reshape(shape)
     tifffile.imwrite(tmp_path / "x.tif", stored, photometric="minisblack")
     dataset = read.open(tmp_path / "x.tif", spacing_um=GIVEN)
-    assert dataset.notes == (f"the file doesn't say what its pages are: read as {told}",)
+    assert dataset.notes == (f"the file doesn't state what its pages are: read as {told}",)
     hold_voxels(dataset, stored, "ZCYX" if shape[1] == 3 else "CZYX")
 
 
 @pytest.mark.parametrize("shape", [(20, 30, 12, 14), (5, 5, 12, 14), (2, 3, 20, 12, 14)])
-def test_axes_that_nobody_names_and_no_guess_fits_are_refused(
+def test_unnamed_axes_that_no_guess_fits_are_refused(
     tmp_path: Path, shape: tuple[int, ...]
 ) -> None:
     tifffile.imwrite(tmp_path / "x.tif", np.zeros(shape, np.uint8), photometric="minisblack")
@@ -217,7 +220,7 @@ def test_colour_pixels_become_three_channels(tmp_path: Path, is_planar: bool) ->
     hold_voxels(dataset, stored, "ZYXS")
 
 
-def test_colour_pixels_of_an_ome_tiff(tmp_path: Path) -> None:
+def test_colour_pixels_of_an_ome_tiff_become_channels(tmp_path: Path) -> None:
     stored = counted("ZYXS", "uint8")
     sizes = {"PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 2.0}
     tifffile.imwrite(
@@ -230,7 +233,7 @@ def test_colour_pixels_of_an_ome_tiff(tmp_path: Path) -> None:
     hold_voxels(dataset, stored, "ZYXS")
 
 
-def test_planes_that_an_lsm_s_description_does_not_count_are_told(tmp_path: Path) -> None:
+def test_planes_that_an_lsm_s_description_does_not_count_are_reported(tmp_path: Path) -> None:
     stored = np.random.default_rng(5).integers(0, 250, (5, 3, 48, 36)).astype(np.uint8)
     channels = {"a": (0, 255, 0), "b": (255, 0, 0), "c": (255, 255, 255)}
     path = write_lsm(tmp_path / "a.lsm", stored, (1.5, 0.4, 0.3), channels)
@@ -243,7 +246,7 @@ def test_planes_that_an_lsm_s_description_does_not_count_are_told(tmp_path: Path
 
 
 @pytest.mark.parametrize("suffix", [".lsm", ".LSM", ".tif"])
-def test_zeiss_lsm(tmp_path: Path, suffix: str) -> None:
+def test_zeiss_lsm_is_read(tmp_path: Path, suffix: str) -> None:
     stored = np.random.default_rng(5).integers(0, 250, (5, 3, 12, 14)).astype(np.uint8)
     channels = {"Ch2-T1": (0, 255, 0), "ChS1-T2": (255, 0, 0), "T PMT": (255, 255, 255)}
     path = write_lsm(tmp_path / f"cells{suffix}", stored, (1.5, 0.4, 0.3), channels)
@@ -259,7 +262,7 @@ def test_zeiss_lsm(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".stk", ".STK", ".tif"])
-def test_metamorph_stk(tmp_path: Path, suffix: str) -> None:
+def test_metamorph_stk_is_read(tmp_path: Path, suffix: str) -> None:
     stored = counted("ZYX")
     path = write_stk(tmp_path / f"cells{suffix}", stored, (1.5, 0.4, 0.3))
     np.testing.assert_array_equal(tifffile.imread(path), stored)
@@ -278,7 +281,7 @@ def test_a_centimetre_of_the_tags_counts_and_a_printer_s_inch_does_not(tmp_path:
         assert told in refusal(path)
 
 
-def test_a_larger_image_behind_a_preview_is_built(tmp_path: Path) -> None:
+def test_a_larger_image_after_a_preview_is_read(tmp_path: Path) -> None:
     stored = counted("ZYX")
     path = tmp_path / "x.tif"
     with tifffile.TiffWriter(path) as writer:
@@ -314,7 +317,7 @@ CUTS = (0.02, 0.3, 0.6, 0.9, 0.98)
 
 
 @pytest.mark.parametrize("kind", ["imagej", "shaped", "pages", "zlib", "stk", "lsm"])
-def test_a_file_that_is_cut_short_is_told_as_one(tmp_path: Path, kind: str) -> None:
+def test_a_file_that_is_cut_short_is_reported_as_such(tmp_path: Path, kind: str) -> None:
     stored = np.random.default_rng(2).integers(0, 60000, (9, 40, 40)).astype(np.uint16)
     path = tmp_path / "x.tif"
     if kind == "stk":
@@ -337,7 +340,7 @@ def test_a_file_that_is_cut_short_is_told_as_one(tmp_path: Path, kind: str) -> N
         line = refusal(path, spacing_um=GIVEN)
         found = line.partition(f"cut short at byte {len(short)} of ")[2].split()
         if kind == "lsm" and not found:
-            continue  # its channels' names lie behind the planes
+            continue  # its channels' names are stored after the planes
         assert len(short) < int(found[0]) <= len(content)
 
 
@@ -350,21 +353,21 @@ def test_a_file_that_is_cut_short_is_told_as_one(tmp_path: Path, kind: str) -> N
         (b"PK\x03\x04" + bytes(50), "a zip archive (unzip it"),
         (b"\x1f\x8b\x08" + bytes(50), "a gzip file"),
         (b"\x89PNG\r\n\x1a\n" + bytes(50), "a PNG image"),
-        (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+        (b"\x89HDF\r\n\x1a\n", "HDF5 file"),
         (bytes(4000), "zeros"),
         (b"just some words", "a text file"),
         (b"\x01\x02\x03\x04\xff", "begins with the bytes 01 02 03 04"),
     ],
 )
 @pytest.mark.parametrize("name", ["x.tif", "x.ome.tif", "x.lsm", "x.stk", "x.zip"])
-def test_what_is_no_tiff_is_told_by_its_first_bytes(
+def test_a_file_that_is_not_tiff_is_named_by_its_first_bytes(
     tmp_path: Path, head: bytes, told: str, name: str
 ) -> None:
     (tmp_path / name).write_bytes(head)
     assert f"found {told}" in refusal(tmp_path / name) or told in refusal(tmp_path / name)
 
 
-def test_broken_ome_xml_is_told_with_what_the_file_is_otherwise(tmp_path: Path) -> None:
+def test_broken_ome_xml_is_refused_with_a_description_of_the_pages(tmp_path: Path) -> None:
     text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Im'
     path = tmp_path / "x.ome.tif"
     tifffile.imwrite(path, counted("ZYX"), description=text, metadata=None)
@@ -377,7 +380,7 @@ def test_a_name_of_ome_tiff_without_ome_xml_is_noted(tmp_path: Path) -> None:
     path = tmp_path / "x.ome.tif"
     tifffile.imwrite(path, counted("ZYX"), imagej=True, metadata={"axes": "ZYX"})
     dataset = read.open(path, spacing_um=GIVEN)
-    assert "the name says OME-TIFF, but there is no OME-XML in it" in dataset.notes[0]
+    assert "the name says OME-TIFF, but the file has no OME-XML" in dataset.notes[0]
 
 
 def companion_set(folder: Path, stored: NDArray[Any], names: list[str]) -> str:
@@ -401,7 +404,7 @@ def companion_set(folder: Path, stored: NDArray[Any], names: list[str]) -> str:
     )
 
 
-def test_a_set_of_files_with_its_ome_xml_beside_them(tmp_path: Path) -> None:
+def test_a_set_of_files_with_its_ome_xml_beside_them_is_read(tmp_path: Path) -> None:
     stored = counted("ZYX")
     names = [f"x-Z{index}.ome.tiff" for index in range(5)]
     text = companion_set(tmp_path, stored, names)
@@ -431,7 +434,7 @@ def test_axes_are_those_that_the_user_names(tmp_path: Path) -> None:
     path = tmp_path / "x.tif"
     tifffile.imwrite(path, stored[:, 0], imagej=True, metadata={"axes": "TYX"})
     line = refusal(path, spacing_um=GIVEN)
-    assert "found 1 along z, and 5 points in time; expected slices: --axes zyx takes" in line
+    assert "found 1 along z, and 5 time points; expected slices: --axes zyx reads" in line
     hold_voxels(read.open(path, axes="zyx", spacing_um=GIVEN), stored[:, 0], "ZYX")
     tifffile.imwrite(path, stored, photometric="minisblack")
     for axes in ("zcyx", "Z,C,Y,X"):
@@ -443,19 +446,19 @@ def test_axes_are_those_that_the_user_names(tmp_path: Path) -> None:
     sizes = {"PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0, "PhysicalSizeZ": 2.0}
     ome = tmp_path / "x.ome.tif"
     tifffile.imwrite(ome, stored[:, 0], ome=True, metadata={"axes": "TYX", **sizes})
-    assert "--axes zyx takes the points in time for slices" in refusal(ome)
+    assert "--axes zyx reads the time points as slices" in refusal(ome)
     hold_voxels(read.open(ome, axes="zyx"), stored[:, 0], "ZYX")
 
 
 @pytest.mark.parametrize("axes", ["zyx", "zzyx", "tcyx", "zcyq", "zcyxt"])
-def test_axes_that_do_not_fit_are_told(tmp_path: Path, axes: str) -> None:
+def test_axes_that_do_not_fit_are_refused(tmp_path: Path, axes: str) -> None:
     tifffile.imwrite(tmp_path / "x.tif", counted("ZCYX"), photometric="minisblack")
-    with pytest.raises(UsageError, match=r"found axes 5, 2, 12, 14 long, expected 4 letters"):
+    with pytest.raises(UsageError, match=r"found axes of length 5, 2, 12, 14, expected 4 letters"):
         read.open(tmp_path / "x.tif", axes=axes, spacing_um=GIVEN)
 
 
 @pytest.mark.parametrize("option", [{"axes": "zyx"}, {"pattern": "{z}"}, {"series": 2}])
-def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, Any]) -> None:
+def test_an_option_of_another_format_is_refused(tmp_path: Path, option: dict[str, Any]) -> None:
     (name,) = option
     if name != "pattern":
         source = tmp_path / "x.nii"
@@ -467,7 +470,7 @@ def test_an_option_of_another_format_is_told(tmp_path: Path, option: dict[str, A
         read.open(source, **option)
 
 
-def test_ndtiff_with_its_index(tmp_path: Path) -> None:
+def test_ndtiff_is_read_with_its_index(tmp_path: Path) -> None:
     stored = counted("CZYX")
     path = write_ndtiff(tmp_path / "x_NDTiffStack.tif", stored, ["DAPI", "GFP"])
     with tifffile.TiffFile(path) as tiff:
@@ -485,7 +488,7 @@ def test_ndtiff_with_its_index(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("photometric", ["minisblack", "rgb"])
 def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photometric: Any) -> None:
-    """As a loop over `TiffWriter.write` leaves them: each is an array by itself to tifffile."""
+    """A loop over `TiffWriter.write` makes them: each plane is a separate array to tifffile."""
     planes = counted("ZYX") if photometric == "minisblack" else counted("ZYXS")[..., :3]
     with tifffile.TiffWriter(tmp_path / "x.tif") as writer:
         for plane in planes:
@@ -499,7 +502,7 @@ def test_planes_that_were_written_one_by_one_are_a_stack(tmp_path: Path, photome
     assert any(f"read as {len(planes)} slices along z" in note for note in dataset.notes)
 
 
-def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
+def test_a_companion_that_names_no_file_is_refused(tmp_path: Path) -> None:
     text = companion_set(tmp_path, counted("ZYX"), [f"x-Z{index}.ome.tiff" for index in range(5)])
     source = tmp_path / "y.companion.ome"
     for spoilt, told in (
@@ -512,7 +515,7 @@ def test_a_companion_that_names_no_file_is_told(tmp_path: Path) -> None:
         assert told in refusal(source)
 
 
-def test_a_file_at_an_address_is_read_and_told_where_it_is_cut(
+def test_a_file_at_an_address_is_read_or_reported_as_cut_short(
     tmp_path: Path, serve: Callable[[Path], Server]
 ) -> None:
     stored = counted("ZYX")

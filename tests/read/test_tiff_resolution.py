@@ -1,4 +1,4 @@
-"""The resolution in the tags of TIFF, beside the voxel size that a program's metadata state."""
+"""The resolution in the tags of TIFF, compared with the voxel size in a program's metadata."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ BODY, UM = f_phantom(), (0.5, 0.2, 0.25)
 def test_the_resolution_of_tifffile_s_file_is_in_the_unit_of_its_tag(
     tmp_path: Path, per_unit: float, resolution_unit: str
 ) -> None:
-    """An inch of tags is no length of voxels, so the unit of the description counts there."""
+    """An inch in the tags is not a length of voxels, so the unit in the description counts."""
     path = tmp_path / "a.tif"
     tifffile.imwrite(
         path, BODY, photometric="minisblack",

@@ -1,4 +1,4 @@
-"""Damaged TIFF files: offsets, sizes and counts that can't be those of one file."""
+"""Damaged TIFF files: offsets, sizes and counts that can't belong to one file."""
 
 import re
 from pathlib import Path
@@ -56,7 +56,7 @@ def test_an_offset_into_another_plane_is_refused(tmp_path: Path, layout: str) ->
     np.testing.assert_array_equal(_read(path), _STACK)
     tag = "TileOffsets" if "tile" in LAYOUTS[layout] else "StripOffsets"
     _change(path, 1, tag, _offset(path, 2, 0) + 8)
-    with pytest.raises(SourceError, match=r"share the bytes from .* on, expected ones that lie"):
+    with pytest.raises(SourceError, match=r"share the bytes from .* on, expected none"):
         _read(path)
 
 
@@ -79,7 +79,7 @@ def test_equal_tiles_that_are_stored_once_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("layout", ["strips", "tiles"])
 @pytest.mark.parametrize("change", [-2, 500])
-def test_another_size_of_what_is_not_packed_is_refused(
+def test_a_wrong_size_of_an_uncompressed_segment_is_refused(
     tmp_path: Path, layout: str, change: int
 ) -> None:
     path = _write(tmp_path / "a.tif", **LAYOUTS[layout])
@@ -87,14 +87,14 @@ def test_another_size_of_what_is_not_packed_is_refused(
     with TiffFile(path) as tiff:
         size = tiff.pages[1].databytecounts[0]
     _change(path, 1, tag, size + change)
-    line = f"{tag}[0]: found {size + change}, expected {size} bytes, since Compression states none"
+    line = f"{tag}[0]: found {size + change}, expected {size} bytes, since Compression states no"
     with pytest.raises(SourceError, match=re.escape(line)):
         _read(path)
 
 
 @pytest.mark.parametrize("compression", [None, "tiff_lzw", "tiff_adobe_deflate", "packbits"])
 def test_files_of_libtiff_are_read(tmp_path: Path, compression: str | None) -> None:
-    """Pillow writes them by libtiff: strips of few rows, directories behind the data."""
+    """Pillow writes them with libtiff: strips of few rows, directories after the data."""
     planes = [Image.fromarray(plane) for plane in _STACK]
     path = tmp_path / "a.tif"
     planes[0].save(path, save_all=True, append_images=planes[1:], compression=compression)

@@ -61,7 +61,7 @@ def upright(stored: Any, orientation: int) -> Any:
     row = {1: "t", 2: "t", 3: "b", 4: "b", 5: "l", 6: "r", 7: "r", 8: "l"}[orientation]
     column = {1: "l", 2: "r", 3: "r", 4: "l", 5: "t", 6: "t", 7: "b", 8: "b"}[orientation]
     seen = stored
-    if row in "lr":  # rows are columns of the image
+    if row in "lr":  # stored rows are columns of the image
         seen = seen.swapaxes(1, 2)
         row, column = column, row
     seen = seen[:, ::-1] if row == "b" else seen
@@ -69,7 +69,7 @@ def upright(stored: Any, orientation: int) -> Any:
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_planes_stand_as_the_tag_orientation_states(tmp_path: Path, orientation: int) -> None:
+def test_planes_are_turned_by_the_tag_orientation(tmp_path: Path, orientation: int) -> None:
     path = tmp_path / "a.tif"
     tifffile.imwrite(
         path, BODY, photometric="minisblack",
@@ -85,7 +85,7 @@ def test_planes_stand_as_the_tag_orientation_states(tmp_path: Path, orientation:
 
 @pytest.mark.parametrize("orientation", [3, 4, 6, 8])
 @pytest.mark.parametrize("ending", ["tif", "jpg"])
-def test_planes_of_a_folder_stand_as_their_orientation_states(
+def test_planes_of_a_folder_are_turned_by_the_tag_orientation(
     tmp_path: Path, orientation: int, ending: str
 ) -> None:
     colour = np.repeat((BODY // 8).astype(np.uint8)[..., None], 3, axis=-1)
@@ -111,9 +111,9 @@ def test_planes_of_a_folder_stand_as_their_orientation_states(
         ({"cf": 0, "c0": -32768.0, "c1": 1.0, "vunit": "HU"}, BODY.astype(int) - 32768, "HU"),
         ({"cf": 0, "c0": 0.5, "c1": 0.25, "vunit": "OD"}, BODY * 0.25 + 0.5, "0.5 + 0.25"),
         ({"cf": 0, "c0": 0.0, "c1": 1.0, "vunit": "Gray Value"}, BODY, ""),
-        ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "no straight line"),
+        ({"cf": 1, "c0": 0.0, "c1": 1.0, "c2": 2.0, "vunit": "OD"}, BODY, "not a straight line"),
         ({"cf": 20}, BODY, ""),
-        ({"cf": 21, "vunit": "Uncalibrated OD"}, BODY, "(Uncalibrated OD) is no straight line"),
+        ({"cf": 21, "vunit": "Uncalibrated OD"}, BODY, "(Uncalibrated OD) is not a straight line"),
         ({"c0": -1024.0, "c1": 2.0}, BODY * 2.0 - 1024, "-1024 + 2"),
         ({}, BODY, ""),
     ],
@@ -167,7 +167,7 @@ def test_labels_that_name_channels_among_the_slices_are_noted(tmp_path: Path) ->
 def test_the_orientation_of_ome_tiff_is_noted_and_not_applied(tmp_path: Path) -> None:
     path = write_ome(tmp_path / "a.ome.tif", BODY, extratags=[(274, "H", 1, 4, True)])
     np.testing.assert_array_equal(read_voxels(path), BODY)
-    assert "not applied, as OME-TIFF has it" in read.open(path).notes[0]
+    assert "not applied, as usual for OME-TIFF" in read.open(path).notes[0]
 
 
 @pytest.mark.parametrize(
@@ -204,13 +204,13 @@ def test_positions_of_planes_are_compared_with_the_depth(
         "",
     ],
 )
-def test_positions_that_agree_or_are_no_lengths_need_no_note(tmp_path: Path, planes: str) -> None:
+def test_positions_that_agree_or_are_not_lengths_need_no_note(tmp_path: Path, planes: str) -> None:
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, planes=planes))
     assert dataset.levels[0].spacing_um == pytest.approx((0.5, 0.2, 0.25))
     assert dataset.notes == ()
 
 
-def test_positions_without_a_unit_are_compared_and_not_taken(tmp_path: Path) -> None:
+def test_positions_without_a_unit_are_compared_and_not_used(tmp_path: Path) -> None:
     planes = places(np.arange(16) * 0.6).replace('PositionZUnit="\u00b5m"', "")
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, depth="1.0", planes=planes))
     assert dataset.levels[0].spacing_um[0] == 1.0
@@ -233,7 +233,7 @@ def test_types_of_voxels_that_disagree_are_noted(
 def test_planes_at_one_position_whose_time_rises_are_noted(tmp_path: Path) -> None:
     planes = places(np.zeros(16), times=range(16))
     dataset = read.open(write_ome(tmp_path / "a.ome.tif", BODY, planes=planes))
-    assert "may be points in time" in dataset.notes[0]
+    assert "may be time points" in dataset.notes[0]
 
 
 ANGLES = MODULO.format('<ModuloAlongZ Type="angle" Unit="degree" Start="0" End="90" Step="90"/>')
@@ -244,7 +244,7 @@ ALTERNATELY = np.stack([BODY, OTHER], axis=1).reshape(32, 48, 36)
 @pytest.mark.parametrize(
     ("stored", "told"), [(STACKS, "after another"), (ALTERNATELY, "alternately")]
 )
-def test_angles_along_z_are_images_of_their_own(tmp_path: Path, stored: Any, told: str) -> None:
+def test_angles_along_z_are_separate_images(tmp_path: Path, stored: Any, told: str) -> None:
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES)
     first = read.open(path)
     np.testing.assert_array_equal(read_voxels(path), BODY)
@@ -258,15 +258,15 @@ def test_angles_along_z_are_images_of_their_own(tmp_path: Path, stored: Any, tol
         read.open(path, series=3)
 
 
-def test_positions_tell_how_angles_are_stored(tmp_path: Path) -> None:
-    """The two angles show the same, so the voxels can't tell."""
+def test_positions_show_how_angles_are_stored(tmp_path: Path) -> None:
+    """The two angles show the same image, so the voxels can't decide."""
     stored = np.stack([BODY, BODY + 1], axis=1).reshape(32, 48, 36)
     planes = places(np.repeat(np.arange(16) * 0.5, 2))
     path = write_ome(tmp_path / "a.ome.tif", stored, after=ANGLES, planes=planes)
     np.testing.assert_array_equal(read_voxels(path, series=2), BODY + 1)
 
 
-def test_lifetimes_along_time_are_no_points_in_time(tmp_path: Path) -> None:
+def test_lifetimes_along_time_are_not_time_points(tmp_path: Path) -> None:
     note = MODULO.format(
         '<ModuloAlongT Type="lifetime" Unit="ps"><Label>0</Label><Label>50</Label></ModuloAlongT>'
     )
@@ -308,7 +308,7 @@ def test_the_resolution_in_the_tags_is_compared_with_the_ome_xml(
     tmp_path: Path, unit: str, is_told: bool
 ) -> None:
     per_um = 1e4 if unit == "CENTIMETER" else 25400.0
-    same = (per_um / 0.25, per_um / 0.2)  # along x and y
+    same = (per_um / 0.25, per_um / 0.2)  # pixels per cm along x and y
     path = write_ome(tmp_path / "a.ome.tif", BODY, resolution=same, resolutionunit=unit)
     assert read.open(path).notes == ()
     half = (per_um / 0.25, per_um / 0.1)
@@ -336,13 +336,13 @@ def test_a_field_that_imagej_s_description_holds_twice_is_reported(tmp_path: Pat
     ("z", "y", "x", "told"),
     [
         ("1", "0.5", "0.0005", "pixels 1000 times as long along y as along x"),
-        ("1000", "0.5", "0.5", "slices 1e+03 um apart along z of pixels of 0.5 um"),
+        ("1000", "0.5", "0.5", "slices 1e+03 um apart along z with pixels of 0.5 um"),
         ("0.001", "0.5", "0.5", "slices 0.001 um apart"),
         ("100", "0.5", "0.5", ""),
         ("1", "5", "0.5", ""),
     ],
 )
-def test_voxels_far_longer_along_one_axis_are_doubted(
+def test_voxels_far_longer_along_one_axis_are_questioned(
     tmp_path: Path, z: str, y: str, x: str, told: str
 ) -> None:
     sizes = {f"PhysicalSize{axis}": float(um) for axis, um in zip("ZYX", (z, y, x), strict=True)}
@@ -350,5 +350,5 @@ def test_voxels_far_longer_along_one_axis_are_doubted(
     tifffile.imwrite(path, BODY, metadata={"axes": "ZYX", **sizes})
     notes = read.open(path).notes
     assert len(notes) == bool(told)
-    assert all(told in note and "another one?" in note for note in notes)
+    assert all(told in note and "is the unit of one of them wrong?" in note for note in notes)
     assert read.open(path, spacing_um=UM).notes == ()

@@ -49,7 +49,7 @@ def _hdf5(folder: Path, voxels: NDArray[np.float32]) -> Path:
 
 
 @pytest.mark.parametrize("write", [_zarr, _tiff, _hdf5])
-def test_they_are_read_as_the_least_value_of_the_channel(
+def test_unmeasured_voxels_are_read_as_the_channel_s_smallest_value(
     tmp_path: Path, write: Callable[[Path, NDArray[np.float32]], Path]
 ) -> None:
     voxels = with_gaps()
@@ -58,13 +58,15 @@ def test_they_are_read_as_the_least_value_of_the_channel(
         expected = np.where(np.isfinite(voxels[channel]), voxels[channel], np.float32(least))
         whole = dataset.read(channel, dataset.levels[0].box).voxels
         np.testing.assert_array_equal(whole, expected)
-        # of a window as of the whole: tiles agree where they meet
+        # A window has the same value as the whole, so tiles agree where they meet.
         box = Box((0, 4, 2), (3, 14, 20))
         np.testing.assert_array_equal(dataset.read(channel, box).voxels, expected[box.slices])
 
 
-def test_levels_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The window is found on a coarse level, and knows the padding of the fine one by its value."""
+def test_all_levels_use_the_same_smallest_value(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The window is found on a coarse level and recognises the padding of the fine one by value."""
     fine = with_gaps()[0]
     coarse = fine.reshape(6, 2, 20, 2, 18, 2).mean((1, 3, 5))
     least = coarse[np.isfinite(coarse)].min()
@@ -79,28 +81,32 @@ def test_levels_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert read.open(path).darkest(0) == least
 
 
-def test_all_slabs_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_slabs_are_searched_for_the_smallest_value(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     dataset = read.open(_zarr(tmp_path, with_gaps()))
     for slab_bytes in (1, 3000, 30_000):
         monkeypatch.setattr(unmeasured, "_SLAB_BYTES", slab_bytes)
         assert unmeasured.least_finite(dataset.arrays[0], 0, 0) == LOWEST[0]
 
 
-def test_integers_are_not_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_integers_are_not_searched_for_gaps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("stereocell.read.dataset.least_finite", None)
     dataset = read.open(write_ome_tiff(tmp_path / "a.ome.tif", VOXELS.astype(np.uint16), "CZYX"))
     assert dataset.read(0, dataset.levels[0].box).voxels.dtype == np.uint16
     assert dataset.share_of_gaps(0, [dataset.levels[0].box], 0) == 0.0
 
 
-def test_the_share_is_of_the_boxes(tmp_path: Path) -> None:
+def test_the_share_of_gaps_counts_only_the_boxes(tmp_path: Path) -> None:
     dataset = read.open(_zarr(tmp_path, with_gaps()))
     boxes = [Box((0, 0, 0), (2, 9, 36)), Box((0, 9, 0), (2, 36, 36))]
     assert dataset.share_of_gaps(1, boxes, 0) == pytest.approx(9 / 36)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_channel_of_nothing_else_is_refused(tmp_path: Path, value: float) -> None:
+def test_a_channel_without_finite_voxels_is_refused(tmp_path: Path, value: float) -> None:
     voxels = VOXELS.copy()
     voxels[1] = value
     dataset = read.open(_tiff(tmp_path, voxels))
@@ -109,7 +115,7 @@ def test_a_channel_of_nothing_else_is_refused(tmp_path: Path, value: float) -> N
         dataset.read(1, Box((0, 0, 0), (2, 2, 2)))
 
 
-def test_the_hand_of_a_map_goes_on_where_it_has_nan(tmp_path: Path) -> None:
+def test_handedness_is_kept_in_a_map_with_nan(tmp_path: Path) -> None:
     voxels = with_gaps()[0]
     with warnings.catch_warnings(), mrcfile.new(tmp_path / "a.mrc") as file:
         warnings.simplefilter("ignore")  # on NaN
@@ -120,7 +126,7 @@ def test_the_hand_of_a_map_goes_on_where_it_has_nan(tmp_path: Path) -> None:
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, expected)
 
 
-def test_a_plain_tiff_of_doubles_is_read_so(tmp_path: Path) -> None:
+def test_unmeasured_voxels_of_a_tiff_of_doubles_are_replaced(tmp_path: Path) -> None:
     voxels = with_gaps()[0].astype(np.float64)
     tifffile.imwrite(tmp_path / "a.tif", voxels, photometric="minisblack")
     dataset = read.open(tmp_path / "a.tif", spacing_um=(1, 1, 1))

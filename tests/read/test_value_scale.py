@@ -57,11 +57,11 @@ def test_voxels_of_a_fill_value_are_read_as_the_smallest_measured_one(
         ({"valid_range": np.array([20, 200], np.int16)}, 20, 200),
         ({"valid_min": np.int16(20)}, 20, 999),
         ({"valid_max": np.int16(200)}, 0, 200),
-        # the NetCDF Users Guide: of the unpacked type the range is of unpacked values
+        # The NetCDF Users Guide: a range of the unpacked type refers to unpacked values.
         ({"valid_range": np.array([40.0, 400.0]), "scale_factor": 2.0}, 20, 200),
     ],
 )
-def test_voxels_outside_the_valid_range_are_no_measurements(
+def test_voxels_outside_the_valid_range_are_not_measurements(
     tmp_path: Path, attributes: dict[str, Any], low: int, high: int
 ) -> None:
     stored = RANDOM.integers(0, 1000, (5, 6, 7)).astype(np.int16)
@@ -94,7 +94,7 @@ def test_attributes_that_change_nothing_leave_the_stored_integers(tmp_path: Path
 
 
 @pytest.mark.parametrize("factor", [0.0, np.nan, np.array([1.0, 2.0])])
-def test_a_factor_that_is_no_number_is_refused(tmp_path: Path, factor: Any) -> None:
+def test_a_factor_that_is_not_a_number_is_refused(tmp_path: Path, factor: Any) -> None:
     path = write(tmp_path / "a.h5", np.ones((5, 6, 7), np.uint8), scale_factor=factor)
     with pytest.raises(SourceError, match="scale_factor: found"):
         read.open(path)

@@ -1,4 +1,4 @@
-"""Chunks of Zarr under other names than the metadata state, and chunks that a shard lacks."""
+"""Zarr chunks under other names than the metadata state, and chunks that a shard lacks."""
 
 import json
 import shutil
@@ -29,7 +29,7 @@ NAMED = {
 
 
 def write(path: Path, version: Any, lies: dict[str, str], says: dict[str, str]) -> Path:
-    """Write an OME-Zarr whose chunks lie in one form, and whose metadata state another."""
+    """Write an OME-Zarr whose chunks have names of one form, and whose metadata state another."""
     write_ome_zarr(path, [BODY], version="0.4" if version == 2 else "0.5")
     shutil.rmtree(path / "0")
     array = zarr.create_array(
@@ -55,12 +55,12 @@ def voxels_of(path: Path | str) -> tuple[Any, tuple[str, ...]]:
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.slow
-def test_chunks_are_read_by_whichever_name_their_files_have(tmp_path: Path, version: int) -> None:
+def test_chunks_are_read_by_the_names_of_their_files(tmp_path: Path, version: int) -> None:
     forms = NAMED[version]
     for number, (lies, says) in enumerate((a, b) for a in forms for b in forms if a != b):
         voxels, notes = voxels_of(write(tmp_path / f"{number}.zarr", version, lies, says))
         np.testing.assert_array_equal(voxels, BODY)
-        assert any("the files are named as" in note for note in notes), (lies, says)
+        assert any("but the files are named like" in note for note in notes), (lies, says)
     voxels, notes = voxels_of(write(tmp_path / "same.zarr", version, forms[0], forms[0]))
     np.testing.assert_array_equal(voxels, BODY)
     assert notes == ()
@@ -68,7 +68,7 @@ def test_chunks_are_read_by_whichever_name_their_files_have(tmp_path: Path, vers
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.slow
-def test_chunks_in_a_zip_file_are_read_by_whichever_name_they_have(
+def test_chunks_in_a_zip_file_are_read_by_the_names_of_their_files(
     tmp_path: Path, version: int
 ) -> None:
     forms = NAMED[version]
@@ -80,7 +80,7 @@ def test_chunks_in_a_zip_file_are_read_by_whichever_name_they_have(
                 file.write(member, member.relative_to(path))
         voxels, notes = voxels_of(archive)
         np.testing.assert_array_equal(voxels, BODY)
-        is_noted = any("the files are named as" in note for note in notes)
+        is_noted = any("but the files are named like" in note for note in notes)
         assert is_noted is (lies != says), (lies, says)
 
 
@@ -89,7 +89,7 @@ def test_chunks_under_both_names_are_all_read(tmp_path: Path) -> None:
     (path / "0/1/2/0").rename(path / "0/1.2.0")
     voxels, notes = voxels_of(path)
     np.testing.assert_array_equal(voxels, BODY)
-    assert "metadata name them as 0/0/0, the files are named as 0.0.0" in notes[0]
+    assert "metadata name them like 0/0/0, but the files are named like 0.0.0" in notes[0]
 
 
 def test_a_bare_array_is_read_by_the_names_of_its_files(tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_a_bare_array_is_read_by_the_names_of_its_files(tmp_path: Path) -> None:
     path.rename(tmp_path / "bare.zarr")
     dataset = read.open(tmp_path / "bare.zarr", spacing_um=(1, 1, 1))
     np.testing.assert_array_equal(dataset.read(0, dataset.levels[0].box).voxels, BODY)
-    assert "the files are named as 0.0.0" in dataset.notes[0]
+    assert "but the files are named like 0.0.0" in dataset.notes[0]
 
 
 def test_chunks_are_read_by_their_names_at_an_address(

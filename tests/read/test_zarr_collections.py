@@ -36,7 +36,7 @@ def plate(path: Path, version: str, wells: list[str], fields: int = 2) -> Path:
 
 
 def labelled(path: Path, version: str, dtype: Any = np.int32) -> Path:
-    """An image with two label images, of which one lists its objects."""
+    """Write an image with two label images, one of which lists its objects."""
     write_ome_zarr(path, [f_phantom()], version=version)
     group(path / "labels", version, {"labels": ["cells", "two words"]})
     for name, objects in (("cells", 3), ("two words", 0)):
@@ -57,14 +57,14 @@ refusal = refusing(read.open)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_plate_lists_its_wells_and_a_well_its_images(tmp_path: Path, version: str) -> None:
+def test_a_plate_lists_its_wells_and_a_well_lists_its_images(tmp_path: Path, version: str) -> None:
     wells = [f"{row}/{column:02d}" for row in "ABC" for column in range(1, 5)]
     path = plate(tmp_path / "my plate's.zarr", version, wells)
     told = refusal(path)
     assert "a plate of 12 wells (A/01, A/02, A/03, A/04, B/01, B/02, B/03, B/04 and 4 more)" in told
-    assert f"open an image of a well by its path, as {path}/A/01/0;" in told
+    assert f"open an image of a well by its path, such as {path}/A/01/0;" in told
     told = refusal(path / "A" / "01")
-    assert f"a well of 2 images (0, 1); open one by its path, as {path}/A/01/0;" in told
+    assert f"a well of 2 images (0, 1); open one by its path, such as {path}/A/01/0;" in told
     assert "found 2 groups (01, 02)" in refusal(path / "A")
     for field in (0, 1):
         dataset = read.open(path / "A" / "02" / str(field))
@@ -75,7 +75,7 @@ def test_a_plate_lists_its_wells_and_a_well_its_images(tmp_path: Path, version: 
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("listed", [True, False])
-def test_a_container_lists_its_images_and_one_alone_is_opened(
+def test_a_container_lists_its_images_and_a_single_one_is_opened(
     tmp_path: Path, version: str, listed: bool
 ) -> None:
     for count in (1, 3):
@@ -125,10 +125,10 @@ def test_a_container_of_one_image_is_opened_at_an_address(
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_an_image_tells_its_label_images(tmp_path: Path, version: str) -> None:
+def test_label_images_of_an_image_are_noted(tmp_path: Path, version: str) -> None:
     path = labelled(tmp_path / "i.zarr", version)
     assert read.open(path).notes == (
-        "label images of it: cells (int32, properties of 3 objects), two words (int32) "
+        "its label images: cells (int32, properties of 3 objects), two words (int32) "
         "(--labels NAME builds the objects of one)",
     )
     assert "a list of labels, 2 label images (cells, two words)" in refusal(path / "labels")
@@ -136,20 +136,21 @@ def test_an_image_tells_its_label_images(tmp_path: Path, version: str) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int32])
-def test_a_label_image_ends_the_plan_unless_it_is_said_to_be_one(
+def test_a_label_image_stops_the_plan_unless_the_user_names_it_as_labels(
     tmp_path: Path, version: str, dtype: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It holds one object alone, which the voxels would tell for a mask."""
+    """It holds only one object, so the voxels alone would look like a mask."""
     path = labelled(tmp_path / "i.zarr", version, dtype) / "labels" / "cells"
     out = tmp_path / "out"
     assert main(["plan", str(path), "-o", str(out)]) == 2
     told = capsys.readouterr().err.strip().splitlines()[-1]
-    assert f"{path}: is a label map: found `image-label` in its attributes" in told
+    assert told.startswith(f"stereocell: {path}: ")
+    assert "is a label map: found `image-label` in its attributes" in told
     assert "--as intensity" in told
     assert main(["plan", str(path), "-o", str(out), "--as", "intensity"]) == 0
 
 
-def test_a_place_among_labels_says_so_too_and_a_folder_of_that_name_does_not(
+def test_a_place_among_labels_counts_and_a_folder_with_that_name_does_not(
     tmp_path: Path,
 ) -> None:
     path = write_ome_zarr(tmp_path / "labels" / "i.zarr", [f_phantom()])
@@ -175,7 +176,9 @@ def test_a_place_among_labels_says_so_too_and_a_folder_of_that_name_does_not(
         {"labels": [None, ["x"]]},
     ],
 )
-def test_metadata_of_another_form_are_one_short_line(tmp_path: Path, ome: dict[str, Any]) -> None:
+def test_metadata_of_another_form_are_refused_in_one_short_line(
+    tmp_path: Path, ome: dict[str, Any]
+) -> None:
     told = refusal(group(tmp_path / "g.zarr", "0.5", ome))
     assert "no multiscales: found" in told
     assert told.isprintable()
@@ -183,7 +186,7 @@ def test_metadata_of_another_form_are_one_short_line(tmp_path: Path, ome: dict[s
 
 
 @pytest.mark.parametrize("labels", [3, [3], [None], ["../../x"], ["x" * 5000], ["cells\n"] * 900])
-def test_label_lists_of_another_form_hinder_no_image(tmp_path: Path, labels: Any) -> None:
+def test_label_lists_of_another_form_do_not_affect_the_image(tmp_path: Path, labels: Any) -> None:
     path = write_ome_zarr(tmp_path / "i.zarr", [f_phantom()])
     group(path / "labels", "0.5", {"labels": labels})
     notes = " ".join(read.open(path).notes)

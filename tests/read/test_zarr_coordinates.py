@@ -24,7 +24,7 @@ def positions(axis: str) -> NDArray[Any]:
 def write(path: Path, version: Any = 2, voxels: Any = None, group: str = "", **about: Any) -> Path:
     """Write an array `ct` in a group, and the positions of z, y and x in the root.
 
-    about  attributes of `ct`; positions along an axis by its letter
+    about  attributes of `ct`, and positions along an axis by its letter
     """
     body = f_phantom() if voxels is None else voxels
     lists = {axis: about.pop(axis, positions(axis)) for axis in "zyx"}
@@ -52,7 +52,7 @@ def _write(group: zarr.Group, name: str, voxels: NDArray[Any], dims: str) -> Any
 
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("given", [None, (1.0, 1.0, 1.0)])
-def test_an_axis_whose_positions_descend_is_turned_round(
+def test_an_axis_whose_positions_descend_is_reversed(
     tmp_path: Path, version: int, given: Any
 ) -> None:
     path = write(tmp_path / "a.zarr", version, f_phantom()[:, ::-1], y=positions("y")[::-1])
@@ -67,12 +67,12 @@ def test_an_axis_whose_positions_descend_is_turned_round(
 def test_positions_lie_in_a_group_around_the_array(tmp_path: Path, group: str, source: str) -> None:
     write(tmp_path / "a.zarr", group=group)
     if group and source != "a.zarr":
-        return  # positions in a group two levels above a named array are out of its reach
+        return  # positions in a group two levels above a named array are out of reach
     dataset = read.open(tmp_path / source)
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
 
 
-def test_positions_go_before_attributes_that_disagree(tmp_path: Path) -> None:
+def test_positions_take_precedence_over_attributes(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zarr", resolution=[1, 0.2, 0.25], units="um")
     dataset = read.open(path)
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
@@ -81,7 +81,7 @@ def test_positions_go_before_attributes_that_disagree(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_uneven_positions_and_those_without_order_are_told(tmp_path: Path) -> None:
+def test_uneven_and_unordered_positions_are_noted(tmp_path: Path) -> None:
     uneven = positions("z")
     uneven[8:] += 5
     dataset = read.open(write(tmp_path / "a.zarr", z=uneven))
@@ -91,7 +91,7 @@ def test_uneven_positions_and_those_without_order_are_told(tmp_path: Path) -> No
     assert any("positions of z neither rise nor fall" in note for note in dataset.notes)
 
 
-def test_a_missing_unit_of_positions_is_told_with_their_steps(tmp_path: Path) -> None:
+def test_a_missing_unit_of_positions_is_reported_with_their_steps(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match=r"positions of z have steps of 0\.5 without a unit"):
         read.open(write(tmp_path / "a.zarr", unit=""))
 
@@ -106,7 +106,7 @@ def test_an_axis_attribute_of_positions_names_the_axis(tmp_path: Path) -> None:
     assert dataset.levels[0].spacing_um == pytest.approx(tuple(SPACING.values()))
 
 
-def test_factors_of_a_group_are_not_applied_and_told(tmp_path: Path) -> None:
+def test_factors_of_a_group_are_noted_and_not_applied(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zarr")
     zarr.open_group(path, mode="a").attrs["scale_factor"] = 2.0
     dataset = read.open(path)
@@ -120,7 +120,7 @@ def test_a_fill_value_written_as_text_marks_gaps(tmp_path: Path) -> None:
     dataset = read.open(write(tmp_path / "a.zarr", voxels=voxels, _FillValue="-9999"))
     assert np.isnan(dataset.arrays[0].array[0, 0, 0])
     dataset = read.open(write(tmp_path / "b.zarr", voxels=voxels, missing_value="none"))
-    assert any("missing_value is 'none', no number" in note for note in dataset.notes)
+    assert any("missing_value is 'none', which is not a number" in note for note in dataset.notes)
     np.testing.assert_array_equal(whole(dataset), voxels)
 
 

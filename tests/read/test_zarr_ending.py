@@ -1,4 +1,4 @@
-"""A read that fails leaves nothing behind that prints as Python ends."""
+"""A failed read leaves nothing behind that prints when Python exits."""
 
 import subprocess
 import sys
@@ -48,12 +48,13 @@ def write_tiff(folder: Path) -> tuple[Path, Path]:
 
 @pytest.mark.parametrize("write", [write_zarr, write_tiff])
 @pytest.mark.slow
-def test_a_damaged_chunk_among_many_prints_nothing_as_python_ends(
+def test_a_damaged_chunk_among_many_prints_nothing_when_python_exits(
     tmp_path: Path, write: Callable[[Path], tuple[Path, Path]]
 ) -> None:
     source, damaged = write(tmp_path)
     data = bytearray(damaged.read_bytes())
-    place = len(data) - 5 if damaged != source else len(data) // 3  # a chunk's checksum; a page
+    # the checksum of a chunk, or a page
+    place = len(data) - 5 if damaged != source else len(data) // 3
     data[place] ^= 0xFF
     damaged.write_bytes(data)
     ended = subprocess.run(

@@ -58,7 +58,7 @@ def test_scale_and_offset_of_an_ome_zarr_are_applied_to_all_levels(
         (3, {"_FillValue": base64.b64encode(struct.pack("<d", 1000.0)).decode()}, {}),
     ],
 )
-def test_fill_values_are_no_measurements(
+def test_fill_values_are_not_measurements(
     tmp_path: Path, version: int, attributes: dict[str, Any], options: dict[str, Any]
 ) -> None:
     path = write(tmp_path / "a.zarr", version, attributes, **options)

@@ -10,7 +10,7 @@ import pytest
 from stereocell.cli.__main__ import main
 
 _NOTE = (
-    "unit of length: not stated, mm is assumed, as most programs of NIfTI do; --spacing-um z,y,x "
+    "unit of length: not stated, mm is assumed, as in most programs for NIfTI; --spacing-um z,y,x "
     "replaces it"
 )
 

@@ -1,4 +1,4 @@
-"""Readers: a source becomes a lazy dataset of voxels (z, y, x), with all lengths in um."""
+"""Readers turn a source into a lazy dataset of voxels (z, y, x), with all lengths in um."""
 
 from stereocell.read.dataset import ChannelInfo, Dataset, Level
 from stereocell.read.open_dataset import open

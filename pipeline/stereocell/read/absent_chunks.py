@@ -1,7 +1,7 @@
 """Count the chunks that are not stored. Zarr, N5 and HDF5 read them as a fill value.
 
-Formats allow this, because writers leave out empty chunks. A chunk that was lost looks the same, so
-the share of absent chunks is reported. A level without any stored chunk is refused by the caller.
+The formats allow absent chunks, because writers leave out empty ones. A lost chunk looks the same,
+so the share of absent chunks is reported. The caller refuses a level without any stored chunk.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ from stereocell.storage.file_states import FileStates
 def count_absent(
     dataset: Dataset, channels: Sequence[int], box: Box, level: int, states: FileStates
 ) -> Absent | None:
-    """Return how many chunks of a box of some channels are absent; None: they can't be counted.
+    """Return how many chunks in a box of some channels are absent; None: they can't be counted.
 
-    states  the source's files, as they were listed
+    states  states of the source's files when they were listed
     """
     array = dataset.arrays[level]
     stored: Any = array.array
@@ -40,7 +40,7 @@ def count_absent(
 
 
 def _spans(array: VoxelArray, time: int, channels: Sequence[int], box: Box) -> Spans:
-    """Return for each axis the ranges of indices that are read."""
+    """Return the ranges of indices to read along each axis."""
     wanted = {
         **{axis: [range(a, b)] for axis, a, b in zip("zyx", box.start, box.stop, strict=True)},
         "t": [range(time, time + 1)],

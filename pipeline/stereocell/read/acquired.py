@@ -1,4 +1,4 @@
-"""A source's own images: the axis across which they lie, and their places where a grid is made."""
+"""The images that a source stores: the axis across which they lie, and their places in the grid."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from stereocell.read.anatomical_axes import Canonical
 class Acquired:
     """The planes that a source stores.
 
-    axis   of z, y, x: the images lie across it
-    first  float64 (n, 3): the first pixel of each image, (z, y, x) in voxels of the grid, images in
-           rising order along `axis`; None: the images are the grid's planes
-    load   returns the images of a time point along the voxels' axes (z, y, x), n of them along
-           `axis`; None with `first`
+    axis   index of z, y, x: the axis across which the images lie
+    first  float64 (n, 3): the first pixel of each image, (z, y, x) in voxels of the grid; images
+           are in rising order along `axis`. None: the images are the grid's planes
+    load   returns the n images of a time point with the grid's axes (z, y, x), stacked along
+           `axis`; None: `first` is None
     """
 
     axis: int = 0
@@ -32,7 +32,7 @@ def turned_places(
     shape: tuple[int, int, int],
     canonical: Canonical,
 ) -> NDArray[np.float64]:
-    """Return the first pixels of planes once they are turned as `canonical` turns the grid.
+    """Return the first pixels of planes after `canonical` has flipped and permuted their axes.
 
     places       (n, 3): first pixels as stored, in voxels (plane, row, column) of the stored grid
     plane_shape  pixels (rows, columns)

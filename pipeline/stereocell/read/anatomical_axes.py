@@ -1,9 +1,9 @@
-"""From a grid in the patient to canonical axes, and from those to the world.
+"""Convert a grid in the patient to canonical axes, and those to the world.
 
 Canonical voxels (z, y, x) have the axes nearest to (anterior, inferior, left). Stored voxels are
-only flipped and permuted, never resampled. A rotation near the identity and an offset remain: they
-are the placement. In the world +x is the patient's left, +y superior and +z anterior, so that the
-patient faces the viewer. A point of LPS (DICOM's axes: left, posterior, superior) becomes
+only flipped and permuted, never resampled. The remaining rotation, near the identity, and offset
+are the placement. In the world +x is the patient's left, +y superior and +z anterior, so the
+patient faces the viewer. A point in LPS (DICOM's axes: left, posterior, superior) becomes
 (L, S, -P), a proper rotation.
 
 References: DICOM PS3.3 C.7.6.2.1.1 (patient-based coordinate system).
@@ -22,18 +22,18 @@ _CANONICAL = np.array([(0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])  # 
 LPS_TO_WORLD = np.array([(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)])  # (3, 3) for columns
 _UM_PER_MM = 1000.0
 _PLANES = ("sagittal", "coronal", "axial")  # indexed by the LPS axis nearest to the normal
-_OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal further from its axis makes the plane oblique
+_OBLIQUE = np.cos(np.radians(2.0))  # cosine; a normal farther from its axis makes the plane oblique
 
 
 @dataclass(frozen=True, slots=True)
 class Canonical:
     """The map from stored axes to canonical ones.
 
-    order       the stored axis that becomes z, y, x
+    order       stored axis that becomes z, y, x
     flips       True where z, y, x run backwards along the stored axis
     spacing_um  (z, y, x), um
-    placement   rows of a (4, 4) matrix for columns, um: from the pipeline's world, whose origin is
-                the centre of canonical voxel (0, 0, 0), to the patient's world
+    placement   rows of a (4, 4) matrix for column vectors, um: from the pipeline's world, whose
+                origin is the centre of canonical voxel (0, 0, 0), to the patient's world
     """
 
     order: tuple[int, int, int]
@@ -42,7 +42,7 @@ class Canonical:
     placement: Matrix
 
     def apply(self, voxels: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Return stored voxels (three axes, any dtype) as canonical (z, y, x): a view."""
+        """Return stored voxels (three axes, any dtype) as a canonical view (z, y, x)."""
         turned = voxels.transpose(self.order)
         return turned[tuple(slice(None, None, -1 if flip else 1) for flip in self.flips)]
 
@@ -50,7 +50,7 @@ class Canonical:
 def canonical_of(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> Canonical:
     """Return the canonical form of a grid with orthogonal axes.
 
-    affine  (4, 4) for columns, float64: from (i, j, k, 1) of the stored axes to LPS in mm
+    affine  (4, 4) for column vectors, float64: from (i, j, k, 1) of the stored axes to LPS in mm
     shape   voxels along the stored axes (i, j, k)
     """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)

@@ -1,4 +1,4 @@
-"""The axes of an array that its format leaves open: given, named by attributes, or assumed."""
+"""Axes of an array whose format leaves them open: given by the user, named or assumed."""
 
 from collections.abc import Sequence
 
@@ -13,9 +13,9 @@ _ANGLES = ("theta", "angle", "tilt", "projection", "rotation")
 
 
 def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
-    """Return the axes of an array by the user's `--axes`: a letter for each, `_` where it has none.
+    """Return the axes of an array from `--axes`: a letter for each, `_` for axes without one.
 
-    given  letters of all axes, or of those longer than 1, slowest first, as `zcyx`
+    given  letters of all axes, or of the axes longer than 1, slowest first, such as `zcyx`
 
     Raises UsageError where the letters don't fit the shape.
     """
@@ -25,8 +25,8 @@ def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
     if not is_axes(letters) or len(letters) != len(places):
         lengths = ", ".join(str(int(shape[place])) for place in long)
         raise UsageError(
-            f"{where}: --axes {given:.40}: found axes {lengths} long, expected {len(long)} letters "
-            f"of {', '.join(AXES)}, each once, with z, y and x among them"
+            f"{where}: --axes {given:.40}: found axes of length {lengths}, expected {len(long)} "
+            f"letters of {', '.join(AXES)}, each at most once, with z, y and x among them"
         )
     names = dict(zip(places, letters, strict=True))
     return tuple(names.get(place, "_") for place in range(len(shape)))
@@ -35,16 +35,15 @@ def given_axes(where: str, shape: Sequence[int], given: str) -> tuple[str, ...]:
 def settle_stated_axes(
     where: str, shape: Sequence[int], given: str, stated: Sequence[Statement]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the axes of an array and notes about them.
+    """Return the axes of an array, and notes on them.
 
     given   the user's `--axes`; empty: none
-    stated  the names of the axes, slowest first, by each field that names them; a field counts
-            where all its names are of t, c, z, y and x (see read/axis_names.py), z, y and x among
-            them
+    stated  for each field that names the axes, the names, slowest first. A field decides if all
+            its names mean t, c, z, y or x (see read/axis_names.py), with z, y and x among them
 
-    Where no field does, names that mean axes keep them, and z, y, x are assumed in this order for
-    the others; axes of length 1 may have no name. Raises UsageError where `given` doesn't fit,
-    SourceError where the axes can't be told.
+    If no field decides, names that mean axes count, and the other axes are assumed to be z, y, x
+    in this order. Axes of length 1 may have no name. Raises UsageError where `given` doesn't fit,
+    SourceError where the axes can't be determined.
     """
     found = f"found {counted(len(shape), 'dimension')} {tuple(int(n) for n in shape)}"
     long = sum(size > 1 for size in shape)
@@ -77,11 +76,11 @@ def settle_stated_axes(
 
 
 def with_assumed(axes: Sequence[str], shape: Sequence[int]) -> tuple[str, ...]:
-    """Return axes of which z, y and x stand in this order where no name means an axis.
+    """Return the axes, with z, y and x in this order where no name means an axis.
 
-    axes   t, c, z, y or x for each dimension, slowest first; another text: its name means none
+    axes   t, c, z, y or x for each dimension, slowest first; any other text names no axis
 
-    Empty: the dimensions without such a name are not as many as the axes that none has.
+    Empty: the number of unnamed dimensions differs from the number of axes that are missing.
     """
     known = [axis for axis in axes if axis in tuple(AXES)]
     missing = [axis for axis in "zyx" if axis not in known]
@@ -97,7 +96,7 @@ def with_assumed(axes: Sequence[str], shape: Sequence[int]) -> tuple[str, ...]:
 
 
 def _count(axes: Sequence[str]) -> int:
-    """Return the number of dimensions whose name means an axis."""
+    """Return the number of dimensions whose name means t, c, z, y or x."""
     return sum(axis in tuple(AXES) for axis in axes)
 
 
@@ -107,9 +106,9 @@ def _quoted(named: Statement) -> str:
 
 
 def _assumption(axes: Sequence[str], by_names: Sequence[str], named: Statement | None) -> str:
-    """Return the note on axes of which some are assumed."""
+    """Return the note on axes that are assumed, in part or all."""
     if named is None or not _quoted(named):
-        return "no names of axes: z, y, x are assumed (else give --axes)"
+        return "the axes have no names: z, y, x are assumed (else give --axes)"
     if not _count(by_names):
         reason = f"the names {_quoted(named)} are no axes of a volume"
         return f"{reason}: z, y, x are assumed (else give --axes)"
@@ -124,7 +123,7 @@ def _assumption(axes: Sequence[str], by_names: Sequence[str], named: Statement |
 
 
 def _axes_by(one: Statement, shape: Sequence[int]) -> tuple[str, ...]:
-    """Return the axes that a statement names; empty: it names another number of them."""
+    """Return the axes that a statement names; empty: it has the wrong number of names."""
     names = one.value if isinstance(one.value, tuple) else (one.value,)
     if len(names) != len(shape):
         return ()
@@ -146,11 +145,11 @@ def _require_space(where: str, axes: tuple[str, ...]) -> None:
     if angle:
         raise SourceError(
             f"{where}: found axes {', '.join(named)}: {angle:.40} is an angle, so these are "
-            "projections; expected the volume that is reconstructed of them"
+            "projections; expected the volume that was reconstructed from them"
         )
     if named and set(named) <= set(AXES) and len(set(named)) == len(named):
         asked = "".join("z" if n == ("t" if "t" in named else "c") else n for n in named)
-        way = f"; --axes {asked} takes what isn't y, x for slices" if is_axes(asked) else ""
+        way = f"; --axes {asked} reads the axis beside y, x as slices" if is_axes(asked) else ""
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: found axes "
             f"{', '.join(named)}, expected z, y, x among them{way}"
@@ -158,9 +157,9 @@ def _require_space(where: str, axes: tuple[str, ...]) -> None:
 
 
 def _example(shape: Sequence[int], stated: Sequence[Statement]) -> str:
-    """Return axes that the user may give for an array of more than three.
+    """Return an example of `--axes` for an array of more than three dimensions.
 
-    An assumed order of three axes is that of the last three, as MATLAB's is.
+    An assumed order of three axes applies to the last three dimensions, as in MATLAB.
     """
     for one in stated:
         if one.trust is Trust.ASSUMED and isinstance(one.value, tuple):

@@ -1,7 +1,7 @@
-"""The voxel spacing in an array's attributes, by the names that writers use.
+"""Read the voxel spacing from an array's attributes, under the names that writers use.
 
-`element_size_um` of PlantSeg and ilastik is z, y, x in um. Others count only where a unit stands
-beside them: `resolution` is nm in CREMI's files and voxels per length in others.
+`element_size_um` of PlantSeg and ilastik is z, y, x in um. Other attributes count only beside a
+unit: `resolution` is in nm in CREMI's files and voxels per length in others.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ def stated_spacings(
 ) -> Iterator[tuple[str, Triple]]:
     """Yield each attribute that states the spacing, and its value (z, y, x), um.
 
-    axes  of the array, as stored: sizes are along all of them, or along the three of space
+    axes  names of the array's axes, as stored; sizes are along all axes or the three of space
     """
     if len(sizes := _numbers(attributes.get(_IN_UM))) == 3:
         yield _IN_UM, (sizes[0], sizes[1], sizes[2])
@@ -36,9 +36,9 @@ def stated_spacings(
 
 
 def spacing_of(sizes: Sequence[float], unit: Any, axes: Sequence[str]) -> Triple | None:
-    """Return (z, y, x), um, of sizes along all axes, or along the three of space; None: neither.
+    """Return (z, y, x), um, from sizes along all axes or the three of space; None: neither fits.
 
-    unit  a text, or one for each size
+    unit  one text for all sizes, or one for each
     """
     along = [axis for axis in axes if axis in "zyx"] if len(sizes) == 3 else list(axes)
     every = text_of(unit)

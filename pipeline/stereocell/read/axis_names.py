@@ -1,9 +1,9 @@
-"""The names that writers give to the axes of an array, and the axis that each of them means.
+"""Names that writers give to the axes of an array, and the axis that each name means.
 
 | writer | field |
 |---|---|
 | Zarr v3, xarray | `dimension_names`, `_ARRAY_DIMENSIONS` |
-| funlib and daisy, where a `^` ends the name of an axis that is none of space | `axis_names` |
+| funlib and daisy, where a `^` ends the name of an axis that is not spatial | `axis_names` |
 | openPMD | `axisLabels` |
 | others | `axis_labels`, `axis_order`, `axes`, `dims` |
 """
@@ -37,7 +37,7 @@ _BETWEEN = re.compile(r"[\s,:;]+")
 
 
 def axis_of(name: str) -> str:
-    """Return the axis that a name of a dimension means; the name in lower case: it means none.
+    """Return the axis that a dimension's name means; the name in lower case if it means none.
 
     >>> [axis_of(name) for name in ("Z", "x_um", "Time", "columns", "zspace", "phony_dim_0")]
     ['z', 'x', 't', 'x', 'z', 'phony_dim_0']
@@ -55,8 +55,8 @@ def axis_of(name: str) -> str:
 def axes_of_names(names: Sequence[str]) -> tuple[str, ...]:
     """Return the axis of each name, as `axis_of` does.
 
-    A height is y beside a width. Where another name means y and none means z it is z, as in files
-    of the atmosphere.
+    A height is y beside a width. If another name means y and none means z, a height is z, as in
+    files on the atmosphere.
 
     >>> axes_of_names(["width", "height", "depth"]), axes_of_names(["height", "lat", "lon"])
     (('x', 'y', 'z'), ('z', 'y', 'x'))
@@ -71,7 +71,7 @@ def axes_of_names(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def listed_names(value: Any, count: int) -> tuple[str, ...]:
-    """Return the names of `count` axes that an attribute lists; empty: it lists none, or others.
+    """Return the names of `count` axes that an attribute lists; empty: it has no such list.
 
     The attribute is a list of texts or of tables with a `name`, or one text with all names.
 

@@ -1,8 +1,8 @@
-"""The voxel spacing and the directions of an array's axes, collected from all that states them.
+"""Collect the voxel spacing and the directions of an array's axes from everything that states them.
 
-Positions along an axis go before attributes, since they are written plane by plane. Positions that
-descend turn their axis round: stored as they are, the volume would be its mirror image. Readers of
-HDF5, Zarr and N5 add what their files state; `settled` compares it.
+Positions along an axis take precedence over attributes, since they are written plane by plane. An
+axis whose positions descend is reversed: read as stored, the volume would be a mirror image. The
+readers of HDF5, Zarr and N5 add the statements of their files; `settled` compares them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,14 +17,14 @@ from stereocell.read.coordinates import Steps, steps_of
 from stereocell.read.spacing import PartialTriple, um_per
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-MAX_POSITIONS = 1_000_000  # longest list of positions that is read
+MAX_POSITIONS = 1_000_000  # positions; longer lists are not read
 
 
 @dataclass(frozen=True, slots=True)
 class SettledSpacing:
-    """The spacing (z, y, x), um, None where it is not stated, and the axes that run backwards.
+    """The spacing (z, y, x), um, with None where it is not stated, and which axes are reversed.
 
-    hint  steps of positions that have no unit of length, for the message about a missing spacing
+    hint  steps between positions that have no unit of length, for the message on missing spacing
     """
 
     spacing_um: PartialTriple
@@ -34,9 +34,9 @@ class SettledSpacing:
 
 
 class AxisSpacings:
-    """Statements of the voxel spacing of one array.
+    """Statements on the voxel spacing of one array.
 
-    axes  of the array, slowest first
+    axes  names of the array's axes, slowest first
     """
 
     def __init__(self, axes: Sequence[str]) -> None:
@@ -47,7 +47,7 @@ class AxisSpacings:
         self._hints: list[str] = []
 
     def add(self, axis: str, spacing_um: float, place: str, trust: Trust = Trust.STATED) -> None:
-        """Add the spacing along an axis; other axes than z, y and x are left out."""
+        """Add the spacing along an axis; axes other than z, y and x are ignored."""
         if axis in self._stated:
             self._stated[axis].append(Statement(float(spacing_um), place, trust))
 
@@ -59,9 +59,9 @@ class AxisSpacings:
     def add_attributes(
         self, attributes: Mapping[str, Any], of: str, trust: Trust = Trust.STATED
     ) -> None:
-        """Add the spacings that attributes of the array, or of a group around it, state.
+        """Add the spacings in the attributes of the array, or of a group around it.
 
-        of  the array or the group, for notes
+        of  name of the array or the group, for notes
         """
         for name, spacing in stated_spacings(attributes, self.axes):
             self.add_all(spacing, f"{name} of {of}", trust)
@@ -69,7 +69,7 @@ class AxisSpacings:
             if z == y != x:
                 self._notes.append(
                     f"voxel spacing: {name} of {of} gives z and y the same spacing and x another "
-                    "one, as if it were listed in another order than the axes: --spacing-um z,y,x "
+                    "one, so its order may differ from that of the axes: --spacing-um z,y,x "
                     "replaces it"
                 )
 
@@ -97,7 +97,7 @@ class AxisSpacings:
             self._hints.append(f"positions of {name} have steps of {size:.5g} {why}")
 
     def add_sense(self, dimension: int, name: str, positive: str) -> None:
-        """Add CF's `positive` of the positions along a dimension: up or down."""
+        """Add CF's attribute `positive` (up or down) of the positions along a dimension."""
         if self.axes[dimension] == "z" and positive.strip().lower() == "down":
             self._notes.append(
                 f"positions of {name} count downwards (`positive`): the planes are read in this "
@@ -105,9 +105,9 @@ class AxisSpacings:
             )
 
     def _add_odd(self, name: str, positions: NDArray[np.float64], count: int) -> None:
-        """Note positions that are as many as voxels, and neither rise nor fall throughout.
+        """Add a note on positions that match the number of voxels but don't rise or fall steadily.
 
-        Positions that are all equal are those of a netCDF dimension without a variable.
+        Equal positions get no note: a netCDF dimension without a variable has them.
         """
         found = np.ravel(positions)
         if count > 1 and len(found) in (count, count + 1) and (found != found[0]).any():
@@ -120,7 +120,7 @@ class AxisSpacings:
             )
 
     def settled(self) -> SettledSpacing:
-        """Return the most trusted spacing along each axis, and notes on contradictions."""
+        """Return the most trusted spacing along each axis, with notes on contradictions."""
         z, y, x = (self._choose(axis) for axis in "zyx")
         notes, hints = dict.fromkeys(self._notes), dict.fromkeys(self._hints)
         return SettledSpacing((z, y, x), tuple(self._flips), tuple(notes), ", ".join(hints))
@@ -143,11 +143,11 @@ def _notes_on(steps: Steps, name: str, shown: str) -> list[str]:
     """
     notes = []
     if steps.mean < 0:
-        notes.append(f"positions of {name} descend: that axis is turned round, so that they rise")
+        notes.append(f"positions of {name} descend: that axis is reversed, so that they rise")
     if not steps.is_even:
         notes.append(
             f"positions of {name} are uneven: found steps of {steps.least:.5g} to "
-            f"{steps.largest:.5g}{shown}: their mean, {abs(steps.mean):.5g}, is used for all, so "
-            "the shape is distorted; interpolate the volume at even positions for its true shape"
+            f"{steps.largest:.5g}{shown}: their mean, {abs(steps.mean):.5g}, is used throughout, "
+            "which distorts the shape; interpolate the volume at even positions to avoid this"
         )
     return notes

@@ -1,4 +1,4 @@
-"""Count the sources of other formats in a folder that was named as one source, for messages."""
+"""Count the sources of other formats in a folder that was given as one source, for messages."""
 
 from collections import Counter
 from pathlib import Path
@@ -6,15 +6,15 @@ from pathlib import Path
 from stereocell.read.known_formats import find_format
 from stereocell.storage.location import Location
 
-_LOOKED_AT = 1000  # entries of a folder
+_LOOKED_AT = 1000  # entries of a folder; more are not counted
 
 
 def others_in(folder: str | Path, *known: str) -> str:
-    """Return the number of sources of each other format in a folder, as `2 HDF5, 1 MRC`.
+    """Return the number of sources of each other format in a folder, such as `2 HDF5, 1 MRC`.
 
     known  names of formats that do not count
 
-    Names of files may be private, and stay out. Empty: nothing, or it is no folder.
+    File names may be private and are left out. Empty: no such source, or `folder` is a file.
     """
     root = Path(folder)
     paths = sorted(root.iterdir())[:_LOOKED_AT] if root.is_dir() else []
@@ -24,6 +24,6 @@ def others_in(folder: str | Path, *known: str) -> str:
 
 
 def or_one_of(folder: str | Path, *known: str) -> str:
-    """Return the end of a refusal: what else could be meant. Empty where there is nothing."""
+    """Return the end of a refusal that points to the folder's other sources; empty: none."""
     held = others_in(folder, *known)
     return f", or one of the folder's other files, by its own name ({held})" if held else ""

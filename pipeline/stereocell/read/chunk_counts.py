@@ -1,4 +1,4 @@
-"""Which chunks of an array a part of it touches, and how many of them are not stored."""
+"""Find the chunks that a part of an array touches, and count those that are not stored."""
 
 import math
 from collections.abc import Iterator, Sequence, Set
@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-MOST_COUNTED = 2_000_000  # most chunks that are looked for; a part with more is not counted
-Spans = Sequence[Sequence[range]]  # for each axis the ranges of indices that are read
+MOST_COUNTED = 2_000_000  # chunks to look for; a part that touches more is not counted
+Spans = Sequence[Sequence[range]]  # ranges of indices to read, for each axis
 
 
 @dataclass(frozen=True, slots=True)
 class Absent:
-    """The number of chunks of a part of a level that are not stored.
+    """The number of chunks that a part of a level touches and that are not stored.
 
-    count  chunks that are absent
-    total  all chunks of the part
+    count  absent chunks
+    total  all chunks that the part touches
     noun   `chunk`, `shard` or `block`
-    fill   the value that is read for absent chunks
+    fill   value that is read for absent chunks
     """
 
     count: int
@@ -27,17 +27,17 @@ class Absent:
 
 
 def touched_along(size: int, ranges: Sequence[range]) -> list[int]:
-    """Return the chunks along one axis, of `size` voxels each, that some ranges touch."""
+    """Return the indices of the chunks, `size` voxels along the axis, that the ranges touch."""
     return sorted({n for one in ranges for n in range(one.start // size, -(-one.stop // size))})
 
 
 def number_of(sizes: Sequence[int], spans: Spans) -> int:
-    """Return the number of chunks of some sizes that a part touches."""
+    """Return the number of chunks that a part touches. `sizes`: of a chunk along each axis."""
     return math.prod(_count(n, ranges) for n, ranges in zip(sizes, spans, strict=True))
 
 
 def _count(size: int, ranges: Sequence[range]) -> int:
-    """Return the number of chunks along one axis; without a list of them, which may be long."""
+    """Return the number of chunks along one axis, without listing them: there may be many."""
     count, reached = 0, 0
     for one in sorted(ranges, key=lambda one: one.start):
         first, stop = max(one.start // size, reached), -(-one.stop // size)
@@ -52,7 +52,7 @@ def places_of(sizes: Sequence[int], spans: Spans) -> Iterator[tuple[int, ...]]:
 
 
 def count_keys(keys: Iterator[str], names: Set[str], noun: str, fill: Any) -> Absent:
-    """Return how many keys of chunks are not among the names of a source's files."""
+    """Count the keys of chunks that are not among the names of a source's files."""
     total = count = 0
     for key in keys:
         total += 1

@@ -1,4 +1,4 @@
-"""Positions of voxels along one axis, as files state them: step, direction, and how even it is."""
+"""Stated positions of voxels along one axis: their step, its direction, and how even it is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_EVEN = 0.02  # largest difference between two steps and their mean, as a share of the mean
+_EVEN = 0.02  # share of the mean step by which any step may differ from it
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
     """The steps along an axis.
 
-    mean           signed, in the positions' unit; negative: the positions descend
-    least, largest sizes of the steps, 0 or more
+    mean            signed, in the positions' unit; negative: the positions descend
+    least, largest  sizes of the steps, 0 or more
     """
 
     mean: float
@@ -23,7 +23,7 @@ class Steps:
 
     @property
     def is_even(self) -> bool:
-        """Whether all steps are as long, but for rounding."""
+        """Whether all steps are equally long, except for rounding."""
         mean = abs(self.mean)
         return max(self.largest - mean, mean - self.least) <= _EVEN * mean
 
@@ -31,10 +31,10 @@ class Steps:
 def steps_of(positions: NDArray[np.float64] | Sequence[float], count: int) -> Steps | None:
     """Return the steps between the positions of `count` voxels.
 
-    positions  one for each voxel, or one more, of the voxels' edges as NeXus has them, or the
-               first two alone, as EMD has it for even steps
+    positions  one for each voxel; or one more, for the voxels' edges, as in NeXus; or only the
+               first two, as in EMD for even steps
 
-    None: there are no such positions, or they neither rise nor fall throughout.
+    None: the number of positions is none of these, or they neither rise nor fall throughout.
 
     >>> steps_of([3.0, 2.0, 0.0], 3)
     Steps(mean=-1.5, least=1.0, largest=2.0)

@@ -1,4 +1,4 @@
-"""A source's channels, levels and voxels. Voxels are read on request only."""
+"""A source's channels, levels and voxels. Voxels are read only on request."""
 
 import difflib
 import weakref
@@ -30,15 +30,16 @@ from stereocell.storage.library_errors import one_line
 __all__ = ["ChannelInfo", "Dataset", "Level", "VoxelArray"]
 
 
-MAX_SEARCHED = 2_000_000_000  # voxels of a level that are searched for the smallest: as a plan has
-MAX_VALUE = 1e30  # largest voxel value: squares and differences of larger ones overflow float32
+# voxels; largest level that is searched for the smallest value, the same limit as in a plan
+MAX_SEARCHED = 2_000_000_000
+MAX_VALUE = 1e30  # largest voxel value; squares and differences of larger ones overflow float32
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
     """One channel. `color` is linear RGB, 0..1, or None where the source states none.
 
-    is_named  False: the source gives no name, and the reader made one up (`Channel0`)
+    is_named  False: the source states no name, and the reader made one up (`Channel0`)
     """
 
     name: str
@@ -115,19 +116,19 @@ class Dataset:
     time_points  the number of time points in the source; `time` is the index of the one to read
     images       the number of images in the source; the reader takes the first
     modality     DICOM's code of the modality (0008,0060): `MR`, `CT`, ...; empty: not known
-    has_hounsfield_units  False: a CT whose values are none, so that levels of CT mean nothing
-    placement    rows of a (4, 4) matrix for columns, um: from the world whose origin is the centre
-                 of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
+    has_hounsfield_units  False: a CT without Hounsfield units, so iso-values of CT don't apply
+    placement    rows of a (4, 4) matrix for column vectors, um: from the world whose origin is the
+                 centre of voxel (0, 0, 0) (volume.zyx_to_xyz) to the patient's world; see
                  read/anatomical_axes.py
     has_sides    whether the source states where the patient's left, back and head are; False where
-                 it is no patient, or the reader had to guess
+                 the subject isn't a patient or the reader had to guess
     remarks      changes and omissions of the reader, a sentence each
-    acquired     the source's own images: the axis across which they lie
-    labels       what in the metadata says that the voxels number objects; empty: nothing does
-    objects      what the file says of these objects
+    acquired     the axis across which the source's own images lie
+    labels       the metadata that says that voxels number objects; empty: none does
+    objects      the file's own notes on these objects
     files        paths or addresses of all files and folders that the source is read from
-    offset_um    where the source puts the centre of level 0's voxel (0, 0, 0), (z, y, x), um;
-                 results count from that voxel, and only two sources together need it
+    offset_um    the source's position of the centre of level 0's voxel (0, 0, 0), (z, y, x), um;
+                 results count from that voxel, and only combining two sources needs it
     """
 
     source: str
@@ -159,15 +160,16 @@ class Dataset:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Changes to the source and parts left out, a sentence each, for the user."""
+        """Changes to the source and parts that were left out, a sentence each, for the user."""
         return (*self.remarks, *choice_notes(self.images, self.time_points, self.time))
 
     @cached_property
     def fingerprint(self) -> str:
         """Hex digest of the metadata and of voxels, computed at the first access.
 
-        It depends on neither path nor date. All voxels are hashed where they fit the budget of
-        64 MB, else blocks of the coarsest and of the finest level, spread evenly.
+        The digest depends on neither path nor date. All voxels are hashed where they fit the budget
+        of 64 MB. Otherwise the coarsest level, or blocks of it, and evenly spread blocks of the
+        finest level are hashed.
         """
         with one_line(self.shown, "chunks that are whole"):
             return fingerprint_of(self)
@@ -178,11 +180,12 @@ class Dataset:
         channel  index into `channels`
         box      voxels of `level`; only the chunks that it touches are read
 
-        The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0), and
-        its `slice_axis` is the source's.
+        The result's `origin_um` is (z, y, x), um, from the centre of level 0's voxel (0, 0, 0). Its
+        `slice_axis` is the source's.
         NaN and infinity are read as the smallest finite value (read/unmeasured.py). Raises
         SourceError where a chunk can't be decoded, where no voxel of the channel is finite or where
-        one is beyond MAX_VALUE; ValueError where the channel, the level or the box is out of range.
+        a voxel is beyond MAX_VALUE. Raises ValueError where the channel, the level or the box is
+        out of range.
         """
         if not 0 <= channel < len(self.channels) or not 0 <= level < len(self.levels):
             raise ValueError(f"channel {channel} of level {level} doesn't exist")
@@ -202,7 +205,7 @@ class Dataset:
             voxels = np.where(is_measured, voxels, voxels.dtype.type(least))
         if voxels.dtype.kind == "f" and not np.abs(voxels).max(initial=0) <= MAX_VALUE:
             raise SourceError(
-                f"{where}: found voxels beyond {MAX_VALUE:g}, expected smaller ones: scale them"
+                f"{where}: found voxels beyond {MAX_VALUE:g}, expected smaller ones: rescale them"
             )
         z, y, x = (
             origin + start * spacing
@@ -218,15 +221,15 @@ class Dataset:
 
     @property
     def stored_dtype(self) -> np.dtype[Any]:
-        """The dtype in the file, in this machine's byte order."""
+        """The dtype of the voxels in the file, in this machine's byte order."""
         return np.dtype(self.arrays[0].array.dtype).newbyteorder("=")
 
     def darkest(self, channel: int) -> float:
-        """Return the smallest finite voxel of a channel, which stands for gaps at all its levels.
+        """Return the smallest finite voxel of a channel, which fills gaps at all its levels.
 
-        It is that of the finest level of MAX_SEARCHED voxels at most, whose averages the coarser
-        ones are. All of it is read, at the first call. Raises SourceError where a chunk can't be
-        decoded or no voxel is finite.
+        The value is taken from the finest level of at most MAX_SEARCHED voxels; coarser levels are
+        averages of that one. The first call reads the whole level. Raises SourceError where a chunk
+        can't be decoded or no voxel is finite.
         """
         if channel not in self._darkest:
             small = (i for i, one in enumerate(self.levels) if prod(one.shape) <= MAX_SEARCHED)
@@ -262,11 +265,12 @@ class Dataset:
             return self.arrays[0].stored_window(self.time, channel, box)
 
     def find_channels(self, selection: Sequence[str]) -> tuple[int, ...]:
-        """Return the indices of channels by name, index or identifier, in that order, each once.
+        """Return the indices of the selected channels, in the order selected, without repeats.
 
-        A name takes precedence over an index, and both over an identifier. Made-up names
-        (`Channel0`) are names as well, since plans, reports and stages show them. Raises UsageError
-        where the source lacks a channel; the message lists the channels that exist.
+        Each selected channel is a name, an index or an identifier; names take precedence over
+        indices, and indices over identifiers. Made-up names (`Channel0`) count too, since plans,
+        reports and stages show them. Raises UsageError where the source lacks a channel; the
+        message lists the channels that exist.
         """
         indices = {channel.name: index for index, channel in enumerate(self.channels)}
         by_id = {to_identifier(name): index for name, index in indices.items()}
@@ -276,7 +280,7 @@ class Dataset:
                 found.append(indices[wanted])
             elif wanted.isdecimal() and int(wanted) < len(self.channels):
                 found.append(int(wanted))
-            elif wanted in by_id:  # as files and prims are called
+            elif wanted in by_id:  # files and prims are called by identifiers
                 found.append(by_id[wanted])
             else:
                 raise UsageError(f"{self.shown}: channel {wanted!r}: {self._remedy(wanted)}")

@@ -1,7 +1,7 @@
-"""Images of diffusion in one array of NRRD or NIfTI: several b-values and directions.
+"""Diffusion images stored in one array of NRRD or NIfTI: several b-values and directions.
 
-They count as points in time, as those of DICOM do. The images without diffusion weighting (b 0)
-show anatomy best, so they come first.
+They count as time points, as those of DICOM do. The images without diffusion weighting (b 0) show
+anatomy best, so they come first.
 """
 
 from collections.abc import Sequence
@@ -9,13 +9,14 @@ from itertools import groupby
 
 from stereocell.model.counted import agreeing, counted
 
-_NEAR = 0.05  # share up to which two b-values are one, since scanners state those they reached
-_UNWEIGHTED = 10.0  # s/mm2: smaller b-values are none; scanners state 5 for 0
-_MOST_RANGES = 4  # most ranges of points in time that a note lists for one b-value
+# relative difference up to which two b-values count as one: scanners state the value reached
+_NEAR = 0.05
+_UNWEIGHTED = 10.0  # s/mm2; smaller b-values count as 0, because scanners state 5 for 0
+_MOST_RANGES = 4  # most ranges of time points that a note lists for one b-value
 
 
 def order_of(b_values: Sequence[float]) -> list[int]:
-    """Return the order of the images: as they are stored if the first has b 0, else by b-value."""
+    """Return the order of the images: as stored if the first one has b 0, else by b-value."""
     stored = list(range(len(b_values)))
     if not b_values or b_values[0] <= _UNWEIGHTED:
         return stored
@@ -23,9 +24,9 @@ def order_of(b_values: Sequence[float]) -> list[int]:
 
 
 def diffusion_note(b_values: Sequence[float], place: str) -> str:
-    """Return the note that names the images by their b-values.
+    """Return a note that lists the images by their b-values.
 
-    b_values  in the order of the file, s/mm2
+    b_values  s/mm2, in the order of the file
     place     the field or file that states them
     """
     order = order_of(b_values)

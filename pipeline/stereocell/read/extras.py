@@ -1,4 +1,4 @@
-"""Libraries of formats that are not installed with StereoCell but by an extra of it."""
+"""Libraries of formats that are installed only with an extra of StereoCell."""
 
 from importlib.util import find_spec
 
@@ -6,13 +6,13 @@ from stereocell.model.errors import SourceError
 
 
 def require_installed(library: str, extra: str, where: str, title: str) -> None:
-    """Raise SourceError, with the command that installs it, where a library is missing."""
+    """Raise SourceError, with the command that installs the library, if it is missing."""
     try:
         is_there = find_spec(library) is not None
-    except ValueError:  # a module without a spec
+    except ValueError:  # the module has no spec
         is_there = False
     if not is_there:
         raise SourceError(
-            f'{where}: {title}: its library is not installed, expected: pip install "stereocell'
-            f'[{extra}]"'
+            f"{where}: the library for {title} is not installed; expected it. Install it with: "
+            f'pip install "stereocell[{extra}]"'
         )

@@ -1,8 +1,8 @@
-"""Voxels that lie in one stretch of a file: as they are, or packed.
+"""Voxels that lie in one stretch of a file, either unpacked or compressed.
 
-Unpacked ones are read a window at a time, by nibabel's `fileslice`: a memory map of the file would
-take address space of its whole size, and end the process where the file is cut short meanwhile.
-Packed ones have no blocks: they are unpacked all at once, at the first access, and cached.
+Unpacked voxels are read a window at a time with nibabel's `fileslice`. A memory map would take
+address space of the whole file, and would end the process if the file were cut short meanwhile.
+Compressed voxels have no blocks: they are unpacked all at once, at the first access, and cached.
 """
 
 import math
@@ -22,10 +22,10 @@ from stereocell.read.statements import omission
 
 
 class FileArray:
-    """Unpacked voxels of a file, the last axis fastest.
+    """Unpacked voxels of a file; the last axis is the fastest.
 
     offset  bytes before the first voxel
-    behind  bytes behind the last one
+    behind  bytes after the last voxel
     """
 
     def __init__(
@@ -57,25 +57,25 @@ def notes_on_rest(array: StoredArray) -> tuple[str, ...]:
 
 
 def rest_note(behind: int, shape: Sequence[int], item_bytes: int) -> tuple[str, ...]:
-    """Return a note on bytes behind the voxels where they are as many as the smallest plane's.
+    """Return a note on bytes after the voxels if they would fill at least one plane.
 
-    behind      bytes behind the voxels
-    item_bytes  of one voxel
+    behind      bytes after the voxels
+    item_bytes  bytes of one voxel
     """
     voxels = math.prod(shape) * item_bytes
     if behind < voxels // max(shape):
         return ()
     return (
         omission(
-            f"{behind:,} bytes behind the voxels, {behind / voxels:.0%} of as many as theirs",
+            f"{behind:,} bytes behind the voxels, {behind / voxels:.0%} of the voxels' own bytes",
             "the header describes no more voxels",
-            "correct its sizes if there are more planes, points in time or channels",
+            "correct its sizes if there are more planes, time points or channels",
         ),
     )
 
 
 class PackedArray:
-    """Voxels that `load` decodes all at once; they are cached."""
+    """Voxels that `load` decodes all at once and that are then cached."""
 
     def __init__(
         self, shape: Sequence[int], dtype: np.dtype[Any], load: Callable[[], NDArray[Any]]
@@ -103,7 +103,7 @@ def unpack_array(
     *,
     skip: int = 0,
 ) -> NDArray[Any]:
-    """Return the voxels of the packed stretch at the end of a file.
+    """Return the voxels of the compressed stretch at the end of a file.
 
     packing  one of packed_stream.PACKINGS
     offset   bytes before the stretch

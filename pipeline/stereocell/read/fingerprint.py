@@ -1,8 +1,8 @@
 """A digest that identifies a dataset independently of its path, date and container.
 
-It covers the metadata that a build depends on and voxels, at a bounded cost: all voxels where they
-fit the budget, else the coarsest level (an average of the finer ones) and blocks of the finest
-level, spread evenly.
+The digest covers the metadata that a build depends on, and voxels at a bounded cost. All voxels
+are covered where they fit the budget. Otherwise the digest covers the coarsest level (an average
+of the finer ones) and evenly spread blocks of the finest level.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ _GOLDEN = 0.6180339887498949  # 1 / golden ratio, the step of a low-discrepancy 
 
 
 class Fingerprinted(Protocol):
-    """The parts of a dataset that the digest covers. `arrays`: one per level, finest first."""
+    """The parts of a dataset that the digest covers. `arrays` has one per level, finest first."""
 
     @property
     def dtype(self) -> np.dtype[Any]: ...
@@ -41,7 +41,7 @@ class Fingerprinted(Protocol):
 
 
 def fingerprint_of(dataset: Fingerprinted) -> str:
-    """Return the digest, 64 hex digits. Raises the errors of the format's library."""
+    """Return the digest, 64 hex digits. Passes on the errors of the format's library."""
     metadata = {
         "dtype": dataset.dtype.name,
         "time": dataset.time,
@@ -63,7 +63,7 @@ def fingerprint_of(dataset: Fingerprinted) -> str:
 
 
 def covers_all(dataset: Fingerprinted) -> bool:
-    """Return whether the fingerprint covers every voxel of every level, not a sample of them."""
+    """Return whether the fingerprint covers every voxel of every level, not only a sample."""
     count = len(dataset.levels)
     budget = BUDGET_BYTES // min(count, 2)
     voxels = (len(dataset.channels) * math.prod(level.shape) for level in dataset.levels)

@@ -1,4 +1,4 @@
-"""Voxels some of whose axes run backwards. They are mirrored while a window is read."""
+"""Voxels with reversed axes. Axes are flipped while a window is read."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from stereocell.read.dataset import StoredArray
 
 
 class FlippedArray:
-    """An array some of whose axes run backwards."""
+    """An array with some of its axes reversed."""
 
     def __init__(self, array: StoredArray, flips: Sequence[bool]) -> None:
         self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
@@ -23,14 +23,14 @@ class FlippedArray:
         return self._array
 
     def stored_spans(self, spans: Sequence[Sequence[range]]) -> list[list[range]]:
-        """Return ranges of indices along each axis as ranges of the stored array."""
+        """Return ranges of indices along each axis as ranges of indices of the stored array."""
         return [
             [range(n - one.stop, n - one.start) if flip else one for one in ranges]
             for ranges, flip, n in zip(spans, self._flips, self.shape, strict=True)
         ]
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
+        """Return the voxels at whole numbers and slices; slices have step 1 and lie inside."""
         place = [
             _mirrored(part, size) if flip else part
             for part, size, flip in zip(key, self.shape, self._flips, strict=True)

@@ -1,7 +1,7 @@
-"""Formats that are not read, by the endings of their names, with a way to a format that is.
+"""Formats that are not read, recognised by file name, each with a way to a format that is read.
 
-The first bytes of many formats (storage/first_bytes.py) name them. The formats here share their
-first bytes with others, or begin with anything.
+Most unsupported formats are recognised by their first bytes (storage/first_bytes.py). The formats
+here share their first bytes with others, or have no fixed ones.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ _HEADER = (
 class Foreign:
     """A format that is not read.
 
-    endings  in small letters
-    title    with an article
-    remedy   the way to a format that is read
-    is_other whether its files begin as those of a format that is read, and mean something else
+    endings  endings of file names, in lower case
+    title    name of the format, with an article
+    remedy   how to convert the file to a format that is read
+    is_other whether its files begin like those of a format that is read, but hold something else
     """
 
     endings: tuple[str, ...]
@@ -52,13 +52,13 @@ FOREIGN = (
 )  # fmt: skip
 _PHILIPS = "dcm2niix makes NIfTI of the pair"
 _VOXELS = (".raw", ".vol", ".bin", ".dat")
-_SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")  # VGStudio, PyHST
+_SIDECARS = (".vgi", ".info", ".vol.info", ".raw.info")  # written by VGStudio and PyHST
 
 
 def foreign_words(path: str, *, only_other: bool = False) -> str:
-    """Return words for a file by its name, with a remedy; empty: its ending says nothing.
+    """Return what a file is by its name, with a remedy; empty: the ending is not known.
 
-    only_other  whether only formats count whose files begin as those of a format that is read
+    only_other  count only formats whose files begin like those of a format that is read
     """
     lower = path.lower()
     if lower.endswith(".rec") and (header := _par_beside(Path(path))):
@@ -70,13 +70,13 @@ def foreign_words(path: str, *, only_other: bool = False) -> str:
 
 
 def _par_beside(path: Path) -> str:
-    """Return the name of the header of Philips beside a .rec; empty: there is none."""
+    """Return the name of the Philips header beside a .rec file; empty: there is none."""
     names = (path.with_suffix(suffix).name for suffix in (".PAR", ".par"))
     return next((name for name in names if path.with_name(name).is_file()), "")
 
 
 def bare_voxels_words(path: Path) -> str:
-    """Return what a file of voxels without a header is, with the way out; empty: it is none."""
+    """Return a description of a raw voxel file and the remedy; empty: it has another ending."""
     if path.suffix.lower() not in _VOXELS:
         return ""
     names = [path.name + ending for ending in _SIDECARS]

@@ -1,7 +1,7 @@
-"""All that is known of a format before a source of it is opened: one row, in its own module.
+"""All that is known about a format before a source is opened: one row, in the format's own module.
 
-A module or package of `read/formats` holds one format, with its row as `FORMAT`. It imports its
-library only when a source is opened, since the rows of all formats are loaded together.
+Each module or package of `read/formats` holds one format, with its row as `FORMAT`. It imports its
+library only when a source is opened, because the rows of all formats are loaded together.
 """
 
 import re
@@ -20,8 +20,8 @@ from stereocell.storage.location import Location
 class Guide(NamedTuple):
     """A row of the table of formats in docs/own-data.md, in Markdown.
 
-    input  how a source is named
-    read   the metadata that are read, or a link to a section
+    input  how to name a source
+    read   metadata that are read, or a link to a section
     """
 
     format: str
@@ -32,7 +32,7 @@ class Guide(NamedTuple):
 class Library(NamedTuple):
     """A library that an extra of StereoCell installs.
 
-    reads  the files that need it, in words
+    reads  description of the files that need it
     """
 
     import_name: str
@@ -44,33 +44,33 @@ class Library(NamedTuple):
 class Format:
     """One format of sources.
 
-    title            the usual name; a part in brackets says how a source is named
-    guides           its rows in the docs
-    open             `open(location) -> Image`, with the options below that the format takes
-    list_series      returns a line for each image of a source; it may hold several, so `open` takes
-                     `series`. None: it holds one
-    order            a sentence on the order of these images; empty: the source's own
-    has_pattern      names of files may tell their places: `open` takes `pattern`
-    has_axes         a source may not name its axes: `open` takes `axes`
+    title            usual name; a part in brackets explains how to name a source
+    guides           rows in the table of formats in the docs
+    open             `open(location) -> Image`, plus the options below that the format accepts
+    list_series      returns a line for each image of a source that may hold several; `open` then
+                     accepts `series`. None: a source holds one image
+    order            a sentence on the order of these images; empty: the source's own order
+    has_pattern      file names may state places, so `open` accepts `pattern`
+    has_axes         a source may not name its axes, so `open` accepts `axes`
     has_parts        a source may be a part of a file: `NAME.h5:/KEY`, `NAME.zarr.zip/0`
-    has_plain_names  files are named by numbers; else a name may identify a patient
-    is_remote        a source may lie at an address
-    version          is raised when the same file gives other voxels or another place: a part of the
-                     key of each result
-    library          the library that it needs beyond StereoCell's own
-    decoders         a library that unpacks more of its files than StereoCell's own do
-    endings          of its files' names, in lower case, the usual one first
-    loose_endings    of files whose first bytes may state another format, which is then taken
-    folder_endings   of its folders' names: all in such a folder is of the format
+    has_plain_names  files are named by numbers; otherwise a name may identify a patient
+    is_remote        a source may be at an address
+    version          part of each result's key; raised when the same file gives other voxels or
+                     another place
+    library          library that the format needs beyond StereoCell's own
+    decoders         library that decodes more of its files than StereoCell's own libraries do
+    endings          endings of file names, in lower case, the usual one first
+    loose_endings    endings that other formats share; first bytes of another format take precedence
+    folder_endings   endings of folder names: everything in such a folder has this format
     addresses        recognises an address whose names have no ending
-    holds            recognises a source on this machine by looking into it. An ending is not enough
-                     for a format that has both
-    marks            recognise a file whose name has no ending of a format
-    needs_ending     marks do not suffice, because its library goes by the name
+    holds            recognises a source on this machine by looking into it. For a format with
+                     `holds`, an ending alone is not enough
+    marks            first bytes that recognise a file whose name has no known ending
+    needs_ending     marks alone are not enough, because the format's library goes by the name
     may_hold         recognises a source that no format has recognised otherwise
-    is_unmarked      returns whether a file, by its path and first bytes, may be of the format
+    is_unmarked      returns whether a file, by its path and first bytes, may have this format
                      although it has none of its marks
-    packed_endings   of files that are packed by gzip; the bytes in them are checked
+    packed_endings   endings of files that are compressed by gzip; their content is checked
     count_absent     counts the chunks of a part of an array that are not stored; None: all are
     read_free_labels returns the free text by which a label map names each object
     name, module     of the module that holds the row; `known_formats` fills them in
@@ -106,7 +106,7 @@ class Format:
 
     @property
     def short_title(self) -> str:
-        """The title without its part in brackets."""
+        """The title without the part in brackets."""
         return self.title.partition(" (")[0]
 
     @property
@@ -115,7 +115,7 @@ class Format:
         return self.list_series is not None
 
     def require_library(self, location: Location) -> None:
-        """Raise SourceError, with the command that installs it, where the library is missing."""
+        """Raise SourceError, with the command that installs the library, if it is missing."""
         if self.library is not None:
             name, extra = self.library.import_name, self.library.extra
             require_installed(name, extra, location.shown, self.short_title)

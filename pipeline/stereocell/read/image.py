@@ -10,9 +10,10 @@ from stereocell.read.dataset import VoxelArray
 from stereocell.read.spacing import Grid
 
 Color = tuple[float, float, float]
-RGB_NAMES = ("Red", "Green", "Blue")  # channels of colour pixels
-RGB_COLORS: tuple[Color, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # linear
-MAX_CHANNELS = 10_000  # most channels of a source; a source with more is refused
+RGB_NAMES = ("Red", "Green", "Blue")  # names of the channels of colour pixels
+# linear RGB, 0..1
+RGB_COLORS: tuple[Color, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+MAX_CHANNELS = 10_000  # a source with more channels is refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +23,14 @@ class Image:
     arrays, grids  one for each level, finest first
     names, colors  one for each channel; None: not stated. Colours are linear RGB, 0..1
     images         the number of images in the source
-    close          frees open files, or None
+    close          closes open files; None: none are open
     title          the image's name; None: the file's name is used
     modality, has_hounsfield_units, placement, has_sides, acquired, labels, objects  as in Dataset
-    notes          become Dataset's `remarks`
+    notes          notes for the user, which become Dataset's `remarks`
     files          paths or addresses of all files and folders that are read; empty: the source
-    notes_at       returns more notes, about one time point; it may read that point's voxels
-    at_time        returns the image as one time point has it, where channels or spacing depend on
-                   the time; it is called once, before anything else uses the image
+    notes_at       returns further notes about one time point; it may read that point's voxels
+    at_time        returns the image at one time point, where channels or spacing depend on the
+                   time; called once, before anything else uses the image
     """
 
     arrays: tuple[VoxelArray, ...]

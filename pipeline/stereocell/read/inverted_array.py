@@ -9,10 +9,10 @@ from stereocell.read.dataset import StoredArray
 
 
 class InvertedArray:
-    """An array whose values count down instead of up: dark voxels are bright.
+    """An array whose values are inverted: dark voxels are bright.
 
-    Whole numbers become the dtype's largest value minus the distance from its smallest, as 255 - v
-    of uint8; floats change their sign.
+    Integers become the dtype's largest value minus the distance from its smallest, such as 255 - v
+    for uint8; floats change their sign.
     """
 
     def __init__(self, array: StoredArray) -> None:

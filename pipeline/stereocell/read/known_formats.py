@@ -1,6 +1,6 @@
-"""The formats that are read, and the one of a source.
+"""The formats that are read, and the search for a source's format.
 
-They are the modules of `read/formats`, in the order of their names. No list of them has to be kept.
+Each module of `read/formats` is one format. A new module is found by itself: there is no list.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from stereocell.storage.first_bytes import Content, Marks
 from stereocell.storage.location import Location
 from stereocell.storage.location import first_bytes as head_of
 
-OTHER = "other"  # takes files that no other format recognises
+OTHER = "other"  # name of the format that takes files which no other format recognises
 _PACKAGE = "stereocell.read.formats"
 
 
@@ -33,16 +33,16 @@ def known_formats() -> Mapping[str, Format]:
 
 
 def format_of(source: str | Path) -> Format:
-    """Return the format of a source by its name and its content, or the one of other files."""
+    """Return the format of a source by its name and content, or the format of other files."""
     return find_format(Location.of(source)) or known_formats()[OTHER]
 
 
 def find_format(location: Location) -> Format | None:
-    """Return the format of a source by its name and its content; None: neither has one.
+    """Return the format of a source by its name and content; None: no format recognises it.
 
     The order is: a folder's name, a look into the source, the ending of a file's name, its first
-    bytes, and at last a format that takes what is left, as DICOM takes folders. At an address only
-    the names count.
+    bytes, an ambiguous ending. Last comes a format that takes any remaining source, as DICOM
+    takes folders. At an address only names and the address itself count.
     """
     formats = [one for one in known_formats().values() if one.name != OTHER]
     for part in reversed(location.parts):
@@ -74,20 +74,20 @@ def _by_marks(location: Location) -> Format | None:
 
 
 def is_unknown(_path: str, head: bytes) -> bool:
-    """Return whether a file begins as no known format or container does."""
+    """Return whether a file begins like no known format or container."""
     return not identify(head).is_known
 
 
 def identify(head: bytes) -> Content:
-    """Return the content of a file that begins with these bytes: of a format, or words alone."""
+    """Return what a file that begins with these bytes holds: a format, or just a description."""
     return first_bytes.identify(head, _marks())
 
 
 @cache
 def _marks() -> Marks:
-    """Return all marks. Those at the first byte go first, then those farther inside.
+    """Return all marks: those at the first byte first, then those farther inside.
 
-    The bytes before a mark are free text in some formats, which may hold another format's mark.
+    The bytes before an inner mark are free text in some formats and may hold another format's mark.
     """
     marks = [(one.name, mark) for one in known_formats().values() for mark in one.marks]
     return sorted(marks, key=lambda pair: (pair[1].at > 0, -pair[1].at))

@@ -1,4 +1,4 @@
-"""A label map: voxels that hold their object's number, of any integer type, or whole floats."""
+"""A label map: voxels that hold the number of their object, as integers or whole floats."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -12,14 +12,14 @@ from stereocell.model.settings import MAX_COUNT
 from stereocell.model.tiling import Box
 from stereocell.read.dataset import Dataset
 
-_MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
+_MAX_EXACT = 2.0**53  # whole numbers below this limit are exact in float64
 
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """One channel of a dataset, at its finest level: coarser ones may be averages of numbers.
+    """One channel of a dataset at its finest level, since coarser levels may average the numbers.
 
-    background  a number of voxels that are no object, beside 0, -1 and NaN; it may be negative
+    background  a number that marks no object, beside 0, -1 and NaN; it may be negative
     """
 
     dataset: Dataset
@@ -33,24 +33,24 @@ class LabelMap:
 
     @property
     def notes(self) -> ObjectNotes:
-        """What the file says of the objects."""
+        """The file's notes on the objects."""
         return self.dataset.objects
 
     def read(self, box: Box) -> NDArray[np.unsignedinteger]:
-        """Return the numbers of a box, (z, y, x), unsigned; 0: no object.
+        """Return the object numbers of a box, (z, y, x), unsigned; 0: no object.
 
-        -1 and NaN are no object either, as some programs write it, nor is `background`. Raises
+        -1, NaN and `background` mean no object too; some programs write -1 or NaN. Raises
         SourceError for other numbers below 0, for fractions, and where a chunk can't be decoded.
         """
         stored = self._without_background(self._integers(box))
         if stored.dtype.kind == "i":
             least = int(stored.min(initial=0))
             if least < -1:
-                way = f"--background {least} if it is the background, else other numbers"
+                way = f"give --background {least} if it marks the background, else renumber"
                 if least < -MAX_COUNT:
-                    way = "another number in its place"
+                    way = "renumber it"
                 raise SourceError(
-                    f"{self._where}: found {least}, expected 0 or more in labels: {way}"
+                    f"{self._where}: found {least}, expected labels of 0 or more: {way}"
                 )
             if least < 0:
                 stored = np.where(stored < 0, 0, stored)
@@ -64,9 +64,9 @@ class LabelMap:
         return self._whole(stored) if stored.dtype.kind == "f" else stored
 
     def _without_background(self, stored: NDArray[np.integer]) -> NDArray[np.integer]:
-        """Return numbers with 0 in the place of `background`."""
+        """Return the numbers with 0 in place of `background`."""
         limits = np.iinfo(stored.dtype)
-        # a number that the type can't hold is in no voxel
+        # No voxel holds a number outside the range of its type.
         if not self.background or not limits.min <= self.background <= limits.max:
             return stored
         kind = stored.dtype.type
@@ -74,7 +74,7 @@ class LabelMap:
 
     def _whole(self, stored: NDArray[np.floating]) -> NDArray[np.int64]:
         numbers = np.where(np.isnan(stored), 0, stored)
-        if numbers.dtype == np.float16:  # it has no number as large as the limit
+        if numbers.dtype == np.float16:  # float16 can't represent the limit
             numbers = numbers.astype(np.float32)
         is_whole = (np.abs(numbers) < _MAX_EXACT) & (np.floor(numbers) == numbers)
         if not is_whole.all():
@@ -88,12 +88,12 @@ class LabelMap:
 
 
 def _not_whole(numbers: NDArray[np.floating], stored: np.dtype[np.floating]) -> str:
-    """Return the message on numbers that are no labels: fractions, infinity, or too large ones."""
+    """Return the message on invalid labels: fractions, infinite numbers or too large ones."""
     large = numbers[np.isfinite(numbers) & (np.abs(numbers) >= _MAX_EXACT)]
     if not len(large):
         return f"found {float(numbers[0]):g}, expected whole numbers in labels"
     return (
         f"found {float(large[0]):.0f} in {stored.name}, which rounds whole numbers beyond "
-        f"{int(_MAX_EXACT):,}, so that objects of neighbouring numbers are one: expected labels "
-        "that are saved as int64 or uint64"
+        f"{int(_MAX_EXACT):,}, so objects with neighbouring numbers would merge: expected labels "
+        "saved as int64 or uint64"
     )

@@ -1,7 +1,7 @@
-"""What files say of the objects of their label maps.
+"""Notes in a file on the objects of its label map: names, colours and other properties.
 
 References: OME-Zarr 0.5, https://ngff.openmicroscopy.org/0.5/#labels-metadata (image-label);
-NIfTI label tables as TotalSegmentator writes them, an XML header extension of CaretExtension's kind
+NIfTI label tables, written by TotalSegmentator as an XML header extension in CaretExtension's style
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -12,13 +12,13 @@ from stereocell.model.color import linear_color
 from stereocell.model.object_notes import ObjectNotes
 from stereocell.read.stated_numbers import number_of
 
-_MAX_LABELS = 1_000_000  # objects of which notes are taken
-_MAX_XML = 1 << 22  # bytes of a header extension that is parsed
+_MAX_LABELS = 1_000_000  # objects; notes on further objects are not read
+_MAX_XML = 1 << 22  # bytes of a header extension; longer ones are not parsed
 _LONGEST = 200  # characters of a name or a text
 
 
 def notes_of_ngff(image_label: Any) -> ObjectNotes:
-    """Return the notes of an image's `image-label`; entries that are none are left out."""
+    """Return the notes in an image's `image-label`; malformed entries are left out."""
     found = ObjectNotes()
     for entry in _entries(image_label, "colors"):
         rgba, label = entry.get("rgba"), _label(entry)
@@ -41,7 +41,7 @@ def notes_of_nifti(extensions: Iterable[bytes]) -> ObjectNotes:
     found = ObjectNotes()
     for content in extensions:
         text = content.rstrip(b"\0")
-        # a document type could name files and multiply entities
+        # A document type could name other files and multiply entities without end.
         if b"<Label" not in text or b"<!DOCTYPE" in text or len(text) > _MAX_XML:
             continue
         try:

@@ -1,8 +1,8 @@
-"""The stated spacing of each coarser level, compared with the spacing that its shape gives.
+"""Compare the stated spacing of each coarser level with the spacing that its shape implies.
 
-All levels of a pyramid cover the same field. A level of half as many voxels has voxels twice as
-long. Where the stated spacing says otherwise, and the shape gives a whole factor, the shape is
-taken: the number of voxels is that of the data. Any other level keeps its stated spacing.
+All levels of a pyramid cover the same field: a level of half as many voxels has voxels twice as
+long. Where the stated spacing contradicts that and the shape implies a whole factor, the shape
+decides, because the number of voxels is certain. Any other level keeps its stated spacing.
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ from dataclasses import replace
 from stereocell.read.spacing import Grid, Triple
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-_ROUNDING = 1.0 + 1e-6  # voxels by which repeated rounding changes the length of a level
+_ROUNDING = 1.0 + 1e-6  # voxels by which repeated rounding may change the length of a level
 
 
 def settle_levels(grids: Sequence[Grid]) -> tuple[tuple[Grid, ...], tuple[str, ...]]:
-    """Return grids whose spacings fit their shapes, and a note for each one that was changed."""
+    """Return grids whose spacings agree with their shapes, and a note on each change."""
     settled, notes = [grids[0]], list[str]()
     for index, grid in enumerate(grids[1:], start=1):
         spacing = list(grid.spacing_um or ())
@@ -37,12 +37,12 @@ def settle_levels(grids: Sequence[Grid]) -> tuple[tuple[Grid, ...], tuple[str, .
 
 
 def _contradiction(finest: Grid, grid: Grid, axis: int) -> tuple[float, Trust] | None:
-    """Return the spacing (um) by a level's shape, and its trust; None: the stated one fits."""
+    """Return the spacing (um) implied by a level's shape, and its trust; None: no contradiction."""
     if finest.spacing_um is None or grid.spacing_um is None:
         return None
     own, coarse = finest.spacing_um[axis], grid.spacing_um[axis]
     if not own > 0 or not coarse > 0:
-        return None  # refused elsewhere
+        return None  # other modules refuse such a spacing
     fine, count = finest.shape[axis], grid.shape[axis]
     if abs(fine * own / coarse - count) <= _ROUNDING:
         return None

@@ -1,11 +1,11 @@
 """Angles, wavelengths, lifetimes or phases that OME-XML describes along z, channels or time.
 
-The annotation `ModuloAlongZ` says that the planes along z are those of several angles. They are
-images of their own, never slices of one stack. Wavelengths along C are channels, and stay so.
+The annotation `ModuloAlongZ` says that several angles are stored along z. The planes of each angle
+are an image of their own, never slices of one stack. Wavelengths along C stay channels.
 
-Bio-Formats has the planes of all angles one after another at each depth; other writers store the
-whole stack of each angle. The places of the planes tell, and else the voxels: neighbouring slices
-of one stack are more alike.
+Bio-Formats stores the planes of all angles one after another at each depth; other writers store the
+whole stack of each angle. The positions of the planes decide which. Without positions the voxels
+decide: neighbouring slices of one stack are more alike.
 
 References: https://docs.openmicroscopy.org/ome-model/latest/developers/6d-7d-and-8d-storage.html
 """
@@ -25,7 +25,7 @@ from stereocell.read.dataset import StoredArray, VoxelArray
 from stereocell.read.image import Image
 from stereocell.read.series import Candidate, candidate, choose
 
-_MOST = 10_000  # most values of one axis
+_MOST = 10_000  # most values along one axis
 _LONGEST = 20  # characters of a type or a label that a message shows
 _COMPARED = 8  # pairs of planes that are compared
 _PLURALS = {"phase": "phases", "lambda": "wavelengths", "lifetime": "lifetimes"}
@@ -33,10 +33,10 @@ _PLURALS = {"phase": "phases", "lambda": "wavelengths", "lifetime": "lifetimes"}
 
 @dataclass(frozen=True, slots=True)
 class Modulo:
-    """One further axis.
+    """A further axis, stored along one of the usual ones.
 
-    axis    `z`, `c` or `t`, along which it is stored
-    kind    such as `angle`
+    axis    `z`, `c` or `t`: the axis along which it is stored
+    kind    type, such as `angle`
     labels  one for each value
     """
 
@@ -46,13 +46,13 @@ class Modulo:
 
     @property
     def counted(self) -> str:
-        """The number of values and their noun."""
+        """The number of values with their noun, such as `3 angles`."""
         plural = _PLURALS.get(self.kind, f"{self.kind}s")
         return f"{len(self.labels)} {plural if len(self.labels) != 1 else self.kind}"
 
 
 def modulos_of(root: ElementTree.Element) -> list[Modulo]:
-    """Return the further axes of the first image, of more than one value each."""
+    """Return the further axes of the first image that have more than one value."""
     found = []
     for node in ome_xml.modulos_of(root):
         axis = node.tag.rpartition("}")[2].removeprefix("ModuloAlong").lower()
@@ -86,9 +86,9 @@ def _labels(node: ElementTree.Element) -> tuple[str, ...]:
 
 
 def split(where: str, image: Image, root: ElementTree.Element | None, series: int) -> Image:
-    """Return one of the images that lie along further axes, with notes.
+    """Return one of the images that are stored along further axes, with notes.
 
-    root    of the OME-XML; None: there is none
+    root    root of the OME-XML; None: there is none
     series  from 1, as `candidates` lists them; 0: the first
 
     Raises UsageError where there is no such image.
@@ -101,7 +101,8 @@ def split(where: str, image: Image, root: ElementTree.Element | None, series: in
     others = [one for one in modulos_of(root) if one not in listed and not _are_channels(one)]
     notes = [
         f"ModuloAlong{one.axis.upper()} states {one.counted}, by which "
-        f"{image.arrays[0].size(one.axis)} planes along {one.axis} can't be divided: not split"
+        f"{image.arrays[0].size(one.axis)} planes along {one.axis} can't be divided: left as one "
+        "image"
         for one in others
     ]
     places = list(product(*(range(len(one.labels)) for one in listed)))[index]
@@ -119,7 +120,7 @@ def split(where: str, image: Image, root: ElementTree.Element | None, series: in
 
 
 def candidates(image: Image, parts: Sequence[Modulo]) -> list[Candidate]:
-    """Return what a list says of each image that lies along further axes."""
+    """Return the entry in the list of series of each image that is stored along further axes."""
     sizes = {axis: image.arrays[0].size(axis) for axis in "zct"}
     for one in parts:
         sizes[one.axis] //= len(one.labels)
@@ -135,14 +136,14 @@ def candidates(image: Image, parts: Sequence[Modulo]) -> list[Candidate]:
 
 
 def listed(image: Image, root: ElementTree.Element | None) -> list[Candidate]:
-    """Return the images of a file that `split` chooses from."""
+    """Return the entries of the images that `split` chooses from."""
     return candidates(image, _parts_of(image, root))
 
 
 def parts_along(root: ElementTree.Element, sizes: Mapping[str, int]) -> list[Modulo]:
     """Return the further axes of the first image that separate images.
 
-    sizes  of the image along z, c and t
+    sizes  lengths of the image along z, c and t
     """
     found = [one for one in modulos_of(root) if not _are_channels(one)]
     return [one for one in found if sizes[one.axis] % len(one.labels) == 0]
@@ -168,11 +169,11 @@ class PartAlong:
 
     @property
     def stored(self) -> StoredArray:
-        """The array as it is stored."""
+        """The array that holds the planes of all values."""
         return self._array
 
     def stored_spans(self, spans: Sequence[Sequence[range]]) -> list[list[range]]:
-        """Return ranges of indices along each axis as ranges of the stored array."""
+        """Return ranges of indices along each axis as ranges of indices of the stored array."""
         found = [list(ranges) for ranges in spans]
         places = [self._start + self._step * at for one in spans[self._axis] for at in one]
         found[self._axis] = [range(place, place + 1) for place in places]
@@ -195,7 +196,7 @@ class PartAlong:
 
 
 def _part(image: Image, one: Modulo, place: int, *, is_interleaved: bool) -> Image:
-    """Return the planes of one value of a further axis."""
+    """Return the image of one value of a further axis."""
     total = image.arrays[0].size(one.axis)
     count = total // len(one.labels)
     start, step = (place, len(one.labels)) if is_interleaved else (place * count, 1)
@@ -220,7 +221,7 @@ def _part(image: Image, one: Modulo, place: int, *, is_interleaved: bool) -> Ima
 
 
 def _is_interleaved(array: VoxelArray, one: Modulo, root: ElementTree.Element) -> bool:
-    """Return whether the values of a further axis take turns at each depth, channel or time."""
+    """Return whether the values of a further axis alternate, rather than follow in runs."""
     n = len(one.labels)
     total = array.size(one.axis)
     if total == n:
@@ -228,10 +229,10 @@ def _is_interleaved(array: VoxelArray, one: Modulo, root: ElementTree.Element) -
     if one.axis == "z":
         places = ome_xml.positions_of(root)
         if len(places) == total:
-            by_turns = sum(places[at] == places[at + 1] for at in range(0, total, n))
+            alternating = sum(places[at] == places[at + 1] for at in range(0, total, n))
             in_runs = sum(places[at] == places[at + total // n] for at in range(total // n))
-            if by_turns != in_runs:
-                return by_turns > in_runs
+            if alternating != in_runs:
+                return alternating > in_runs
     firsts = np.linspace(0, total - n - 1, _COMPARED).astype(int)
     near = sum(_difference(array, one.axis, at, at + 1) for at in firsts)
     far = sum(_difference(array, one.axis, at, at + n) for at in firsts)
@@ -239,7 +240,7 @@ def _is_interleaved(array: VoxelArray, one: Modulo, root: ElementTree.Element) -
 
 
 def _difference(array: VoxelArray, axis: str, first: int, second: int) -> float:
-    """Return the mean difference of two planes along an axis."""
+    """Return the mean absolute difference between two planes along an axis."""
     planes = []
     for at in (first, second):
         _, y, x = array.shape

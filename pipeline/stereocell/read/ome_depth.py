@@ -1,4 +1,4 @@
-"""The positions of the planes in OME-XML: the depth of voxels by them, and a drift sideways."""
+"""Read the positions of the planes from OME-XML: the depth of voxels, and sideways drift."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -14,9 +14,9 @@ from stereocell.read.statements import Statement
 def settle_depth(
     root: ElementTree.Element, stated: Sequence[Statement]
 ) -> tuple[float | None, tuple[str, ...]]:
-    """Return the depth of a voxel, um, and notes; None: no field states one.
+    """Return the depth of a voxel, um, and notes; None: no field states a depth.
 
-    stated  the depth as other fields state it, in um, the most trusted first
+    stated  the depth in other fields, um, the most trusted first
     """
     places, has_unit = positions_of(root)
     depth, notes = settle_places(places, stated, "PositionZ", has_unit=has_unit)
@@ -26,7 +26,7 @@ def settle_depth(
 
 
 def _drift_notes(root: ElementTree.Element, axis: str) -> tuple[str, ...]:
-    """Return a note where the planes lie at different places along x or y."""
+    """Return a note if the planes lie at different positions along x or y."""
     pixels = ome_xml.pixels_of(root)
     places, _ = positions_of(root, axis)
     if pixels is None or len(places) < 2:
@@ -38,22 +38,22 @@ def _drift_notes(root: ElementTree.Element, axis: str) -> tuple[str, ...]:
 
 
 _SAME = (
-    "the planes' PositionZ is the same and their DeltaT rises: they may be points in time (--axes "
-    "with t in the place of z reads them so)"
+    "the planes' PositionZ is the same and their DeltaT rises: they may be time points (--axes "
+    "with t in place of z reads them so)"
 )
 
 
 def _planes(root: ElementTree.Element) -> list[ElementTree.Element]:
-    """Return the planes of the first channel and time that are described."""
+    """Return the described planes of the first channel and time point."""
     planes = ome_xml.planes_of(root)
     first = min(((p.get("TheT", "0"), p.get("TheC", "0")) for p in planes), default=("", ""))
     return [p for p in planes if (p.get("TheT", "0"), p.get("TheC", "0")) == first]
 
 
 def positions_of(root: ElementTree.Element, axis: str = "Z") -> tuple[dict[int, float], bool]:
-    """Return PositionZ, or that of X or Y, in um by TheZ, and whether a unit of length is stated.
+    """Return PositionZ (or X or Y) in um by TheZ, and whether a unit of length is stated.
 
-    Without any unit um are assumed. The unit `reference frame` is no length.
+    um are assumed where no plane states a unit. The unit `reference frame` is not a length.
     """
     found: dict[int, float] = {}
     planes, field = _planes(root), f"Position{axis}"

@@ -1,7 +1,7 @@
-"""OME-XML: the images of a file, their voxel spacing, and their channels' names and colours.
+"""Read OME-XML: the images of a file, their voxel spacing, and their channels' names and colours.
 
-Only what a build needs is read, by Python's own parser: a file whose instruments or annotations
-break the schema opens all the same.
+Python's own parser reads only the parts that a build needs, so a file opens even if its
+instruments or annotations break the schema.
 
 References: https://docs.openmicroscopy.org/ome-model/latest/ome-xml/
 """
@@ -17,18 +17,18 @@ from stereocell.read.image import Color
 from stereocell.read.repeats import record_xml
 from stereocell.read.spacing import PartialTriple, um_per
 
-_HEAD = 4096  # characters of a description, in which OME-XML names itself, whole or not
+_HEAD = 4096  # characters at the start of a description that are searched for signs of OME-XML
 _DEFAULT_COLOR = -1  # opaque white
-_DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z, where the file names none
+_DEFAULT_UNIT = "\u00b5m"  # unit of PhysicalSizeX, Y and Z where the file states none
 
 
 @dataclass(frozen=True, slots=True)
 class OmeImage:
     """One image.
 
-    spacing_um  (z, y, x), um; None each: not stated with a unit of length
+    spacing_um  (z, y, x), um; None for each axis that is not stated with a unit of length
     names       one for each channel; None: not stated
-    colors      the same, linear RGB, 0..1
+    colors      one for each channel, linear RGB, 0..1; None: not stated
     """
 
     spacing_um: PartialTriple
@@ -37,7 +37,7 @@ class OmeImage:
 
 
 def is_ome(description: str) -> bool:
-    """Whether the description of a TIFF file is OME-XML, whole or not."""
+    """Return whether the description of a TIFF file is OME-XML, complete or cut off."""
     text = description.strip("\ufeff\0 \t\r\n")
     head = text[:_HEAD]
     is_named = text.endswith("OME>") or "<OME" in head or "openmicroscopy.org" in head
@@ -47,13 +47,13 @@ def is_ome(description: str) -> bool:
 def parse(text: str, where: str) -> ElementTree.Element:
     """Return the root of OME-XML. `where` names the file in errors.
 
-    Raises SourceError where the text is none, or isn't well-formed, or declares entities: those
-    could name other files, or grow without end.
+    Raises SourceError where the text is not OME-XML, is not well-formed, or declares entities:
+    entities could refer to other files or grow without end.
     """
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         raise SourceError(
-            f"{where}: OME-XML: found none in the first plane's ImageDescription; expected an "
-            "OME-TIFF file, whole, with its OME-XML"
+            f"{where}: OME-XML: found none in the first plane's ImageDescription; expected a "
+            "complete OME-TIFF file with its OME-XML"
         )
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise SourceError(f"{where}: OME-XML: found a DOCTYPE, expected none")
@@ -61,7 +61,7 @@ def parse(text: str, where: str) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise SourceError(
-            f"{where}: OME-XML: {error}; expected an OME-TIFF file, whole, with its OME-XML"
+            f"{where}: OME-XML: {error}; expected a complete OME-TIFF file with its OME-XML"
         ) from error
     if _local(root) != "OME":
         raise SourceError(f"{where}: OME-XML: found <{_local(root):.40}>, expected <OME>")
@@ -70,18 +70,18 @@ def parse(text: str, where: str) -> ElementTree.Element:
 
 
 def metadata_file_of(root: ElementTree.Element) -> tuple[str, str]:
-    """Return the name and UUID of the file that holds the OME-XML; empty: it is here."""
+    """Return name and UUID of another file that holds the OME-XML; empty: this file holds it."""
     other = next(_children(root, "BinaryOnly"), None)
     return ("", "") if other is None else (other.get("MetadataFile", ""), other.get("UUID", ""))
 
 
 def uuids_of(root: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    """Yield the UUID of the file of each plane, or of a run of them, with its name."""
+    """Yield the UUID elements: each names the file of one plane or of several."""
     return (element for element in root.iter() if _local(element) == "UUID")
 
 
 def files_of(root: ElementTree.Element) -> Iterator[str]:
-    """Yield the name of the file of each plane, or of a run of them."""
+    """Yield file names, each of one plane or of several."""
     return (uuid.get("FileName", "") for uuid in uuids_of(root) if uuid.get("FileName"))
 
 
@@ -91,9 +91,10 @@ def count_images(root: ElementTree.Element) -> int:
 
 
 def only_image(root: ElementTree.Element, index: int) -> ElementTree.Element:
-    """Return OME-XML of one image: a copy without the others and without their annotations.
+    """Return OME-XML of one image: a copy without the other images and their annotations.
 
-    The image at `index` is the first one of the copy. There is none where the index is too large.
+    The image at `index` is the first one of the copy. The copy has no image if `index` is too
+    large.
     """
     images = list(_children(root, "Image"))
     kept = images[index] if 0 <= index < len(images) else None
@@ -128,7 +129,7 @@ def planes_of(root: ElementTree.Element) -> list[ElementTree.Element]:
 def positions_of(root: ElementTree.Element) -> list[float]:
     """Return PositionZ of the planes of the first channel and time, by TheZ, in any unit.
 
-    Empty: a plane has none.
+    Empty: a plane has no position, or not every TheZ has a plane.
     """
     found: dict[int, float] = {}
     for plane in planes_of(root):
@@ -143,7 +144,7 @@ def positions_of(root: ElementTree.Element) -> list[float]:
 def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
     """Return the further axes (`ModuloAlongZ`, ...) of the first image.
 
-    An annotation counts for all images where no image refers to it.
+    An annotation that no image refers to counts for all images.
     """
     images = list(_children(root, "Image"))
     refers = [_annotations_of(image) for image in images]
@@ -157,7 +158,7 @@ def modulos_of(root: ElementTree.Element) -> list[ElementTree.Element]:
 
 
 def samples_of(pixels: ElementTree.Element) -> int:
-    """Return the samples in each pixel (3 of RGB) of the first channel."""
+    """Return the samples of each pixel (3 for RGB) in the first channel."""
     channel = next(_children(pixels, "Channel"), None)
     return max(int(channel.get("SamplesPerPixel", 1)), 1) if channel is not None else 1
 
@@ -165,7 +166,7 @@ def samples_of(pixels: ElementTree.Element) -> int:
 def tiff_data_of(
     root: ElementTree.Element,
 ) -> Iterator[tuple[ElementTree.Element, ElementTree.Element | None]]:
-    """Yield each TiffData of the first image with its UUID, or None where it has none."""
+    """Yield each TiffData of the first image with its UUID; None: it has no UUID."""
     pixels = pixels_of(root)
     for data in () if pixels is None else _children(pixels, "TiffData"):
         yield data, next(_children(data, "UUID"), None)
@@ -174,7 +175,7 @@ def tiff_data_of(
 def images_of(root: ElementTree.Element, where: str) -> list[OmeImage]:
     """Return the images with their pixels' metadata.
 
-    Raises SourceError where they hold what is no number.
+    Raises SourceError where a field should hold a number and doesn't.
     """
     return [_image(image, where) for image in _children(root, "Image")]
 
@@ -211,10 +212,10 @@ def _spacing(pixels: ElementTree.Element, where: str) -> PartialTriple:
 
 
 def _color(channel: ElementTree.Element, where: str) -> Color | None:
-    """Return the colour, which OME holds as a signed 32-bit number of R, G, B and A.
+    """Return the colour, which OME stores as a signed 32-bit number of R, G, B and A.
 
-    Where it states none, that of the light. White is the default of OME-XML, which programs write
-    where they know none, so the light counts more.
+    Without a stated colour, the channel takes the colour of its light. White is OME-XML's default,
+    which programs write if they know no colour, so the light takes precedence over white.
     """
     given, nm, dye = channel.get("Color"), _emission_nm(channel), channel.get("Fluor", "")
     if given is None:
@@ -231,7 +232,7 @@ def _color(channel: ElementTree.Element, where: str) -> Color | None:
 
 
 def _emission_nm(channel: ElementTree.Element) -> float | None:
-    """Return the wavelength of the light that a channel took, nm; None: not stated."""
+    """Return the emission wavelength of a channel, nm; None: not stated."""
     per = um_per(channel.get("EmissionWavelengthUnit", "nm"))
     try:
         return None if per is None else float(channel.get("EmissionWavelength", "")) * per * 1000
@@ -244,5 +245,5 @@ def _children(element: ElementTree.Element, name: str) -> Iterator[ElementTree.E
 
 
 def _local(element: ElementTree.Element) -> str:
-    """Return an element's name without its namespace, which changes from version to version."""
+    """Return an element's name without its namespace, which differs between versions."""
     return element.tag.rpartition("}")[2]

@@ -1,4 +1,4 @@
-"""Open a source: read its metadata by its format's reader, check that we can build it."""
+"""Open a source: read its metadata with its format's reader and check that it can be built."""
 
 import math
 from collections import Counter
@@ -23,7 +23,7 @@ from stereocell.read.spacing import Triple, levels_of
 from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location
 
-MAX_CHUNK_BYTES = 4 << 30  # largest chunk in bytes: a chunk is decoded whole
+MAX_CHUNK_BYTES = 4 << 30  # bytes; largest chunk that is accepted, because a chunk is decoded whole
 
 
 def open(
@@ -43,18 +43,19 @@ def open(
     time        time point, from 0
     spacing_um  (z, y, x), um; replaces the voxel spacing that the source states
     series      series of DICOM or of planes, or image of a file of several, from 1 as
-                `list_series` counts; 0: the largest
-    pattern     how the files of a folder of planes are named, as `img_c{c}_z{z}.tif`; empty:
-                guessed
-    axes        letters of an array's axes, or of those longer than 1, as `czyx`, slowest first;
-                empty: as the source names them
+    series      series of DICOM or of planes, or image of a file that holds several; counted from 1
+                as `list_series` does; 0: the largest
+    pattern     how the files of a folder of planes are named, such as `img_c{c}_z{z}.tif`; empty:
+                the names are guessed from the files
+    axes        letters of all axes of an array, or of its axes longer than 1, slowest first, such
+                as `czyx`; empty: as the source names them
     dark        whether structures are darker than their surroundings: then all values are inverted
                 (`InvertedArray`), so that structures are bright
 
     No voxels are read yet, with two exceptions: DICOM slices at the same place, to detect copies,
-    and floats of NIfTI, to count NaN. Raises SourceError where the source can't be read as a
-    volume (one line: the found value, its place, the expected value), UsageError where the source
-    lacks the time point or the series, or where `spacing_um` is no length.
+    and floating-point NIfTI, to count NaN. Raises SourceError where the source can't be read as a
+    volume (one line: the found value, its place, the expected value). Raises UsageError where the
+    source lacks the time point or the series, or where `spacing_um` isn't three positive lengths.
 
         dataset = open("head.ome.zarr")
         volume = dataset.read(0, Box((0, 0, 0), (64, 64, 64)))
@@ -103,7 +104,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
         placement=image.placement,
         has_sides=image.has_sides,
         remarks=(
-            *map(printable, image.notes),  # which may name files
+            *map(printable, image.notes),  # notes may quote names of files
             *level_notes,
             *filter(None, [cast_note(finest.array.dtype)]),
             *(image.notes_at(time) if image.notes_at is not None else ()),
@@ -117,7 +118,7 @@ def _dataset(location: Location, image: Image, time: int, spacing_um: Triple | N
 
 
 def _at_time(where: str, image: Image, time: int) -> Image:
-    """Return an image as one time point has it. Raises UsageError for a time that isn't there."""
+    """Return the image at one time point. Raises UsageError where that time point is missing."""
     count = image.arrays[0].size("t")
     if not 0 <= time < count:
         raise UsageError(
@@ -160,7 +161,8 @@ def _check_arrays(where: str, image: Image) -> None:
             )
         bytes_of_one = math.prod(int(n) for n in level.array.chunks) * dtype.itemsize
         if bytes_of_one > MAX_CHUNK_BYTES:
-            found = min(-(-100 * bytes_of_one >> 30), 10**20) / 100  # up, so that it is more
+            # rounded up, so that the message never shows the limit itself
+            found = min(-(-100 * bytes_of_one >> 30), 10**20) / 100
             raise SourceError(
                 f"{where}: chunk {level.array.chunks} of level {index}: found {found:g} GiB, "
                 f"expected at most {MAX_CHUNK_BYTES >> 30} GiB"
@@ -174,8 +176,8 @@ def _check_arrays(where: str, image: Image) -> None:
 
 
 def _beside(flat: VoxelArray) -> str:
-    """Return the words for the axes that a flat image has beside y and x."""
-    counts = [(flat.size("c"), "channels"), (flat.size("t"), "points in time")]
+    """Return the words for the channels and time points of a flat image; empty: one of each."""
+    counts = [(flat.size("c"), "channels"), (flat.size("t"), "time points")]
     found = " and ".join(f"{count} {noun}" for count, noun in counts if count > 1)
     return f" (a flat image of {found})" if found else ""
 

@@ -1,4 +1,4 @@
-"""Voxels whose images along one axis are in another order than they are stored in."""
+"""Voxels whose images along one axis are read in another order than the stored one."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,9 +10,9 @@ from stereocell.read.dataset import StoredArray
 
 
 class OrderedArray:
-    """An array with the images along one axis in another order.
+    """An array whose images along one axis are in another order than stored.
 
-    order  for each place along the axis the stored one
+    order  stored index of the image at each index along the axis
     """
 
     def __init__(self, array: StoredArray, axis: int, order: Sequence[int]) -> None:

@@ -1,8 +1,8 @@
-"""Unpack a stream of gzip, zlib, bzip2 or xz, and read it to its end, where its checksum stands.
+"""Unpack a stream of gzip, zlib, bzip2 or xz to its end, where its checksum stands.
 
 A reader that stops at the last voxel never compares the checksum (CRC-32 of gzip and bzip2,
-Adler-32 of zlib, CRC-64 of xz). A damaged file would be built with other voxels. So all readers
-unpack streams with this module. Bytes behind the voxels are unpacked piece by piece and dropped.
+Adler-32 of zlib, CRC-64 of xz). It would build a damaged file with wrong voxels. Therefore all
+readers unpack streams with this module. Bytes behind the voxels are unpacked in pieces and dropped.
 
 A gzip stream may consist of several members, and zeros or other bytes may follow the last member,
 as gzip's own tools allow.
@@ -15,9 +15,9 @@ import zlib
 from typing import IO, Protocol
 
 PACKINGS = ("zlib", "gzip", "bzip2", "xz")
-_PIECE = 1 << 24  # bytes that are unpacked at once
-_MOST_BEHIND = 1 << 32  # unpacked bytes behind the last voxel; a stream with more is refused
-_MEMBER = b"\x1f\x8b"  # the first bytes of each member of gzip
+_PIECE = 1 << 24  # bytes; unpacked at once
+_MOST_BEHIND = 1 << 32  # bytes unpacked behind the last voxel; a stream with more is refused
+_MEMBER = b"\x1f\x8b"  # first bytes of each member of a gzip stream
 _AGAIN = "copy or download it again"
 
 
@@ -33,14 +33,14 @@ def unpack(
     skip: int = 0,
     most_behind: int = _MOST_BEHIND,
 ) -> bytes:
-    """Return `size` unpacked bytes, after the checksum of the whole stream was compared.
+    """Return `size` unpacked bytes once the checksum of the whole stream has been verified.
 
-    file         at the stream's first byte, or the stream itself
+    file         an open file at the stream's first byte, or the bytes of the stream
     packing      one of PACKINGS
     skip         unpacked bytes before those that are returned
-    most_behind  largest number of unpacked bytes behind them
+    most_behind  largest number of unpacked bytes allowed behind them
 
-    Raises OSError, in words for the user, for a stream that is damaged, cut short or too long.
+    Raises OSError, worded for the user, for a stream that is damaged, cut short or too long.
     """
     stream = _opened(io.BytesIO(file) if isinstance(file, bytes) else file, packing)
     parts: list[bytes] = []
@@ -71,13 +71,14 @@ def unpack(
     return b"".join(parts)
 
 
-_BZIP2_FAULT = "Invalid data stream"  # Python's message, also where a checksum of bzip2 differs
+# Python's message for damaged data, also where a checksum of bzip2 differs
+_BZIP2_FAULT = "Invalid data stream"
 
 
 def _short(packing: str, found: int, size: int) -> str:
     reason = f"found {found} of {size} bytes"
     if found == size:
-        reason = f"it ends before its checksum, behind {size} bytes"
+        reason = f"it ends before its checksum, after {size} bytes"
     return f"the {packing} stream is cut short: {reason} ({_AGAIN})"
 
 
@@ -94,7 +95,7 @@ def _opened(file: IO[bytes], packing: str) -> _Stream:
 
 
 class _Deflated:
-    """A stream of zlib or gzip. zlib compares the checksum of each member."""
+    """A stream of zlib or gzip. zlib itself verifies the checksum of each member."""
 
     def __init__(self, file: IO[bytes], *, is_gzip: bool) -> None:
         self._file, self._is_gzip = file, is_gzip
@@ -104,7 +105,7 @@ class _Deflated:
         return zlib.decompressobj(zlib.MAX_WBITS + (16 if self._is_gzip else 0))
 
     def read(self, size: int, /) -> bytes:
-        """Return up to `size` unpacked bytes; none at the end. Raises EOFError, zlib.error."""
+        """Return up to `size` unpacked bytes; none at the end. Raises EOFError or zlib.error."""
         packed = self._stream.unconsumed_tail
         while True:
             if self._stream.eof:
@@ -121,7 +122,7 @@ class _Deflated:
             packed = self._stream.unconsumed_tail
 
     def _next_member(self) -> bytes:
-        """Return the first bytes of the next member of gzip; empty: there is no other one."""
+        """Return the first bytes of the next gzip member; empty: there is no further member."""
         if not self._is_gzip:
             return b""
         rest = self._stream.unused_data.lstrip(b"\0")

@@ -20,8 +20,8 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.whole_array import WholeArray
 
 _ORIGIN = Subject("place of the first voxel in the patient", "mm")
-_SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
-_MIN_VOLUME = 0.1  # least volume of the three unit axes' parallelepiped; below, they lie in a plane
+_SKEW = 1e-3  # cosine between two axes; a smaller one is due to rounding
+_MIN_VOLUME = 0.1  # volume spanned by the three unit axes, 0..1; below it they lie in one plane
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Placed:
     notes: tuple[str, ...] = ()
 
     def image(self, title: str, *, notes: Sequence[str] = (), has_sides: bool) -> Image:
-        """Return the image of a format whose files name no channel, after more notes."""
+        """Return an image without channel names. `notes` come before the notes on the grid."""
         count = self.array.size("c")
         return Image(
             arrays=(self.array,),
@@ -52,10 +52,10 @@ class Placed:
 def settle_origin(
     field: str, stated: Sequence[float] | None
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the place of the first voxel's centre in the field's unit, and notes.
+    """Return the centre of the first voxel, in the field's unit, and notes.
 
-    field   of the header that holds it
-    stated  its three numbers; None: it is absent
+    field   header field that holds the origin
+    stated  its three numbers; None: the field is absent
     """
     found = np.zeros(3) if stated is None else np.array(stated, float)[:3]
     if stated is not None and np.isfinite(found).all():
@@ -68,19 +68,22 @@ def settle_origin(
 def place(
     where: str, array: StoredArray, axes: tuple[str, ...], affine: NDArray[np.float64], field: str
 ) -> Placed:
-    """Return an array's canonical form: flipped and permuted on reading, a window at a time.
+    """Return an array in canonical form. Flips and permutations are applied to each window read.
 
-    axes    of the array; i, j, k are those of the affine, t and c may be there
-    affine  (4, 4) for columns: from (i, j, k, 1) to LPS in mm
-    field   of the header that holds it, for messages
+    axes    names of the array's axes: i, j and k are the affine's, t and c are optional
+    affine  (4, 4), for column vectors: from (i, j, k, 1) to LPS in mm
+    field   header field that holds the affine, for messages
 
-    Skew axes are resampled onto an orthogonal grid, which reads a time point whole. Raises
-    SourceError where the affine has no three axes.
+    Skew axes are resampled onto an orthogonal grid; then a whole time point is read at once.
+    Raises SourceError where the affine's axes don't span three dimensions.
     """
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
     is_sound = np.isfinite(affine).all() and lengths.min() > 0
     if not is_sound or abs(np.linalg.det(affine[:3, :3] / lengths)) < _MIN_VOLUME:
-        raise SourceError(f"{where}: {field}: found no three axes, expected an affine of space")
+        raise SourceError(
+            f"{where}: {field}: the axes of the affine don't span three dimensions, "
+            "expected three independent axes"
+        )
     i, j, k = (int(array.shape[axes.index(axis)]) for axis in "ijk")
     unit = affine[:3, :3] / lengths
     if np.abs(unit.T @ unit - np.eye(3)).max() > _SKEW:
@@ -101,7 +104,8 @@ def _resampled(
     stored = VoxelArray(array, tuple(swapped.get(axis, axis) for axis in axes))
     if stored.size("c") > 1:
         raise SourceError(
-            f"{where}: skew axes and {stored.size('c')} values for each voxel, expected one of both"
+            f"{where}: found skew axes and {stored.size('c')} values for each voxel, expected "
+            "orthogonal axes or one value"
         )
     shape, orthogonal = orthogonal_grid(stored.shape[::-1], affine)
     canonical = canonical_of(orthogonal, shape)

@@ -1,21 +1,21 @@
-"""The depth of voxels by the positions of the planes, compared with the stated depth; drift."""
+"""Compare the stated depth of voxels with the positions of the planes, and find sideways drift."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-_EVEN = 0.1  # largest difference of a step from the mean, as its share: rounding, and a drive's
-_TOLERANCE = 0.01  # relative difference of two depths that needs no note
-_MOST_APART = 50.0  # a larger ratio of two depths is one of units
-_MOST_ASIDE = 0.5  # voxels by which a plane may lie beside the others without a note
+_EVEN = 0.1  # share of the mean by which a step may differ: rounding and the precision of a drive
+_TOLERANCE = 0.01  # relative difference up to which two depths agree
+_MOST_APART = 50.0  # ratio of two depths; a larger one is due to a wrong unit
+_MOST_ASIDE = 0.5  # voxels by which planes may lie beside each other without a note
 _SUBJECT = Subject(
     "voxel spacing along z", "um", _TOLERANCE, remedy="--spacing-um z,y,x replaces it"
 )
 
 
 def falling_notes(field: str, first_um: float, last_um: float) -> tuple[str, ...]:
-    """Return a note where planes were taken downwards, so that a volume may be a mirror image."""
+    """Return a note if planes were taken downwards, since the volume may be a mirror image."""
     if last_um >= first_um:
         return ()
     return (
@@ -27,11 +27,11 @@ def falling_notes(field: str, first_um: float, last_um: float) -> tuple[str, ...
 def drift_notes(
     places: Mapping[int, float], field: str, axis: str, pixel_um: float | None
 ) -> tuple[str, ...]:
-    """Return a note where planes were taken at different places within the plane.
+    """Return a note if planes were taken at different positions within their plane.
 
-    places    where planes lie along x or y, um, by their numbers
+    places    position along x or y of each plane, um, by the plane's number
     axis      x or y
-    pixel_um  the voxel spacing along this axis; None: not stated
+    pixel_um  voxel spacing along this axis; None: not stated
     """
     apart = max(places.values(), default=0.0) - min(places.values(), default=0.0)
     if apart <= _MOST_ASIDE * (pixel_um or 0.0):
@@ -46,12 +46,12 @@ def drift_notes(
 def settle_places(
     places: Mapping[int, float], stated: Sequence[Statement], field: str, *, has_unit: bool
 ) -> tuple[float | None, tuple[str, ...]]:
-    """Return the depth of a voxel, um, and notes; None: no field states one.
+    """Return the depth of a voxel, um, and notes; None: no field states a depth.
 
-    places    where planes lie along z, um, by their numbers
-    stated    the depth as other fields state it, in um, the most trusted first
-    field     the name of the field that states the places
-    has_unit  whether it is in a stated unit of length; else um are assumed
+    places    position along z of each plane, um, by the plane's number
+    stated    the depth in other fields, um, the most trusted first
+    field     name of the field that states the positions
+    has_unit  whether the positions have a stated unit of length; otherwise um are assumed
     """
     settled = settle(_SUBJECT, stated) if stated else None
     stated_um, own = (None, ()) if settled is None else (settled.number, settled.notes)

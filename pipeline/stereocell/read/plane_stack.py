@@ -1,13 +1,16 @@
 """The positions of a stack of parallel planes, and the even, orthogonal grid that holds it.
 
 The layout follows from the planes' positions and orientation alone (ImagePositionPatient and
-ImageOrientationPatient): SliceThickness and SpacingBetweenSlices may hold any value. Planes
-are sorted along their normal. The median of the gaps decides which gaps are regular. Where all
-gaps are, or are whole multiples of it (planes are missing), the spacing is the mean over the
-length, so that rounded positions don't add up. Else the length is divided into as many gaps as the
-median fits in, and all planes between are interpolated. Planes that drift sideways (a tilted
-gantry) are a sheared stack; they are shifted within their planes onto an orthogonal grid. So are
-planes of which some jump sideways, but a note names the jump, which no gantry makes.
+ImageOrientationPatient), because SliceThickness and SpacingBetweenSlices may hold any value.
+
+1. Planes are sorted along their normal. The median of the gaps decides which gaps are regular.
+2. If all gaps are regular or whole multiples of the median (planes are missing), the spacing is
+   the mean over the whole length. So the rounding of positions doesn't add up.
+3. Otherwise the length is divided into as many gaps as the median fits into it, and all planes in
+   between are interpolated.
+4. Planes that drift sideways (a tilted gantry) form a sheared stack. They are shifted within their
+   planes onto an orthogonal grid. Planes that jump sideways are shifted too, and a note names the
+   jump, since no gantry causes one.
 
 References: DICOM PS3.3 C.7.6.2 (Image Plane module).
 """
@@ -20,32 +23,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from stereocell.model.counted import agreeing, counted
 
-REGULAR = 0.02  # share of the median gap: an even gap deviates by no more (rounded positions)
-DRIFT = 0.05  # pixels over the whole stack: planes that drift less are not shifted
-JUMP = 0.05  # share of a plane's shorter side: a larger sideways step than the others' is no tilt
-SAME_PLACE = 0.02  # pixels: planes at a smaller distance count as one place
+REGULAR = 0.02  # share of a regular gap by which it may deviate, because positions are rounded
+DRIFT = 0.05  # pixels over the whole stack; planes that drift less are not shifted
+JUMP = 0.05  # share of a plane's shorter side; a larger unusual sideways step is no gantry tilt
+SAME_PLACE = 0.02  # pixels; planes that are closer together count as one place
 
 
 class NoStackError(Exception):
-    """The planes make no volume; the text gives the reason."""
+    """The planes don't form a volume; the text of the error gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class StackLayout:
     """A grid of voxels for a stack of n planes. LPS, mm; voxels are (plane, row, column).
 
-    shape        voxels of the grid
-    spacing_mm   of the grid, along its three axes
-    axes         (3, 3): orthogonal unit vectors along them, one a row
+    shape        voxels along each axis of the grid
+    spacing_mm   mm between voxels along each axis of the grid
+    axes         (3, 3): orthogonal unit vectors along the grid's axes, one per row
     origin_mm    (3,): centre of voxel (0, 0, 0)
     places       (n, 3): each plane's first pixel in voxels of the grid, in rising order
-    stack        (4, 4) for columns: from (plane, row, column, 1) to mm for the original planes,
-                 evenly spread from the first to the last: sheared where the gantry was tilted
+    stack        (4, 4) for column vectors: from (plane, row, column, 1) to mm, for as many planes
+                 spread evenly from the first position to the last; sheared if the gantry was tilted
     gaps_mm      (n - 1,): distances along the normal
-    missing      the number of grid planes without a plane of the stack
-    is_even      the gaps are whole multiples of the spacing
+    missing      number of grid planes without a plane of the stack
+    is_even      whether the gaps are whole multiples of the spacing
     tilt_deg     angle between the normal and the line through the planes' first pixels; 0: none
-    jump_mm      largest sideways step between neighbours beyond their usual one; 0: all are alike
+    jump_mm      largest sideways step between neighbours beyond their usual one; 0: no jump
     """
 
     shape: tuple[int, int, int]
@@ -62,12 +65,12 @@ class StackLayout:
 
     @property
     def is_resampled(self) -> bool:
-        """Whether the grid's planes differ from the stack's own."""
+        """Whether the grid's planes differ from the planes of the stack."""
         return self.missing > 0 or not self.is_even or self.tilt_deg > 0
 
     @property
     def affine(self) -> NDArray[np.float64]:
-        """(4, 4) for columns: from (plane, row, column, 1) of the grid to mm."""
+        """(4, 4) for column vectors: from (plane, row, column, 1) of the grid to mm."""
         matrix = np.eye(4)
         matrix[:3, :3] = (self.axes * np.array(self.spacing_mm)[:, None]).T
         matrix[:3, 3] = self.origin_mm
@@ -75,7 +78,7 @@ class StackLayout:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Differences between the grid and the acquired planes, a sentence each."""
+        """Differences between the grid and the acquired planes, one sentence each."""
         notes = []
         spacing = self.spacing_mm[0]
         if not self.is_even:
@@ -94,8 +97,8 @@ class StackLayout:
             )
         if self.jump_mm:
             notes.append(
-                f"neighbouring slices jump sideways by up to {self.jump_mm:.3g} mm, as no gantry "
-                "tilt does: each lies where its position says, which may be wrong"
+                f"neighbouring slices jump sideways by up to {self.jump_mm:.3g} mm, which no "
+                "gantry tilt explains: each slice lies at its stated position, which may be wrong"
             )
         elif self.tilt_deg:
             notes.append(
@@ -105,7 +108,7 @@ class StackLayout:
 
 
 def normal_of(along_row: ArrayLike, along_column: ArrayLike) -> NDArray[np.float64]:
-    """Return the unit normal (3,) of a plane, right-handed to its row and its column."""
+    """Return the unit normal (3,) of a plane: the cross product of its row and column vectors."""
     normal = np.cross(np.asarray(along_row, np.float64), np.asarray(along_column, np.float64))
     return normal / np.linalg.norm(normal)
 
@@ -120,32 +123,35 @@ def lay_out(
 ) -> StackLayout:
     """Return the grid for parallel planes.
 
-    positions_mm      (n, 3): centres of the first pixels, LPS, mm; they rise along the normal, one
-                      plane at each place
-    along_row         (3,): unit vector of growing column index; `along_column` of growing row index
-    pixel_spacing_mm  between (rows, columns)
+    positions_mm      (n, 3): centres of the first pixels, LPS, mm; they rise along the normal, with
+                      one plane at each place
+    along_row         (3,): unit vector along a row, towards larger column indices
+    along_column      (3,): unit vector along a column, towards larger row indices
+    pixel_spacing_mm  mm between (rows, columns)
     plane_shape       pixels (rows, columns)
 
-    Raises NoStackError where there are fewer than 2 planes, where planes lie beside each other, or
-    where more planes are missing than present.
+    Raises NoStackError where there are fewer than 2 planes, where planes lie side by side in one
+    plane, or where more planes are missing than present.
     """
     positions = np.asarray(positions_mm, np.float64)
     if len(positions) < 2:
         raise NoStackError(f"a volume needs at least 2 slices: found {len(positions)}")
     normal = normal_of(along_row, along_column)
     across = np.asarray(along_row, np.float64)
-    down = np.cross(normal, across)  # orthogonal to both, also where the vectors are rounded
+    down = np.cross(normal, across)  # orthogonal to both, even if the two vectors are rounded
     axes = np.stack([normal, down, across])
     local = (positions - positions[0]) @ axes.T  # mm along (normal, down, across)
     gaps = np.diff(local[:, 0])
     if gaps.min() <= SAME_PLACE * min(pixel_spacing_mm):
-        raise NoStackError("slices lie beside each other in one plane, expected one over the other")
+        raise NoStackError(
+            "slices lie side by side in one plane, expected slices on top of each other"
+        )
     count, is_even = _count_planes(gaps)
     lost = count - len(positions)
     if lost > len(positions):
         raise NoStackError(
             f"{lost} of {count} slices {agreeing(lost, 'is', 'are')} missing (gaps of "
-            f"{gaps.min():.4g} to {gaps.max():.4g} mm), expected fewer than there are"
+            f"{gaps.min():.4g} to {gaps.max():.4g} mm), expected fewer missing slices than present"
         )
     spacing = local[-1, 0] / (count - 1)
     places = local / np.array([spacing, *pixel_spacing_mm])
@@ -155,7 +161,7 @@ def lay_out(
     tilt = 0.0
     if np.abs(places[:, 1:]).max() > DRIFT:
         tilt = math.degrees(math.atan2(float(np.linalg.norm(sideways)), local[-1, 0]))
-        tilt = max(tilt, 1e-3)  # planes that drift and return are shifted as well
+        tilt = max(tilt, 1e-3)  # planes that drift and come back are shifted as well
     else:
         places[:, 1:] = 0.0
     low = np.floor(places[:, 1:].min(axis=0) + 1e-6)
@@ -186,7 +192,7 @@ def lay_out(
 def _find_jump(local: NDArray[np.float64], least_mm: float) -> float:
     """Return the largest sideways step beyond the usual drift, mm; 0 if it is below `least_mm`.
 
-    local  (n, 3): places in mm along the normal and along two axes in the plane
+    local  (n, 3): positions in mm along the normal and along two axes in the plane
     """
     steps = np.diff(local, axis=0)
     usual = np.median(steps[:, 1:] / steps[:, :1], axis=0)

@@ -1,38 +1,38 @@
-"""Sizes of voxels that no instrument has: the unit of one length is likely another one."""
+"""Notes on voxel sizes that no instrument has, which are likely due to a wrong unit."""
 
 from collections.abc import Sequence
 
 _WIDEST_MM = 12.0  # mm between voxels; PET and SPECT have up to 10 mm
-_LEAST_MM = 1.0  # mm across a whole volume
+_LEAST_MM = 1.0  # mm across a whole volume; scanners have more
 
 _LONGEST_PIXEL = 30.0  # length of a pixel over its width; OCT and line scans reach about 10
-_THICKEST_SLICE = 300.0  # distance of slices over the length of a pixel; sections reach 100
-_THINNEST_SLICE = 1 / 30.0  # the same; light-sheet stacks that are oversampled reach 1/4
-_DOUBT = "is the unit of one of them another one? (--spacing-um z,y,x replaces it)"
+_THICKEST_SLICE = 300.0  # distance between slices over the length of a pixel; sections reach 100
+_THINNEST_SLICE = 1 / 30.0  # the same ratio; oversampled light-sheet stacks reach 1/4
+_QUESTION = "is the unit of one of them wrong? (--spacing-um z,y,x replaces it)"
 
 
 def ratio_notes(spacing_um: Sequence[float], slice_axis: int) -> tuple[str, ...]:
-    """Return a note where voxels are implausibly longer along one axis than along another.
+    """Return a note if voxels are implausibly longer along one axis than along another.
 
     spacing_um  (z, y, x)
-    slice_axis  of z, y, x: the images lie across it
+    slice_axis  index of z, y, x: the axis across which the images lie
     """
     rows, columns = (n for n in range(3) if n != slice_axis)
     long, short = sorted((rows, columns), key=lambda n: -spacing_um[n])
     ratio = spacing_um[long] / spacing_um[short]
     if ratio > _LONGEST_PIXEL:
         found = f"pixels {ratio:.0f} times as long along {'zyx'[long]} as along {'zyx'[short]}"
-        return (f"voxel spacing: found {found}: {_DOUBT}",)
+        return (f"voxel spacing: found {found}: {_QUESTION}",)
     in_plane = (spacing_um[rows] * spacing_um[columns]) ** 0.5
     ratio = spacing_um[slice_axis] / in_plane
     if _THINNEST_SLICE <= ratio <= _THICKEST_SLICE:
         return ()
     found = f"slices {spacing_um[slice_axis]:.3g} um apart along {'zyx'[slice_axis]}"
-    return (f"voxel spacing: found {found} of pixels of {in_plane:.3g} um: {_DOUBT}",)
+    return (f"voxel spacing: found {found} with pixels of {in_plane:.3g} um: {_QUESTION}",)
 
 
 def size_notes(spacing_mm: Sequence[float], shape: Sequence[int]) -> tuple[str, ...]:
-    """Return a note where a volume is implausibly coarse or small for its unit.
+    """Return a note if a volume is implausibly coarse or small for its unit.
 
     spacing_mm, shape  along the same three axes
     """
@@ -44,4 +44,4 @@ def size_notes(spacing_mm: Sequence[float], shape: Sequence[int]) -> tuple[str, 
         found = f"found {across:.3g} mm across the whole volume, where scanners have over 1 mm"
     else:
         return ()
-    return (f"voxel spacing: {found}: is its unit another one? (--spacing-um z,y,x replaces it)",)
+    return (f"voxel spacing: {found}: is its unit wrong? (--spacing-um z,y,x replaces it)",)

@@ -1,4 +1,4 @@
-"""Find the reader of a source, and check that the source is there and of its format."""
+"""Find the reader of a source, and check that the source exists and has that reader's format."""
 
 import os
 from pathlib import Path
@@ -22,15 +22,18 @@ _SURFACES = (
     *(".gii", ".gii.gz", ".stl", ".obj", ".ply", ".vtp", ".glb", ".gltf", ".3mf"),
     *(".usda", ".usdc", ".usdz"),
 )
-_PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # which are planes of a folder
-_VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")  # of MetaImage and NRRD
+_PICTURES = (".png", ".jpg", ".jpeg", ".bmp")  # images in a folder may be the planes of a volume
+# endings that MetaImage and NRRD use
+_VOXELS, _HEADERS = (".raw", ".zraw", ".bin"), (".mhd", ".nhdr")
 
 
 def read_image(
     location: Location, format: Format, *, series: int = 0, pattern: str = "", axes: str = ""
 ) -> Image:
-    """Return the image of a source. Raises UsageError for an option that its format doesn't take,
-    and SourceError where a library is missing or the source can't be read.
+    """Return the image of a source.
+
+    Raises UsageError for an option that its format doesn't accept, and SourceError where a library
+    is missing or the source can't be read.
     """
     given: dict[str, Any] = {}
     for name, value in (("series", series), ("pattern", pattern), ("axes", axes)):
@@ -43,13 +46,13 @@ def read_image(
 
 
 def find_reader(source: str | Path) -> tuple[Location, Format]:
-    """Return the place of a source that is there, and its format. Raises SourceError."""
+    """Return the place and the format of a source. Raises SourceError where there is none."""
     location = Location.of(source)
     if location.is_local and not Path(location.path).exists():
         if os.path.islink(location.path):
             target = os.readlink(location.path)
             raise SourceError(
-                f"{location.shown}: a link to {printable(target):.200}, which isn't there, "
+                f"{location.shown}: a link to {printable(target):.200}, which doesn't exist, "
                 "expected a file or a folder"
             )
         raise SourceError(f"{location.shown}: not found, expected a file or a folder")
@@ -79,7 +82,7 @@ def find_reader(source: str | Path) -> tuple[Location, Format]:
 
 
 def _other_format(location: Location) -> Format:
-    """Return the format of other files, if it takes this one. Raises SourceError."""
+    """Return the format of other files, if it accepts this one. Raises SourceError."""
     other = known_formats()[OTHER]
     if other.may_hold is None or not other.may_hold(location):
         raise _unknown(location)
@@ -87,7 +90,10 @@ def _other_format(location: Location) -> Format:
 
 
 def _require_no_result(location: Location) -> None:
-    """Raise SourceError where a folder is a result of StereoCell: its images look like planes."""
+    """Refuse a folder that is a result of StereoCell, since its images look like planes.
+
+    Raises SourceError.
+    """
     found = contents_of(Path(location.path))
     if found.kind in (Kind.BUILD, Kind.STAGE, Kind.BUNDLE, Kind.SITE, Kind.PART):
         raise SourceError(
@@ -97,10 +103,10 @@ def _require_no_result(location: Location) -> None:
 
 
 def list_series(source: str | Path) -> tuple[str, ...]:
-    """Return a line for each image of a source of several; line i describes `series` = i.
+    """Return a line for each image of a source that holds several; line i describes `series` = i.
 
-    A line holds modality, orientation, size and spacing, and no description from the files.
-    Raises SourceError where the source can't be read, UsageError where it has another format.
+    A line shows modality, orientation, size and spacing, and none of the file's own descriptions.
+    Raises SourceError where the source can't be read, UsageError where its format has one image.
     """
     location, format = find_reader(source)
     if format.list_series is None:
@@ -111,19 +117,20 @@ def list_series(source: str | Path) -> tuple[str, ...]:
 
 
 def series_order(source: str | Path) -> str:
-    """Return a sentence on the order of `list_series`; empty: that of the source itself."""
+    """Return a sentence on the order of `list_series`; empty: the order of the source itself."""
     return find_reader(source)[1].order
 
 
 def _unknown(location: Location) -> SourceError:
-    """Return the error of a source of no known format, which says what it is instead."""
+    """Return the error for a source of unknown format, with a description of the content."""
     last = location.parts[-1].lower() if location.parts else ""
     found = "unknown format"
     if last.endswith(_SURFACES):
-        found = "a surface (mesh), no volume"
+        found = "a surface (mesh), not a volume"
     elif header := _header_beside(location):
         return SourceError(
-            f"{location.shown}: found the voxels of {printable(header):.200}, expected that file"
+            f"{location.shown}: found the voxels that {printable(header):.200} describes, expected "
+            "that header file"
         )
     elif location.is_local:
         content = _words_of(Path(location.source))
@@ -134,7 +141,8 @@ def _unknown(location: Location) -> SourceError:
             )
         found += f": found {content}"
     formats = ", ".join(one.title for one in known_formats().values() if one.name != OTHER)
-    if found.endswith(")"):  # the way out is the message, so the list would hide it
+    # the text in brackets is the remedy; a long list of formats would hide it
+    if found.endswith(")"):
         formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"
     return SourceError(
         f"{location.shown}: {found}; expected {formats}, or {known_formats()[OTHER].title}"
@@ -142,7 +150,7 @@ def _unknown(location: Location) -> SourceError:
 
 
 def _words_of(path: Path) -> str:
-    """Return words for a path of no known format: by its first bytes, else by its name."""
+    """Return a description of a path of unknown format, by its first bytes or its name."""
     content = contents_of(path).words
     if not path.is_file():
         return content
@@ -157,7 +165,7 @@ def _words_of(path: Path) -> str:
 
 
 def _header_beside(location: Location) -> str:
-    """Return the name of the header beside a file of bare voxels; empty: there is none."""
+    """Return the name of the header beside a file of raw voxels; empty: there is none."""
     path = Path(location.path)
     if not location.is_local or path.suffix.lower() not in _VOXELS:
         return ""
@@ -166,7 +174,7 @@ def _header_beside(location: Location) -> str:
 
 
 def _not_taken(location: Location, format: Format, option: str, value: str) -> UsageError:
-    """Return the error of an option that a format doesn't take; it names those that do."""
+    """Return the error for an option that a format doesn't accept; it lists formats that do."""
     formats = sorted(known_formats().values(), key=lambda one: one.name == OTHER)
     takers = [one.title for one in formats if getattr(one, f"has_{option}")]
     return UsageError(

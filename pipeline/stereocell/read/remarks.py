@@ -1,4 +1,4 @@
-"""Notes to the user on how a source is read; no result holds them."""
+"""Notes for the user on how a source is read. They are not part of any result."""
 
 from typing import Any
 
@@ -7,11 +7,11 @@ import numpy as np
 from stereocell.read.cast import built_dtype
 
 LEFT_OUT = "files left out"  # first words of the note on files of a set that are not read
-CAST = "voxels are"  # how the note on a cast begins
+CAST = "voxels are"  # first words of the note on a conversion of the number type
 
 
 def cast_note(stored: Any) -> str:
-    """Return a sentence on what the cast changes; empty: nothing is cast."""
+    """Return a sentence on how the number type is converted; empty: it stays as it is."""
     dtype, built = np.dtype(stored), built_dtype(stored)
     if built is None or dtype.name == built.name:
         return ""
@@ -27,10 +27,10 @@ def cast_note(stored: Any) -> str:
 
 
 def choice_notes(images: int, time_points: int, time: int) -> tuple[str, ...]:
-    """Return a sentence each on what else than what is read a source holds."""
+    """Return a sentence on each choice of an image or a time point among several."""
     notes = []
     if images > 1:
-        notes.append(f"{images} images in the source; building the first alone")
+        notes.append(f"{images} images in the source; building only the first")
     if time_points > 1:
-        notes.append(f"{time_points} points in time; building --time {time}")
+        notes.append(f"{time_points} time points; building --time {time}")
     return tuple(notes)

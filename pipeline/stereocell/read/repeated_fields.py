@@ -1,6 +1,6 @@
-"""Fields that a header of text states several times: the last line counts, with a note.
+"""Fields that a text header states several times: the last line counts, and a note says so.
 
-ITK, ImageJ and tifffile take the last line of a field as well. pynrrd refuses such a file.
+ITK, ImageJ and tifffile use the last line of a field as well. pynrrd refuses such a file.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,10 +11,10 @@ from stereocell.read.statements import Statement, Subject, Trust, Value, settle
 def settle_repeats(
     lines: Iterable[tuple[str, str]], source: str = "the header"
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return the text of each field, and a note for each field with lines that disagree.
+    """Return the text of each field, and a note on each field whose lines disagree.
 
-    lines   fields that are read, each with its text, in the order of the file
-    source  of the lines, for notes
+    lines   (field, text) of the fields that are read, in the order of the file
+    source  name of the header, for notes
     """
     found: dict[str, list[str]] = {}
     for name, text in lines:
@@ -26,7 +26,7 @@ def settle_repeats(
 
 
 def value_of(text: str) -> Value:
-    """Return a text as numbers where it is a list of numbers."""
+    """Return a list of numbers as a tuple of floats, and any other text unchanged."""
     try:
         return tuple(float(part) for part in text.replace(",", " ").split()) or ""
     except ValueError:
@@ -34,7 +34,7 @@ def value_of(text: str) -> Value:
 
 
 def _settle(subject: Subject, texts: Sequence[str]) -> tuple[str, ...]:
-    """Compare the last text of a field with those before it."""
+    """Return a note if earlier texts of a field disagree with its last one."""
     last = Statement(value_of(texts[-1]), "its last line")
     earlier = [Statement(value_of(text), "an earlier line", Trust.REPEATED) for text in texts[:-1]]
     return settle(subject, [last, *earlier]).notes

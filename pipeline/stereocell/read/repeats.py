@@ -1,11 +1,10 @@
-"""Keys that a JSON text states twice, and XML elements that stand twice where one is permitted.
+"""Find keys that a JSON text states twice, and XML elements that are repeated against the schema.
 
-Parsers take the last key and drop the others without a word, and readers take the first element.
-`open` collects a note for each repeat whose values differ: `load_json`, `record_json` and
-`record_xml` add notes to the collection that is open, if there is one, and change no result.
+Parsers silently use the last of equal keys, and readers use the first of several elements. `open`
+collects a note on each repeat whose values differ. `load_json`, `record_json` and `record_xml` add
+their notes to the current collection, if there is one, and change no result.
 
-References: RFC 8259, section 4 (the names within an object should be unique); OME-XML schema
-2016-06.
+References: RFC 8259, section 4 (names within an object should be unique); OME-XML schema 2016-06.
 """
 
 import json
@@ -19,9 +18,9 @@ from xml.etree import ElementTree
 
 from stereocell.read.statements import Statement, Subject, Trust, Value, settle
 
-_MOST_BYTES = 4 << 20  # longer texts are not searched for repeats
+_MOST_BYTES = 4 << 20  # bytes; longer texts are not searched for repeats
 _MOST_SHOWN = 60  # characters of a value in a note
-# parent -> children of which it has at most one, in OME-XML and in BigDataViewer's XML
+# parent -> children that it may have once at most, in OME-XML and BigDataViewer's XML
 _SINGLE = {
     "OME": ("BinaryOnly",),
     "Image": ("Pixels",),
@@ -30,7 +29,7 @@ _SINGLE = {
     "ViewSetup": ("id", "name", "size", "voxelSize", "attributes"),
     "voxelSize": ("unit", "size"),
 }
-# element -> attributes of which no two siblings may have the same
+# element -> attributes that identify it: no two siblings may agree in all of them
 _UNIQUE = {
     "Plane": ("TheZ", "TheC", "TheT"),
     "Channel": ("ID",),
@@ -59,7 +58,7 @@ def load_json(text: str | bytes, source: str) -> Any:
 
 
 def record_json(text: str | bytes, source: str) -> None:
-    """Record keys that one object of a JSON text states several times with different values."""
+    """Record keys that one object of a JSON text states several times, with different values."""
     notes = _found.get()
     if notes is None or len(text) > _MOST_BYTES:
         return
@@ -75,11 +74,11 @@ def record_json(text: str | bytes, source: str) -> None:
     try:
         json.loads(text, object_pairs_hook=pairs)
     except (ValueError, RecursionError):
-        return  # the reader refuses it in its own words
+        return  # the reader refuses the text with its own message
 
 
 def record_xml(root: ElementTree.Element, source: str) -> None:
-    """Record elements that stand several times where the schema permits one."""
+    """Record elements that occur several times where the schema permits one."""
     notes = _found.get()
     if notes is None:
         return
@@ -106,7 +105,7 @@ def _record(
 ) -> None:
     other = "an earlier value" if place != _FIRST else "another one"
     source, name = key
-    subject = Subject(f"{name} of {source}, which stands there {len(others) + 1} times")
+    subject = Subject(f"{name} of {source}, which is there {len(others) + 1} times")
     for found in others:
         ours, theirs = _values(used, found)
         statements = [Statement(ours, place), Statement(theirs, other, Trust.REPEATED)]
@@ -115,7 +114,7 @@ def _record(
 
 
 def _values(used: Any, other: Any) -> tuple[Value, Value]:
-    """Return two values for a note; of long texts the part in which they differ."""
+    """Return two values for a note; long texts are cut to the part where they differ."""
     numbers = [float(one) for one in (used, other) if isinstance(one, int | float)]
     if len(numbers) == len((used, other)):
         return numbers[0], numbers[1]

@@ -10,9 +10,9 @@ from stereocell.read.plane_stack import StackLayout
 
 
 def resample_stack(planes: NDArray[np.generic], layout: StackLayout) -> NDArray[np.generic]:
-    """Return the grid's voxels (plane, row, column) of a stack's planes, in their dtype.
+    """Return the grid's voxels (plane, row, column), resampled from a stack's planes.
 
-    planes  (n, rows, columns), any dtype, in the order of `layout.places`
+    planes  (n, rows, columns), any dtype, in the order of `layout.places`; the result keeps it
 
     Voxels outside all planes take the lowest value of the planes. Integers are rounded.
     """
@@ -33,7 +33,7 @@ def resample_stack(planes: NDArray[np.generic], layout: StackLayout) -> NDArray[
 def _moved(
     plane: NDArray[np.generic], place: NDArray[np.float64], layout: StackLayout, fill: float
 ) -> NDArray[np.float32]:
-    """Return a plane on the grid's rows and columns, float32; `fill` is the value outside it."""
+    """Return a plane on the grid's rows and columns, float32, with `fill` outside the plane."""
     _, rows, columns = layout.shape
     whole = np.floor(place[1:] + 1e-9).astype(int)
     moved = np.full((rows + 1, columns + 1), fill, np.float32)
@@ -41,7 +41,8 @@ def _moved(
     for axis in (0, 1):
         part = np.float32(max(place[1 + axis] - whole[axis], 0.0))
         if part > 1e-6:
-            neighbour = np.roll(moved, 1, axis)  # the last row is padding: none wraps round
+            # the last row and column are padding, so no value wraps round
+            neighbour = np.roll(moved, 1, axis)
             moved = (1 - part) * moved + part * neighbour
     return moved[:rows, :columns]
 
@@ -52,7 +53,7 @@ def resample_sheared(
     """Return voxels resampled from a skew grid onto an orthogonal one, and its affine (4, 4).
 
     voxels  (i, j, k), any dtype, which the result keeps
-    affine  (4, 4) for columns, float64: from (i, j, k, 1) to mm
+    affine  (4, 4) for column vectors, float64: from (i, j, k, 1) to mm
 
     The new axes are the nearest orthogonal ones (polar decomposition), the spacings stay, and the
     new grid contains all of the old one.
@@ -72,7 +73,7 @@ def orthogonal_grid(
     """Return shape and affine (4, 4) of the orthogonal grid around a skew one; reads no voxels.
 
     shape   voxels (i, j, k) of the skew grid
-    affine  (4, 4) for columns: from (i, j, k, 1) to mm
+    affine  (4, 4) for column vectors: from (i, j, k, 1) to mm
     """
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     u, _, vt = np.linalg.svd(affine[:3, :3] / spacing)

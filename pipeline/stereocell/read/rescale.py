@@ -1,7 +1,7 @@
-"""The dtype for a format's values after its rescale, and the rescale itself.
+"""Choose the dtype for rescaled values, and rescale them.
 
-Integers stay integers: where slopes and intercepts are whole, the dtype is the narrowest of uint8,
-uint16 and int16 that holds all values of the stored bits; else float32.
+Integers stay integers: if slopes and intercepts are whole, the dtype is the narrowest of uint8,
+uint16 and int16 that holds all values of the stored bits. Otherwise it is float32.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ _INTEGERS = (np.uint8, np.uint16, np.int16)  # narrowest first
 
 
 def dtype_for(ranges: Iterable[tuple[float, float, float, float]]) -> np.dtype[Any]:
-    """Return the dtype for all slices' values.
+    """Return a dtype that holds the values of all slices.
 
     ranges  (lowest stored value, highest stored value, slope, intercept) of each slice
     """
@@ -37,7 +37,7 @@ def rescale(
 
     stored  any shape and dtype; the result has the same shape
 
-    Values beyond float32 become infinity; the caller checks for it.
+    Values beyond float32 become infinite; the caller checks for them.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         if slope == 1 and intercept == 0:

@@ -1,4 +1,4 @@
-"""The name of a source, and the folder that belongs to it, by the endings of formats."""
+"""A source's name for display and the folder that it occupies, by the endings of formats."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from stereocell.model.errors import UsageError
 from stereocell.read.known_formats import known_formats
 from stereocell.storage.location import Location
 
-_OTHERS = (".zip",)  # endings that are no format's own
+_OTHERS = (".zip",)  # endings that belong to no format
 
 
 def name_of(location: Location) -> str:
@@ -38,13 +38,13 @@ def require_apart(source: str | Path, out: Path) -> None:
     outermost = _outermost(source)
     if outermost is not None and _is_in(out, outermost):
         raise UsageError(
-            f"OUT is {out}, inside the input {outermost}, expected a folder elsewhere: "
-            "it would write into the data"
+            f"OUT is {out}, inside the input {outermost}, where it would be written into the "
+            "data; expected a folder elsewhere"
         )
 
 
 def working_folder_outside(source: str | Path) -> Path:
-    """Return the working folder, or the one that holds a source which the working folder is in."""
+    """Return the working folder, or the folder around the source if it holds the working folder."""
     outermost = _outermost(source)
     if outermost is None or not _is_in(Path(), outermost):
         return Path()
@@ -52,7 +52,7 @@ def working_folder_outside(source: str | Path) -> Path:
 
 
 def _outermost(source: str | Path) -> Path | None:
-    """Return the folder that a source is a part of, as a dataset of files, or the source itself.
+    """Return the outermost folder of a dataset that the source is part of, or the source itself.
 
     None: the source is at an address.
     """
@@ -65,5 +65,5 @@ def _outermost(source: str | Path) -> Path | None:
 
 
 def _is_in(place: Path, folder: Path) -> bool:
-    # not Path.resolve, which raises its own error for a ring of links
+    # Path.resolve would raise an error of its own for links that form a ring.
     return Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder))

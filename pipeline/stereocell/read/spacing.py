@@ -11,12 +11,12 @@ from stereocell.model.tiling import Box
 Triple = tuple[float, float, float]
 PartialTriple = tuple[float | None, float | None, float | None]
 
-# unit -> um, in both spellings: OME-Zarr's (UDUNITS-2 names) and OME-XML's (symbols)
+# um per unit, in the names of OME-Zarr (UDUNITS-2) and the symbols of OME-XML
 _UM: dict[str, float] = {
     "angstrom": 1e-4,
     "\u00c5": 1e-4,
     "\u00e5": 1e-4,  # the same letter in lower case
-    "\u212b": 1e-4,  # the sign of the unit
+    "\u212b": 1e-4,  # the sign of the unit, a character of its own
     "\u00e5ngstrom": 1e-4,
     "\u00e5ngstr\u00f6m": 1e-4,
     "A": 1e-4,
@@ -43,7 +43,7 @@ _UM: dict[str, float] = {
     "m": 1e6,
     "inch": 25400.0,
     "in": 25400.0,
-    "inche": 25400.0,  # the plural loses its s
+    "inche": 25400.0,  # `inches` without its s
 }
 
 
@@ -53,7 +53,7 @@ class Level:
 
     shape       voxels (z, y, x)
     spacing_um  (z, y, x), um
-    origin_um   centre of voxel (0, 0, 0), (z, y, x), um, from level 0's
+    origin_um   centre of voxel (0, 0, 0), (z, y, x), um, from the same centre of level 0
     """
 
     shape: tuple[int, int, int]
@@ -73,8 +73,8 @@ class Grid:
     shape       voxels (z, y, x)
     spacing_um  (z, y, x), um
     offset_um   centre of voxel (0, 0, 0), (z, y, x), um
-    partial_um  (z, y, x), um, where the source states some of the three and `spacing_um` is None
-    hint        where a missing one may come from, for the message; empty: not known
+    partial_um  (z, y, x), um, where the source states only some of them; `spacing_um` is then None
+    hint        where the missing ones may be found, for the message; empty: not known
     """
 
     shape: tuple[int, int, int]
@@ -85,10 +85,10 @@ class Grid:
 
 
 def um_per(unit: object) -> float | None:
-    """Return a length unit in um; None for no unit or one that is no length (`pixel`).
+    """Return a unit of length in um; None: no unit, or not one of length (`pixel`).
 
-    Units are known in any case, in the plural, in quotes or brackets, with either sign of the
-    micro, and where UTF-8 was read as Latin-1.
+    Units are recognised in any case, in the plural, in quotes or brackets, with either character
+    for micro, and where UTF-8 was decoded as Latin-1.
 
     >>> um_per("[n_m]"), um_per(" Microns "), um_per("\u00c2\u00b5m")
     (0.001, 1.0, 1.0)
@@ -106,7 +106,7 @@ def um_per(unit: object) -> float | None:
 
 
 def _from_latin_1(text: str) -> str:
-    """Return the text of UTF-8 bytes that were decoded as Latin-1; other texts as they are."""
+    """Return the text of UTF-8 bytes that were decoded as Latin-1; other texts unchanged."""
     try:
         return text.encode("latin-1").decode("utf-8")
     except UnicodeError:
@@ -119,9 +119,9 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
     given_um  (z, y, x), um, the user's `--spacing-um`; replaces the metadata of level 0
     where     the source's name, for messages
 
-    A coarser level without a translation is taken for an average of blocks of voxels: its first
-    centre lies at 0.5 (f - 1) of level 0's spacing, where f is its factor. Raises SourceError where
-    the spacing is missing or isn't a positive length, UsageError where `given_um` isn't.
+    A coarser level without a translation counts as an average of blocks of voxels. So its first
+    centre lies at 0.5 (f - 1) times level 0's spacing, where f is its factor. Raises SourceError
+    where the spacing is missing or isn't a positive length, UsageError where `given_um` isn't one.
     """
     if given_um is not None:
         if len(given_um) != 3 or not all(_is_length(value) for value in given_um):
@@ -143,7 +143,7 @@ def levels_of(grids: tuple[Grid, ...], given_um: Triple | None, where: str) -> t
         spacing = _triple(s * f for s, f in zip(finest, factors, strict=True))
         origin = _triple(0.5 * (f - 1.0) * s for s, f in zip(finest, factors, strict=True))
         if grid.offset_um is not None and grids[0].offset_um is not None:
-            # In level 0's own spacing, so that a given spacing scales the shift as well.
+            # Measured in level 0's own spacing, so that a spacing given by the user scales it too.
             stated = grids[0].spacing_um or finest
             shifts = zip(grid.offset_um, grids[0].offset_um, stated, finest, strict=True)
             origin = _triple((a - b) / own * used for a, b, own, used in shifts)
@@ -167,19 +167,20 @@ def _check(grids: tuple[Grid, ...], where: str) -> None:
                 )
         if any(n < 1 for n in grid.shape):
             raise SourceError(
-                f"{where}: shape (z, y, x) of level {index}: found {grid.shape}, expected voxels"
+                f"{where}: shape (z, y, x) of level {index}: found {grid.shape}, "
+                "expected at least one voxel along each axis"
             )
     for index, (finer, coarser) in enumerate(pairwise(grids), start=1):
         if any(b > a for a, b in zip(finer.shape, coarser.shape, strict=True)):
             raise SourceError(
                 f"{where}: shape (z, y, x) of level {index}: found {coarser.shape}, "
-                f"expected at most level {index - 1}'s {finer.shape}, as the finest level is "
-                "listed first"
+                f"expected at most level {index - 1}'s {finer.shape}, since levels are listed "
+                "from the finest to the coarsest"
             )
 
 
 def _missing(grid: Grid) -> str:
-    """Return the words for a spacing that is not stated, or in part."""
+    """Return the words for a spacing that is not stated, or only in part."""
     stated = zip("zyx", grid.partial_um, strict=True)
     found = [f"{axis} {value:.5g} um" for axis, value in stated if value is not None]
     if not found:
@@ -201,7 +202,7 @@ def _missing(grid: Grid) -> str:
 
 
 def grid_of(shape: tuple[int, int, int], stated_um: PartialTriple, hint: str = "") -> Grid:
-    """Return a grid whose spacing (z, y, x), um, is stated whole, in part or not at all."""
+    """Return a grid from a spacing (z, y, x), um, that is stated whole, in part or not at all."""
     z, y, x = stated_um
     if z is None or y is None or x is None:
         return Grid(shape, partial_um=stated_um, hint=hint)
@@ -209,14 +210,14 @@ def grid_of(shape: tuple[int, int, int], stated_um: PartialTriple, hint: str = "
 
 
 def _factors(grid: Grid, finest: Grid) -> Triple:
-    """The voxels of level 0 per voxel of this level, (z, y, x)."""
+    """Return the number of level 0's voxels per voxel of this level, (z, y, x)."""
     if grid.spacing_um is not None and finest.spacing_um is not None:
         return _triple(a / b for a, b in zip(grid.spacing_um, finest.spacing_um, strict=True))
     return _triple(_shape_factor(n, m) for n, m in zip(finest.shape, grid.shape, strict=True))
 
 
 def _shape_factor(fine: int, coarse: int) -> float:
-    """The factor between two lengths in voxels: a whole number where halving and rounding fit."""
+    """Return the ratio of two sizes in voxels: whole where halving with rounding explains it."""
     whole = round(fine / coarse)
     if coarse in (fine // whole, -(-fine // whole)):
         return float(whole)
@@ -228,7 +229,7 @@ def _is_sound(grid: Grid) -> bool:
 
 
 def _is_length(value: float) -> bool:
-    """Whether a voxel can have this spacing (um): any other is a wrong unit."""
+    """Return whether a voxel can have this spacing, um. Other values are due to a wrong unit."""
     return 1e-6 <= value <= 1e9
 
 

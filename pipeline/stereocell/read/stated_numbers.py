@@ -6,9 +6,9 @@ from typing import Any
 
 
 def number_of(value: Any) -> float:
-    """Return a stated number; infinity where it has more digits than a float can hold.
+    """Return a stated number; infinity where it is too large for a float.
 
-    Raises ValueError or TypeError where it is no number.
+    Raises ValueError or TypeError where it is not a number.
     """
     try:
         return float(value)
@@ -17,7 +17,7 @@ def number_of(value: Any) -> float:
 
 
 def numbers_of(values: Iterable[Any] | None) -> list[float]:
-    """Return stated numbers as floats; empty: nothing is stated, or one value is not a number."""
+    """Return stated numbers as floats; empty: none are stated, or one value is not a number."""
     try:
         return [number_of(value) for value in (() if values is None else values)]
     except (TypeError, ValueError):

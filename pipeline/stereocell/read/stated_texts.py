@@ -1,4 +1,4 @@
-"""Convert texts that a file states. HDF5 and JSON hold some as bytes, or as a list of one."""
+"""Convert texts that a file states. HDF5 and JSON may hold a text as bytes, or in a list of one."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def text_of(value: Any) -> str:
-    """Return a stated text without the blanks around it; empty: the value is no single text.
+    """Return a stated text without surrounding blanks; empty: the value is not a single text.
 
     >>> text_of(b" um "), text_of(["um"]), text_of(["um", "nm"]), text_of(3)
     ('um', 'um', '', '')

@@ -2,12 +2,12 @@
 
 Files state a size, an axis order, a direction, a value scale or the kind of a frame in several
 fields, and the fields may disagree. A reader collects a Statement for each field, with its place in
-the file. `settle` compares them, takes the value of the most trusted one, and writes a note where
-the others disagree or where no field states the value. `omission` words a note on data that is not
-read. A note is one sentence for the user; no result depends on it.
+the file. `settle` compares them and chooses the value of the most trusted one. It writes a note
+where the others disagree or where no field states the value. `omission` words a note on data that
+is not read. A note is one sentence for the user; no result depends on it.
 
-The order of trust is that of `Trust`: a user's own value first, then values that were measured
-while images were taken, then the field that the format defines for the purpose.
+`Trust` gives the order of trust: a user's own value first, then values that were measured while
+images were taken, then the field that the format defines for the purpose.
 """
 
 import math
@@ -17,11 +17,11 @@ from enum import IntEnum
 
 Value = float | str | tuple[float, ...] | tuple[str, ...]
 
-_MOST_SHOWN = 4  # most disagreeing statements that a note lists
+_MOST_SHOWN = 4  # statements that a note lists at most
 
 
 class Trust(IntEnum):
-    """The origin of a value, the most trusted first.
+    """Where a value comes from; the most trusted origin is first.
 
     GIVEN     the user's flag
     MEASURED  written for each image while it was acquired, such as the position of each slice
@@ -46,7 +46,7 @@ class Subject:
     name       noun for the note, such as `voxel spacing along z`
     unit       unit of numeric values, such as `um`; empty: none
     tolerance  relative difference up to which two numbers agree
-    remedy     how a user corrects the choice, such as `--spacing-um z,y,x replaces it`
+    remedy     how the user corrects the choice, such as `--spacing-um z,y,x replaces it`
     """
 
     name: str
@@ -88,10 +88,10 @@ class Settled:
 
 
 def settle(subject: Subject, statements: Sequence[Statement]) -> Settled:
-    """Choose among the statements of one subject, of which there is at least one.
+    """Choose among the statements on one subject. At least one statement is needed.
 
-    The most trusted statement is taken; among equals the first. The note lists the statements that
-    disagree with it, or explains an assumption.
+    The most trusted statement wins; among equally trusted ones, the first. The note lists the
+    statements that disagree with it, or explains an assumption.
     """
     chosen = min(statements, key=lambda one: one.trust)
     remedy = f"; {subject.remedy}" if subject.remedy else ""
@@ -124,7 +124,7 @@ def omission(found: str, reason: str, remedy: str = "") -> str:
 
     found   the data with their number, such as `5 derived images`
     reason  why they are not read, such as `they are projections of the others`
-    remedy  how a user reads them; empty: there is no way
+    remedy  how the user can read them; empty: not possible
     """
     return f"left out: {found}, because {reason}{f'; {remedy}' if remedy else ''}"
 
@@ -146,7 +146,7 @@ def _is_close(a: object, b: object, tolerance: float) -> bool:
 
 
 def _shown(value: Value, subject: Subject) -> str:
-    """Return a value with its unit."""
+    """Return a value as text, with its unit if it is a number."""
     parts = value if isinstance(value, tuple) else (value,)
     text = ", ".join(part if isinstance(part, str) else f"{part:.5g}" for part in parts)
     is_number = bool(parts) and not isinstance(parts[0], str)

@@ -1,4 +1,4 @@
-"""An image whose axes are permuted and reversed: read so, never copied."""
+"""Axes of an image are permuted and reversed while windows are read; voxels are never copied."""
 
 from dataclasses import dataclass, replace
 
@@ -12,9 +12,9 @@ from stereocell.read.spacing import Grid, Triple
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """How stored axes become z, y and x.
+    """The order and direction in which stored axes become z, y and x.
 
-    order  the stored axis (0 z, 1 y, 2 x) that becomes z, y, x
+    order  stored axis (0 z, 1 y, 2 x) that becomes z, y, x
     flips  True where z, y, x run backwards along the stored axis
     """
 
@@ -23,12 +23,12 @@ class Turn:
 
     @property
     def is_needed(self) -> bool:
-        """Whether anything is permuted or reversed."""
+        """Whether any axis is permuted or reversed."""
         return self.order != (0, 1, 2) or any(self.flips)
 
 
 def turned_array(array: VoxelArray, turn: Turn | Canonical) -> VoxelArray:
-    """Return an array whose axes are renamed and reversed."""
+    """Return an array whose axes are renamed and, where needed, reversed."""
     names, flips = list(array.axes), [False] * len(array.axes)
     for name, stored, flip in zip("zyx", turn.order, turn.flips, strict=True):
         place = array.axes.index("zyx"[stored])
@@ -38,7 +38,7 @@ def turned_array(array: VoxelArray, turn: Turn | Canonical) -> VoxelArray:
 
 
 def turned_grid(grid: Grid, turn: Turn | Canonical) -> Grid:
-    """Return the grid of a turned array. Its offset is that of the new first voxel."""
+    """Return the grid of a turned array. Its offset is that of the voxel that is now the first."""
     z, y, x = (grid.shape[axis] for axis in turn.order)
     offset = grid.offset_um
     if offset is not None and grid.spacing_um is not None:
@@ -60,7 +60,7 @@ def turned_grid(grid: Grid, turn: Turn | Canonical) -> Grid:
 
 
 def turned_image(image: Image, turn: Turn) -> Image:
-    """Return an image whose levels are turned; it knows across which axis its planes lie."""
+    """Return an image with turned levels, and with the axis across which its planes now lie."""
     if not turn.is_needed:
         return image
     return replace(

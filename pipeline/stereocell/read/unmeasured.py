@@ -1,8 +1,9 @@
 """Voxels that are NaN or infinite: places without a measurement, read as the darkest value.
 
-Registered stacks have NaN outside the field of view; ratios and logarithms have NaN and infinity
-where there was no signal. The smallest finite value of the channel stands there, one for all of
-it: the rule for padding (isosurface/level_evidence.py) knows it, and tiles agree where they meet.
+Registered stacks have NaN outside the field of view. Ratios and logarithms have NaN and infinity
+where there was no signal. These voxels are read as the channel's smallest finite value. One value
+for the whole channel makes neighbouring tiles agree, and the rule for padding
+(isosurface/level_evidence.py) recognises it.
 """
 
 import math
@@ -14,11 +15,11 @@ from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box
 
-_SLAB_BYTES = 1 << 26  # bytes that are read at once, where the chunks permit
+_SLAB_BYTES = 1 << 26  # bytes read at once, where the chunks permit
 
 
 class Searched(Protocol):
-    """What is asked of a level's voxels (dataset.VoxelArray)."""
+    """The parts of a level's voxels that the search needs (dataset.VoxelArray)."""
 
     @property
     def shape(self) -> tuple[int, int, int]: ...
@@ -30,7 +31,7 @@ class Searched(Protocol):
 
 
 def least_finite(array: Searched, time: int, channel: int) -> float | None:
-    """Return the smallest finite voxel; None: there is none. All voxels are read."""
+    """Return the smallest finite voxel; None: no voxel is finite. All voxels are read."""
     least = math.inf
     for box in _slabs(array):
         stored = array.stored_window(time, channel, box)
@@ -49,7 +50,7 @@ def share_of_gaps(array: Searched, time: int, channel: int, boxes: Iterable[Box]
 
 
 def _slabs(array: Searched) -> Iterator[Box]:
-    """Yield boxes that fill the array, whole chunks along z and y."""
+    """Yield boxes of whole chunks along z and y that together fill the array."""
     depth, height, width = array.shape
     deep, high, _ = array.chunk
     row = width * np.dtype(array.array.dtype).itemsize

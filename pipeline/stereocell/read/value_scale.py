@@ -1,10 +1,10 @@
-"""Values that an array stores packed: scale, offset, sign and fill values of the CF conventions.
+"""Packed values: scale, offset, sign and fill values by the CF conventions.
 
-netCDF, xarray and many writers of HDF5 and Zarr store whole numbers and state beside them how they
+netCDF, xarray and many writers of HDF5 and Zarr store integers and state beside them how they
 become measured values: `scale_factor * stored + add_offset`. `_FillValue`, `missing_value` and
-`valid_range` name stored values that stand for no measurement; those are read as NaN, which
-read/unmeasured.py replaces by the smallest finite value. `_Unsigned` states the sign of integers
-whose type has the other one.
+`valid_range` name stored values that mark missing measurements. They are read as NaN, which
+read/unmeasured.py replaces with the smallest finite value. `_Unsigned` states the true sign of
+integers whose type has the wrong one.
 
 References: CF conventions 1.11, sections 2.5.1 and 8.1; NetCDF Users Guide, attribute conventions.
 """
@@ -33,12 +33,13 @@ ATTRIBUTES = (
 
 @dataclass(frozen=True, slots=True)
 class ValueScale:
-    """How stored numbers become values.
+    """The rule by which stored numbers become values.
 
-    signed    the stored integers' sign where it is another one than that of their type
-    missing   stored values that stand for no measurement
+    slope, intercept  value = slope * stored + intercept
+    signed     whether the stored integers are signed, where their type states the opposite
+    missing    stored values that mark missing measurements
     low, high  range of the stored values that are measurements
-    notes     a sentence for each attribute that is followed, or can't be
+    notes      a sentence on each attribute that is applied, or that can't be
     """
 
     slope: float = 1.0
@@ -51,12 +52,12 @@ class ValueScale:
 
     @property
     def has_gaps(self) -> bool:
-        """Whether some stored values stand for no measurement."""
+        """Whether some stored values mark missing measurements."""
         return bool(self.missing) or self.low > -np.inf or self.high < np.inf
 
     @property
     def is_plain(self) -> bool:
-        """Whether the stored numbers are the values."""
+        """Whether the stored numbers are the values themselves."""
         is_same = (self.slope, self.intercept) == (1.0, 0.0) and self.signed is None
         return is_same and not self.has_gaps
 
@@ -64,11 +65,11 @@ class ValueScale:
 def scaled(
     where: str, array: StoredArray, attributes: Mapping[str, Any]
 ) -> tuple[StoredArray, tuple[str, ...]]:
-    """Return the array's values as its attributes define them, and notes.
+    """Return the array with the values that its attributes define, and notes.
 
-    attributes  those of ATTRIBUTES that are there, None for others
+    attributes  values of ATTRIBUTES; None or missing: the array has no such attribute
 
-    Raises SourceError where a stated factor is no finite number.
+    Raises SourceError where a stated factor is not a finite number.
     """
     scale = scale_of(where, np.dtype(array.dtype), attributes)
     if scale.is_plain:
@@ -77,22 +78,22 @@ def scaled(
 
 
 def ignored_note(of: str, attributes: Mapping[str, Any]) -> str:
-    """Return a sentence on factors among the attributes of a group; empty: there are none.
+    """Return a sentence on factors in the attributes of a group; empty: there are none.
 
-    CF defines them for the array that they stand on, so those of a group are not applied.
+    CF defines factors for the array that has them, so those of a group are not applied.
     """
     stated = {name: attributes.get(name) for name in ("scale_factor", "add_offset")}
     named = [f"{name} {value}"[:40] for name, value in stated.items() if value is not None]
     if not named:
         return ""
     return (
-        f"values: {' and '.join(named)} of {of} are not applied: they count only among the "
+        f"values: {' and '.join(named)} of {of} are not applied, because they count only as "
         "attributes of the array itself"
     )
 
 
 def scale_of(where: str, stored: np.dtype[Any], attributes: Mapping[str, Any]) -> ValueScale:
-    """Return how the values of an array with these attributes are stored."""
+    """Return the rule by which an array with these attributes stores its values."""
     slope, intercept = (
         _factor(where, name, attributes.get(name), default)
         for name, default in (("scale_factor", 1.0), ("add_offset", 0.0))
@@ -121,20 +122,22 @@ def _factor(where: str, name: str, value: Any, default: float) -> float:
 
 
 def _sign(stored: np.dtype[Any], attributes: Mapping[str, Any], notes: list[str]) -> ValueScale:
-    """Return a scale with the sign of the integers, by `_Unsigned`."""
+    """Return a scale with the sign that `_Unsigned` states for the integers."""
     stated = attributes.get("_Unsigned", "")
-    said = (text_of(stated) or str(stated)).lower()
+    stated_text = (text_of(stated) or str(stated)).lower()
     other = {"i": "true", "u": "false"}.get(stored.kind)
-    if said != other or stored.itemsize > 4:
+    if stated_text != other or stored.itemsize > 4:
         return ValueScale()
-    notes.append(f"_Unsigned = {said!r}: the stored {stored.name} are read with the other sign")
+    notes.append(
+        f"_Unsigned = {stated_text!r}: the stored {stored.name} are read with the other sign"
+    )
     return ValueScale(signed=stored.kind == "u")
 
 
 def _gaps(
     stored: np.dtype[Any], scale: ValueScale, attributes: Mapping[str, Any], notes: list[str]
 ) -> ValueScale:
-    """Return a scale with the stored values that are no measurements."""
+    """Return a scale with the stored values that mark missing measurements."""
     if stored.kind == "b":
         return scale
     fills: dict[str, tuple[float, ...]] = {}
@@ -143,10 +146,13 @@ def _gaps(
         if found := tuple(value for value in found if np.isfinite(value)):
             fills[name] = found
         elif _is_unread(attributes.get(name)):
-            notes.append(f"values: {name} is {_shown(attributes[name])}, no number: it is not used")
+            notes.append(
+                f"values: {name} is {_shown(attributes[name])}, which is not a number: it is not "
+                "used"
+            )
     missing = tuple(dict.fromkeys(value for values in fills.values() for value in values))
     if stored.kind in "iu" and scale.slope > 0 and missing == (_least(stored, scale),) == (0.0,):
-        missing, fills = (), {}  # 0 of unsigned numbers is the smallest value anyway
+        missing, fills = (), {}  # 0 in unsigned numbers is the smallest value anyway
     low, high = _range(stored, scale, attributes)
     shown = [f"{name} {', '.join(f'{v:g}' for v in values)}" for name, values in fills.items()]
     if low > -np.inf or high < np.inf:
@@ -154,8 +160,8 @@ def _gaps(
         shown.append(f"stored values {' and '.join(ends)}, by the valid range")
     if shown:
         notes.append(
-            f"values: voxels of {', or of '.join(shown)} are no measurements: read as the smallest "
-            "measured value"
+            f"values: voxels of {', or of '.join(shown)} are not measurements: they are read as "
+            "the smallest measured value"
         )
     return replace(scale, missing=missing, low=low, high=high)
 
@@ -163,7 +169,7 @@ def _gaps(
 def _range(
     stored: np.dtype[Any], scale: ValueScale, attributes: Mapping[str, Any]
 ) -> tuple[float, float]:
-    """Return the stated range of measured values where it excludes numbers of the dtype."""
+    """Return the stated range of measured values, or infinity where it excludes no number."""
     both, low, high = (
         _limits(stored, scale, attributes.get(name))
         for name in ("valid_range", "valid_min", "valid_max")
@@ -185,7 +191,8 @@ def _range(
 def _limits(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
     """Return the ends of a range as stored values.
 
-    The NetCDF Users Guide: a range of real numbers beside stored integers is of measured values.
+    By the NetCDF Users Guide, a range of real numbers for stored integers refers to the measured
+    values.
     """
     found = _stored_values(stored, scale, value)
     is_measured = stored.kind in "iu" and np.asarray(value).dtype.kind == "f"
@@ -196,7 +203,7 @@ def _limits(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float
 
 
 def _stored_values(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tuple[float, ...]:
-    """Return an attribute's numbers in the sign of the voxels; empty: it states none."""
+    """Return an attribute's numbers with the sign of the voxels; empty: it states no number."""
     numbers = np.ravel(np.asarray(() if value is None else value))
     if numbers.dtype.kind in "SUO":  # numbers as texts, such as "-9999" or "0, 4095"
         return tuple(numbers_of(_SEPARATORS.split(" ".join(map(_text, numbers)).strip("[]() "))))
@@ -209,7 +216,7 @@ def _stored_values(stored: np.dtype[Any], scale: ValueScale, value: Any) -> tupl
 
 
 def _is_unread(value: Any) -> bool:
-    """Return whether an attribute that should be a number is another text."""
+    """Return whether an attribute that should be a number is a text without numbers."""
     texts = [_text(one) for one in np.ravel(np.asarray(value))] if value is not None else []
     return any(texts) and not numbers_of(texts)
 
@@ -234,7 +241,7 @@ def _resigned(stored: np.dtype[Any], scale: ValueScale) -> np.dtype[Any]:
 
 
 class ScaledArray:
-    """An array whose values follow from stored numbers by a ValueScale."""
+    """An array whose values are computed from stored numbers by a ValueScale."""
 
     def __init__(self, array: StoredArray, scale: ValueScale) -> None:
         self.shape, self.chunks = tuple(array.shape), tuple(array.chunks)
@@ -243,7 +250,7 @@ class ScaledArray:
 
     @property
     def stored(self) -> StoredArray:
-        """The array as it is stored."""
+        """The array of stored numbers."""
         return self._array
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
@@ -262,7 +269,7 @@ def dtype_of_values(stored: np.dtype[Any], scale: ValueScale) -> np.dtype[Any]:
 
 
 def values_of(stored: NDArray[Any], scale: ValueScale, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return the values of stored numbers in `dtype`; NaN where there is no measurement."""
+    """Return the values of stored numbers in `dtype`; NaN where a measurement is missing."""
     signed = _resigned(stored.dtype, scale)
     if stored.dtype != signed:
         stored = stored.view(signed)
@@ -272,7 +279,8 @@ def values_of(stored: NDArray[Any], scale: ValueScale, dtype: np.dtype[Any]) -> 
     if not scale.has_gaps:
         return values
     is_gap = (stored < scale.low) | (stored > scale.high)
-    kind = signed.type if signed.kind == "f" else float  # a float's fill value was rounded as well
+    # a float's fill value was rounded to the type as well
+    kind = signed.type if signed.kind == "f" else float
     for missing in scale.missing:
         is_gap |= stored == kind(missing)
     return np.where(is_gap, values.dtype.type(np.nan), values)

@@ -1,9 +1,9 @@
 """Voxels that are decoded all at once, at the first access, and cached.
 
-A file for each slice, or one stream of gzip, has no blocks. A tile's window is cut along canonical
-axes, which cross nearly every slice of nearly every series, so that reading by slices would decode
-the whole series for each window. A volume of this kind takes some hundred MB at most, so a process
-decodes it once and caches it. Its size is known from the headers and is checked
+Formats with one file per slice, or one gzip stream, have no blocks. A tile's window is cut along
+canonical axes, which cross nearly every slice of nearly every series. Reading slice by slice would
+therefore decode the whole series for each window. Such a volume takes a few hundred MB at most, so
+a process decodes it once and caches it. Its size is known from the headers and is checked
 (read/open_dataset.py) before memory is allocated.
 """
 
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 
 class WholeArray:
-    """Time points of one volume, (t, z, y, x); one of them is cached.
+    """Time points of one volume, (t, z, y, x); the last one that was read is cached.
 
     shape  (t, z, y, x) in voxels
-    load   returns the voxels (z, y, x) of a time point; may return a view
+    load   returns the voxels (z, y, x) of a time point; it may return a view
     """
 
     def __init__(
@@ -40,6 +40,6 @@ class WholeArray:
         time, *place = key
         with self._lock:
             if self._held is None or self._held[0] != time:
-                self._held = None  # frees the old one first: never two in memory
+                self._held = None  # frees the old time point first, so that memory never holds two
                 self._held = (time, self._load(time))
             return self._held[1][tuple(place)]

@@ -1,9 +1,9 @@
-"""End the reads that a failed one leaves behind in zarr's event loop, before Python ends.
+"""Cancel reads that a failed read leaves in zarr's event loop, before Python exits.
 
-zarr reads the chunks of a window side by side. The first damaged chunk ends the read, and the other
-reads stay in zarr's event loop. zarr closes that loop as Python ends, and each read that is still
-in it then prints a traceback of its own after the line on the damage. Modules that read through
-zarr import this one.
+zarr reads the chunks of a window concurrently. The first damaged chunk ends the read, but the other
+reads stay in zarr's event loop. zarr closes that loop when Python exits, and each remaining read
+then prints a traceback after our line on the damage. Modules that read through zarr import this
+module.
 """
 
 import asyncio
@@ -13,11 +13,11 @@ from contextlib import suppress
 
 from zarr.core import sync
 
-_PATIENCE_S = 5  # s for the reads to end
+_PATIENCE_S = 5  # seconds to wait for the reads to end
 
 
 def end_reads() -> None:
-    """Cancel the reads that are left in zarr's event loop, and wait until they have ended."""
+    """Cancel the reads that remain in zarr's event loop, and wait until they have ended."""
     loop = sync.loop[0]
     if loop is None or not loop.is_running():
         return
@@ -32,5 +32,5 @@ async def _cancel_others() -> None:
     await asyncio.gather(*others, return_exceptions=True)
 
 
-# Python calls these in the reverse order: this one before that of zarr, which it has imported.
+# Python calls exit functions in reverse order: this one runs before zarr's, imported above.
 atexit.register(end_reads)

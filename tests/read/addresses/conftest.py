@@ -1,4 +1,4 @@
-"""A service on loopback for each test, and no answer of another test."""
+"""A service on loopback for each test, without the answers of other tests."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,7 @@
 """BioImage Archive: pages of images and studies.
 
-The answers are written by the requests of the archive's own pages and by the tests of its API; none
-was recorded.
+The answers follow the requests of the archive's own pages and the tests of its API; none was
+recorded.
 """
 
 from typing import Any
@@ -67,12 +67,12 @@ def test_each_form_leads_to_the_image(archive: Service, page: str) -> None:
         "https://www.ebi.ac.uk/biostudies/files/S-BIAD843/wing.n5",
     ],
 )
-def test_addresses_of_data_are_left_alone(archive: Service, data: str) -> None:
+def test_addresses_of_data_are_not_changed(archive: Service, data: str) -> None:
     assert resolve(data).source == data
     assert archive.asked == []
 
 
-def test_a_study_of_several_images_asks_for_one(archive: Service) -> None:
+def test_a_study_of_several_images_is_refused_with_the_list(archive: Service) -> None:
     images = [{"uuid": IMAGE}, {"uuid": OTHER}]
     archive.json(f"/api/v2/dataset/{DATASET}/image?page_size=100", images)
     with pytest.raises(UsageError, match="a study of 2 images or more, expected the page of one"):
@@ -80,7 +80,7 @@ def test_a_study_of_several_images_asks_for_one(archive: Service) -> None:
 
 
 @pytest.mark.parametrize("answer", [Answer(b"", 404), Answer(b"null"), Answer(b"[]")])
-def test_a_study_that_is_not_there(archive: Service, answer: Answer) -> None:
+def test_an_absent_study_is_refused(archive: Service, answer: Answer) -> None:
     archive.answers["/api/v2/search/study/accession?accession_id=S-BIAD843&page_size=1"] = answer
     with pytest.raises(SourceError, match="S-BIAD843: not found"):
         resolve("https://www.ebi.ac.uk/bioimage-archive/study/S-BIAD843")
@@ -91,13 +91,13 @@ def test_a_study_that_is_not_there(archive: Service, answer: Answer) -> None:
     [
         (b"<html>", "found a web page"),
         (b"{}", "found no list"),
-        (b"[]", "no OME-Zarr of it"),
-        (b"[1, null]", "no OME-Zarr of it"),
-        (b'[{"image_format": ".ome.zarr", "file_uri": "https://a"}]', "no OME-Zarr of it"),
-        (b'[{"image_format": ".ome.zarr", "file_uri": [null]}]', "no OME-Zarr of it"),
+        (b"[]", "found no OME-Zarr"),
+        (b"[1, null]", "found no OME-Zarr"),
+        (b'[{"image_format": ".ome.zarr", "file_uri": "https://a"}]', "found no OME-Zarr"),
+        (b'[{"image_format": ".ome.zarr", "file_uri": [null]}]', "found no OME-Zarr"),
     ],
 )
-def test_a_bad_answer_is_one_line(archive: Service, answer: bytes, words: str) -> None:
+def test_a_bad_answer_is_refused_in_one_line(archive: Service, answer: bytes, words: str) -> None:
     archive.put(f"/api/v2/image/{IMAGE}/image_representation?page_size=100", answer)
     with pytest.raises(SourceError, match=words):
         resolve(PAGE)
@@ -125,7 +125,7 @@ def test_data_elsewhere_are_refused(archive: Service, place: str) -> None:
 
 
 @pytest.mark.parametrize("uuid", ["../../x", "", None, 4])
-def test_a_bad_uuid_leads_nowhere(archive: Service, uuid: Any) -> None:
+def test_a_bad_uuid_is_refused(archive: Service, uuid: Any) -> None:
     archive.json(f"/api/v2/study/{STUDY}/dataset?page_size=100", [{"uuid": uuid}])
     with pytest.raises(SourceError, match="expected a UUID"):
         resolve("https://www.ebi.ac.uk/bioimage-archive/study/S-BIAD843")
@@ -141,7 +141,7 @@ def test_a_bad_uuid_leads_nowhere(archive: Service, uuid: Any) -> None:
         "https://uk1s3.embassy.ebi.ac.uk/bia-integrator-data/pages/",
     ],
 )
-def test_another_form_says_which_are_understood(archive: Service, page: str) -> None:
-    with pytest.raises(UsageError, match="in another form, expected https://www"):
+def test_an_unknown_form_is_refused_with_the_known_ones(archive: Service, page: str) -> None:
+    with pytest.raises(UsageError, match=r"another form of .*, expected https://www"):
         resolve(page)
     assert archive.asked == []

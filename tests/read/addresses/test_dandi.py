@@ -1,7 +1,7 @@
-"""DANDI: assets by their UUID, and by their place in a dandiset.
+"""DANDI: assets by their UUID, and by their path in a dandiset.
 
-The answers are written by the archive's API (its OpenAPI page) and by the metadata of an asset that
-the archive shows; none was recorded.
+The answers follow the archive's API (its OpenAPI page) and the metadata of an asset that the
+archive shows; none was recorded.
 """
 
 from pathlib import Path
@@ -74,7 +74,7 @@ def test_each_form_leads_to_the_zarr(archive: Service, address: str) -> None:
 
 @pytest.mark.slow
 def test_the_zarr_is_read(archive: Service, tiny_zarr_04: Path) -> None:
-    """Its address has no ending that tells the format."""
+    """Its address has no ending that shows the format."""
     for file in tiny_zarr_04.rglob("*"):
         if file.is_file():
             name = file.relative_to(tiny_zarr_04).as_posix()
@@ -115,12 +115,14 @@ def test_the_newest_published_version_is_taken(archive: Service) -> None:
     ("paths", "words"),
     [
         ([], "0 assets"),
-        (["a/b.nwb", "a/c.json"], "2 assets at 'a' and no Zarr or NIfTI"),
+        (["a/b.nwb", "a/c.json"], "2 assets at 'a', but no Zarr or NIfTI"),
         (["ab/c.nii.gz"], "0 assets at 'a'"),
-        ([f"a/{n}.nii.gz" for n in range(9)], "9 assets, 9 of Zarr or NIfTI ('a/0.nii.gz', "),
+        ([f"a/{n}.nii.gz" for n in range(9)], "9 assets, 9 of them Zarr or NIfTI ('a/0.nii.gz', "),
     ],
 )
-def test_a_place_of_none_or_several_says_so(archive: Service, paths: list[str], words: str) -> None:
+def test_a_path_of_no_asset_or_of_several_is_refused(
+    archive: Service, paths: list[str], words: str
+) -> None:
     rows = [{"asset_id": ASSET, "path": path} for path in paths]
     archive.json("/api/dandisets/000108/versions/draft/assets/", {"results": rows})
     with pytest.raises(StereoCellError) as caught:
@@ -128,13 +130,13 @@ def test_a_place_of_none_or_several_says_so(archive: Service, paths: list[str], 
     assert words in str(caught.value)
 
 
-def test_the_whole_name_is_enough_among_many(archive: Service) -> None:
-    """A place of more assets than one answer lists leaves open which one is meant."""
+def test_the_full_name_is_enough_among_many(archive: Service) -> None:
+    """A path of more assets than one answer lists doesn't determine one of them."""
     rows = [{"asset_id": ASSET, "path": PATH}, {"asset_id": ZARR, "path": "sub-MITU01/a.json"}]
     page = {"next": f"{archive.url}/page/2", "results": rows}
     archive.json("/api/dandisets/000108/versions/draft/assets/", page)
     assert resolve(f"{PAGE}/000108/draft/files?location={PATH}").source.endswith(f"{ZARR}/")
-    with pytest.raises(UsageError, match="2 assets or more, 1 of Zarr or NIfTI"):
+    with pytest.raises(UsageError, match="2 assets or more, 1 of them Zarr or NIfTI"):
         resolve(f"{PAGE}/000108/draft/files?location=sub-MITU01")
     assert "/page/2" not in archive.paths
 
@@ -176,7 +178,7 @@ def test_data_elsewhere_are_refused(archive: Service, address: Any) -> None:
         (Answer(b"", 401), "HTTP 401"),
     ],
 )
-def test_a_bad_answer_is_one_line(archive: Service, answer: Answer, words: str) -> None:
+def test_a_bad_answer_is_refused_in_one_line(archive: Service, answer: Answer, words: str) -> None:
     archive.answers[f"/api/assets/{ASSET}/"] = answer
     with pytest.raises(SourceError, match=words):
         resolve(f"https://api.dandiarchive.org/api/assets/{ASSET}/")
@@ -197,7 +199,7 @@ def test_other_kinds_are_named(archive: Service, path: str, kind: str, words: st
 
 
 @pytest.mark.parametrize("rows", [{}, {"results": 1}, [], {"results": [{"path": "a/b.zarr"}]}])
-def test_a_bad_list_of_assets_is_one_line(archive: Service, rows: Any) -> None:
+def test_a_bad_list_of_assets_is_refused_in_one_line(archive: Service, rows: Any) -> None:
     archive.json("/api/dandisets/000108/versions/draft/assets/", rows)
     with pytest.raises(SourceError, match="the server's answer"):
         resolve(f"{PAGE}/000108/draft/files?location=a")
@@ -214,7 +216,7 @@ def test_a_bad_list_of_assets_is_one_line(archive: Service, rows: Any) -> None:
         f"{PAGE}/search?search=mouse",
     ],
 )
-def test_another_form_says_which_are_understood(archive: Service, address: str) -> None:
-    with pytest.raises(UsageError, match=r"in another form, expected https://api\.dandi"):
+def test_an_unknown_form_is_refused_with_the_known_ones(archive: Service, address: str) -> None:
+    with pytest.raises(UsageError, match=r"another form of .*, expected https://api\.dandi"):
         resolve(address)
     assert archive.asked == []

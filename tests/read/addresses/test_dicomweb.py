@@ -1,7 +1,7 @@
 """DICOMweb: QIDO-RS and WADO-RS of a small server.
 
-The answers are written by DICOM PS3.18 (10.4 retrieve, 10.6 search) and PS3.18 F (the JSON model);
-none was recorded. The instances are written by pydicom.
+The answers follow DICOM PS3.18 (10.4 retrieve, 10.6 search) and PS3.18 F (the JSON model); none was
+recorded. pydicom writes the instances.
 """
 
 import json
@@ -78,7 +78,7 @@ def address(pacs: Service, *, series: str | None = SERIES) -> str:
     return f"{pacs.url}/web/studies/{STUDY}" + (f"/series/{series}" if series else "")
 
 
-def test_a_series_is_read_as_its_files_are(pacs: Service, tmp_path: Path) -> None:
+def test_a_series_is_read_like_its_files(pacs: Service, tmp_path: Path) -> None:
     dataset, files = api.open_volume(address(pacs)), read.open(tmp_path / "written")
     assert dataset.fingerprint == files.fingerprint
     assert dataset.levels == files.levels
@@ -87,7 +87,7 @@ def test_a_series_is_read_as_its_files_are(pacs: Service, tmp_path: Path) -> Non
     assert accepts[1].startswith('multipart/related; type="application/dicom"')
 
 
-def test_a_plan_says_what_was_read_and_nothing_of_the_patient(pacs: Service) -> None:
+def test_a_plan_reports_the_source_and_nothing_about_the_patient(pacs: Service) -> None:
     plan = settle(address(pacs), Settings())
     (note,) = [note for note in plan.notes if note.startswith("DICOMweb")]
     assert "one series (MR, 8 instances)" in note
@@ -96,7 +96,7 @@ def test_a_plan_says_what_was_read_and_nothing_of_the_patient(pacs: Service) -> 
         assert word not in str(plan)
 
 
-def test_the_folder_is_its_owner_s_alone_and_has_plain_names(pacs: Service) -> None:
+def test_the_folder_is_private_and_its_files_have_plain_names(pacs: Service) -> None:
     folder = Path(resolve(address(pacs)).source)
     assert (
         stat.S_IMODE(folder.stat().st_mode) == stat.S_IMODE(folder.parent.stat().st_mode) == 0o700
@@ -123,7 +123,7 @@ def test_the_folder_is_removed_at_the_end(pacs: Service) -> None:
     assert not Path(done.stdout.strip()).parent.exists()
 
 
-def test_nothing_is_left_of_a_series_that_fails(
+def test_a_series_that_fails_leaves_no_files(
     pacs: Service, instances: list[bytes], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "scratch"))
@@ -135,7 +135,7 @@ def test_nothing_is_left_of_a_series_that_fails(
     assert os.listdir(tmp_path / "scratch") == []
 
 
-def test_a_study_gives_its_largest_series_of_images(pacs: Service) -> None:
+def test_the_largest_series_of_images_in_a_study_is_read(pacs: Service) -> None:
     rows = [row("1.9", "SR", 900), row("1.8", "MR", 3), row(), row("1.7", "SEG", 50)]
     pacs.json(f"/web/studies/{STUDY}/series", rows)
     found = resolve(address(pacs, series=None))
@@ -208,7 +208,7 @@ def test_the_token_does_not_follow_a_redirect(
 
 
 @pytest.mark.parametrize("token", ["two words", "line\r\nX-Evil: 1", "ä", "a\0b"[:1] + "\x7f"])
-def test_a_token_that_no_header_takes_is_refused_and_not_shown(
+def test_a_token_that_does_not_fit_a_header_is_refused_and_not_shown(
     pacs: Service, monkeypatch: pytest.MonkeyPatch, token: str
 ) -> None:
     monkeypatch.setenv(dicomweb.TOKEN, token)
@@ -218,7 +218,7 @@ def test_a_token_that_no_header_takes_is_refused_and_not_shown(
     assert pacs.asked == []
 
 
-def test_a_token_is_not_sent_in_the_clear(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_token_is_not_sent_unencrypted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(dicomweb.TOKEN, SECRET)
     monkeypatch.setattr(dicomweb, "numbers_of", lambda address: ["10.1.2.3"])
     with pytest.raises(UsageError, match="expected https://") as caught:
@@ -227,7 +227,9 @@ def test_a_token_is_not_sent_in_the_clear(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize("status", [401, 403])
-def test_a_login_is_named(pacs: Service, monkeypatch: pytest.MonkeyPatch, status: int) -> None:
+def test_a_required_login_is_reported(
+    pacs: Service, monkeypatch: pytest.MonkeyPatch, status: int
+) -> None:
     monkeypatch.delenv(dicomweb.TOKEN, raising=False)
     pacs.json(f"/web/studies/{STUDY}/series", [], status=status)
     with pytest.raises(SourceError, match=f"HTTP {status}.*{dicomweb.TOKEN}"):
@@ -258,7 +260,7 @@ def test_a_login_is_named(pacs: Service, monkeypatch: pytest.MonkeyPatch, status
         (b"[", "damaged JSON"),
     ],
 )
-def test_a_bad_search_is_one_line(pacs: Service, answer: bytes, words: str) -> None:
+def test_a_bad_search_is_refused_in_one_line(pacs: Service, answer: bytes, words: str) -> None:
     pacs.put(f"/web/studies/{STUDY}/series", answer)
     with pytest.raises(SourceError, match=words) as caught:
         resolve(address(pacs))
@@ -279,7 +281,7 @@ def test_a_bad_search_is_one_line(pacs: Service, answer: bytes, words: str) -> N
         (b"", 'multipart/related; type="application/dicom"', "without a boundary"),
     ],
 )
-def test_bad_instances_are_one_line(
+def test_bad_instances_are_refused_in_one_line(
     pacs: Service, body: bytes, content_type: str, words: str
 ) -> None:
     path = f"/web/studies/{STUDY}/series/{SERIES}"
@@ -329,7 +331,7 @@ def test_names_in_an_answer_are_not_used(pacs: Service, instances: list[bytes]) 
         f"/viewer?StudyInstanceUIDs={STUDY}",
     ],
 )
-def test_another_form_says_which_are_understood(tail: str) -> None:
+def test_an_unknown_form_is_refused_with_the_known_ones(tail: str) -> None:
     with pytest.raises(UsageError, match=r"expected https://HOST/\.\.\./studies/UID") as caught:
         resolve(f"https://pacs.example/web{tail}")
     assert STUDY not in str(caught.value)
@@ -348,5 +350,5 @@ def test_a_uid_that_is_too_long_is_refused() -> None:
         "https://host.example/my/studies/mouse/",
     ],
 )
-def test_other_addresses_are_left_alone(other: str) -> None:
+def test_other_addresses_are_not_changed(other: str) -> None:
     assert resolve(other).source == other

@@ -1,4 +1,4 @@
-"""Folders of fetched files end with their process, also where it is killed."""
+"""Folders of fetched files are removed after their process ends, even if it was killed."""
 
 import os
 import signal
@@ -25,7 +25,7 @@ def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_folder_is_its_owner_s_alone_and_can_be_removed_at_once(scratch: Path) -> None:
+def test_a_folder_is_private_and_can_be_removed_at_once(scratch: Path) -> None:
     folder = fetched_folder.new_folder("dicom")
     assert folder.parent.parent == scratch
     assert (folder.stat().st_mode | folder.parent.stat().st_mode) & 0o77 == 0
@@ -42,7 +42,7 @@ def test_a_folder_is_removed_when_its_process_ends(scratch: Path, end: str) -> N
 
 
 @pytest.mark.slow
-def test_a_child_that_is_forked_leaves_the_folder(scratch: Path) -> None:
+def test_a_forked_child_does_not_remove_the_folder(scratch: Path) -> None:
     fork = "import os; p = os.fork(); p or sys.exit(0); os.waitpid(p, 0); print(folder.exists())"
     done = subprocess.run(
         [sys.executable, "-c", MAKE + fork], capture_output=True, text=True, check=True
@@ -59,9 +59,9 @@ def test_the_folder_of_a_killed_process_is_removed_by_the_next_one(scratch: Path
     ) as process:
         assert process.stdout is not None
         killed = Path(process.stdout.readline().strip())
-        (scratch / "stereocell-fetched-other").mkdir()  # one that is being made
+        (scratch / "stereocell-fetched-other").mkdir()  # another process is making it
         fetched_folder.remove(fetched_folder.new_folder("dicom"))
-        assert (killed / "a.dcm").exists()  # its process lives
+        assert (killed / "a.dcm").exists()  # its process is running
         process.send_signal(signal.SIGKILL)
         process.wait()
     assert killed.exists()
@@ -69,7 +69,7 @@ def test_the_folder_of_a_killed_process_is_removed_by_the_next_one(scratch: Path
     assert os.listdir(scratch) == ["stereocell-fetched-other"]
 
 
-def test_no_link_leads_to_a_folder_elsewhere(scratch: Path) -> None:
+def test_links_to_other_folders_are_not_followed(scratch: Path) -> None:
     mine = scratch / "mine"
     mine.mkdir()
     (mine / ".lock").touch()

@@ -1,7 +1,7 @@
 """Imaging Data Commons: its index and its buckets.
 
-The answers are written by the documentation of the Commons' API (version 3, POST /sql) and of
-ListObjectsV2 of S3; none was recorded.
+The answers follow the documentation of the Commons' API (version 3, POST /sql) and of ListObjectsV2
+of S3; none was recorded.
 """
 
 import os
@@ -83,7 +83,7 @@ def commons(service: Service, files: dict[str, bytes], monkeypatch: pytest.Monke
         f"{VIEWER}/slim/studies/{STUDY}/series/{SERIES}",
     ],
 )
-def test_a_series_is_read_as_its_files_are(commons: Service, tmp_path: Path, address: str) -> None:
+def test_a_series_is_read_like_its_files(commons: Service, tmp_path: Path, address: str) -> None:
     dataset, files = api.open_volume(address), read.open(tmp_path / "written")
     assert dataset.fingerprint == files.fingerprint
     (note,) = resolve(address).notes
@@ -91,7 +91,7 @@ def test_a_series_is_read_as_its_files_are(commons: Service, tmp_path: Path, add
     assert STUDY not in note
 
 
-def test_the_index_is_asked_by_the_series(commons: Service) -> None:
+def test_the_index_is_queried_by_series(commons: Service) -> None:
     resolve(f"{VIEWER}/v3/viewer/?StudyInstanceUIDs={STUDY}&SeriesInstanceUIDs={SERIES}")
     assert f"SeriesInstanceUID = '{SERIES}'" in commons.asked[0].body.decode()
 
@@ -101,7 +101,7 @@ def test_a_link_to_a_study_of_one_series_is_enough(commons: Service) -> None:
     assert f"StudyInstanceUID = '{STUDY}'" in commons.asked[0].body.decode()
 
 
-def test_files_are_named_by_numbers_and_are_the_owner_s_alone(commons: Service) -> None:
+def test_files_are_named_by_numbers_and_are_private(commons: Service) -> None:
     folder = Path(resolve(f"s3://idc-open-data-two/{UUID}/").source)
     assert sorted(os.listdir(folder)) == [f"{n:06d}.dcm" for n in range(1, 7)]
     assert folder.parent.stat().st_mode & 0o77 == 0
@@ -121,7 +121,7 @@ def test_files_are_named_by_numbers_and_are_the_owner_s_alone(commons: Service) 
         "https://idc-open-data.s3.amazonaws.com/",
     ],
 )
-def test_another_form_says_which_are_understood(commons: Service, address: str) -> None:
+def test_an_unknown_form_is_refused_with_the_known_ones(commons: Service, address: str) -> None:
     with pytest.raises(UsageError, match="expected"):
         resolve(address)
     assert commons.asked == []
@@ -142,7 +142,9 @@ def test_another_form_says_which_are_understood(commons: Service, address: str) 
         ([], "found no rows"),
     ],
 )
-def test_a_bad_answer_of_the_index_is_one_line(commons: Service, answer: Any, words: str) -> None:
+def test_a_bad_answer_of_the_index_is_refused_in_one_line(
+    commons: Service, answer: Any, words: str
+) -> None:
     commons.json("/v3/sql", answer)
     with pytest.raises(StereoCellError) as caught:
         resolve(f"{VIEWER}/viewer/{STUDY}")
@@ -166,7 +168,7 @@ def test_a_bad_answer_of_the_index_is_one_line(commons: Service, answer: Any, wo
         (listing({f"{UUID}/missing.dcm": 9}), "HTTP 404"),
     ],
 )
-def test_a_bad_listing_is_one_line(commons: Service, body: bytes, words: str) -> None:
+def test_a_bad_listing_is_refused_in_one_line(commons: Service, body: bytes, words: str) -> None:
     commons.put(f"/idc-open-data/?list-type=2&prefix={UUID}%2F", body)
     with pytest.raises(SourceError) as caught:
         resolve(f"s3://idc-open-data/{UUID}/")
@@ -183,7 +185,7 @@ def test_a_bad_listing_is_one_line(commons: Service, body: bytes, words: str) ->
         (bytes(128) + b"DICM", 200, "cut off"),
     ],
 )
-def test_a_bad_file_leaves_nothing(
+def test_a_bad_file_leaves_no_files(
     commons: Service,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -1,8 +1,7 @@
 """Image Data Resource: the pages of images, and the OME-Zarr behind them.
 
-The answers are written by the documentation of OMERO's JSON API and by the requests of
-OMERO.iviewer (paths_to_object); the addresses are those of the Resource's list of samples. None was
-recorded.
+The answers follow the documentation of OMERO's JSON API and the requests of OMERO.iviewer
+(paths_to_object); the addresses are from the Resource's list of samples. None was recorded.
 """
 
 from typing import Any
@@ -20,7 +19,7 @@ ID = "6001240"
 
 @pytest.fixture
 def resource(service: Service, monkeypatch: pytest.MonkeyPatch) -> Service:
-    """The Resource with one image of study idr0062, whose data lie nowhere yet."""
+    """The Resource with one image of study idr0062, whose data are not stored yet."""
     monkeypatch.setattr(idr, "PAGES", service.url)
     monkeypatch.setattr(idr, "DATA", (f"{service.url}/idr/zarr", f"{service.url}/second"))
     path = [
@@ -67,7 +66,7 @@ def test_each_form_of_a_page_leads_to_the_image(resource: Service, page: str) ->
         f"v0.1/{ID}.zarr/.zattrs",
     ],
 )
-def test_the_newest_version_that_is_there_is_taken(resource: Service, file: str) -> None:
+def test_the_newest_existing_version_is_read(resource: Service, file: str) -> None:
     resource.put(f"/idr/zarr/{file}")
     resource.put(f"/idr/zarr/v0.1/{ID}.zarr/.zattrs")
     assert resolve(f"{PAGE}/iviewer/?images={ID}").source == (
@@ -75,7 +74,7 @@ def test_the_newest_version_that_is_there_is_taken(resource: Service, file: str)
     )
 
 
-def test_an_image_without_ome_zarr_says_so(resource: Service) -> None:
+def test_an_image_without_ome_zarr_is_refused(resource: Service) -> None:
     with pytest.raises(SourceError, match=r"no OME-Zarr at .*v0\.5 to v0\.1.*ome-ngff-samples"):
         resolve(f"{PAGE}/iviewer/?images={ID}")
     looked = [path for path in resource.paths if path.startswith("/idr/zarr/")]
@@ -83,7 +82,7 @@ def test_an_image_without_ome_zarr_says_so(resource: Service) -> None:
     assert not any(path.startswith("/second") for path in resource.paths)
 
 
-def test_the_other_name_of_the_bucket_is_asked_where_the_first_is_down(resource: Service) -> None:
+def test_the_second_name_of_the_bucket_is_used_if_the_first_is_down(resource: Service) -> None:
     resource.answers[f"/idr/zarr/v0.5/idr0062A/{ID}.zarr/zarr.json"] = Answer(b"", 503)
     resource.put(f"/second/v0.4/idr0062A/{ID}.zarr/.zattrs")
     found = resolve(f"{PAGE}/iviewer/?images={ID}")
@@ -93,13 +92,13 @@ def test_the_other_name_of_the_bucket_is_asked_where_the_first_is_down(resource:
         resolve(f"{PAGE}/iviewer/?images={ID}&again=1")
 
 
-def test_a_bucket_that_refuses_absent_files_is_no_fault(resource: Service) -> None:
+def test_a_bucket_may_refuse_absent_files(resource: Service) -> None:
     resource.answers[f"/idr/zarr/v0.5/idr0062A/{ID}.zarr/zarr.json"] = Answer(b"", 403)
     resource.put(f"/idr/zarr/v0.1/{ID}.zarr/.zattrs")
     assert resolve(f"{PAGE}/iviewer/?images={ID}").source.endswith(f"/v0.1/{ID}.zarr")
 
 
-def test_an_image_that_is_not_there(resource: Service) -> None:
+def test_an_absent_image_is_refused(resource: Service) -> None:
     with pytest.raises(SourceError, match="IDR image 999: not found"):
         resolve(f"{PAGE}/iviewer/?images=999")
 
@@ -117,7 +116,7 @@ def test_an_image_that_is_not_there(resource: Service) -> None:
         ({"paths": [[{"type": "project", "id": 801}]]}, {"data": {"Name": None}}),
     ],
 )
-def test_odd_answers_leave_the_places_without_a_study(
+def test_after_odd_answers_the_addresses_without_a_study_are_tried(
     resource: Service, answer: Any, project: Any
 ) -> None:
     resource.json(f"/webclient/api/paths_to_object/?image={ID}", answer)
@@ -127,7 +126,7 @@ def test_odd_answers_leave_the_places_without_a_study(
     assert not any(".." in path for path in resource.paths)
 
 
-def test_a_page_in_place_of_json_is_one_line(resource: Service) -> None:
+def test_a_page_in_place_of_json_is_refused_in_one_line(resource: Service) -> None:
     resource.put(f"/webclient/api/paths_to_object/?image={ID}", b"<html>maintenance</html>")
     with pytest.raises(SourceError, match="found a web page"):
         resolve(f"{PAGE}/iviewer/?images={ID}")
@@ -148,7 +147,7 @@ def test_a_page_in_place_of_json_is_one_line(resource: Service) -> None:
         f"{PAGE}/search/?query=nuclei",
     ],
 )
-def test_another_form_says_which_are_understood(resource: Service, page: str) -> None:
-    with pytest.raises(UsageError, match="in another form, expected https://idr"):
+def test_an_unknown_form_is_refused_with_the_known_ones(resource: Service, page: str) -> None:
+    with pytest.raises(UsageError, match=r"another form of .*, expected https://idr"):
         resolve(page)
     assert resource.asked == []

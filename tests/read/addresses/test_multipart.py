@@ -1,6 +1,6 @@
-"""Answers of several parts are split as RFC 2046 says, wherever the pieces end.
+"""Answers of several parts are split as RFC 2046 states, wherever their pieces end.
 
-Python's own `email` package writes the parts that are compared with.
+The expected parts are written by Python's own `email` package.
 """
 
 from collections.abc import Iterator
@@ -44,18 +44,18 @@ PARTS = [
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 7, 64, 5001, 1 << 20])
-def test_parts_are_the_same_however_the_bytes_come_in(size: int) -> None:
+def test_parts_do_not_depend_on_the_pieces_of_the_answer(size: int) -> None:
     heads = [b"\r\n--edge\r\nContent-Type: application/dicom\r\n\r\n" + part for part in PARTS]
     body = b"a preamble" + b"".join(heads) + b"\r\n--edge--\r\nan epilogue"
     assert parts_of(body, b"edge", size) == PARTS
 
 
-def test_parts_without_headers_and_with_spaces_behind_the_boundary() -> None:
+def test_parts_without_headers_and_spaces_after_the_boundary_are_read() -> None:
     body = b"--edge  \r\n\r\none\r\n--edge\r\nA: b\r\nC: d\r\n\r\ntwo\r\n--edge--"
     assert parts_of(body, b"edge", 5) == [b"one", b"two"]
 
 
-def test_parts_that_another_program_has_written() -> None:
+def test_parts_of_another_program_are_read() -> None:
     message = MIMEMultipart("related", boundary="a b=c", policy=HTTP)
     for part in (b"first", b"second part"):
         message.attach(MIMEApplication(part, "dicom", lambda m: None, policy=HTTP))
@@ -69,7 +69,7 @@ def test_parts_that_another_program_has_written() -> None:
 
 
 @pytest.mark.parametrize("kept", range(0, 83, 6))
-def test_an_answer_that_is_cut_off_is_refused(kept: int) -> None:
+def test_a_truncated_answer_is_refused(kept: int) -> None:
     body = b"--edge\r\nContent-Type: application/dicom\r\n\r\n" + b"x" * 30 + b"\r\n--edge--"
     assert kept < len(body)
     with pytest.raises(SourceError, match="ends within a part"):

@@ -36,7 +36,7 @@ def names(monkeypatch: pytest.MonkeyPatch) -> None:
         f"https://vizarr.example/#/?source={DATA}",
     ],
 )
-def test_the_image_of_a_link_is_unwrapped(link: str) -> None:
+def test_the_image_in_a_link_is_found(link: str) -> None:
     found = resolve(link)
     assert found.source == DATA
     assert found.notes == (f"the link's image is read from {DATA}",)
@@ -50,7 +50,7 @@ def test_a_signature_stays_in_the_address_and_out_of_the_note() -> None:
     assert "abc" not in str(found.notes)
 
 
-def test_a_bucket_is_taken() -> None:
+def test_an_address_in_a_bucket_is_accepted() -> None:
     assert resolve("https://x.github.io/vizarr?source=s3://b/a.zarr").source == "s3://b/a.zarr"
 
 
@@ -70,7 +70,7 @@ def test_an_image_in_the_network_is_refused(inner: str) -> None:
     "inner",
     ["file:///etc/passwd", "/etc/passwd", "javascript:1", "a.zarr", "https://a/%1b[31m.zarr"],
 )
-def test_an_image_at_no_address_is_refused(inner: str) -> None:
+def test_an_image_without_a_valid_address_is_refused(inner: str) -> None:
     with pytest.raises(UsageError, match="expected an http"):
         resolve(f"https://hms-dbmi.github.io/vizarr/?source={inner}")
 
@@ -81,18 +81,18 @@ def test_a_user_name_in_an_image_s_address_is_not_shown() -> None:
     assert "hunter2" not in str(caught.value)
 
 
-def test_a_link_to_several_images_asks_for_one() -> None:
+def test_a_link_to_several_images_is_refused() -> None:
     with pytest.raises(UsageError, match="a link to 2 images"):
         resolve(f"https://hms-dbmi.github.io/vizarr/?source={DATA}&source={DATA}2")
 
 
-def test_a_viewer_without_an_image_says_what_is_understood() -> None:
+def test_a_viewer_without_an_image_is_refused_with_the_known_forms() -> None:
     with pytest.raises(UsageError, match=r"expected https://HOST/\.\.\./vizarr/"):
         resolve("https://hms-dbmi.github.io/vizarr/")
 
 
 @pytest.mark.parametrize("page", ["/webclient/?show=image-3", "/iviewer/?images=3", "/webgateway/"])
-def test_a_page_of_omero_web_says_what_is_understood(page: str) -> None:
+def test_a_page_of_omero_web_is_refused_with_the_known_forms(page: str) -> None:
     with pytest.raises(UsageError, match=r"OMERO\.web.*expected https://HOST"):
         resolve(f"https://omero.example{page}")
 
@@ -108,6 +108,6 @@ def test_a_page_of_omero_web_says_what_is_understood(page: str) -> None:
         "a.ome.zarr",
     ],
 )
-def test_other_sources_are_left_alone(other: str) -> None:
+def test_other_sources_are_not_changed(other: str) -> None:
     assert resolve(other).notes == ()
     assert resolve(other).source.endswith(other)

@@ -1,4 +1,4 @@
-"""The client of services against servers that answer badly, or lead elsewhere."""
+"""The client of services against servers that answer badly or redirect elsewhere."""
 
 import socket
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ def test_json_is_read(service: Service) -> None:
     assert service.paths == ["/a?q=1"]
 
 
-def test_an_empty_answer_is_nothing(service: Service) -> None:
+def test_an_empty_answer_is_none(service: Service) -> None:
     service.answers["/a"] = Answer(b"", 204)
     assert client(service).fetch_json(f"{service.url}/a") is None
 
@@ -46,10 +46,10 @@ def test_an_empty_answer_is_nothing(service: Service) -> None:
         (Answer(b"", 500), "HTTP 500"),
         (Answer(b"", 302), "redirect"),
         (Answer(b"{}", 206), "HTTP 206"),
-        (Answer(b"{}", headers={"Content-Encoding": "gzip"}), "packed bytes"),
+        (Answer(b"{}", headers={"Content-Encoding": "gzip"}), "compressed bytes"),
     ],
 )
-def test_a_bad_answer_is_one_line(service: Service, answer: Answer, words: str) -> None:
+def test_a_bad_answer_is_refused_in_one_line(service: Service, answer: Answer, words: str) -> None:
     service.answers["/a"] = answer
     with pytest.raises(SourceError, match=words) as caught:
         client(service).fetch_json(f"{service.url}/a")
@@ -57,7 +57,7 @@ def test_a_bad_answer_is_one_line(service: Service, answer: Answer, words: str) 
     assert "expected" in str(caught.value)
 
 
-def test_a_huge_answer_is_refused_before_it_is_held(
+def test_a_huge_answer_is_refused_before_it_fills_memory(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(web_client, "ANSWER_BYTES", 1 << 20)
@@ -66,17 +66,19 @@ def test_a_huge_answer_is_refused_before_it_is_held(
         client(service).fetch(f"{service.url}/a", "*/*")
 
 
-def test_an_answer_that_drips_is_refused(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_comes_too_slowly_is_refused(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(web_client, "ANSWER_S", -1.0)
     service.json("/a", {})
     with pytest.raises(SourceError, match="no end within"):
         client(service).fetch_json(f"{service.url}/a")
 
 
-def test_a_server_that_is_down_is_one_line() -> None:
+def test_a_server_that_is_down_is_reported_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         url = f"http://127.0.0.1:{taken.getsockname()[1]}"
-    with pytest.raises(SourceError, match="expected a server that is up"):
+    with pytest.raises(SourceError, match="expected a server that responds"):
         WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
 
 
@@ -112,7 +114,7 @@ def sending(sent: bytes) -> Iterator[str]:
         CHUNKED + b"zz\r\n[1, 2]\r\n0\r\n\r\n",
     ],
 )
-def test_a_server_that_speaks_no_http_is_one_line(sent: bytes) -> None:
+def test_a_server_that_does_not_speak_http_is_reported_in_one_line(sent: bytes) -> None:
     with sending(sent) as url, pytest.raises(SourceError, match=r"^the service: "):
         WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
 
@@ -122,7 +124,7 @@ def test_an_answer_in_chunks_is_read() -> None:
         assert WebClient([url], shown="the service").fetch_json(f"{url}/a") == [1, 2]
 
 
-def test_a_silent_server_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waiting_for_a_silent_server_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(web_client, "SILENCE_S", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         url = f"http://127.0.0.1:{listening.getsockname()[1]}"
@@ -130,14 +132,16 @@ def test_a_silent_server_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
             WebClient([url], shown="the service").fetch(f"{url}/a", "*/*")
 
 
-def test_a_redirect_at_the_own_host_is_followed_with_the_token(service: Service) -> None:
+def test_a_redirect_within_the_host_is_followed_with_the_token(service: Service) -> None:
     service.redirect("/a", "/b")
     service.json("/b", 1)
     assert client(service, token=SECRET).fetch_json(f"{service.url}/a") == 1
     assert [one.headers.get("Authorization") for one in service.asked] == [f"Bearer {SECRET}"] * 2
 
 
-def test_a_redirect_into_the_network_is_refused(service: Service, other_service: Service) -> None:
+def test_a_redirect_into_the_local_network_is_refused(
+    service: Service, other_service: Service
+) -> None:
     other_service.json("/b", "the metadata of a cloud")
     service.redirect("/a", f"{other_service.url}/b")
     with pytest.raises(SourceError, match="private network"):
@@ -156,13 +160,13 @@ def test_no_other_host_gets_the_token(service: Service, other_service: Service) 
 
 
 @pytest.mark.parametrize("target", ["file:///etc/passwd", "ftp://host/a", "http://u:p@host/a"])
-def test_a_redirect_to_no_http_is_refused(service: Service, target: str) -> None:
+def test_a_redirect_to_another_scheme_is_refused(service: Service, target: str) -> None:
     service.redirect("/a", target)
     with pytest.raises(SourceError, match="expected"):
         client(service).fetch(f"{service.url}/a", "*/*")
 
 
-def test_redirects_come_to_an_end(service: Service) -> None:
+def test_endless_redirects_are_refused(service: Service) -> None:
     for step in range(10):
         service.redirect(f"/{step}", f"/{step + 1}")
     service.json("/10", 1)
@@ -181,7 +185,7 @@ def test_a_post_is_sent_once_and_never_redirected(service: Service) -> None:
     assert len(service.asked) == 2
 
 
-def test_a_file_is_saved_whole_or_refused(service: Service, tmp_path: Path) -> None:
+def test_a_file_is_saved_completely_or_refused(service: Service, tmp_path: Path) -> None:
     service.put("/a", b"x" * 1000)
     assert client(service).save(f"{service.url}/a", tmp_path / "a", limit=1000) == 1000
     assert (tmp_path / "a").read_bytes() == b"x" * 1000
@@ -194,21 +198,21 @@ def test_a_file_is_saved_whole_or_refused(service: Service, tmp_path: Path) -> N
         client(service).save(f"{service.url}/a", tmp_path / "a", limit=1000)
 
 
-def test_absent_files_are_told_from_faults(service: Service) -> None:
+def test_absent_files_are_distinguished_from_faults(service: Service) -> None:
     service.put("/a")
     service.answers["/refused"] = Answer(b"", 403)
     service.answers["/broken"] = Answer(b"", 503)
     asking = client(service)
     assert asking.is_there(f"{service.url}/a")
     assert not asking.is_there(f"{service.url}/b")
-    assert not asking.is_there(f"{service.url}/refused")  # as public buckets answer
+    assert not asking.is_there(f"{service.url}/refused")  # public buckets answer so
     with pytest.raises(SourceError, match="HTTP 503"):
         asking.is_there(f"{service.url}/broken")
     with pytest.raises(NotThereError):
         asking.fetch(f"{service.url}/b", "*/*")
 
 
-def test_line_ends_in_an_address_reach_no_header(service: Service) -> None:
+def test_line_ends_in_an_address_do_not_reach_headers(service: Service) -> None:
     service.json("/a", 1)
     with pytest.raises(SourceError, match="HTTP 404"):
         client(service).fetch(f"{service.url}/a%0d%0aX-Evil: 1\r\nX-More: 2", "*/*")

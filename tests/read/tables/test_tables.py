@@ -1,4 +1,4 @@
-"""Tables with a row an object: what is read of each kind, and what is refused, in one line."""
+"""Tables with a row per object: what is read from each kind, and what is refused in one line."""
 
 import sys
 from pathlib import Path
@@ -34,7 +34,7 @@ def refusal(place: str, key: str = "", wanted: tuple[str, ...] = ()) -> str:
 
 
 @pytest.mark.parametrize(("mark", "name"), [(",", "t.csv"), ("\t", "t.tsv"), (";", "t.csv")])
-def test_numbers_words_and_gaps(tmp_path: Path, mark: str, name: str) -> None:
+def test_numbers_words_and_gaps_are_read(tmp_path: Path, mark: str, name: str) -> None:
     lines = ["CellID,CD8,type,empty", "3,1.5,T cell,", "1,NA,B,nan", "7,-2e3,,"]
     table = read_table(csv(tmp_path, "\r\n".join(lines).replace(",", mark), name), "", (), "cells")
     assert (table.key, table.labels.tolist()) == ("CellID", [3, 1, 7])
@@ -45,20 +45,20 @@ def test_numbers_words_and_gaps(tmp_path: Path, mark: str, name: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["label", "cell_id", "ObjectNumber", "instance_id", "LABEL"])
-def test_keys_as_programs_call_them(tmp_path: Path, key: str) -> None:
+def test_key_columns_are_found_by_the_names_that_programs_use(tmp_path: Path, key: str) -> None:
     table = read_table(csv(tmp_path, f"area,{key}\n5,2.0\n6,4\n"), "", (), "cells")
     assert (table.key, table.labels.tolist()) == (key, [2, 4])
     assert [column.name for column in table.columns] == ["area"]
 
 
-def test_a_byte_order_mark_quotes_and_names_of_all_kinds(tmp_path: Path) -> None:
+def test_a_byte_order_mark_quotes_and_odd_names_are_read(tmp_path: Path) -> None:
     text = '\ufeffCellID,"a,b","../x",ümlaut  \t1\n1,2,3,4\n'
     table = read_table(csv(tmp_path, text), "", (), "cells")
     assert [column.name for column in table.columns] == ["a,b", "../x", "ümlaut 1"]
 
 
-def test_what_spreadsheets_and_pandas_write(tmp_path: Path) -> None:
-    """An index without a name; semicolons with a comma before the fraction; words of two lines."""
+def test_tables_of_spreadsheets_and_pandas_are_read(tmp_path: Path) -> None:
+    """An index without a name; semicolons with a decimal comma; words in two lines."""
     table = read_table(csv(tmp_path, ",CellID,a\n0,4,1.5\n1,5,2\n"), "", (), "cells")
     assert [column.name for column in table.columns] == ["column 1", "a"]
     text = 'label;a;b\n1;1,5;"T\n cell"\n2;0,25;B\n'
@@ -68,7 +68,7 @@ def test_what_spreadsheets_and_pandas_write(tmp_path: Path) -> None:
 
 
 def numbers(tmp_path: Path, text: str, name: str = "t.csv") -> dict[str, list[float]]:
-    """Return the columns of numbers of a table of text."""
+    """Return the number columns of a text table."""
     table = read_table(csv(tmp_path, text, name), "", (), "cells")
     return {c.name: c.numbers.tolist() for c in table.columns if c.numbers is not None}
 
@@ -101,7 +101,7 @@ def test_words_among_numbers_are_missing_values_and_are_quoted(tmp_path: Path, w
     assert np.isnan(area[0])
     assert area[1:] == [label / 2 for label in range(1, 20)]
     quoted = repr(word.strip()) if word.strip() else "empty"
-    assert f"1 cell in columns of numbers taken for missing values: area: {quoted} (1)" in notes(
+    assert f"1 cell in columns of numbers read as missing values: area: {quoted} (1)" in notes(
         tmp_path, text
     )
 
@@ -110,7 +110,9 @@ def test_a_column_with_many_words_holds_categories(tmp_path: Path) -> None:
     cells = ["1", "2", "tumour", "stroma", "3", "tumour", "tumour"]
     text = "label,zone\n" + "".join(f"{i},{cell}\n" for i, cell in enumerate(cells, start=1))
     (zone,) = read_table(csv(tmp_path, text), "", (), "cells").columns
-    told = "column 'zone': 3 of 7 cells are numbers, others are words, as 'tumour': read as texts"
+    told = (
+        "column 'zone': 3 of 7 cells are numbers, others are words such as 'tumour': read as texts"
+    )
     assert (zone.texts, notes(tmp_path, text)) == (tuple(cells), told)
 
 
@@ -149,7 +151,7 @@ def test_numbers_of_several_units_stay_texts_and_are_noted(tmp_path: Path) -> No
     (column,) = read_table(csv(tmp_path, text), "", (), "cells").columns
     assert column.texts == ("12 um", "3 mm", "5 um")
     assert "the numbers have several units ('um', 'mm'): read as texts" in notes(tmp_path, text)
-    wells = "label,well\n1,1A\n2,2B\n3,3A\n"  # names that begin with a digit are no numbers
+    wells = "label,well\n1,1A\n2,2B\n3,3A\n"  # names that begin with a digit are not numbers
     assert notes(tmp_path, wells) == ""
 
 
@@ -167,7 +169,7 @@ def test_numbers_of_several_units_stay_texts_and_are_noted(tmp_path: Path) -> No
         ("label;a\n1;\u22121,5\n2;+2,5\n", [-1.5, 2.5]),
     ],
 )
-def test_decimal_marks_and_marks_between_thousands(
+def test_decimal_marks_and_marks_between_thousands_are_recognised(
     tmp_path: Path, text: str, expected: list[float]
 ) -> None:
     assert numbers(tmp_path, text) == {"a": expected}
@@ -177,9 +179,7 @@ def test_decimal_marks_and_marks_between_thousands(
 def test_marks_between_thousands_are_noted(tmp_path: Path, cell: str) -> None:
     told = notes(tmp_path, f"label;a;b\n1;{cell};1,5\n2;5,5;2\n")
     assert f"marks between thousands are left out: {cell} is 99250.5" in told
-    once = notes(
-        tmp_path, 'label,a\n1,"2,001"\n2,"3,002"\n'
-    )  # a doubt that names the number itself
+    once = notes(tmp_path, 'label,a\n1,"2,001"\n2,"3,002"\n')  # the note names the number itself
     assert once.count("2,001 is 2001") + once.count("3,002 is 3002") == 1
     assert "thousands" not in notes(tmp_path, "label;a\n1;0,125\n2;12,5\n3;5\n")
     assert "thousands" not in notes(tmp_path, "label,a,b\n1,0.125,7\n2,12.5,100\n")
@@ -193,7 +193,7 @@ def test_a_mark_that_other_cells_do_not_explain_is_noted(tmp_path: Path) -> None
     )
     text = 'label,count\n1,"1,234"\n2,"5,678"\n'
     assert numbers(tmp_path, text)["count"] == [1234, 5678]
-    assert "a point (1,234 is 1234) is assumed, as no other cell" in notes(tmp_path, text)
+    assert "a point (1,234 is 1234) is assumed, since no other cell" in notes(tmp_path, text)
     text = "label;word;a\n1;x, y;1.234\n2;z;5.678\n"
     assert numbers(tmp_path, text)["a"] == [1.234, 5.678]
     assert "'a': not stated, a point (1.234 is 1.234) is assumed" in notes(tmp_path, text)
@@ -201,7 +201,7 @@ def test_a_mark_that_other_cells_do_not_explain_is_noted(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "cp1252"])
-def test_encodings_of_spreadsheets(tmp_path: Path, encoding: str) -> None:
+def test_encodings_of_spreadsheets_are_recognised(tmp_path: Path, encoding: str) -> None:
     text = "label\tvolume (\u00b5m\u00b3)\tkind\r\n1\t2,5\tgr\u00fcn\r\n"
     (tmp_path / "t.csv").write_bytes(text.encode(encoding))
     table = read_table(str(tmp_path / "t.csv"), "", (), "cells")
@@ -228,12 +228,12 @@ def test_lines_before_the_header_are_left_out(tmp_path: Path, before: str, told:
     assert (told in " ".join(table.notes)) if told else not table.notes
 
 
-def test_names_that_occur_twice_get_their_group(tmp_path: Path) -> None:
+def test_repeated_column_names_are_preceded_by_their_group(tmp_path: Path) -> None:
     text = "Image,Cells,Nuclei\nObjectNumber,Area,Area\n1,2,3\n"
     assert numbers(tmp_path, text) == {"Cells Area": [2], "Nuclei Area": [3]}
 
 
-def test_a_table_of_imagej_is_joined_by_its_nameless_column(tmp_path: Path) -> None:
+def test_a_table_of_imagej_uses_its_unnamed_column_as_key(tmp_path: Path) -> None:
     place = csv(tmp_path, " ,Label,Mean\n1,cells.tif:1,5.5\n2,cells.tif:2,6\n")
     assert "--table-key 'column 1' takes the first column" in refusal(place)
     table = read_table(place, "column 1", (), "cells")
@@ -241,20 +241,20 @@ def test_a_table_of_imagej_is_joined_by_its_nameless_column(tmp_path: Path) -> N
 
 
 def test_a_row_of_data_is_never_taken_for_the_header(tmp_path: Path) -> None:
-    assert "no column of the objects' numbers: found a, b" in refusal(
+    assert "no column holds the objects' numbers: found a, b" in refusal(
         csv(tmp_path, "a,b\n1,2\nid,label\n")
     )
 
 
 @pytest.mark.parametrize("ending", ["", ".0", ".", "e0", ",0"])
-def test_64_bits(tmp_path: Path, ending: str) -> None:
-    """Programs write whole numbers as real ones too; a double would round these."""
+def test_numbers_of_64_bits_are_read_exactly(tmp_path: Path, ending: str) -> None:
+    """Programs write whole numbers as real ones too; float64 would round these."""
     text = f"label;a\n{2**63 + 1}{ending};1\n{2**53 + 1}{ending};2\n"
     table = read_table(csv(tmp_path, text), "", (), "cells")
     assert table.labels.tolist() == [2**63 + 1, 2**53 + 1]
 
 
-def test_columns_by_name_and_many_columns(tmp_path: Path) -> None:
+def test_columns_are_chosen_by_name_and_limited_in_number(tmp_path: Path) -> None:
     names = [f"m{i}" for i in range(300)]
     place = csv(tmp_path, "label," + ",".join(names) + "\n1" + ",2" * 300 + "\n")
     table = read_table(place, "", (), "cells")
@@ -268,9 +268,9 @@ def test_columns_by_name_and_many_columns(tmp_path: Path) -> None:
     ("text", "told"),
     [
         ("", "found no header"),
-        ("a,b\n1,2\n", "no column of the objects' numbers: found a, b; expected CellID, label"),
+        ("a,b\n1,2\n", "no column holds the objects' numbers: found a, b; expected CellID, label"),
         ("label,a\n1,2\n1,3\n", "label: found 1 more than once (1 in all)"),
-        ("label,a\n1.5,2\n", "label, row 1: found 1.5, expected a number of an object"),
+        ("label,a\n1.5,2\n", "label, row 1: found 1.5, expected an object's number"),
         ("label,a\n0,2\n", "label, row 1: found 0, expected"),
         ("label,a\n-3,2\n", "label, row 1: found -3, expected"),
         ("label,a\n1e400,2\n", "label, row 1: found 1e400, expected"),
@@ -284,13 +284,13 @@ def test_columns_by_name_and_many_columns(tmp_path: Path) -> None:
         (",".join(f"c{i}" for i in range(100_001)) + "\n", "found 100001 columns"),
     ],
 )
-def test_what_is_no_table(tmp_path: Path, text: str, told: str) -> None:
+def test_a_text_that_is_not_a_table_is_refused(tmp_path: Path, text: str, told: str) -> None:
     assert told in refusal(csv(tmp_path, text))
 
 
-def test_other_files(tmp_path: Path) -> None:
+def test_files_of_other_kinds_are_refused(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_bytes(b"label,a\n1,\xff\xfe\n")
-    assert "no text" in refusal(str(tmp_path / "b.csv"))
+    assert "bytes that are not text" in refusal(str(tmp_path / "b.csv"))
     assert "can't be read (No such file" in refusal(str(tmp_path / "none.csv"))
     assert "unknown kind of table" in refusal(csv(tmp_path, "x", "t.xlsx"))
     text = csv(tmp_path, "x" * 99, "t.parquet")
@@ -299,14 +299,16 @@ def test_other_files(tmp_path: Path) -> None:
     assert "found a pointer of Git LFS" in refusal(
         csv(tmp_path, "version https://git-lfs.github.com/spec/v1\n")
     )
-    assert "is not on this machine" in refusal("https://example.org/t.parquet")
+    assert "found an address, expected a file on this machine" in refusal(
+        "https://example.org/t.parquet"
+    )
     assert "no column 'k', expected one of label, a" in refusal(
         csv(tmp_path, "label,a\n1,2\n"), "k"
     )
 
 
 def anndata(path: Path, version: int | str, x: str) -> Path:
-    """Write a table as AnnData's format says, without AnnData; version: of Zarr, or "h5ad"."""
+    """Write a table in AnnData's format without AnnData; version: that of Zarr, or "h5ad"."""
     if version == "h5ad":
         path.parent.mkdir(parents=True)
         with h5py.File(path, "w") as file:
@@ -367,7 +369,7 @@ def fill_anndata(group: Any, x: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3, "h5ad"])
 @pytest.mark.parametrize("x", ["dense", "csr", "csc"])
-def test_a_table_of_spatialdata(tmp_path: Path, version: int | str, x: str) -> None:
+def test_a_table_of_spatialdata_is_read(tmp_path: Path, version: int | str, x: str) -> None:
     name = "it's a table.h5ad" if version == "h5ad" else "table"
     path = anndata(tmp_path / "s.zarr" / "tables" / name, version, x)
     table = read_table(str(path), "", (), "cells")
@@ -378,27 +380,27 @@ def test_a_table_of_spatialdata(tmp_path: Path, version: int | str, x: str) -> N
     np.testing.assert_array_equal(by_name["ok"].numbers, [1, 0, 1])
     np.testing.assert_array_equal(by_name["CD8"].numbers, [1, 0, 3])
     np.testing.assert_array_equal(by_name["CD3"].numbers, [0, 2.5, 4])
-    with pytest.raises(SourceError, match="rows of cells, nuclei, expected some of organs"):
+    with pytest.raises(SourceError, match="found rows for cells, nuclei, expected some for organs"):
         read_table(str(path), "", (), "organs")
 
 
-def test_a_zarr_group_without_a_table(tmp_path: Path) -> None:
+def test_a_zarr_group_without_a_table_is_refused(tmp_path: Path) -> None:
     zarr.open_group(tmp_path / "s.zarr", mode="w")
     assert "found no group `obs`" in refusal(str(tmp_path / "s.zarr"))
 
 
 @pytest.mark.slow
-def test_a_file_of_an_older_anndata(tmp_path: Path) -> None:
+def test_a_file_of_an_older_anndata_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5ad", "w") as file:
         obs = file.create_group("obs")
         obs.attrs["column-order"] = ["id"]
         obs["id"] = [1]
         obs.create_group("__categories")
-    assert "as AnnData before 0.8 wrote them" in refusal(str(tmp_path / "a.h5ad"))
+    assert "in the form before AnnData 0.8" in refusal(str(tmp_path / "a.h5ad"))
 
 
 @pytest.mark.slow
-def test_only_the_genes_that_are_asked_for(tmp_path: Path) -> None:
+def test_only_the_requested_genes_are_read(tmp_path: Path) -> None:
     path = str(anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr"))
     (only,) = read_table(path, "", ("CD3",), "cells").columns
     np.testing.assert_array_equal(only.numbers, [0, 2.5, 4])
@@ -408,13 +410,15 @@ def test_only_the_genes_that_are_asked_for(tmp_path: Path) -> None:
     ("name", "change", "told"),
     [
         ("X/indices", lambda a: a.__setitem__(0, 7), "X/indices: found 7, beyond the matrix"),
-        ("X/indptr", lambda a: a.__setitem__(1, 9), "X/indptr: found no rising numbers"),
+        ("X/indptr", lambda a: a.__setitem__(1, 9), "X/indptr: expected rising numbers"),
         ("obs/type/codes", lambda a: a.__setitem__(0, 5), "found codes -1 to 5, expected -1 to 1"),
         ("obs/id", lambda a: a.__setitem__(0, 2), "id: found 2 more than once"),
     ],
 )
 @pytest.mark.slow
-def test_an_h5ad_that_contradicts_itself(tmp_path: Path, name: str, change: Any, told: str) -> None:
+def test_an_h5ad_that_contradicts_itself_is_refused(
+    tmp_path: Path, name: str, change: Any, told: str
+) -> None:
     path = anndata(tmp_path / "a" / "b.h5ad", "h5ad", "csr")
     with h5py.File(path, "a") as file:
         change(file[name])
@@ -428,7 +432,7 @@ def parquet(tmp_path: Path, **columns: Any) -> str:
 
 
 @pytest.mark.slow
-def test_a_table_of_parquet(tmp_path: Path) -> None:
+def test_a_table_of_parquet_is_read(tmp_path: Path) -> None:
     place = parquet(
         tmp_path,
         label=pa.array([2**63 - 1, 2**64 - 1, 5], pa.uint64()),
@@ -503,15 +507,17 @@ def test_numbers_that_anndata_stores_as_texts_are_read_as_numbers_and_noted(tmp_
     assert "numbers stored as texts are read as numbers: 'size'" in table.notes
 
 
-def test_parquet_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parquet_without_its_library_names_the_command_that_installs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = parquet(tmp_path, id=pa.array([1]))
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert refusal(place).endswith('expected: pip install "stereocell[tables]"')
+    assert refusal(place).endswith('Install it with: pip install "stereocell[tables]"')
 
 
 @pytest.mark.slow
-def test_a_text_that_stands_in_a_million_rows_is_kept_once(tmp_path: Path) -> None:
-    """Decoded to a text a row it would be 2 GB."""
+def test_a_text_that_a_million_rows_share_is_stored_once(tmp_path: Path) -> None:
+    """Decoded to one text per row it would take 2 GB."""
     rows = 20_000
     word = pa.array(["x" * 100_000]).dictionary_encode()
     column = pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), word.dictionary)
@@ -529,11 +535,11 @@ def test_parquet_on_which_its_library_aborts_is_refused_in_a_line(tmp_path: Path
     content = place.read_bytes()
     assert content.count(b"%\x02\x18\x05label") == 1
     place.write_bytes(content.replace(b"%\x02\x18\x05label", b"%\x42\x18\x05label"))
-    assert "expected a Parquet file that is whole" in refusal(place)
+    assert "expected a complete Parquet file" in refusal(place)
 
 
 @pytest.mark.slow
-def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_path: Path) -> None:
+def test_an_h5ad_with_floats_of_a_nonstandard_form_is_refused(tmp_path: Path) -> None:
     place = tmp_path / "a.h5ad"
     with h5py.File(place, "w") as file:
         write_anndata(file, h5py.string_dtype())
@@ -541,7 +547,7 @@ def test_an_h5ad_whose_floats_are_described_in_no_standard_way_is_refused(tmp_pa
     content = place.read_bytes()
     assert ieee in content
     place.write_bytes(content.replace(ieee, ieee[:-5] + b"\x30" + ieee[-4:]))
-    assert "expected an IEEE float" in refusal(str(place))
+    assert "expected IEEE floats" in refusal(str(place))
 
 
 @pytest.mark.slow
@@ -553,7 +559,7 @@ def test_an_h5ad_whose_heap_makes_hdf5_loop_without_end_is_refused_at_a_time_lim
     with h5py.File(place, "w") as file:
         write_anndata(file, h5py.string_dtype())
     content = bytearray(place.read_bytes())
-    size = content.index(b"CD8\0\0\0\0\0") + 16  # of the free space behind the last object
+    size = content.index(b"CD8\0\0\0\0\0") + 16  # size of the free space after the last object
     content[size : size + 8] = bytes(8)
     place.write_bytes(content)
     monkeypatch.setattr(stores, "_MOST_S", 3.0)
@@ -561,7 +567,9 @@ def test_an_h5ad_whose_heap_makes_hdf5_loop_without_end_is_refused_at_a_time_lim
 
 
 @pytest.mark.slow
-def test_a_column_of_parquet_beyond_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_column_of_parquet_that_exceeds_memory_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(parquet_tables, "_MAX_BYTES", 50_000)
     place = parquet(tmp_path, id=pa.array([1, 2]), a=pa.array(["x" * 60_000, "y"]), b=[1.5, 2])
     assert "column 'a': found 60" in refusal(place)

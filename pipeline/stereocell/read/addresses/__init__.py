@@ -1,1 +1,1 @@
-"""Addresses that people copy from a browser, and the data behind them."""
+"""Resolve addresses that people copy from a browser to the data behind them."""

@@ -1,7 +1,7 @@
-"""BioImage Archive: the OME-Zarr of an image page, or of a study that has one image.
+"""BioImage Archive: find the OME-Zarr of an image page, or of a study with one image.
 
-The archive's API lists the datasets of a study, their images, and each image's representations; the
-one whose format is `.ome.zarr` has the address in `file_uri`.
+The archive's API lists the datasets of a study, their images, and each image's representations. The
+representation with the format `.ome.zarr` has the address in `file_uri`.
 """
 
 import re
@@ -12,7 +12,7 @@ from stereocell.model.errors import SourceError, UsageError
 from stereocell.read.addresses.resolved import NotThereError, Resolved, other_form, wrong_answer
 from stereocell.read.addresses.web_client import WebClient
 
-API = "https://wwwdev.ebi.ac.uk/bioimage-archive/api/v2"  # which the archive's own pages ask
+API = "https://wwwdev.ebi.ac.uk/bioimage-archive/api/v2"  # the API behind the archive's own pages
 # where the archive's OME-Zarr lies; an answer that leads elsewhere is refused
 DATA = ("https://uk1s3.embassy.ebi.ac.uk", "https://livingobjects.ebi.ac.uk")
 FORMS = (
@@ -35,7 +35,7 @@ _STUDY = re.compile(
 
 
 def resolve(address: str) -> Resolved | None:
-    """Return the OME-Zarr of a page of the archive; None: the address is none of its pages."""
+    """Return the OME-Zarr of a page of the archive; None: the address is not one of its pages."""
     parts = urlsplit(address)
     if parts.scheme not in ("http", "https") or not _HOST.fullmatch(parts.hostname or ""):
         return None
@@ -51,7 +51,7 @@ def resolve(address: str) -> Resolved | None:
 
 
 def _only_image(client: WebClient, accession: str) -> str:
-    """Return the UUID of the only image of a study."""
+    """Return the UUID of the only image in a study."""
     missing = SourceError(f"BioImage Archive: {accession}: not found, expected a study with images")
     try:
         study = client.fetch_json(
@@ -70,11 +70,11 @@ def _only_image(client: WebClient, accession: str) -> str:
         found = client.fetch_json(f"{API}/dataset/{uuid}/image?page_size=100")
         images += [_uuid_of(client, one) for one in _rows(client, found)]
     if not images:
-        raise SourceError(f"BioImage Archive: {accession}: no image in it, expected one")
+        raise SourceError(f"BioImage Archive: {accession}: found no image, expected one")
     if len(images) > 1:
         raise UsageError(
-            f"BioImage Archive: {accession}: a study of {len(images)} images or more, expected the "
-            f"page of one: {FORMS[0]}"
+            f"BioImage Archive: {accession}: found a study of {len(images)} images or more, "
+            f"expected the page of one image: {FORMS[0]}"
         )
     return images[0]
 
@@ -90,8 +90,8 @@ def _image(client: WebClient, uuid: str) -> Resolved:
     places = [place for one in lists for place in one if isinstance(place, str)]
     if not places:
         raise SourceError(
-            f"BioImage Archive: image {uuid}: no OME-Zarr of it, expected one: its page may offer "
-            "the file to download"
+            f"BioImage Archive: image {uuid}: found no OME-Zarr, expected one: the image's page "
+            "may offer the file to download"
         )
     place = places[0]
     if not place.startswith(tuple(f"{base}/" for base in DATA)) or not _ZARR.fullmatch(place):

@@ -1,7 +1,7 @@
-"""DANDI: Zarr and NIfTI assets of the archive.
+"""DANDI: find Zarr and NIfTI assets of the archive.
 
-The archive's API describes an asset by its metadata: `contentUrl` has the address of its data in
-the archive's bucket, `encodingFormat` the type, `path` the name in its dandiset.
+The archive's API returns the metadata of an asset: `contentUrl` is the address of its data in the
+archive's bucket, `encodingFormat` the type, `path` the name in its dandiset.
 """
 
 import re
@@ -23,7 +23,7 @@ FORMS = (
     "https://api.dandiarchive.org/api/assets/UUID/",
     "https://dandiarchive.org/dandiset/NUMBER/VERSION/files?location=PATH",
 )
-FILE_BYTES = 16 << 30  # largest NIfTI file
+FILE_BYTES = 16 << 30  # bytes of the largest NIfTI file
 _UUID = r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 _OBJECT = re.compile(r"/(zarr|blobs)(/[\w-]+)+/?")
 _NUMBER, _VERSION = r"\d{6}", r"draft|\d+\.\d+\.\d+"
@@ -43,7 +43,7 @@ _LISTED = 5  # assets that a message names
 
 
 def resolve(address: str) -> Resolved | None:
-    """Return the data of an asset; None: the address is none of the archive's."""
+    """Return the data of an asset; None: the address is not one of the archive's."""
     parts = urlsplit(address)
     if parts.hostname not in _HOSTS or parts.scheme not in ("http", "https"):
         return None
@@ -59,7 +59,7 @@ def resolve(address: str) -> Resolved | None:
 
 
 def _find_asset(client: WebClient, number: str, version: str, place: str) -> str:
-    """Return the UUID of the only asset at a place of a dandiset that can be read."""
+    """Return the UUID of the only readable asset at a place in a dandiset."""
     version = version or _newest(client, number)
     query = f"path={quote(place, safe='')}&page_size=1000"
     address = f"{API}/dandisets/{number}/versions/{version}/assets/?{query}"
@@ -70,7 +70,7 @@ def _find_asset(client: WebClient, number: str, version: str, place: str) -> str
     pairs = [
         (str(row.get("path")), str(row.get("asset_id"))) for row in rows if isinstance(row, dict)
     ]
-    # the archive matches the beginning of a path, also within a name
+    # The archive matches the start of a path, even within a name.
     own = [(p, key) for p, key in pairs if not place or p == place or p.startswith(f"{place}/")]
     found = [(path, key) for path, key in own if path.lower().endswith(_READ)]
     found = [(path, key) for path, key in found if path == place] or found
@@ -78,15 +78,16 @@ def _find_asset(client: WebClient, number: str, version: str, place: str) -> str
     count = f"{len(own)} assets{' or more' if is_more else ''}"
     if not found:
         raise SourceError(
-            f"DANDI {number}: {count} at {place or 'the top'!r:.120} and no Zarr or NIfTI among "
-            "them, expected one: name its folder by location="
+            f"DANDI {number}: found {count} at {place or 'the top'!r:.120}, but no Zarr or NIfTI "
+            "among them, expected one: name its folder with location="
         )
     if len(found) > 1 or is_more:
         names = ", ".join(repr(path)[:120] for path, _ in found[:_LISTED])
         more = ", ..." if len(found) > _LISTED else ""
         raise UsageError(
-            f"DANDI {number}: {count}, {len(found)} of Zarr or NIfTI ({names}{more}), expected "
-            "one: name it whole by location=, or by https://api.dandiarchive.org/api/assets/UUID/"
+            f"DANDI {number}: found {count}, {len(found)} of them Zarr or NIfTI ({names}{more}), "
+            "expected one: give its full path with location=, or use "
+            "https://api.dandiarchive.org/api/assets/UUID/"
         )
     key = found[0][1]
     if not re.fullmatch(_UUID, key):
@@ -95,7 +96,7 @@ def _find_asset(client: WebClient, number: str, version: str, place: str) -> str
 
 
 def _newest(client: WebClient, number: str) -> str:
-    """Return the newest published version of a dandiset, or its draft."""
+    """Return the newest published version of a dandiset, or else its draft."""
     try:
         answer = client.fetch_json(f"{API}/dandisets/{number}/")
     except NotThereError:
@@ -103,7 +104,7 @@ def _newest(client: WebClient, number: str) -> str:
     found = answer.get("most_recent_published_version") if isinstance(answer, dict) else None
     version = str(found.get("version")) if isinstance(found, dict) else "draft"
     if not re.fullmatch(_VERSION, version):
-        raise wrong_answer(client.shown, f"version {version!r:.60}", "as 0.210914.1900")
+        raise wrong_answer(client.shown, f"version {version!r:.60}", "one such as 0.210914.1900")
     return version
 
 
@@ -113,7 +114,7 @@ def _asset(client: WebClient, uuid: str) -> Resolved:
     except NotThereError:
         raise SourceError(f"DANDI asset {uuid}: not found, expected the UUID of an asset") from None
     if not isinstance(asset, dict):
-        raise wrong_answer(client.shown, "no metadata", "those of an asset")
+        raise wrong_answer(client.shown, "no metadata", "the metadata of an asset")
     path, address = str(asset.get("path", "")).lower(), _address_in(asset, uuid)
     if asset.get("encodingFormat") == "application/x-zarr" or path.endswith(".zarr"):
         if not path.endswith(".zarr") or path.endswith(".nwb.zarr"):
@@ -123,10 +124,11 @@ def _asset(client: WebClient, uuid: str) -> Resolved:
     if not ending:
         kind = str(asset.get("encodingFormat"))
         raise SourceError(
-            f"DANDI asset {uuid}: found {kind!r:.80}, expected OME-Zarr or NIfTI: download others"
+            f"DANDI asset {uuid}: found {kind!r:.80}, expected OME-Zarr or NIfTI: download other "
+            "kinds yourself"
         )
     folder = fetched_folder.new_folder("dandi")
-    file = folder / f"asset{ending}"  # the name in the dandiset may name a subject
+    file = folder / f"asset{ending}"  # the name in the dandiset may identify a subject
     try:
         client.save(address, file, limit=FILE_BYTES)
     except BaseException:

@@ -1,8 +1,8 @@
-"""DICOMweb: a series of a PACS or an archive, as files in a folder.
+"""DICOMweb: fetch a series of a PACS or an archive into files in a folder.
 
-QIDO-RS finds the series and how many instances it has; WADO-RS sends these in one answer of many
-parts (DICOM PS3.18, chapter 10). An address identifies a patient's examination, so no message, note
-or name holds it.
+QIDO-RS finds the series and its number of instances. WADO-RS sends these in one multipart answer
+(DICOM PS3.18, chapter 10). An address identifies a patient's examination, so no message, note or
+name contains it.
 """
 
 import os
@@ -21,10 +21,10 @@ from stereocell.read.addresses.resolved import NotThereError, Resolved, other_fo
 from stereocell.read.addresses.web_client import WebClient
 from stereocell.storage.public_hosts import is_public, numbers_of, split_address
 
-TOKEN = "STEREOCELL_DICOMWEB_TOKEN"  # the environment's name for the bearer token
+TOKEN = "STEREOCELL_DICOMWEB_TOKEN"  # environment variable with the bearer token
 FORMS = ("https://HOST/.../studies/UID/series/UID", "https://HOST/.../studies/UID")
-SERIES_BYTES = 16 << 30  # largest series
-MAX_INSTANCES = 100_000  # of one series
+SERIES_BYTES = 16 << 30  # bytes of the largest series
+MAX_INSTANCES = 100_000  # instances of one series
 UID = r"[0-9]+(?:\.[0-9]+)+"
 _LONGEST_UID = 64  # characters
 _ADDRESS = re.compile(
@@ -37,7 +37,7 @@ _OTHER_FORM = re.compile(
     rf"|https?://.*[?&]StudyInstanceUIDs?=.*"
 )
 _MODALITY = re.compile(r"[A-Z0-9_]{1,16}")
-# modalities whose objects are no images, or none that were acquired
+# modalities whose objects are not images, or not acquired ones
 _NO_IMAGES = frozenset(
     (
         *("AU", "DOC", "ECG", "EEG", "FID", "HD", "KO", "PLAN", "PR", "REG", "RTDOSE", "RTPLAN"),
@@ -48,12 +48,12 @@ _PREAMBLE, _MARK = 128, b"DICM"
 
 
 def is_other_form(address: str) -> bool:
-    """Return whether an address looks like DICOMweb, or like a viewer of it, in another form."""
+    """Return whether an address has another form of DICOMweb, or belongs to a viewer of it."""
     return _ADDRESS.fullmatch(address) is None and _OTHER_FORM.fullmatch(address) is not None
 
 
 def resolve(address: str) -> Resolved | None:
-    """Fetch the series of a DICOMweb address; None: the address is none of DICOMweb."""
+    """Fetch the series of a DICOMweb address; None: it is not a DICOMweb address."""
     if is_other_form(address):
         raise other_form(f"https://{urlsplit(address).hostname}", "DICOMweb", FORMS)
     match = _ADDRESS.fullmatch(address)
@@ -103,7 +103,7 @@ class _Series:
 
 
 def _find_series(client: WebClient, address: str, uid: str | None) -> list[_Series]:
-    """Return the series of images of a study, or the one with a UID, by QIDO-RS."""
+    """Return the image series of a study, or the series with a UID, by QIDO-RS."""
     if uid is not None:
         address += f"?SeriesInstanceUID={uid}"
     try:
@@ -146,7 +146,7 @@ def _first(row: Any, tag: str) -> Any:
 
 
 def _fetch(client: WebClient, address: str, folder: Path) -> int:
-    """Write the instances of a series, named by numbers; return how many there are."""
+    """Write the instances of a series to files named by numbers; return how many there are."""
     accept = 'multipart/related; type="application/dicom"; transfer-syntax=*'
     with client.opened(address, accept) as response:
         boundary = boundary_of(response.headers.get("Content-Type", ""), client.shown)
@@ -169,7 +169,7 @@ def _fetch(client: WebClient, address: str, folder: Path) -> int:
 def _write(
     path: Path, first: bytes | None, rest: Iterator[bytes | None], shown: str, *, limit: int
 ) -> int:
-    """Write the pieces of one part up to None; return its bytes."""
+    """Write the pieces of one part up to None; return its number of bytes."""
     size, piece = 0, first
     with open(path, "xb") as file:
         while piece is not None:
@@ -184,7 +184,7 @@ def _write(
 
 
 def require_dicom(path: Path, shown: str) -> None:
-    """Raise SourceError for a file that a server has sent and that is no DICOM file."""
+    """Raise SourceError if a file that a server sent is not a DICOM file."""
     with open(path, "rb") as file:
         head = file.read(_PREAMBLE + len(_MARK))
     if head[_PREAMBLE:] != _MARK:
@@ -194,7 +194,7 @@ def require_dicom(path: Path, shown: str) -> None:
 
 
 def _token_for(root: str, shown: str) -> str:
-    """Return the bearer token of the environment; empty: there is none.
+    """Return the bearer token from the environment; empty: there is none.
 
     Raises UsageError where it can't be sent, or where others could read it on its way.
     """
@@ -205,7 +205,7 @@ def _token_for(root: str, shown: str) -> str:
         return token
     if any(not _is_loopback(number) for number in numbers_of(root)):
         raise UsageError(
-            f"{shown}: {TOKEN} is set, and http:// would show it to others on the way: expected "
+            f"{shown}: {TOKEN} is set, but http:// would show it to others on the way: expected "
             "https://, or no token"
         )
     return token

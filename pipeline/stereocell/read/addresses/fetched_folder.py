@@ -1,8 +1,8 @@
-"""Folders for files that are fetched for one command: their owner's alone, and removed at its end.
+"""Folders for files that are fetched for one command, private and removed when it ends.
 
-`tempfile.mkdtemp` makes a folder that nobody else can enter, with a name that holds nothing of the
-address. A process that is killed leaves its folder behind. The system's lock (flock) on a file in
-it ends with the process, so the next command finds out and removes the folder. Windows has no
+`tempfile.mkdtemp` makes a folder that nobody else can enter, with a name that contains nothing of
+the address. A process that is killed leaves its folder behind. The system's lock (flock) on a file
+in it ends with the process, so the next command notices and removes the folder. Windows has no
 flock: there such a folder stays.
 """
 
@@ -22,7 +22,7 @@ _LOCK = ".lock"
 
 
 def new_folder(name: str) -> Path:
-    """Return a new, empty folder of this name, which is removed when this process ends."""
+    """Return a new, empty folder with this name, which is removed when this process ends."""
     _remove_abandoned()
     outer = Path(tempfile.mkdtemp(prefix=_PREFIX))
     atexit.register(_remove, outer, os.getpid())
@@ -33,12 +33,12 @@ def new_folder(name: str) -> Path:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder of `new_folder` at once, since fetching has failed."""
+    """Remove a folder of `new_folder` at once, because fetching has failed."""
     _remove(folder.parent, os.getpid())
 
 
 def _remove(outer: Path, owner: int) -> None:
-    if os.getpid() == owner:  # no process that was forked meanwhile
+    if os.getpid() == owner:  # a forked process must not remove it
         shutil.rmtree(outer, ignore_errors=True)
 
 
@@ -47,17 +47,19 @@ def _hold(outer: Path) -> None:
     if sys.platform == "win32":
         return
     part = outer / f"{_LOCK}.part"
-    file = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)  # open until the process ends
+    # stays open until the process ends
+    file = os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     fcntl.flock(file, fcntl.LOCK_EX)
-    part.rename(outer / _LOCK)  # only now, since others take a file without a lock for abandoned
+    # renamed only once it is locked, because others take an unlocked file for abandoned
+    part.rename(outer / _LOCK)
 
 
 def _remove_abandoned() -> None:
-    """Remove the folders of this user's processes that were killed."""
+    """Remove folders that killed processes of this user left behind."""
     if sys.platform == "win32":
         return
     for outer in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
-        with suppress(OSError):  # another command removes it, too; or it is another user's
+        with suppress(OSError):  # another command may remove it too, or it belongs to another user
             if outer.is_symlink() or outer.stat().st_uid != os.getuid():
                 continue
             file = os.open(outer / _LOCK, os.O_RDWR | os.O_NOFOLLOW)

@@ -1,7 +1,7 @@
-"""Imaging Data Commons: a series in its public buckets, as files in a folder.
+"""Imaging Data Commons: fetch a series from its public buckets into files in a folder.
 
-A series lies as `BUCKET/CRDC_SERIES_UUID/INSTANCE.dcm`. Links to the viewer have the UIDs of DICOM;
-the index of the Commons (its API, version 3) gives bucket and UUID for them.
+A series lies at `BUCKET/CRDC_SERIES_UUID/INSTANCE.dcm`. Links to the viewer contain DICOM UIDs; the
+index of the Commons (its API, version 3) returns bucket and UUID for them.
 """
 
 import re
@@ -16,7 +16,7 @@ from stereocell.read.addresses.resolved import Resolved, other_form, wrong_answe
 from stereocell.read.addresses.web_client import WebClient
 
 API = "https://api.imaging.datacommons.cancer.gov/v3"
-BUCKET = "https://{bucket}.s3.amazonaws.com"  # how a bucket is reached without credentials
+BUCKET = "https://{bucket}.s3.amazonaws.com"  # address of a bucket without credentials
 BUCKETS = ("idc-open-data", "idc-open-data-two", "idc-open-data-cr")
 FORMS = (
     "s3://idc-open-data/UUID/",
@@ -30,12 +30,12 @@ _IN_BUCKET = re.compile(
 )
 _KEY = re.compile(rf"(?P<uuid>{_UUID})/[\w-]+\.dcm")
 _HOST = "imaging.datacommons.cancer.gov"
-_AT_ONCE = 8  # files that are fetched at a time
-_PAGES = 1 + MAX_INSTANCES // 1000  # of a listing of 1000 objects each
+_AT_ONCE = 8  # files that are fetched at the same time
+_PAGES = 1 + MAX_INSTANCES // 1000  # pages of a listing with 1000 objects each
 
 
 def resolve(address: str) -> Resolved | None:
-    """Fetch a series of the Commons; None: the address is none of its addresses."""
+    """Fetch a series of the Commons; None: it is not one of the Commons' addresses."""
     if match := _IN_BUCKET.fullmatch(address):
         return _fetch(match["bucket"], match["uuid"])
     parts = urlsplit(address)
@@ -60,8 +60,8 @@ def _uids_in(address: str) -> tuple[str, str] | None:
     series = (path[2] if path else None) or next((query[n] for n in names if n in query), "")
     if "," in series:
         raise UsageError(
-            "Imaging Data Commons: a link to several series, expected one: leave one UID in "
-            "SeriesInstanceUIDs="
+            "Imaging Data Commons: found a link to several series, expected one: keep only one "
+            "UID in SeriesInstanceUIDs="
         )
     if not re.fullmatch(UID, study) or (series and not re.fullmatch(UID, series)):
         return None
@@ -84,8 +84,8 @@ def _look_up(study: str, series: str) -> tuple[str, str]:
         )
     if len(rows) > 1:
         raise UsageError(
-            f"Imaging Data Commons: a link to a study of {len(rows)} series, expected one series: "
-            "add &SeriesInstanceUIDs=UID"
+            f"Imaging Data Commons: found a link to a study of {len(rows)} series, expected one "
+            "series: add &SeriesInstanceUIDs=UID"
         )
     row = rows[0] if isinstance(rows[0], dict) else {}
     bucket, uuid = str(row.get("aws_bucket")), str(row.get("crdc_series_uuid"))
@@ -120,7 +120,7 @@ def _fetch(bucket: str, uuid: str) -> Resolved:
 
 
 def _listed(client: WebClient, place: str, uuid: str) -> dict[str, int]:
-    """Return the keys of a series' objects and their bytes (ListObjectsV2)."""
+    """Return the keys of a series' objects with their sizes in bytes (ListObjectsV2)."""
     sizes: dict[str, int] = {}
     token = ""
     for _ in range(_PAGES):

@@ -1,8 +1,9 @@
-"""Image Data Resource: the OME-Zarr of an image page.
+"""Image Data Resource: find the OME-Zarr of an image page.
 
-The Resource keeps OME-Zarr of some images at `zarr/v0.N/`: of version 0.3 and later by study, as
-`idr0062A/6001240.zarr`, of earlier versions by the image's number alone. The study follows from the
-name of the image's project, as `idr0062-blin-nuclearsegmentation/experimentA`.
+The Resource stores OME-Zarr of some images at `zarr/v0.N/`. Version 0.3 and later are stored by
+study, such as `idr0062A/6001240.zarr`, earlier versions by the image's number alone. The study
+follows from the name of the image's project, such as
+`idr0062-blin-nuclearsegmentation/experimentA`.
 """
 
 import re
@@ -14,7 +15,7 @@ from stereocell.read.addresses.resolved import NotThereError, Resolved, other_fo
 from stereocell.read.addresses.web_client import WebClient
 
 PAGES = "https://idr.openmicroscopy.org"
-DATA = (  # two names of one bucket; the second one is asked where the first one is down
+DATA = (  # two names of one bucket; the second is asked if the first is down
     "https://livingobjects.ebi.ac.uk/idr/zarr",
     "https://uk1s3.embassy.ebi.ac.uk/idr/zarr",
 )
@@ -25,13 +26,13 @@ FORMS = (
 )
 _SAMPLES = "https://idr.github.io/ome-ngff-samples/"
 _HOST = "idr.openmicroscopy.org"
-_VERSIONS = ("v0.5", "v0.4", "v0.3", "v0.2", "v0.1")  # in the order in which they are looked for
+_VERSIONS = ("v0.5", "v0.4", "v0.3", "v0.2", "v0.1")  # in the order of the search
 _STUDY = re.compile(r"(idr\d{4})\b.*?(?:/(?:experiment|screen)([A-Z]))?")
 _ID = r"[1-9]\d{0,11}"
 
 
 def resolve(address: str) -> Resolved | None:
-    """Return the OME-Zarr of an image page; None: the address is none of the Resource's."""
+    """Return the OME-Zarr of an image page; None: it is not one of the Resource's pages."""
     parts = urlsplit(address)
     if parts.hostname != _HOST or parts.scheme not in ("http", "https"):
         return None
@@ -44,7 +45,7 @@ def resolve(address: str) -> Resolved | None:
 
 
 def _find(client: WebClient, studies: list[str], number: str) -> str:
-    """Return the address of an image's OME-Zarr, of the newest version that is there."""
+    """Return the address of an image's OME-Zarr, in the newest version that exists."""
     names = []
     for version in _VERSIONS:
         folders = [] if version in ("v0.1", "v0.2") else [f"{one}/" for one in studies]
@@ -61,13 +62,13 @@ def _find(client: WebClient, studies: list[str], number: str) -> str:
             continue
         break
     raise SourceError(
-        f"IDR image {number}: no OME-Zarr at {base} ({_VERSIONS[0]} to {_VERSIONS[-1]}), expected "
-        f"an image that has one: {_SAMPLES} lists them; other images can be downloaded"
+        f"IDR image {number}: found no OME-Zarr at {base} ({_VERSIONS[0]} to {_VERSIONS[-1]}), "
+        f"expected an image that has one: {_SAMPLES} lists them; other images can be downloaded"
     )
 
 
 def _image_in(path: str, query: dict[str, list[str]]) -> str:
-    """Return the number of the image that a page shows; empty: another form, or several images."""
+    """Return the number of the image on a page; empty: another form, or several images."""
     shown = ""
     if re.fullmatch(r"/webclient/?(userdata/)?", path):
         shown = ",".join(query.get("show", [])).removeprefix("image-")
@@ -79,7 +80,7 @@ def _image_in(path: str, query: dict[str, list[str]]) -> str:
 
 
 def _studies(client: WebClient, number: str) -> list[str]:
-    """Return the folders of the image's study, by the names of its projects."""
+    """Return the folders of the image's study, from the names of its projects."""
     try:
         answer = client.fetch_json(f"{PAGES}/webclient/api/paths_to_object/?image={number}")
     except NotThereError:

@@ -1,4 +1,4 @@
-"""Split an answer of several parts (RFC 2046), as WADO-RS sends instances, while it comes in."""
+"""Split a multipart answer (RFC 2046), by which WADO-RS sends instances, while it arrives."""
 
 import re
 from collections.abc import Iterator
@@ -7,12 +7,12 @@ from email.message import Message
 from stereocell.model.errors import SourceError
 from stereocell.read.addresses.resolved import wrong_answer
 
-_HEADER_BYTES = 1 << 16  # largest header of a part
+_HEADER_BYTES = 1 << 16  # bytes of the largest header of a part
 _BOUNDARY = re.compile(r"[0-9A-Za-z'()+_,\-./:=? ]{0,69}[0-9A-Za-z'()+_,\-./:=?]")
 
 
 def boundary_of(content_type: str, shown: str) -> bytes:
-    """Return what separates the parts. Raises SourceError for an answer of another type."""
+    """Return the separator of the parts. Raises SourceError for an answer of another type."""
     message = Message()
     message["Content-Type"] = content_type.replace("\r", " ").replace("\n", " ")
     found = message.get_content_type()
@@ -26,19 +26,19 @@ def boundary_of(content_type: str, shown: str) -> bytes:
 
 
 def split_parts(blocks: Iterator[bytes], boundary: bytes, shown: str) -> Iterator[bytes | None]:
-    """Yield the bytes of each part in pieces, and None behind each part.
+    """Yield the bytes of each part in pieces, and None after each part.
 
-    The headers of a part are skipped: no name in them is used. Raises SourceError where the answer
-    ends before its last part does.
+    The headers of a part are skipped, and none of their names is used. Raises SourceError where the
+    answer ends before its last part does.
     """
     delimiter = b"\r\n--" + boundary
     held = _Held(blocks, shown)
-    held.bytes += b"\r\n"  # the first delimiter may stand at the very beginning
+    held.bytes += b"\r\n"  # the first delimiter may be at the very beginning
     for _ in held.until(delimiter):
-        pass  # a preamble means nothing
+        pass  # a preamble has no meaning
     while not held.starts_with(b"--"):
         skipped = 0
-        for piece in held.until(b"\r\n"):  # spaces behind a boundary
+        for piece in held.until(b"\r\n"):  # spaces after a boundary
             skipped += len(piece)
             _require_short(skipped, shown)
         if held.starts_with(b"\r\n"):
@@ -53,11 +53,11 @@ def split_parts(blocks: Iterator[bytes], boundary: bytes, shown: str) -> Iterato
 
 def _require_short(count: int, shown: str) -> None:
     if count > _HEADER_BYTES:
-        raise wrong_answer(shown, "a part with an endless header", "parts of DICOM")
+        raise wrong_answer(shown, "a part with an endless header", "DICOM parts")
 
 
 class _Held:
-    """The bytes of an answer that have come in and are not used yet."""
+    """The bytes of an answer that have arrived and are not used yet."""
 
     def __init__(self, blocks: Iterator[bytes], shown: str) -> None:
         self._blocks, self._shown = blocks, shown
@@ -70,12 +70,12 @@ class _Held:
         return self.bytes.startswith(mark)
 
     def until(self, mark: bytes) -> Iterator[bytes]:
-        """Yield the bytes ahead of a mark in pieces, and drop the mark."""
+        """Yield the bytes before a mark in pieces, and drop the mark."""
         while (at := self.bytes.find(mark)) < 0:
-            certain = len(self.bytes) - len(mark) + 1
-            if certain > 0:
-                yield bytes(self.bytes[:certain])
-                del self.bytes[:certain]
+            safe = len(self.bytes) - len(mark) + 1
+            if safe > 0:
+                yield bytes(self.bytes[:safe])
+                del self.bytes[:safe]
             self._fill()
         if at:
             yield bytes(self.bytes[:at])

@@ -1,4 +1,4 @@
-"""Links of OMERO and of viewers of OME-Zarr: the image that `?source=` names."""
+"""Links of OMERO and of OME-Zarr viewers: find the image that `?source=` names."""
 
 import re
 from urllib.parse import parse_qs, urlsplit
@@ -17,17 +17,17 @@ _OMERO_WEB = re.compile(r"/(?:webclient|webgateway|iviewer)(?:/.*)?", re.I)
 
 
 def resolve(address: str) -> Resolved | None:
-    """Return the image that a viewer's link names; None: the address is no such link."""
+    """Return the image that a viewer's link names; None: the address is not such a link."""
     parts = urlsplit(address)
     if parts.scheme not in ("http", "https"):
         return None
     if _OMERO_WEB.fullmatch(parts.path):
         raise UsageError(
-            f"{parts.scheme}://{parts.hostname}: a page of OMERO.web, which has rendered pictures "
-            f"and no voxels, expected {' or '.join(FORMS)}"
+            f"{parts.scheme}://{parts.hostname}: found a page of OMERO.web, which offers rendered "
+            f"images but no voxels, expected {' or '.join(FORMS)}"
         )
     is_viewer = _VIEWER.search(f"{parts.hostname}{parts.path}") is not None
-    is_page = parts.path.endswith("/index.html")  # StereoCell's own
+    is_page = parts.path.endswith("/index.html")  # a page of StereoCell itself
     if (not is_viewer and not is_page) or parts.path.lower().endswith(".zarr"):
         return None
     found = [*parse_qs(parts.query).get("source", []), *_behind_hash(parts.fragment)]
@@ -36,11 +36,13 @@ def resolve(address: str) -> Resolved | None:
             return None
         raise other_form(address[:200], "a viewer of OME-Zarr", FORMS)
     if len(found) > 1:
-        raise UsageError(f"{parts.hostname}: a link to {len(found)} images, expected one source=")
+        raise UsageError(
+            f"{parts.hostname}: found a link to {len(found)} images, expected one source="
+        )
     place = found[0]
     if not place.startswith(("http://", "https://", "s3://")) or not place.isprintable():
         raise UsageError(
-            f"{parts.hostname}: source={place!r:.120}, expected an http(s) or s3 address"
+            f"{parts.hostname}: found source={place!r:.120}, expected an http(s) or s3 address"
         )
     require_public(place)
     where = urlsplit(place)

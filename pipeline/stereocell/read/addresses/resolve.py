@@ -1,7 +1,7 @@
 """Find the data behind an address that a person has copied from a browser.
 
-It is called where a person's words come in, ahead of `read.open`. A plan holds what it returns. So
-no worker asks a service again, and no file that a stranger has written sends requests anywhere.
+It is called where a person enters an address, before `read.open`. A plan stores what it returns, so
+no worker asks a service again, and no file written by a stranger triggers requests.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from stereocell.read.addresses.resolved import Resolved
 from stereocell.read.known_formats import find_format
 from stereocell.storage.location import Location
 
-# In the order in which they are asked: hosts first, then forms that any host may have
+# In the order of the search: fixed hosts first, then forms that any host may have.
 RESOLVERS: tuple[Callable[[str], Resolved | None], ...] = (
     idc.resolve,
     idr.resolve,
@@ -22,20 +22,20 @@ RESOLVERS: tuple[Callable[[str], Resolved | None], ...] = (
     dicomweb.resolve,
     omero.resolve,
 )
-_known: dict[str, Resolved] = {}  # what this process has found
-_one_at_a_time = Lock()
+_known: dict[str, Resolved] = {}  # addresses that this process has resolved
+_lock = Lock()
 
 
 def resolve(source: str | Path) -> Resolved:
-    """Return the data behind a source: itself, unless it is an address of a known service.
+    """Return the data behind a source: the source itself, or the data at a known service.
 
-    Raises StereoCellError where the service doesn't have it, or the address has another form than
-    those that are understood. Files that are fetched lie in a folder until this process ends.
+    Raises StereoCellError where the service doesn't have the data, or the address has an unknown
+    form. Fetched files lie in a folder until this process ends.
     """
     location = Location.of(source)
     if location.is_local or not may_know(location.source) or find_format(location) is not None:
         return Resolved(location.source)
-    with _one_at_a_time:
+    with _lock:
         if location.source not in _known:
             answers = (ask(location.source) for ask in RESOLVERS)
             found = next((one for one in answers if one is not None), None)
@@ -46,7 +46,7 @@ def resolve(source: str | Path) -> Resolved:
 
 
 def remember(source: str | Path, found: Resolved) -> None:
-    """Take over what another process of the same command has found."""
+    """Store what another process of the same command has resolved."""
     _known[Location.of(source).source] = found
 
 

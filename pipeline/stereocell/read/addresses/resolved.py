@@ -1,4 +1,4 @@
-"""The data that an address leads to, and the errors of addresses."""
+"""The data that an address leads to, and the errors for addresses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from stereocell.model.errors import SourceError, UsageError
 class Resolved:
     """The data behind an address.
 
-    source  the address or the folder that a reader opens
-    notes   how it was found, a sentence each
+    source  address or folder that a reader opens
+    notes   sentences on how it was found
     """
 
     source: str
@@ -23,12 +23,12 @@ class NotThereError(SourceError):
 
 
 def other_form(shown: str, service: str, forms: Sequence[str]) -> UsageError:
-    """Return the error of an address of a service in a form that is not understood."""
+    """Return the error for a service's address in an unknown form."""
     return UsageError(
-        f"{shown}: an address of {service} in another form, expected {' or '.join(forms)}"
+        f"{shown}: found another form of an address of {service}, expected {' or '.join(forms)}"
     )
 
 
 def wrong_answer(shown: str, found: str, expected: str) -> SourceError:
-    """Return the error of an answer that is not in the documented form."""
+    """Return the error for an answer that doesn't have the documented form."""
     return SourceError(f"{shown}: the server's answer: found {found}, expected {expected}")

@@ -1,4 +1,4 @@
-"""Fetch the answers of services: bounded in bytes and time, and from public hosts alone."""
+"""Fetch answers of services, limited in bytes and time, and only from public hosts."""
 
 import http.client
 import json
@@ -21,7 +21,7 @@ from stereocell.storage.public_hosts import (
     split_address,
 )
 
-ANSWER_BYTES = 16 << 20  # largest answer in JSON or XML
+ANSWER_BYTES = 16 << 20  # bytes of the largest answer in JSON or XML
 ANSWER_S = 60.0  # s for such an answer, from its first byte to its last
 _REDIRECTS = 5
 _BLOCK_BYTES = 1 << 18
@@ -33,9 +33,9 @@ class WebClient:
     """Asks the hosts of one service, and follows redirects to public hosts.
 
     own    addresses of the service, or of the user: their origins may be private
-    token  a secret for the first of these origins. No other host gets it, also by a redirect
-    login  the remedy where a host requires a login
-    shown  the service, for messages; it holds no secret and no identity
+    token  secret for the first of these origins; no other host gets it, not even by a redirect
+    login  remedy where a host requires a login
+    shown  name of the service for messages; it contains no secret and no identity
     """
 
     def __init__(
@@ -58,14 +58,14 @@ class WebClient:
                     )
                 if time.monotonic() > end_s:
                     raise wrong_answer(
-                        self.shown, f"no end within {ANSWER_S:g} s", "a server that is up"
+                        self.shown, f"no end within {ANSWER_S:g} s", "a server that responds"
                     )
         return bytes(body)
 
     def fetch_json(
         self, address: str, *, accept: str = "application/json", post: Any = None
     ) -> Any:
-        """Return the values of an answer in JSON; None where the answer is empty."""
+        """Return the values of an answer in JSON; None: the answer is empty."""
         sent = None if post is None else json.dumps(post).encode()
         body = self.fetch(address, accept, post=sent)
         if not body.strip():
@@ -78,7 +78,7 @@ class WebClient:
             raise wrong_answer(self.shown, "damaged JSON", "JSON") from None
 
     def is_there(self, address: str) -> bool:
-        """Return whether a file lies at an address. A public bucket may answer 403 if not."""
+        """Return whether a file lies at an address. For none, a public bucket may answer 403."""
         try:
             with self.opened(address, "*/*", refused=NotThereError):
                 return True
@@ -100,7 +100,7 @@ class WebClient:
         return size
 
     def blocks(self, response: http.client.HTTPResponse) -> Iterator[bytes]:
-        """Yield the bytes of an answer as they come. Raises SourceError where it breaks off."""
+        """Yield the bytes of an answer as they arrive. Raises SourceError where it breaks off."""
         while True:
             with self._one_line():
                 block = response.read1(_BLOCK_BYTES)
@@ -119,14 +119,15 @@ class WebClient:
     ) -> Iterator[http.client.HTTPResponse]:
         """Yield the answer of an address, or of the one that it is redirected to.
 
-        refused  raised where a login is required
+        refused  error that is raised where a login is required
         """
         for _ in range(1 + _REDIRECTS):
             with ExitStack() as stack:
                 connection = stack.enter_context(closing(self._connect(address)))
                 with self._one_line():
                     response = self._ask(connection, address, accept, post)
-                stack.callback(response.close)  # it may hold the connection's socket by itself
+                # the response may hold the connection's socket itself
+                stack.callback(response.close)
                 if response.status not in _MOVED:
                     self._require_answer(response, refused)
                     yield response
@@ -139,7 +140,7 @@ class WebClient:
     ) -> str:
         target = urljoin(address, response.headers.get("Location", ""))
         if target == address or post is not None:
-            raise wrong_answer(self.shown, "a redirect without a way on", "data")
+            raise wrong_answer(self.shown, "a redirect that leads nowhere", "data")
         if urlsplit(address).scheme == "https" and urlsplit(target).scheme != "https":
             raise wrong_answer(self.shown, "a redirect from https:// to another scheme", "https://")
         return target
@@ -148,7 +149,7 @@ class WebClient:
         scheme, host, port = origin = origin_of(address)
         numbers = numbers_of(address) if origin in self._own else public_numbers_of(address)
         with self._one_line():
-            # the numbers that were checked, since a name could have others a moment later
+            # Connect to the checked IP addresses: a name could resolve to others a moment later.
             opened = _connected(numbers, port)
             connection: http.client.HTTPConnection
             if scheme == "http":
@@ -187,7 +188,7 @@ class WebClient:
         if not 200 <= status < 300 or status == 206:
             raise wrong_answer(self.shown, f"HTTP {status}", "HTTP 200")
         if response.headers.get("Content-Encoding", "identity").lower() != "identity":
-            raise wrong_answer(self.shown, "packed bytes", "bytes as they are, as requested")
+            raise wrong_answer(self.shown, "compressed bytes", "uncompressed bytes, as requested")
 
     @contextmanager
     def _one_line(self) -> Iterator[None]:
@@ -195,19 +196,21 @@ class WebClient:
             yield
         except TimeoutError:
             raise SourceError(
-                f"{self.shown}: no answer within {SILENCE_S:g} s, expected a server that is up"
+                f"{self.shown}: no answer within {SILENCE_S:g} s, expected a server that responds"
             ) from None
         except http.client.IncompleteRead:
-            raise wrong_answer(self.shown, "an end before its last byte", "a whole one") from None
+            raise wrong_answer(self.shown, "an end before its last byte", "all bytes") from None
         except (http.client.HTTPException, ValueError) as error:
             raise wrong_answer(self.shown, type(error).__name__, "HTTP") from None
         except OSError as error:
             words = error.strerror or type(error).__name__
-            raise SourceError(f"{self.shown}: {words:.160}, expected a server that is up") from None
+            raise SourceError(
+                f"{self.shown}: {words:.160}, expected a server that responds"
+            ) from None
 
 
 def _connected(numbers: Sequence[str], port: int) -> socket.socket:
-    """Return a connection to the first of some IP addresses that takes one."""
+    """Return a connection to the first of some IP addresses that accepts one."""
     last: OSError = OSError("no address")
     for number in numbers:
         try:

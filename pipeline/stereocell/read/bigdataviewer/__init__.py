@@ -1,1 +1,1 @@
-"""BigDataViewer's XML and containers, for the formats that hold them: HDF5 and N5."""
+"""BigDataViewer's XML and containers, for the formats HDF5 and N5, which hold them."""

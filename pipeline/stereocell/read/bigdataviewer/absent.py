@@ -1,4 +1,4 @@
-"""Count the blocks of BigDataViewer's views that are not stored."""
+"""Count the blocks of BigDataViewer's views that are not stored in the container."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,9 +13,9 @@ def count_in_views(
     states: FileStates,
     count: Callable[[Any, Spans, FileStates], Absent | None],
 ) -> Absent | None:
-    """Return how many blocks of BigDataViewer's views are absent; each view is an array.
+    """Return how many blocks of BigDataViewer's views are absent; each view is an array of its own.
 
-    count  counts the blocks of one view
+    count  function that counts the absent blocks of one view
     """
     times, channels, *place = spans
     found = []

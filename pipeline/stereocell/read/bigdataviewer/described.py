@@ -1,7 +1,6 @@
-"""The setups of a BigDataViewer container as its XML states them, and the views that they make.
+"""The setups of a BigDataViewer container as its XML states them, and the views that they form.
 
-A view is an image of its own. It has one tile, angle and illumination, and its setups are its
-channels.
+Each view is an image of its own with one tile, angle and illumination; its setups are its channels.
 
 References: https://imagej.net/plugins/bdv/index
 """
@@ -18,20 +17,21 @@ from stereocell.model.errors import SourceError
 from stereocell.read.series import Candidate, candidate
 from stereocell.read.spacing import Triple
 
-_OF_A_VIEW = ("tile", "angle", "illumination")  # attributes of which no two make one image
+_OF_A_VIEW = ("tile", "angle", "illumination")  # attributes whose values separate images
 _OF_A_CHANNEL = ("channel", "displaysettings")  # attributes that may differ within one image
 _CHANNEL = "channel"
-_OTHER_SCALE = 0.05  # share by which channels' scales differ; chromatic aberration has under 0.01
-_OTHER_DIRECTION = math.cos(math.radians(45))  # cosine between an axis of two channels
-_SHOWN = 8  # numbers in a message
+_OTHER_SCALE = 0.05  # relative difference in scale; chromatic aberration stays below 0.01
+# cosine of the largest angle between the same axis of two channels
+_OTHER_DIRECTION = math.cos(math.radians(45))
+_SHOWN = 8  # numbers that a message shows
 
-Matrix = NDArray[np.float64]  # (4, 4) for columns, from voxels (x, y, z, 1) to the world
+Matrix = NDArray[np.float64]  # (4, 4), for column vectors: from voxels (x, y, z, 1) to the world
 
 
 def have_one_grid(first: Matrix, other: Matrix) -> bool:
-    """Return whether two registrations have one scale and direction; they may be shifted."""
+    """Return whether two registrations agree in scale and direction; their shifts may differ."""
     if not (np.isfinite(first).all() and np.isfinite(other).all()):
-        return True  # the reader reports it
+        return True  # the reader reports unreadable registrations
     relative = np.linalg.pinv(first[:3, :3]) @ other[:3, :3]
     lengths = np.linalg.norm(relative, axis=0)
     return bool(
@@ -45,9 +45,9 @@ class Setup:
     """One channel of a view.
 
     spacing_um  (z, y, x); None: not stated in a unit of length
-    unit_um     the unit of the voxel size in um; None: no unit of length
+    unit_um     unit of the voxel size, um; None: it is not a unit of length
     size        voxels (x, y, z); None: not stated
-    attributes  all attributes, number by name, such as the tile, the channel and a user's own
+    attributes  numbers by attribute name: tile, channel and others, also the user's own
     """
 
     name: str | None
@@ -59,10 +59,10 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """The setups of an XML by their numbers, and its time points; both empty without an XML.
+    """The setups of an XML by their numbers, and its time points; both are empty without an XML.
 
-    registrations  by time point and setup, where they can be read
-    missing        pairs of time point and setup of which no image was taken
+    registrations  readable ones, by time point and setup
+    missing        pairs of time point and setup for which no image was taken
     """
 
     setups: Mapping[int, Setup]
@@ -71,11 +71,11 @@ class Described:
     missing: Set[tuple[int, int]] = frozenset()
 
     def views(self, setups: Sequence[int]) -> list[list[int]]:
-        """Return setups by tile, angle, illumination and own attributes.
+        """Group setups into views, by tile, angle, illumination and the user's own attributes.
 
         The setups of a view are its channels, so two setups of one channel are two views. An own
-        attribute counts where setups of one channel differ in it; else it describes the channel.
-        Setups that are registered at another scale or in another direction are views of their own.
+        attribute separates views if setups of one channel differ in it; otherwise it describes the
+        channel. Setups registered at another scale or in another direction form another view.
         """
         found: dict[tuple[object, ...], list[int]] = {}
         repeated = self._repeated(setups)
@@ -86,7 +86,7 @@ class Described:
         return [view for group in found.values() for view in self._by_registration(group)]
 
     def _by_registration(self, setups: Sequence[int]) -> list[list[int]]:
-        """Return setups by the scale and direction of their registrations, at their first time."""
+        """Group setups by the scale and direction of their registrations at their first time."""
         placed: dict[int, Matrix] = {}
         for time, setup in sorted(self.registrations):
             if (time, setup) not in self.missing:
@@ -104,7 +104,7 @@ class Described:
         return views
 
     def _repeated(self, setups: Sequence[int]) -> set[int]:
-        """Return the setups of which an earlier one has the same attributes and channel."""
+        """Return the setups whose attributes and channel repeat those of an earlier setup."""
         found: dict[tuple[object, ...], int] = {}
         names = [*self._view_names(setups), _CHANNEL]
         stated = [number for number in setups if _CHANNEL in self._attributes(number)]
@@ -120,7 +120,7 @@ class Described:
         return tuple(own.get(name) for name in names)
 
     def _view_names(self, setups: Sequence[int]) -> list[str]:
-        """Return the names of the attributes that separate views."""
+        """Return the names of the attributes whose values separate views."""
         every = dict.fromkeys(name for number in setups for name in self._attributes(number))
         own = [name for name in every if name not in (*_OF_A_VIEW, *_OF_A_CHANNEL)]
         names = [name for name in _OF_A_VIEW if name in every]
@@ -134,7 +134,7 @@ class Described:
         return names
 
     def candidate(self, view: Sequence[int]) -> Candidate:
-        """Return what a list says of a view."""
+        """Return the entry of a view in the list of series."""
         own = self.setups.get(view[0]) or Setup(None, None)
         x, y, z = (int(size) for size in own.size or (1, 1, 1))
         found = candidate(
@@ -159,7 +159,7 @@ class Described:
         return Candidate(label, found.voxels)
 
     def alone(self, setup: int) -> "Described":
-        """Return what the XML states about one setup."""
+        """Return the part of the XML that describes one setup."""
         own = {setup: self.setups[setup]} if setup in self.setups else {}
         placed = {key: one for key, one in self.registrations.items() if key[1] == setup}
         missing = frozenset(key for key in self.missing if key[1] == setup)
@@ -174,25 +174,25 @@ class Described:
     ) -> set[tuple[int, int]]:
         """Return the pairs of time point and setup that are not listed as missing.
 
-        Raises SourceError where all are listed.
+        Raises SourceError where all are listed as missing.
         """
         found = {(t, s) for t in times for s in setups if (t, s) not in self.missing}
         if not found:
             raise SourceError(
-                f"{where}: found no view of this image, since MissingViews of the XML lists all; "
-                "expected another --series"
+                f"{where}: found no view of this image, since MissingViews of the XML lists all of "
+                "them; expected another --series"
             )
         return found
 
     def require_views(self, where: str, setups: Sequence[int], times: Sequence[int]) -> None:
         """Raise SourceError where a container lacks setups or time points.
 
-        They are those of the XML, or without one all from the first to the last.
+        The XML lists those expected; without one, all from the first to the last are expected.
         """
         parts = (("setups", setups, tuple(self.setups)), ("time points", times, self.times))
         for noun, found, listed in parts:
             present, first, last = set(found), min(found), max(found)
-            # groups may be numbered up to 10^12, so that all numbers in between make no list
+            # Numbers go up to 10^12, so the numbers in between are never listed.
             expected = sorted(set(listed)) if listed else range(first, last + 1)
             size = len(expected) if listed else last - first + 1
             count = len(present.intersection(expected)) if listed else len(present)

@@ -1,8 +1,7 @@
-"""BigDataViewer's HDF5: `t00000/s00/0/cells`, a dataset for each time, setup and level.
+"""BigDataViewer's HDF5: `t00000/s00/0/cells`, one dataset for each time point, setup and level.
 
-It holds 16 bits without a sign in datasets of int16, since Java has no others. Names and voxel
-sizes of the setups are in the XML beside it.
-
+Datasets of int16 hold unsigned 16-bit numbers, since Java has no unsigned type. An XML beside the
+container states names and voxel sizes of the setups.
 References: https://imagej.net/plugins/bdv/index
 """
 
@@ -28,7 +27,7 @@ _MAX_LEVELS = 64
 
 
 class _Cells:
-    """A view's voxels; int16 is read as the uint16 that it holds."""
+    """The voxels of a view; int16 is read as the uint16 that it really holds."""
 
     def __init__(self, array: Hdf5Array) -> None:
         self.shape, self.chunks = array.shape, array.chunks
@@ -39,24 +38,24 @@ class _Cells:
 
     @property
     def dataset(self) -> h5py.Dataset:
-        """The dataset, whose chunks can be counted."""
+        """The h5py dataset, so that its stored chunks can be counted."""
         return self._array.dataset
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         found = np.asarray(self._array[key])
-        return found.astype(self.dtype, copy=False)  # of int16: modulo 2^16
+        return found.astype(self.dtype, copy=False)  # conversion from int16 is modulo 2^16
 
 
 def is_container(tree: Hdf5Tree) -> bool:
-    """Whether a file has the groups of BigDataViewer."""
+    """Return whether a file has the groups of BigDataViewer."""
     return bool(_named(tree, r"t\d{5,}") and _named(tree, r"s\d{2,}"))
 
 
 def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str = "") -> Image:
-    """Return the image of a view, whose setups are channels. Raises SourceError, UsageError.
+    """Return the image of a view, whose setups are channels. Raises SourceError and UsageError.
 
-    series  of the views as the XML lists them, from 1; 0: the largest
-    xml     path of the XML that the user named; empty: none
+    series  counts the views as listed in the XML, from 1; 0: the largest
+    xml     path of the XML that the user named; empty: the user named the container
     """
     times, setups = _named(tree, r"t\d{5,}"), _named(tree, r"s\d{2,}")[:MAX_CHANNELS]
     described, every = read_described(location.path, xml), [int(name[1:]) for name in setups]
@@ -91,9 +90,9 @@ def read_image(tree: Hdf5Tree, location: Location, *, series: int = 0, xml: str 
 def _common_levels(
     tree: Hdf5Tree, groups: Sequence[Sequence[str | None]], setups: Sequence[str]
 ) -> tuple[int, tuple[str, ...]]:
-    """Return the number of levels that all setups have, and a note where some have more.
+    """Return the number of levels that all setups have, and a note if some have more.
 
-    groups  of the views, by time and then by setup; None: a missing view
+    groups  paths of the views, by time point and setup; None: a missing view
     """
     counts = []
     for place, setup in enumerate(setups):
@@ -104,7 +103,7 @@ def _common_levels(
 
 
 def _count_levels(tree: Hdf5Tree, group: str, setup: str) -> int:
-    """Return the number of levels of a view. Raises SourceError where some are missing."""
+    """Return the number of levels of a view. Raises SourceError if the file lacks stated levels."""
     first = tree.find(group)
     names = set(first) if isinstance(first, h5py.Group) else set()
     count = next((n for n in range(_MAX_LEVELS) if str(n) not in names), _MAX_LEVELS)
@@ -126,7 +125,7 @@ def _named(tree: Hdf5Tree, pattern: str) -> list[str]:
 def _cells(tree: Hdf5Tree, path: str) -> _Cells:
     node = tree.find(path)
     if not isinstance(node, h5py.Dataset):
-        raise SourceError(f"{tree.where}: {path}: expected a dataset z, y, x")
+        raise SourceError(f"{tree.where}: {path}: found no dataset, expected one with axes z, y, x")
     return _Cells(Hdf5Array(node, f"{tree.where}: {path}"))
 
 
@@ -136,7 +135,7 @@ def _stated_levels(tree: Hdf5Tree, path: str) -> int:
 
 
 def _factors(tree: Hdf5Tree, path: str, level: int) -> Triple | None:
-    """Return level 0's voxels per voxel (z, y, x); the file has a row x, y, z for each level."""
+    """Return level 0's voxels per voxel (z, y, x); the table has a row x, y, z for each level."""
     node = tree.find(path)
     table = np.zeros((0, 3))
     if isinstance(node, h5py.Dataset):

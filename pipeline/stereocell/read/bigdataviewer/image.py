@@ -1,4 +1,4 @@
-"""The image of BigDataViewer's container: one grid, whose setups are channels."""
+"""The image of a BigDataViewer container: one grid, with the setups as channels."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -14,10 +14,10 @@ from stereocell.read.series import choose
 from stereocell.read.spacing import Grid, Triple
 from stereocell.read.statements import Statement, Subject, Trust, omission, settle
 
-# The views of one level, by time and then by setup, each (z, y, x). None: the view is missing.
+# The views of one level, by time point and setup, each (z, y, x). None: the view is missing.
 Views = Sequence[Sequence[StoredArray | None]]
 _REMEDY = "--spacing-um z,y,x replaces it"
-_NO_XML = "BigDataViewer states it in an XML, and none lies beside the container"
+_NO_XML = "BigDataViewer states it in an XML, which is not beside the container"
 _TOLERANCE = 5e-3  # relative difference of two spacings that needs no note
 
 
@@ -34,7 +34,7 @@ class BdvLevel:
     def view(self, time: int, channel: int) -> StoredArray:
         """Return the array of one view, (z, y, x)."""
         found = self._views[time][channel]
-        assert found is not None, "a missing view is no channel at its time"
+        assert found is not None, "channels without a view at this time are left out beforehand"
         return found
 
     def of_channels(self, channels: Sequence[int]) -> "BdvLevel":
@@ -55,11 +55,11 @@ def image_of(
 ) -> Image:
     """Return the image of a container's views, finest level first.
 
-    factors    level 0's voxels per voxel, (z, y, x), of each level; None: not stated
+    factors    for each level: level 0's voxels per voxel, (z, y, x); None: not stated
     stated_um  voxel spacing (z, y, x) of level 0 in the container; None: not stated
-    setups     by their numbers; None: the XML has no such setup, or there is no XML
+    setups     setups by number; None: the XML lacks the setup, or there is no XML
 
-    Raises SourceError where the views have not one grid.
+    Raises SourceError where the views differ in their grids.
     """
     arrays = []
     for views in levels:
@@ -88,29 +88,29 @@ def image_of(
 def chosen_view(
     where: str, described: Described, setups: Sequence[int], series: int, xml: str
 ) -> tuple[list[int], tuple[str, ...]]:
-    """Return the setups of one view, and notes. Setups without attributes are one view.
+    """Return the setups of one view, and notes. Setups without attributes form one view.
 
-    xml  the XML that the user named; empty: the container was named
+    xml  path of the XML that the user named; empty: the user named the container
 
     Raises UsageError where there is no such view.
     """
     views = described.views(setups)
     index, notes = choose(where, [described.candidate(view) for view in views], series)
     if notes and not xml:
-        notes = (f"{notes[0]} (--series needs the name of the XML)",)
+        notes = (f"{notes[0]} (to use --series, name the XML as the source)",)
     return views[index], notes
 
 
 def common_levels(counts: Sequence[int]) -> tuple[int, tuple[str, ...]]:
-    """Return the number of levels that all setups have, and a note where some have more.
+    """Return the number of levels that all setups have, and a note if some have more.
 
-    counts  of the setups' levels
+    counts  number of levels of each setup
     """
     fewest, most = min(counts), max(counts)
     if fewest == most:
         return fewest, ()
     found = f"{most - fewest} of {most} levels of detail"
-    return fewest, (omission(found, f"some setups have {fewest} alone"),)
+    return fewest, (omission(found, f"some setups have only {fewest}"),)
 
 
 def grids_of(
@@ -119,9 +119,9 @@ def grids_of(
     scales: Sequence[Triple | None],
     hint: str = "",
 ) -> tuple[Grid, ...]:
-    """Return the levels' grids; a level without factors is measured by its shape.
+    """Return the grids of the levels; the shape gives the spacing of a level without factors.
 
-    hint  where a missing spacing may come from
+    hint  where a missing spacing may be found
     """
     grids = []
     for shape, scale in zip(shapes, scales, strict=True):
@@ -141,7 +141,7 @@ def _present(views: Views) -> Iterator[StoredArray]:
 def _spacing(
     setups: Mapping[int, Setup | None], stated_um: Triple | None
 ) -> tuple[Triple | None, tuple[str, ...]]:
-    """Return the voxel spacing (z, y, x), um, of all setups, and a note for each contradiction."""
+    """Return the voxel spacing (z, y, x), um, of all setups, and notes on contradictions."""
     stated = [
         (f"voxelSize of setup {number}", setup.spacing_um)
         for number, setup in setups.items()
@@ -162,7 +162,7 @@ def _spacing(
 
 
 def _size_notes(setups: Mapping[int, Setup | None], shape: tuple[int, int, int]) -> tuple[str, ...]:
-    """Return a note for each setup whose size in the XML is not that of the container's arrays."""
+    """Return a note for each setup whose size in the XML differs from the container's arrays."""
     z, y, x = (float(size) for size in shape)
     notes = list[str]()
     for number, setup in setups.items():
@@ -180,4 +180,4 @@ def _setup_notes(setups: Mapping[int, Setup | None]) -> tuple[str, ...]:
     unknown = "" if any(setups.values()) else (
         ", since no XML beside the container states whether they are tiles, angles or channels"
     )  # fmt: skip
-    return (f"{len(setups)} setups of BigDataViewer: taken for channels{unknown}",)
+    return (f"{len(setups)} setups of BigDataViewer: read as channels{unknown}",)

@@ -1,10 +1,10 @@
-"""The registration of a BigDataViewer view: a scale, a mirror and an order of axes are applied.
+"""Apply the registration of a BigDataViewer view: a scale, a mirror and an order of axes.
 
-A view has several transforms, of which the first is applied last. Together they lead from voxels
-(x, y, z) of level 0 to the world. The world's unit is that of `voxelSize`, or one voxel of the
-smallest size of all setups, as BigStitcher has it. A registration without a scale, such as the
-identity or a mirror alone, states no spacing. A rotation or a shear is not applied, and a note says
-so: the view is read as it was acquired.
+A view has several transforms; the first one listed is applied last. Together they lead from voxels
+(x, y, z) of level 0 to the world. The world's unit is that of `voxelSize`, or, in files of
+BigStitcher, one voxel of the smallest size of all setups. A registration without a scale, such as
+the identity or only a mirror, states no spacing. Rotation and shear are not applied: the view is
+read as acquired, and a note says so.
 
 References: https://imagej.net/plugins/bdv/, package mpicbg.spim.data.registration
 """
@@ -22,20 +22,20 @@ from stereocell.read.spacing import Grid, Triple
 from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.read.turn import Turn, turned_image
 
-_SKEW = 1e-3  # cosine; a smaller one between two axes is rounding
-_ALMOST = 0.05  # share by which the smallest scale differs from 1 in a world of voxels
+_SKEW = 1e-3  # cosine between two axes; a smaller one is due to rounding
+_ALMOST = 0.05  # relative difference of the smallest scale from 1, in a world that counts voxels
 _TOLERANCE = 5e-3  # relative difference of two spacings that needs no note
-_SHIFT = 0.5  # voxels by which the channels of a view may lie apart
+_SHIFT = 0.5  # voxels by which the channels of a view may be shifted without a note
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """A registration, taken apart.
+    """The parts of a registration.
 
-    scale      lengths of the columns for (x, y, z)
+    scale      lengths of the matrix columns for (x, y, z)
     turn       order and direction of the axes
-    angle_deg  rotation that is left; 0: none
-    shear_deg  largest angle by which two axes are not at right angles; 0: none
+    angle_deg  remaining rotation; 0: none
+    shear_deg  largest deviation of the angle between two axes from 90 degrees; 0: none
     """
 
     scale: tuple[float, float, float]
@@ -44,8 +44,8 @@ class Parts:
     shear_deg: float = 0.0
 
 
-def taken_apart(matrix: Matrix) -> Parts | None:
-    """Return the parts of a registration; None: it has no three axes."""
+def decompose(matrix: Matrix) -> Parts | None:
+    """Return the parts of a registration; None: its axes don't span three dimensions."""
     linear = matrix[:3, :3]
     lengths = np.linalg.norm(linear, axis=0)
     if not np.isfinite(matrix).all() or lengths.min() <= 0:
@@ -57,7 +57,8 @@ def taken_apart(matrix: Matrix) -> Parts | None:
     shear = math.degrees(math.asin(min(float(np.abs(cosines).max()), 1.0)))
     best = max(permutations(range(3)), key=lambda p: sum(abs(unit[i, p[i]]) for i in range(3)))
     signs = [unit[world, stored] < 0 for world, stored in enumerate(best)]
-    # World axes x, y, z in the order z, y, x; stored axis k of (x, y, z) is 2 - k of (z, y, x).
+    # World axes x, y, z are needed in the order z, y, x. Stored axis k of (x, y, z) is axis 2 - k
+    # of (z, y, x).
     z, y, x = (2 - best[world] for world in (2, 1, 0))
     turn = Turn((z, y, x), (bool(signs[2]), bool(signs[1]), bool(signs[0])))
     nearest = np.zeros((3, 3))
@@ -76,17 +77,17 @@ def taken_apart(matrix: Matrix) -> Parts | None:
 
 
 def registered(image: Image, described: Described, setups: Sequence[int], time: int) -> Image:
-    """Return the image of some setups, which are channels, as their registration places it.
+    """Return an image with the spacing and axes of its registration. Its channels are the setups.
 
-    time  the number of the time point
+    time  number of the time point
     """
     own = described.setups.get(setups[0])
     matrix = described.registrations.get((time, setups[0]))
     if own is None or matrix is None or np.allclose(matrix[:3, :3], np.eye(3), atol=_SKEW):
         return replace(image, notes=(*image.notes, *_channel_notes(described, setups, time)))
-    parts = taken_apart(matrix)
+    parts = decompose(matrix)
     if parts is None:
-        note = "the registration of the view has no three axes: it is not applied"
+        note = "the axes of the view's registration don't span three dimensions: it is not applied"
         return replace(image, notes=(*image.notes, note))
     spacing, spacing_notes = _spacing(own, parts, _voxel_of_world(described, time))
     before = image.grids[0].spacing_um
@@ -98,9 +99,9 @@ def registered(image: Image, described: Described, setups: Sequence[int], time: 
 
 
 def _voxel_of_world(described: Described, time: int) -> float | None:
-    """Return the length of a voxel, um, in whose number the world counts; None: it counts lengths.
+    """Return the length of a voxel, um, where the world counts voxels; None: it counts lengths.
 
-    It counts voxels where the smallest scale of all setups is 1.
+    The world counts voxels where the smallest scale of all setups is 1.
     """
     placed = [one for (at, _), one in described.registrations.items() if at == time]
     smallest = min(float(np.linalg.norm(one[:3, :3], axis=0).min()) for one in placed)
@@ -113,7 +114,7 @@ def _spacing(
 ) -> tuple[Triple | None, tuple[str, ...]]:
     """Return the spacing (z, y, x), um, and notes; None: no unit of length is stated.
 
-    voxel_um  by `_voxel_of_world`
+    voxel_um  result of `_voxel_of_world`
     """
     if setup.spacing_um is None or setup.unit_um is None:
         return None, ()
@@ -137,7 +138,7 @@ def _scaled(
     """Return a level's grid with the spacing of the registration."""
     if after is None or grid.spacing_um is None or before is None:
         x, y, z = parts.scale
-        hint = f"the registration has {z:.5g},{y:.5g},{x:.5g} (z,y,x) without one"
+        hint = f"the registration has {z:.5g},{y:.5g},{x:.5g} (z,y,x) without a unit"
         return replace(grid, hint=hint if setup.spacing_um is None else "")
     z, y, x = (
         length if new == old else length * new / old
@@ -147,7 +148,7 @@ def _scaled(
 
 
 def _unturned(matrix: Matrix, parts: Parts) -> Turn:
-    """Return the turn of a view that stays as acquired: only its mirror image is undone."""
+    """Return the turn of a view that is read as acquired: only a mirroring is undone."""
     if np.linalg.det(matrix[:3, :3]) > 0:
         return Turn()
     mirrored = next((axis for axis, flip in enumerate(parts.turn.flips) if flip), 2)
@@ -160,7 +161,7 @@ def _turn_notes(parts: Parts) -> tuple[str, ...]:
     if parts.shear_deg:
         return (
             f"the registration shears the view by {parts.shear_deg:.3g} degrees: it is read as "
-            "acquired, not sheared (a stack that is to be deskewed: deskew it before)",
+            "acquired, not sheared (deskew a stack that needs it before building)",
         )
     if parts.angle_deg:
         return (
@@ -177,7 +178,7 @@ def _turn_notes(parts: Parts) -> tuple[str, ...]:
 
 
 def _channel_notes(described: Described, setups: Sequence[int], time: int) -> tuple[str, ...]:
-    """Return a note where the channels of a view are registered to different places."""
+    """Return a note if the channels of a view are registered to different places."""
     found = [described.registrations.get((time, setup)) for setup in setups]
     first = found[0]
     if first is None or any(one is None or not np.isfinite(one).all() for one in found):
@@ -198,8 +199,8 @@ def _channel_notes(described: Described, setups: Sequence[int], time: int) -> tu
 
 
 def _differences(relative: Sequence[Matrix]) -> str:
-    """Return the scales and angles by which channels differ, for a note; empty: only shifts."""
-    parts = [one for one in map(taken_apart, relative) if one is not None]
+    """Return the scales and angles by which channels differ, for a note; empty: only by shifts."""
+    parts = [one for one in map(decompose, relative) if one is not None]
     scale = max((abs(size - 1.0) for one in parts for size in one.scale), default=0.0)
     angle = max((max(one.angle_deg, one.shear_deg) for one in parts), default=0.0)
     found = [f"a scale of {scale:.2g}"] * (scale > _SKEW)

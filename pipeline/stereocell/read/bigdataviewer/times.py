@@ -1,7 +1,7 @@
-"""BigDataViewer's views at one time point: the channels that have one, placed as registered then.
+"""Choose the channels of a BigDataViewer image at one time point, and place them as registered.
 
-Views that the XML lists as missing (`MissingViews`) are in no container. A channel without a view
-at the chosen time is left out, and a note says so.
+A container lacks the views that the XML lists as missing (`MissingViews`). A channel without a view
+at the chosen time point is left out, and a note says so.
 """
 
 from collections.abc import Sequence
@@ -20,10 +20,10 @@ from stereocell.read.statements import omission
 def with_times(
     where: str, image: Image, described: Described, setups: Sequence[int], times: Sequence[int]
 ) -> Image:
-    """Return an image whose channels and registration are those of the time point that is chosen.
+    """Return an image with the channels and the registration of the chosen time point.
 
-    setups  the numbers of the channels' setups
-    times   the numbers of the time points
+    setups  number of each channel's setup
+    times   numbers of the time points
     """
     return replace(image, at_time=partial(_at_time, where, described, setups, times))
 

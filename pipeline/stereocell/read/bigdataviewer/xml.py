@@ -1,4 +1,4 @@
-"""BigDataViewer's XML beside a container of N5 or HDF5: setups, their attributes, registrations.
+"""Read BigDataViewer's XML beside an N5 or HDF5 container: setups, attributes, registrations.
 
 References: https://imagej.net/plugins/bdv/index
 """
@@ -18,7 +18,7 @@ from stereocell.read.spacing import Triple, um_per
 from stereocell.read.stated_numbers import numbers_of
 from stereocell.storage.location import is_own
 
-_MAX_FILES = 50  # most XML files of the folder that are looked into
+_MAX_FILES = 50  # XML files of a folder that are looked into
 _MAX_BYTES = 16 << 20
 _MAX_TIMES = 100_000
 _RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:step
@@ -27,7 +27,8 @@ _RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?(?::(\d{1,9}))?")  # first-last:st
 def read_described(path: str, xml: str = "") -> Described:
     """Return what the XML of a container on this machine states.
 
-    xml  the XML that the user named; empty: the first one beside the container that names it
+    xml  path of the XML that the user named; empty: the first one beside the container that names
+         the container
     """
     container = Path(path)
     beside = sorted(container.parent.glob("*.xml"))
@@ -79,7 +80,7 @@ def _counts(text: str) -> Triple | None:
 
 
 def _registrations(root: ElementTree.Element) -> Mapping[tuple[int, int], Matrix]:
-    """Return the registration of each view, by time point and setup; NaN: it is not readable."""
+    """Return the registration of each view, by time point and setup; NaN: it can't be read."""
     found: dict[tuple[int, int], Matrix] = {}
     for node in root.findall("ViewRegistrations/ViewRegistration"):
         time, setup = node.get("timepoint", ""), node.get("setup", "")
@@ -93,7 +94,7 @@ def _registrations(root: ElementTree.Element) -> Mapping[tuple[int, int], Matrix
 
 
 def _affine(text: str) -> Matrix:
-    """Return the matrix (4, 4) of an affine transform; NaN: it has not 12 finite numbers."""
+    """Return the matrix (4, 4) of an affine transform; NaN: the text isn't 12 finite numbers."""
     rows = np.array(numbers_of(text.split()))
     if rows.size != 12 or not np.isfinite(rows).all():
         return np.full((4, 4), np.nan)
@@ -101,7 +102,7 @@ def _affine(text: str) -> Matrix:
 
 
 def _missing(root: ElementTree.Element) -> frozenset[tuple[int, int]]:
-    """Return the time point and setup of each view that was not taken."""
+    """Return the time point and setup of each view for which no image was taken."""
     views = root.findall("SequenceDescription/MissingViews/MissingView")
     pairs = [(view.get("timepoint", ""), view.get("setup", "")) for view in views]
     return frozenset(
@@ -112,7 +113,7 @@ def _missing(root: ElementTree.Element) -> frozenset[tuple[int, int]]:
 def _times(
     root: ElementTree.Element, setups: Collection[int], missing: Set[tuple[int, int]]
 ) -> tuple[int, ...]:
-    """Return the numbers of the time points, except those at which no view was taken."""
+    """Return the numbers of the time points, except those for which no image was taken."""
     node = root.find("SequenceDescription/Timepoints")
     if node is None:
         return ()
@@ -132,7 +133,7 @@ def _times(
 
 
 def container_of(path: str) -> str | None:
-    """Return the path of the container that an XML names, as it stands there; None: none."""
+    """Return the path of the container as an XML states it; None: it states none."""
     file = Path(path)
     if file.stat().st_size > _MAX_BYTES:
         return None
@@ -143,7 +144,7 @@ def container_of(path: str) -> str | None:
 
 
 def _parsed(text: str) -> ElementTree.Element | None:
-    """Return the root of the XML; None: it is another's, or damaged, or has entities."""
+    """Return the root of BigDataViewer's XML; None: another kind, damaged, or with entities."""
     if "<SpimData" not in text or "<!DOCTYPE" in text or "<!ENTITY" in text:
         return None
     try:
@@ -153,7 +154,7 @@ def _parsed(text: str) -> ElementTree.Element | None:
 
 
 def _size(text: str, unit: str) -> Triple | None:
-    """Return z, y, x in um of a text `x y z` and its unit; None: no lengths."""
+    """Return z, y, x in um from a text `x y z` and its unit; None: they aren't lengths."""
     per = um_per(unit.strip())
     try:
         x, y, z = (float(part) for part in text.split())

@@ -1,4 +1,4 @@
-"""BigDataViewer's XML as a source: the container of HDF5 or N5 that it names is read.
+"""Read BigDataViewer's XML as a source: open the HDF5 or N5 container that it names.
 
 References: https://imagej.net/plugins/bdv/index
 """
@@ -20,8 +20,8 @@ from stereocell.storage.file_states import FileStates
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, first_bytes, is_own, require_own
 
-_CONTAINERS = ("hdf5", "n5")  # formats that an XML may name
-_HEAD_BYTES = 1 << 16  # of an XML, which hold the name of its root
+_CONTAINERS = ("hdf5", "n5")  # formats of the container that an XML may name
+_HEAD_BYTES = 1 << 16  # bytes at the start of an XML that contain the name of its root
 
 
 def _holds(location: Location) -> bool:
@@ -32,7 +32,7 @@ def _holds(location: Location) -> bool:
 def read_image(location: Location, *, series: int = 0) -> Image:
     """Return the image of one view of the container; 0 is the largest.
 
-    Raises SourceError where there is no container in the folder, UsageError for no such view.
+    Raises SourceError if there is no container in the folder, UsageError for a missing view.
     """
     container = _container_of(location)
     if format_of(container.source).name == "n5":
@@ -67,24 +67,24 @@ def _container_of(location: Location) -> Location:
         named = container_of(location.path)
     if named is None:
         raise SourceError(
-            f"{where}: ImageLoader: found no file of HDF5 or N5, expected one beside the XML; name "
+            f"{where}: ImageLoader: found no HDF5 or N5 file, expected one beside the XML; name "
             "the image files themselves, or save them again as HDF5 in BigStitcher"
         )
     path = os.path.join(os.path.dirname(os.path.realpath(location.path)), named)
     field = f"{where}: ImageLoader {named!r:.200}"
     if not is_own(path, [location.folder]):
         raise SourceError(
-            f"{field}: leads to {os.path.realpath(path)}, expected a container in "
-            f"{location.folder} or below (links followed)"
+            f"{field}: leads to {os.path.realpath(path)}, expected a container inside "
+            f"{location.folder} (links are followed)"
         )
     if not os.path.isdir(path):
-        require_own(path, [location.folder], named=field)  # a pipe would block
+        require_own(path, [location.folder], named=field)  # opening a pipe would block
     container = Location.of(path)
     format = format_of(path)
     if os.path.isdir(path) and format.name == "ome-zarr":
         raise SourceError(
-            f"{field}: found OME-Zarr, expected HDF5 (.h5) or N5 (.n5); name an image in it, as "
-            f"{named}/IMAGE, or save it again as HDF5 in BigStitcher"
+            f"{field}: found OME-Zarr, expected HDF5 (.h5) or N5 (.n5); name an image in it, such "
+            f"as {named}/IMAGE, or save it again as HDF5 in BigStitcher"
         )
     if not os.path.exists(path) or format.name not in _CONTAINERS:
         raise SourceError(f"{field}: not found, expected HDF5 (.h5) or N5 beside the XML")

@@ -1,7 +1,7 @@
-"""FreeSurfer's MGH: .mgh, and packed by gzip as .mgz, read with the parts that read NIfTI.
+"""Read FreeSurfer's MGH (.mgh, and .mgz compressed by gzip) with the modules that read NIfTI.
 
-The voxels are big-endian and have no scale; the centre of the volume lies at `Pxyz_c`, in RAS, in
-mm. Behind the voxels stand command lines with names of files and users, which are not read.
+The voxels are big-endian and have no scale. The centre of the volume lies at `Pxyz_c`, in RAS, in
+mm. Command lines with names of files and users follow the voxels; they are not read.
 
 References: https://surfer.nmr.mgh.harvard.edu/fswiki/FsTutorial/MghFormat
 """

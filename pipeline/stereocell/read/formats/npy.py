@@ -1,7 +1,7 @@
-"""NumPy's .npy: one array, of which a window is read at a time.
+"""Read NumPy's .npy: one array, a window at a time.
 
-The file states no axes and no spacing. An array of Fortran order is read as one of C order whose
-axes are reversed.
+The file states no axes and no spacing. An array of Fortran order is read as an array of C order
+with its axes reversed.
 
 References: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
 """
@@ -22,21 +22,22 @@ from stereocell.storage.first_bytes import Mark
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_USUAL = {3: ("z", "y", "x"), 4: ("c", "z", "y", "x")}  # axes by their number
+_USUAL = {3: ("z", "y", "x"), 4: ("c", "z", "y", "x")}  # usual axes by their number
 _REFUSED = {"O": "Python objects", "V": "records", "b": "bool, a mask"}  # by the dtype's kind
 
 
 def _open(location: Location, *, axes: str = "") -> Image:
     """Return the volume of the file. Raises SourceError where it can't be read."""
-    from stereocell.read.file_array import FileArray, notes_on_rest  # it imports nibabel
+    # imported here because it imports nibabel
+    from stereocell.read.file_array import FileArray, notes_on_rest
 
     where, path = location.shown, os.path.realpath(location.path)
-    with one_line(where, "an .npy file that is whole"):
+    with one_line(where, "a complete .npy file"):
         shape, is_fortran, dtype, offset = _header(path)
     if dtype.kind in _REFUSED:
         raise SourceError(
-            f"{where}: dtype: found {_REFUSED[dtype.kind]}, expected integers or floats, as "
-            "`array.astype('uint8')` makes them"
+            f"{where}: dtype: found {_REFUSED[dtype.kind]}, expected integers or floats: convert "
+            "the array, for example with `array.astype('uint8')`"
         )
     usual = _USUAL.get(len(shape))
     stated = [Statement(usual, "as in most arrays of Python", Trust.ASSUMED)] if usual else []
@@ -67,7 +68,7 @@ def _header(path: str) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
         version = np.lib.format.read_magic(file)
         if version == (1, 0):
             header = np.lib.format.read_array_header_1_0(file)
-        else:  # 3.0 differs in the letters of names of fields
+        else:  # version 3.0 differs only in the characters allowed in field names
             header = np.lib.format.read_array_header_2_0(file)
         return *header, file.tell()
 

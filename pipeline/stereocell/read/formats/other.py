@@ -1,7 +1,8 @@
-"""Any other format, through bioio and those of its plugins that are installed beside StereoCell.
+"""Read any other format with bioio and those of its plugins that are installed with StereoCell.
 
-bioio is no dependency: it takes 2 s to import, and most of its plugins need libraries of their own.
-A plugin may open files beside the source, so this runs only for files that no other format takes.
+StereoCell doesn't depend on bioio: importing it takes 2 s, and most of its plugins need further
+libraries. A plugin may open files beside the source, so this module is used only for files that no
+other format recognises.
 
 References: https://bioio-devs.github.io/bioio/
 """
@@ -25,13 +26,13 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_MADE_UP = re.compile(r"Channel:\d+(:\d+)*")  # bioio's name where the file has none
+_MADE_UP = re.compile(r"Channel:\d+(:\d+)*")  # bioio's name for a channel without one
 _GIVEN = "--spacing-um z,y,x replaces it"
 _UNIT = Subject("unit of the voxel size", remedy=_GIVEN)
 
 
 class _DaskArray:
-    """bioio's voxels (t, c, z, y, x); the chunks that a window touches are read."""
+    """bioio's voxels (t, c, z, y, x); only the chunks that a window touches are read."""
 
     def __init__(self, array: Any) -> None:
         self.shape: tuple[int, ...] = tuple(int(n) for n in array.shape)
@@ -44,7 +45,7 @@ class _DaskArray:
 
 
 def can_read(location: Location) -> bool:
-    """Whether bioio is installed, and one of its plugins takes a file on this machine."""
+    """Return whether bioio is installed and one of its plugins reads a file on this machine."""
     if not location.is_local or find_spec("bioio") is None or not os.path.isfile(location.path):
         return False
     from bioio_base.exceptions import UnsupportedFileFormatError
@@ -58,13 +59,13 @@ def can_read(location: Location) -> bool:
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
-    """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
+    """Return one scene; 0 is the largest. Raises SourceError, and UsageError for no such scene."""
     where = location.shown
-    with one_line(where, "a file that a plugin of bioio reads whole"):
+    with one_line(where, "a complete file that a plugin of bioio reads"):
         image = _open(location)
         candidates = _candidates(image)
     index, notes = choose(where, candidates, series)
-    with one_line(where, "a file that a plugin of bioio reads whole"):
+    with one_line(where, "a complete file that a plugin of bioio reads"):
         image.set_scene(index)
         array = VoxelArray(_DaskArray(image.dask_data), tuple(image.dims.order.lower()))
         names = [None if _MADE_UP.fullmatch(name) else name for name in image.channel_names or ()]
@@ -83,7 +84,7 @@ def _sign_notes(image: Any) -> tuple[str, ...]:
     """Return a note for each axis along which the voxel size is negative."""
     sizes = [(axis, getattr(image.physical_pixel_sizes, axis)) for axis in "ZYX"]
     return tuple(
-        f"voxel size along {axis.lower()}: found {size:g} um: its size is taken and the voxels "
+        f"voxel size along {axis.lower()}: found {size:g} um: the sign is ignored and the voxels "
         "stay as stored, so the volume may be mirrored"
         for axis, size in sizes
         if size is not None and size < 0
@@ -92,7 +93,7 @@ def _sign_notes(image: Any) -> tuple[str, ...]:
 
 def list_series(location: Location) -> tuple[str, ...]:
     """Return a line for each scene. Raises SourceError."""
-    with one_line(location.shown, "a file that a plugin of bioio reads whole"):
+    with one_line(location.shown, "a complete file that a plugin of bioio reads"):
         return lines(_candidates(_open(location)))
 
 
@@ -122,8 +123,8 @@ def _candidates(image: Any) -> list[Candidate]:
 def _settle_spacing(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
     """Return the spacing (z, y, x), um, and notes; None: a plugin does not state all three.
 
-    A plugin states each size twice, as `physical_pixel_sizes` and `scale`. The unit stands apart,
-    in `dimension_properties`, where a plugin knows one.
+    A plugin states each size twice, as `physical_pixel_sizes` and `scale`. The unit is separate, in
+    `dimension_properties`, if a plugin knows one.
     """
     found: list[float] = []
     notes: list[str] = []
@@ -153,7 +154,7 @@ def _settle_spacing(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
 
 
 def _part(value: Any, *names: str) -> Any:
-    """Return a part of a part of an object; None: it is absent, as in other versions of bioio."""
+    """Return a nested attribute of an object; None: absent, as in other versions of bioio."""
     for name in names:
         value = getattr(value, name, None)
     return value

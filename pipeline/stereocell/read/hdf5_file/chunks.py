@@ -1,12 +1,12 @@
-"""Whether the index of a chunked HDF5 dataset leads to each of its chunks.
+"""Check that the index of a chunked HDF5 dataset leads to each of its chunks.
 
 Most files have an index of version 1, a B-tree without a checksum. HDF5 reads a chunk that its
-look-up does not find as the fill value, and one at a wrong address as other bytes. So the places,
-addresses and sizes in the index are compared with the dataset's shape, the file's size and each
-other, and each chunk that the index lists is looked up.
+look-up does not find as the fill value, and a chunk at a wrong address as other bytes. So the
+positions, addresses and sizes in the index are compared with the dataset's shape, the file's size
+and each other. Each chunk that the index lists is looked up.
 
-The index is listed once, which takes about 2 us a chunk. A look-up takes 5.5 us, so a chunk is
-looked up as a window first touches it: to read it takes longer.
+Listing the index takes about 2 us per chunk and is done once. A look-up takes 5.5 us, so each chunk
+is looked up when a window first touches it; reading it takes longer than that.
 """
 
 import math
@@ -20,20 +20,22 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 
-_MOST_CHUNKS = 10_000_000  # most that are compared: the list takes about 100 bytes a chunk
-_MOST_PLACES = 1 << 63  # most places for chunks that a number counts
+# chunks; a longer index is not checked, since its list takes about 100 bytes per chunk
+_MOST_CHUNKS = 10_000_000
+_MOST_PLACES = 1 << 63  # positions for chunks; 64-bit numbers can't count more
 
 
 class ChunkIndex:
     """The chunks that the index of a dataset lists.
 
-    Raises SourceError where the index contradicts itself, the shape or the file. An index of more
-    than 10 million chunks, and one of a dataset without chunks, isn't looked at.
+    Raises SourceError where the index contradicts itself, the shape or the file. Datasets without
+    chunks and indexes of more than 10 million chunks are not checked.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
         self._dataset, self._where = dataset, where
-        self._numbers = np.empty(0, np.int64)  # of the listed chunks' places, in order
+        # numbers of the positions of the listed chunks, in rising order
+        self._numbers = np.empty(0, np.int64)
         if dataset.chunks is None or dataset.id.get_num_chunks() > _MOST_CHUNKS:
             return
         pairs = zip(dataset.shape, dataset.chunks, strict=True)
@@ -43,9 +45,9 @@ class ChunkIndex:
         self._is_found = np.zeros(len(self._numbers), bool)
 
     def require_found(self, window: Sequence[slice | int] | None = None) -> None:
-        """Look up the chunks that a window touches, each once; None: all of them.
+        """Look up the chunks that a window touches, each only once; None: all chunks.
 
-        Raises SourceError where HDF5 doesn't find one that the index lists.
+        Raises SourceError where HDF5 doesn't find a chunk that the index lists.
         """
         if not len(self._numbers):
             return
@@ -58,7 +60,7 @@ class ChunkIndex:
         self._is_found[which] = True
 
     def _touched(self, window: Sequence[slice | int]) -> NDArray[Any]:
-        """Return where the listed chunks that a window touches lie in the list."""
+        """Return the indices in the list of the chunks that a window touches."""
         spans = []
         for part, n, size in zip(window, self._dataset.shape, self._dataset.chunks, strict=True):
             start, stop, _ = (part if isinstance(part, slice) else slice(part, part + 1)).indices(n)
@@ -68,7 +70,7 @@ class ChunkIndex:
         return np.asarray(at[self._numbers[at] == wanted])
 
     def _list(self) -> None:
-        """List the chunks by the index, and compare the entries."""
+        """List the chunks of the index, and compare the entries."""
         rank = len(self._dataset.chunks)
         listed = array("Q")
 
@@ -87,8 +89,8 @@ class ChunkIndex:
         numbers = np.ravel_multi_index(tuple(inside.T), self._grid)
         end = int(self._dataset.file.id.get_filesize())
         checks = (
-            (is_placed, "a place off the grid", "one of the shape's"),
-            (_is_first(numbers), "that place twice", "each place once"),
+            (is_placed, "a position off the grid", "a position of the grid"),
+            (_is_first(numbers), "that position twice", "each position once"),
             (_is_apart(starts, sizes, end), _SHARED, "bytes of its own"),
             (_has_size(self._dataset, skipped, sizes), _OTHER_SIZE, "the size of its voxels"),
         )
@@ -104,7 +106,7 @@ class ChunkIndex:
         )
 
 
-_SHARED = "bytes beyond the file or of another chunk"
+_SHARED = "bytes beyond the end of the file or of another chunk"
 _OTHER_SIZE = "an unpacked chunk of another size"
 
 
@@ -132,9 +134,9 @@ def _is_apart(starts: NDArray[Any], sizes: NDArray[Any], end: int) -> NDArray[np
 def _has_size(
     dataset: h5py.Dataset, skipped: NDArray[Any], sizes: NDArray[Any]
 ) -> NDArray[np.bool_]:
-    """Whether chunks that no filter packs have the size of their voxels.
+    """Return whether each chunk that no filter compresses has the size of its voxels.
 
-    skipped  the entries' masks: a bit for each filter that did not pack the chunk
+    skipped  masks of the entries: a bit for each filter that was skipped for the chunk
     """
     filters = dataset.id.get_create_plist().get_nfilters()
     every = np.uint64((1 << filters) - 1)
@@ -143,10 +145,10 @@ def _has_size(
 
 
 def _is_found(dataset: h5py.Dataset, place: tuple[int, ...]) -> bool:
-    """Whether HDF5 finds a chunk by its place. No byte of it is read: the buffer has no room."""
+    """Return whether HDF5 finds a chunk by its position. The buffer is too small to read it."""
     try:
         dataset.id.read_direct_chunk(place, out=bytearray(1))
-    except ValueError:  # too small a buffer: the look-up has told the chunk's size
+    except ValueError:  # the buffer is too small, so the look-up has found the chunk's size
         return True
     except (RuntimeError, OSError):
         return False

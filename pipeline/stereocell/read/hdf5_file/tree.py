@@ -1,12 +1,12 @@
-"""HDF5 files, opened so that a link or an external file can't lead out of the source's folder.
+"""Open HDF5 files so that no link or external file leads out of the source's folder.
 
 HDF5 looks for the file of an external link, of external storage and of a virtual dataset in
-several places, the working folder among them. So links are followed here, one by one; a dataset
-whose voxels lie in other files is refused.
+several places, including the working folder. Therefore this module follows links itself, one by
+one, and refuses a dataset whose voxels lie in other files.
 
-Texts of attributes are read in a child process (texts.py). HDF5's own filters run here.
-Those of hdf5plugin decode in many libraries of C, which trust their input, so they run in a child
-process (windows.py).
+A child process reads variable-length texts of attributes (texts.py). HDF5's own filters run in
+this process. The filters of hdf5plugin decode in many C libraries that trust their input, so they
+run in a child process (windows.py).
 """
 
 import os
@@ -28,19 +28,20 @@ from stereocell.read.hdf5_file.windows import PluginWindows, has_plugins
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
-_MAX_STEPS = 200  # names along a path, links followed
+_MAX_STEPS = 200  # names along a path, including followed links
 _MAX_NODES = 20_000  # groups and datasets that a search visits
-_LISTED = 12  # names in a message
-_NUMBERS = "biuf"  # kinds of dtype
-_CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")  # in HDF5's words
-_FIRST_PLUGIN = 256  # number of a filter; HDF5's own filters have smaller numbers
+_LISTED = 12  # names that a message lists
+_NUMBERS = "biuf"  # kinds of dtype that are numbers
+# HDF5's message for a truncated file
+_CUT = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
+_FIRST_PLUGIN = 256  # filter number; HDF5's own filters have smaller ones
 _EXTRA = 'pip install "stereocell[hdf5]"'
 
 
 class Hdf5Tree:
-    """An open file. Use `close` at the end.
+    """An open file. Call `close` at the end.
 
-    where  the file's name, for messages
+    where  name of the file, for messages
     """
 
     def __init__(self, location: Location, expected: str) -> None:
@@ -54,11 +55,11 @@ class Hdf5Tree:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The paths of the files that are open: the source, and those that links led to."""
+        """The paths of the open files: the source and the files that links led to."""
         return tuple(self._files)
 
     def close(self) -> None:
-        """Close the file, and those that its links led to."""
+        """Close the file and the files that its links led to."""
         self._texts.close()
         self._stack.close()
 
@@ -88,7 +89,7 @@ class Hdf5Tree:
                 beside = sorted(at)[:_LISTED] if isinstance(at, h5py.Group) else []
                 raise SourceError(
                     f"{self.where}: {path!r:.200}: {name!r:.80} not found, expected one of "
-                    f"{', '.join(beside) or 'nothing: it is no group'}"
+                    f"{', '.join(beside) or 'nothing: the path leads through a dataset'}"
                 )
             if isinstance(link, h5py.SoftLink):
                 steps.extendleft(reversed(_steps(link.path)))
@@ -97,18 +98,18 @@ class Hdf5Tree:
                 named = f"{self.where}: link {name!r:.200}"
                 file = os.path.join(os.path.dirname(at.file.filename), link.filename)
                 require_own(file, [self._folder], named=named)
-                with one_line(named, "an HDF5 file that is whole"):
+                with one_line(named, "a complete HDF5 file"):
                     at = self._open(os.path.realpath(file))["/"]
                 steps.extendleft(reversed(_steps(link.path)))
             else:
                 with one_line(f"{self.where}: {path!r:.200}", "a group or a dataset"):
                     at = at[name]
-        raise SourceError(f"{self.where}: {path!r:.200}: links in a circle, expected a dataset")
+        raise SourceError(f"{self.where}: {path!r:.200}: links form a circle, expected a dataset")
 
     def attribute(self, node: h5py.Group | h5py.Dataset, name: str) -> Any:
-        """Return an attribute; text as str, several texts as a tuple of them; None: absent.
+        """Return an attribute: a text as str, several texts as a tuple; None: absent.
 
-        An array of one text, as netCDF's NC_STRING is, and Imaris's arrays of characters are text.
+        An array of one text (netCDF's NC_STRING) or of characters (Imaris) counts as a text.
         """
         value = self._attribute(node, name)
         if isinstance(value, bytes):
@@ -122,7 +123,7 @@ class Hdf5Tree:
         return texts[0] if len(texts) == 1 else texts
 
     def texts(self, node: h5py.Group | h5py.Dataset, name: str) -> tuple[str, ...]:
-        """Return the texts of an attribute, one for each element; none where it is absent."""
+        """Return the texts of an attribute, one for each element; empty: it is absent."""
         value = self._attribute(node, name)
         return () if value is None else _texts(value)
 
@@ -130,20 +131,20 @@ class Hdf5Tree:
         if name not in node.attrs:
             return None
         where = f"{node.file.filename}: attribute {name!r} of {node.name}"
-        with one_line(where, "a readable one"):
+        with one_line(where, "a readable attribute"):
             stored = node.attrs.get_id(name).get_type()
             require_standard(stored, where)
             return self._texts.read(node, name) if lies_in_heap(stored) else node.attrs[name]
 
     def scales(self, dataset: h5py.Dataset) -> list[list[h5py.Dataset]]:
-        """Return the dimension scales of a dataset, a list for each dimension; empty: it has none.
+        """Return the dimension scales of a dataset, one list per dimension; empty: it has none.
 
         Raises SourceError where they can't be read.
         """
         if "DIMENSION_LIST" not in dataset.attrs:
             return []
         where = f"{dataset.file.filename}: dimension scales of {dataset.name}"
-        with one_line(where, "readable ones"):
+        with one_line(where, "readable scales"):
             paths = self._texts.scales(dataset)
         root = dataset.file["/"]
         found = [[self.find(path, start=root) for path in named if path] for named in paths]
@@ -154,13 +155,13 @@ class Hdf5Tree:
         return (dataset for dataset in self._all(start) if is_volume(dataset))
 
     def datasets(self, start: h5py.Group, most: int) -> list[h5py.Dataset]:
-        """Return up to `most` datasets below a group, whatever they hold."""
+        """Return up to `most` datasets below a group, of any content."""
         return list(islice(self._all(start), most))
 
     def _all(self, start: h5py.Group) -> Iterator[h5py.Dataset]:
         """Yield the datasets below a group, by name.
 
-        Links are not followed: what they lead to is in the file under its own name, or elsewhere.
+        Links are not followed: their targets are found under their own names, or lie elsewhere.
         """
         waiting: deque[h5py.Group] = deque([start])
         seen = {hash(start.id)}
@@ -180,7 +181,7 @@ class Hdf5Tree:
 
 
 def is_volume(dataset: h5py.Dataset) -> bool:
-    """Whether a dataset holds numbers along three axes longer than 1."""
+    """Return whether a dataset holds numbers along at least three axes longer than 1."""
     return dataset.dtype.kind in _NUMBERS and sum(n > 1 for n in dataset.shape or ()) >= 3
 
 
@@ -196,10 +197,10 @@ def _steps(path: str) -> list[str]:
 
 
 class Hdf5Array:
-    """A dataset's voxels, read by h5py a window at a time.
+    """A dataset's voxels; h5py reads one window at a time.
 
-    Raises SourceError where they lie in other files, are of no standard type, or are packed by a
-    filter that isn't there. Windows raise it where the index of the chunks is damaged.
+    Raises SourceError where the voxels lie in other files, have no standard type, or need a filter
+    that is not installed. Reading a window raises it where the index of the chunks is damaged.
     """
 
     def __init__(self, dataset: h5py.Dataset, where: str) -> None:
@@ -224,19 +225,19 @@ class Hdf5Array:
 
 
 def require_readable(dataset: h5py.Dataset, where: str) -> bool:
-    """Return whether a dataset's voxels are packed by a plugin filter, not by one of HDF5 itself.
+    """Return whether a plugin filter, not one of HDF5's own, compresses a dataset's voxels.
 
-    Raises SourceError where they can't be read from its own file, or are of no standard type.
+    Raises SourceError where they can't be read from the file itself, or have no standard type.
     """
     is_plugin = False
     if dataset.external or dataset.is_virtual:
         raise SourceError(
-            f"{where}: its voxels lie in other files (external or virtual storage), expected them "
-            "in the file itself: copy the dataset by h5repack or h5py"
+            f"{where}: the voxels lie in other files (external or virtual storage), expected them "
+            "in the file itself: copy the dataset with h5repack or h5py"
         )
     creation = dataset.id.get_create_plist()
     filters = {creation.get_filter(index)[0] for index in range(creation.get_nfilters())}
-    if h5py.h5z.FILTER_NBIT not in filters:  # that filter packs numbers of any width
+    if h5py.h5z.FILTER_NBIT not in filters:  # the NBIT filter packs numbers of any width
         require_standard(dataset.id.get_type(), where)
     for index in range(creation.get_nfilters()):
         code, _, _, name = creation.get_filter(index)

@@ -1,8 +1,8 @@
 """Check that HDF5's description of a number is that of a standard type.
 
 HDF5 describes a number by its bits: the places of sign, exponent and mantissa, the exponent's bias,
-the bits in use. In most files no checksum protects the description, and HDF5 converts by any
-description without an error.
+and the bits in use. In most files no checksum protects the description, and HDF5 silently converts
+numbers by any description.
 """
 
 import h5py
@@ -19,7 +19,7 @@ def require_standard(stored: h5py.h5t.TypeID, where: str) -> None:
     standard = h5py.h5t.py_create(stored.dtype)
     if not stored.equal(standard):
         raise SourceError(
-            f"{where}: found a number of {8 * stored.get_size()} bits that its description "
-            "divides in another way than a standard type, expected an IEEE float or an integer "
-            "of all bits: the file is damaged: copy it again, or convert it by h5py"
+            f"{where}: found {8 * stored.get_size()}-bit numbers whose bits are not laid out as in "
+            "a standard type, expected IEEE floats or integers that use all bits: the file is "
+            "damaged: copy it again, or convert it with h5py"
         )

@@ -1,4 +1,4 @@
-"""Windows of HDF5 datasets whose filters come from hdf5plugin, read in a child process."""
+"""Read windows of HDF5 datasets that need filters of hdf5plugin in a child process."""
 
 from threading import Lock
 from typing import Any
@@ -14,14 +14,14 @@ _lock = Lock()
 
 
 class PluginWindows:
-    """A dataset's voxels. The child starts at the first window, and ends with its last user."""
+    """A dataset's voxels. The first window starts the child; it ends with the file's last user."""
 
     def __init__(self, dataset: h5py.Dataset) -> None:
         self._path, self._name = str(dataset.file.filename), str(dataset.name)
         self._child: Child | None = None
 
     def __getitem__(self, key: Any) -> Any:
-        """Return voxels. Raises h5py's errors, ChildError."""
+        """Return voxels. Raises h5py's errors and ChildError."""
         with _lock:
             self._child = self._child or _children.get(self._path) or Child(_OpenFile, self._path)
             _children[self._path] = self._child
@@ -29,7 +29,7 @@ class PluginWindows:
 
 
 class _OpenFile:
-    """An open HDF5 file."""
+    """An open HDF5 file in the child process."""
 
     def __init__(self, path: str) -> None:
         has_plugins()
@@ -41,7 +41,7 @@ class _OpenFile:
 
 
 def has_plugins() -> bool:
-    """Register the filters of hdf5plugin; False: it isn't installed."""
+    """Register the filters of hdf5plugin. Returns False if it isn't installed."""
     try:
         import hdf5plugin  # noqa: F401
     except ImportError:

@@ -1,4 +1,4 @@
-"""Tables with a row an object: CSV, TSV, Parquet, and AnnData's in Zarr and HDF5 (.h5ad)."""
+"""Tables with one row per object: CSV, TSV, Parquet, and AnnData in Zarr and HDF5 (.h5ad)."""
 
 import os
 
@@ -15,7 +15,7 @@ from stereocell.storage.library_errors import library_boundary
 from stereocell.storage.location import Location, first_bytes
 
 _TEXTS = (".csv", ".tsv", ".txt")
-_UTF16 = (b"\xff\xfe", b"\xfe\xff")  # which begin a text of Excel
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of texts saved by Excel
 
 __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
 
@@ -23,17 +23,17 @@ __all__ = ["KEYS", "Table", "TableColumn", "read_table"]
 def read_table(place: str, key: str, wanted: tuple[str, ...], labels: str) -> Table:
     """Return a table: its key and its columns, in the file's order.
 
-    place   a file, or a Zarr group of a table
-    key     the column of the objects' numbers; empty: the first of KEYS that is there
+    place   a file, or a Zarr group that holds a table
+    key     column of the objects' numbers; empty: the first of KEYS that the table has
     wanted  names of columns; empty: all but the key
-    labels  the name of the label map, of a table that belongs to several
+    labels  name of the label map, for a table that describes several
 
-    Raises SourceError where the table can't be read, changes meanwhile or lacks a column.
+    Raises SourceError where the table can't be read, changes while it is read, or lacks a column.
     """
     location = Location.of(place)
     with (
         unchanged_while_read(location, "run the same command again"),
-        library_boundary(location.shown, "a table that is whole"),
+        library_boundary(location.shown, "a complete table"),
     ):
         return _read(location, key, wanted, labels)
 
@@ -45,10 +45,10 @@ def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) ->
     if name.endswith(_TEXTS):
         return read_delimited(location, key, wanted)
     if name.endswith((".parquet", ".h5ad")) and not location.is_local:
-        raise SourceError(f"{location.shown}: is not on this machine, expected a file that is")
+        raise SourceError(f"{location.shown}: found an address, expected a file on this machine")
     if name.endswith(".parquet"):
         return read_parquet(location, key, wanted)
-    # h5py is slow to import: every command and worker would wait for it
+    # h5py is slow to import, and every command and worker would pay for it.
     from stereocell.read.tables.stores import read_anndata_zarr, read_h5ad
 
     if name.endswith(".h5ad"):
@@ -64,12 +64,13 @@ def _read(location: Location, key: str, wanted: tuple[str, ...], labels: str) ->
 
 
 def _require_sound(location: Location, name: str) -> None:
-    """Raise SourceError for a folder, for a pipe or a device, which may never end, and for a file
-    that is of another kind than its name says.
+    """Refuse folders, files of another kind than their name says, and pipes or devices.
+
+    A pipe or device may never end. Raises SourceError.
     """
     path = os.path.realpath(location.source)
     if os.path.exists(path) and not os.path.isfile(path):
-        raise SourceError(f"{location.shown}: is no regular file, expected a table")
+        raise SourceError(f"{location.shown}: found no regular file, expected a table")
     head = first_bytes(path)
     if words := pointer_words(head):
         raise SourceError(f"{location.shown}: found {words}, expected a table")

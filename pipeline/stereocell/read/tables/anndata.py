@@ -1,7 +1,7 @@
-"""AnnData's tables in Zarr and HDF5 (.h5ad): `obs`, and `X` by the names of `var`.
+"""Read AnnData tables in Zarr and HDF5 (.h5ad): `obs`, and the columns of `X` named by `var`.
 
-A SpatialData store holds them below `tables/`. Its own library would bring 60 others; zarr and h5py
-alone are enough. X is read a block at a time: of ten thousand genes 128 are taken.
+A SpatialData store holds such tables below `tables/`. Its own library would bring 60 others, so
+zarr and h5py are used directly. X is read a block at a time: of ten thousand genes 128 are taken.
 
 References
 AnnData's on-disk format, https://anndata.readthedocs.io/en/latest/fileformat-prose.html
@@ -28,39 +28,42 @@ from stereocell.read.tables.table import (
     named,
 )
 
-_ATTRIBUTES = "spatialdata_attrs"  # key in `uns`: the label map that the rows belong to
+_ATTRIBUTES = "spatialdata_attrs"  # key in `uns` that names the label map of the rows
 _BLOCK = 1 << 22  # values of X that are read at a time
-_MAX_VALUES = 1 << 28  # most values of X that are read
+_MAX_VALUES = 1 << 28  # values of X that are read in all
 
 
 class Node(Protocol):
     """A group or an array of a store.
 
-    shape  of an array; None: a group
+    shape  shape of an array; None: a group
     """
 
     @property
     def shape(self) -> tuple[int, ...] | None: ...
 
     def attribute(self, name: str) -> Any:
-        """Return an attribute, text as str; None: there is none."""
+        """Return an attribute, text as str; None: there is no such attribute."""
 
     def find(self, name: str) -> Self | None:
-        """Return a member of a group; None: there is none."""
+        """Return a member of a group; None: there is no such member."""
 
     def read(self, key: Any) -> NDArray[Any]:
-        """Return a part of an array, texts as objects."""
+        """Return a part of an array; texts have dtype object."""
 
 
 def read_anndata(root: Node, where: str, key: str, wanted: tuple[str, ...], labels: str) -> Table:
-    """Return a table of AnnData; of several label maps' rows those of one. Raises SourceError."""
+    """Return an AnnData table; of rows for several label maps, only the rows for `labels`.
+
+    Raises SourceError.
+    """
     obs = root.find("obs")
     if obs is None or obs.shape is not None:
         raise SourceError(f"{where}: found no group `obs`, expected a table of AnnData")
     if obs.find("__categories") is not None:
         raise SourceError(
-            f"{where}: obs: found categories as AnnData before 0.8 wrote them, expected a file of "
-            "a newer one: read and write it again there"
+            f"{where}: obs: found categories in the form before AnnData 0.8, expected a newer "
+            "file: read it and write it again with a newer AnnData"
         )
     order = obs.attribute("column-order")
     if order is None or len(order) > MAX_NAMES:
@@ -81,7 +84,9 @@ def read_anndata(root: Node, where: str, key: str, wanted: tuple[str, ...], labe
         kept = np.array([str(region) == labels for region in regions], bool)
         if not kept.any():
             found = ", ".join(sorted({clean(str(region))[:40] for region in regions})[:8])
-            raise SourceError(f"{where}: rows of {found or 'nothing'}, expected some of {labels}")
+            raise SourceError(
+                f"{where}: found rows for {found or 'no label map'}, expected some for {labels}"
+            )
     matrix = root.find("X")
     genes = [] if matrix is None else named(_index(_found(root, "var"), where))
     own = [name for name in names if name not in (chosen, region_key)]
@@ -117,7 +122,7 @@ def _found(group: Node, name: str) -> Node:
 
 
 def _about(root: Node) -> dict[str, str]:
-    """Return which label map a table says it belongs to: `region_key`, `instance_key`."""
+    """Return the columns that link rows to label maps: `region_key` and `instance_key`."""
     uns = root.find("uns")
     held = uns.find(_ATTRIBUTES) if uns is not None and uns.shape is None else None
     found = {}
@@ -134,7 +139,7 @@ def _index(frame: Node, where: str) -> list[str]:
 
 
 def _series(node: Node, where: str) -> list[Any]:
-    """Return the values of one column; None: missing."""
+    """Return the values of one column; None: a missing value."""
     kind = str(node.attribute("encoding-type") or "")
     if kind == "categorical":
         categories = _series(_found(node, "categories"), where)
@@ -183,12 +188,12 @@ def _columns_of(
     if rows * len(places) > _MAX_VALUES:
         raise SourceError(
             f"{where}: X: found {rows} rows by {len(places)} columns, expected at most "
-            f"{_MAX_VALUES} values: name those you want by --columns"
+            f"{_MAX_VALUES} values: choose columns with --columns"
         )
     stated = matrix.shape if matrix.shape is not None else matrix.attribute("shape")
     if stated is None or tuple(stated) != size:
         found = "no shape" if stated is None else f"{_by(stated)} values"
-        raise SourceError(f"{where}: X: found {found}, expected {_by(size)} by obs and var")
+        raise SourceError(f"{where}: X: found {found}, expected {_by(size)}, the sizes of obs, var")
     made = np.zeros((rows, len(places)))
     if matrix.shape is not None:
         step = max(1, _BLOCK // max(genes, 1))
@@ -211,18 +216,20 @@ def _fill(
     *,
     by_row: bool,
 ) -> None:
-    """Put a sparse matrix's values of some columns in their places.
+    """Copy a sparse matrix's values for some columns to their places in a dense array.
 
-    by_row  whether `indptr` counts rows (CSR), and `indices` are columns, or the other way round
+    by_row  True for CSR: `indptr` counts rows and `indices` are columns; False for CSC: the reverse
     """
     data, indices, pointer = (_found(matrix, name) for name in ("data", "indices", "indptr"))
     lines = len(made) if by_row else genes
     if pointer.shape != (lines + 1,) or data.shape is None or data.shape != indices.shape:
-        raise SourceError(f"{where}: X: parts of other lengths, expected those of a sparse matrix")
+        raise SourceError(
+            f"{where}: X: found parts of unequal lengths, expected those of a sparse matrix"
+        )
     begins = np.asarray(pointer.read(...), np.int64)
     count = data.shape[0]
     if begins[0] != 0 or begins[-1] != count or (np.diff(begins) < 0).any():
-        raise SourceError(f"{where}: X/indptr: found no rising numbers from 0 to {count}")
+        raise SourceError(f"{where}: X/indptr: expected rising numbers from 0 to {count}")
     column = np.full(genes, -1)
     column[places] = np.arange(len(places))
     for start in range(0, count, _BLOCK):

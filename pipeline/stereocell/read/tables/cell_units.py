@@ -1,4 +1,4 @@
-"""Take the unit that follows the number in each cell of a column, such as `12.5 %`, away."""
+"""Remove the unit that follows the number in each cell of a column, such as `12.5 %`."""
 
 import re
 from collections import Counter
@@ -16,9 +16,9 @@ _SHOWN = 4  # units that a note lists
 
 
 def without_unit(name: str, texts: Sequence[str]) -> tuple[Sequence[str], str]:
-    """Return a column's cells without the unit that follows their numbers, and a note on it.
+    """Return a column's cells without the unit that follows their numbers, and a note.
 
-    Cells with several units of length, or of shares, stay as they are, and the note says so.
+    Cells with several units of length or of shares are not changed, and the note says so.
     """
     if not any(text[:1].isdecimal() and not text[-1:].isdecimal() for text in texts):
         return texts, ""

@@ -1,7 +1,7 @@
-"""Tables of text: CSV and TSV. The csv module parses them.
+"""Read tables of text, CSV and TSV, with the csv module.
 
-pyarrow, an optional dependency, parses faster. It knows no lines before a header, no marks between
-thousands and no words among numbers, so it would leave all the checks here.
+pyarrow, an optional dependency, parses faster. But it handles no lines before a header, no marks
+between thousands and no words among numbers, so all those checks would still be needed here.
 """
 
 import codecs
@@ -26,12 +26,12 @@ from stereocell.read.tables.table import (
 )
 from stereocell.storage.location import Location
 
-_MAX_BYTES = 4 << 30  # most bytes of a table
+_MAX_BYTES = 4 << 30  # bytes of a table
 _LONGEST = 1 << 17  # characters of a cell: the csv module's own limit
-_LONGEST_LINE = 1 << 24  # characters
-_BLOCK = 1 << 20  # bytes
+_LONGEST_LINE = 1 << 24  # characters of a line
+_BLOCK = 1 << 20  # bytes read at a time
 _UTF16 = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
-# bytes of Windows-1252 that units and European names have: ° ± ² ³ µ · and letters but for þ and ÿ
+# bytes of Windows-1252 in units and European names: ° ± ² ³ µ · and all letters except þ and ÿ
 _WESTERN = frozenset((*b"\xb0\xb1\xb2\xb3\xb5\xb7", *range(0xC0, 0xFE)))
 
 
@@ -47,7 +47,7 @@ def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Tab
             return _read(text, where, key, wanted, (note,) if note else ())
     except UnicodeDecodeError as error:
         raise SourceError(
-            f"{where}: found bytes that are no text ({error.reason}), expected UTF-8"
+            f"{where}: found bytes that are not text ({error.reason}), expected UTF-8"
         ) from None
     except csv.Error as error:
         raise SourceError(
@@ -59,7 +59,7 @@ def read_delimited(location: Location, key: str, wanted: tuple[str, ...]) -> Tab
 
 
 def _encoding_of(path: str) -> tuple[str, str]:
-    """Return a text's encoding, and a note if it is assumed."""
+    """Return a text's encoding, and a note if the encoding is assumed."""
     decoder, is_utf8, others = codecs.getincrementaldecoder("utf-8")(), True, set[int]()
     with open(path, "rb") as file:
         head = file.read(4)
@@ -82,7 +82,10 @@ def _encoding_of(path: str) -> tuple[str, str]:
                 is_utf8 = False
     if is_utf8 or not others <= _WESTERN:
         return "utf-8-sig", ""
-    return "cp1252", "the text is no UTF-8: Windows-1252 is assumed, as Western spreadsheets write"
+    return (
+        "cp1252",
+        "the text is not UTF-8: Windows-1252 is assumed, as Western spreadsheets write",
+    )
 
 
 def _read(
@@ -92,7 +95,7 @@ def _read(
     first = list(islice(lines, SEARCHED_LINES))
     header = find_header(first, key)
     if not any(name.strip() for name in header.names):
-        raise SourceError(f"{where}: found no header, expected names of columns in the first line")
+        raise SourceError(f"{where}: found no header, expected column names in the first line")
     if len(header.names) > MAX_NAMES:
         raise SourceError(
             f"{where}: found {len(header.names)} columns, expected at most {MAX_NAMES}"
@@ -107,7 +110,7 @@ def _read(
         for held, place in zip(cells, places, strict=True):
             held.append(row[place])
     labels = keys_of(where, chosen_key, _as_keys(cells[0], header.separator), _hint(header, key))
-    # a mark at the end of each line makes a column without a name and without values
+    # A separator at the end of each line adds a column without a name and without values.
     held_cells = {
         name: texts
         for name, place, texts in zip(taken, places[1:], cells[1:], strict=True)
@@ -119,21 +122,21 @@ def _read(
 
 
 def _as_keys(texts: Sequence[str], separator: str) -> Sequence[str]:
-    """Return objects' numbers with a decimal point: programs write whole ones as `1,0` too."""
+    """Return objects' numbers with a decimal point: some programs write whole ones as `1,0`."""
     if any(COMMA in text for text in texts) and decimal_mark(texts, separator) == COMMA:
         return [text.replace(COMMA, ".") for text in texts]
     return texts
 
 
 def _hint(header: Header, key: str) -> str:
-    """Return the way out where the key's column holds no numbers and the first has no name."""
+    """Return the remedy if the key's column holds no numbers and the first one has no name."""
     if key or header.names[0].strip():
         return ""
     return "; --table-key 'column 1' takes the first column, which has no name"
 
 
 def _lines(text: io.TextIOWrapper, where: str) -> Iterator[str]:
-    """Yield the lines of a text, none of which is read where it has no end."""
+    """Yield the lines of a text. Raises SourceError for a line that is too long."""
     while line := text.readline(_LONGEST_LINE):
         if len(line) == _LONGEST_LINE:
             raise SourceError(
@@ -144,19 +147,19 @@ def _lines(text: io.TextIOWrapper, where: str) -> Iterator[str]:
 
 
 def _rows(lines: Iterator[str], header: Header, where: str) -> Iterator[list[str]]:
-    """Yield the rows below the header that hold anything, as wide as the header."""
+    """Yield the rows below the header that hold anything, each as wide as the header."""
     width = len(header.names)
     required = max(place for place, name in enumerate(header.names, start=1) if name.strip())
     reader = csv.reader(lines, delimiter=header.separator)
     next(reader)
     for count, row in enumerate(reader):
         if count > MAX_ROWS:
-            raise SourceError(f"{where}: found more than {MAX_ROWS} rows, expected at most those")
+            raise SourceError(f"{where}: found more than {MAX_ROWS} rows, expected at most that")
         if not any(row):
             continue
         if len(row) < required or any(row[width:]):
             raise SourceError(
                 f"{where}: line {header.skipped + reader.line_num}: found {len(row)} cells, "
-                f"expected {width} as the header"
+                f"expected {width}, as in the header"
             )
         yield (row + [""] * width)[:width]

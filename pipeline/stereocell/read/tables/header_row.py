@@ -1,8 +1,8 @@
-"""Find the header of a table of text: the mark between its cells, and the line of its names.
+"""Find the header of a text table: the separator between its cells, and the line of column names.
 
-Programs write lines before the header: a title and a rule (Imaris), the names of groups of columns
-(CellProfiler), `sep=;` (spreadsheets), comments. The header is the first line that has a column of
-objects' numbers, if nothing before it looks like a row of the table.
+Programs write lines before the header: a title and a rule (Imaris), names of groups of columns
+(CellProfiler), `sep=;` (spreadsheets), or comments. The header is the first line that names a
+column of objects' numbers, if no line before it looks like a row of the table.
 """
 
 import csv
@@ -14,17 +14,17 @@ from stereocell.read.tables.table import KEYS, clean
 
 SEPARATORS = "\t,;|"
 SEARCHED_LINES = 64  # first lines of a table that are searched for the header
-_STATED = re.compile(r"\s*\"?sep=(.)\"?\s*")  # a line that spreadsheets write and read
+_STATED = re.compile(r"\s*\"?sep=(.)\"?\s*")  # line by which spreadsheets state the separator
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
     """The header of a table.
 
-    separator  the mark between cells
-    skipped    lines before the header
-    names      of the columns; empty: a column has none
-    note       on the lines before the header; empty: there are none
+    separator  mark between cells
+    skipped    number of lines before the header
+    names      names of the columns; empty text: a column without a name
+    note       note on the lines before the header; empty: there are none
     """
 
     separator: str
@@ -36,7 +36,7 @@ class Header:
 def find_header(lines: Sequence[str], key: str) -> Header:
     """Return the header in the first lines of a table; its names are empty if there is none.
 
-    key  the name of the column of the objects' numbers; empty: one of KEYS
+    key  name of the column of the objects' numbers; empty: any of KEYS
     """
     given = _STATED.fullmatch(lines[0]) if lines else None
     stated = given[1] if given else ""
@@ -58,7 +58,7 @@ def find_header(lines: Sequence[str], key: str) -> Header:
 def _with_key(
     lines: Sequence[str], separator: str, wanted: set[str], *, is_exact: bool
 ) -> Header | None:
-    """Return the header if one line, split at this mark, names the objects' numbers."""
+    """Return the header if a line, split at this separator, names a column of objects' numbers."""
     reader = csv.reader(lines, delimiter=separator)
     before: list[list[str]] = []
     start = 0
@@ -72,7 +72,7 @@ def _with_key(
             )
             if not (is_plain and is_first):
                 return None
-            own = _told_apart(names, before[-1] if before else [])
+            own = _with_group_names(names, before[-1] if before else [])
             note = _note(lines[:start])
             return Header(separator, start, tuple(own), note)
         before.append(row)
@@ -81,7 +81,7 @@ def _with_key(
 
 
 def _note(before: Sequence[str]) -> str:
-    """Return the note on lines before a header; it quotes none, as they may name a person."""
+    """Return the note on lines before a header. It quotes none, since they may name a person."""
     if not any(line.strip() and not _STATED.fullmatch(line) for line in before):
         return ""
     count = len(before)
@@ -90,15 +90,15 @@ def _note(before: Sequence[str]) -> str:
 
 
 def _next(reader: Iterator[list[str]]) -> list[str] | None:
-    """Return the next row; None: there is none, or none that can be read."""
+    """Return the next row; None: there is no further row, or it can't be parsed."""
     try:
         return next(reader, None)
     except csv.Error:
         return None
 
 
-def _told_apart(names: list[str], groups: Sequence[str]) -> list[str]:
-    """Return names, those that occur twice with the name of their group of columns before them."""
+def _with_group_names(names: list[str], groups: Sequence[str]) -> list[str]:
+    """Return the names; repeated ones are preceded by the name of their group of columns."""
     if len(groups) != len(names):
         return names
     return [

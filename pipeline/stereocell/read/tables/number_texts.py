@@ -1,9 +1,9 @@
 """Read cells of text as numbers, in the convention of the program that wrote the table.
 
-A table has one decimal mark, a point or a comma. The other one may stand between groups of three
-digits, as spaces and apostrophes may. `1.234` and `1,234` fit both conventions, so other cells of
-the column decide, then other columns, then the mark between cells. A column holds numbers if nearly
-all of its cells do: a few words among them are missing values, and are quoted in a note.
+A table has one decimal mark, a point or a comma. The other mark may separate groups of three
+digits, and so may spaces and apostrophes. `1.234` and `1,234` fit both conventions, so other cells
+of the column decide, then other columns, then the separator between cells. A column holds numbers
+if nearly all its cells do. A few words among them count as missing values and are quoted in a note.
 """
 
 import re
@@ -20,12 +20,13 @@ from stereocell.read.tables.cell_units import without_unit
 from stereocell.read.tables.table import MISSING, TableColumn, word_of
 
 POINT, COMMA = ".", ","
-_SEMICOLON = ";"  # separates cells where a comma is the decimal mark
+_SEMICOLON = ";"  # separates cells in tables with a decimal comma
 _MOST_WORDS = 5  # different words that may stand among numbers; error values don't count
-_MOST_SHARE = 0.25  # of the cells with something in them, that may be such words
-_MOST_SHARE_OF_FRACTIONS = 0.5  # the same where a number has a fraction: categories have none
-_MIXED = 0.25  # share of numbers in a column of texts from which on a note counts them
-_SHOWN = 4  # words, or columns, that a note lists
+_MOST_SHARE = 0.25  # share of the filled cells that may be such words
+# the same share if some numbers have fractions, since categories have none
+_MOST_SHARE_OF_FRACTIONS = 0.5
+_MIXED = 0.25  # share of numbers in a column of texts above which a note counts them
+_SHOWN = 4  # words or columns that a note lists
 _EXPONENT = r"([eE][+-]?[0-9]+)?"
 _PLAIN = {
     mark: re.compile(rf"[+-]?([0-9]+{re.escape(mark)}?[0-9]*|{re.escape(mark)}[0-9]+){_EXPONENT}")
@@ -37,10 +38,10 @@ _GROUPED = {
     )
     for mark, other in ((POINT, COMMA), (COMMA, POINT))
 }
-_EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a number by both conventions
+_EITHER = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")  # a number in both conventions
 _SPACES = "\u00a0\u2009\u202f '\u2019"
 _SPACED = re.compile(rf"(?<=[0-9])[{_SPACES}](?=[0-9]{{3}}(?![0-9]))")
-# words of spreadsheets and measuring programs that stand for no number, in small letters
+# words of spreadsheets and measuring programs that are not numbers, in lower case
 _NO_NUMBER = re.compile(
     r"#.*|[-+]?1\.#.*|-+|\.+|\?+|[\u2013\u2014]|[+-]?inf(inity)?|[+-]nan|n\.?d\.?"
 )
@@ -57,10 +58,10 @@ class Reading:
 
 
 def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
-    """Return columns of text as numbers where they are numbers.
+    """Return columns of text, converted to numbers where they hold numbers.
 
-    named      the cells of each column
-    separator  the mark between cells
+    named      cells of each column, by name
+    separator  mark between cells
     """
     columns, missing, notes, grouped = [], {}, [], ""
     bare = {name: without_unit(name, texts) for name, texts in named.items()}
@@ -83,7 +84,7 @@ def read_columns(named: Mapping[str, Sequence[str]], separator: str) -> Reading:
 
 
 def read_stored_texts(named: Mapping[str, Sequence[str]]) -> Reading:
-    """Return columns that a file with types of its own stores as texts, numbers where they are."""
+    """Return text columns of a typed file, converted to numbers where they hold numbers."""
     reading = read_columns(named, "")
     holds = [
         column.numbers is not None and bool(np.isfinite(column.numbers).any())
@@ -102,12 +103,12 @@ def read_stored_texts(named: Mapping[str, Sequence[str]]) -> Reading:
 
 
 def decimal_mark(texts: Sequence[str], separator: str) -> str:
-    """Return the mark before the fractions of one column."""
+    """Return the decimal mark of one column."""
     return _conventions({"": texts}, separator)[""][0]
 
 
 def _conventions(named: Mapping[str, Sequence[str]], separator: str) -> dict[str, tuple[str, str]]:
-    """Return each column's decimal mark, and a note where another one would fit its cells too."""
+    """Return each column's decimal mark, and a note if the other mark would fit as well."""
     has_comma = any(COMMA in "\n".join(texts) for texts in named.values())
     if not has_comma and separator != _SEMICOLON:
         return dict.fromkeys(named, (POINT, ""))
@@ -116,15 +117,15 @@ def _conventions(named: Mapping[str, Sequence[str]], separator: str) -> dict[str
     conventions = {}
     for name, (marks, example) in found.items():
         mark = next(iter(marks)) if marks else ""
-        note, is_doubtful = "", False
+        note, is_uncertain = "", False
         if not mark and of_table and example:
             mark = of_table.most_common(1)[0][0]
             reason = "as in other columns of the table"
         elif not mark and example:
             mark = POINT if separator == COMMA or POINT in example else COMMA
-            reason = "as no other cell tells them apart"
-            is_doubtful = separator == _SEMICOLON or mark not in example
-        if not marks and example and (is_doubtful or mark not in example):
+            reason = "since no other cell distinguishes them"
+            is_uncertain = separator == _SEMICOLON or mark not in example
+        if not marks and example and (is_uncertain or mark not in example):
             note = _ambiguous(name, example, mark, reason)
         conventions[name] = mark or POINT, note
     return conventions
@@ -156,7 +157,7 @@ def _ambiguous(name: str, example: str, mark: str, reason: str) -> str:
 
 
 def _grouped_note(texts: Sequence[str], mark: str) -> str:
-    """Return the note on marks between thousands in a column of numbers; empty: it has none."""
+    """Return a note on marks between thousands in a column of numbers; empty: there are none."""
     joined = "\n".join(texts)
     if not any(one in joined for one in (*_SPACES, COMMA if mark == POINT else POINT)):
         return ""
@@ -169,7 +170,7 @@ def _grouped_note(texts: Sequence[str], mark: str) -> str:
 
 
 def _numbers(texts: Sequence[str], mark: str) -> tuple[NDArray[np.float64], Counter[str]]:
-    """Return numbers, NaN where there is none, and the cells without one, as they are written."""
+    """Return the numbers, NaN for cells without one, and counts of those cells' texts."""
     numbers = np.full(len(texts), np.nan)
     words: Counter[str] = Counter()
     for row, text in enumerate(texts):
@@ -182,9 +183,9 @@ def _numbers(texts: Sequence[str], mark: str) -> tuple[NDArray[np.float64], Coun
 
 
 def _value(text: str, mark: str) -> float:
-    """Return a cell's number; NaN: it holds none."""
+    """Return a cell's number; NaN: it holds no number."""
     try:
-        if mark == POINT and "_" not in text:  # float also takes an underscore between digits
+        if mark == POINT and "_" not in text:  # float also accepts underscores between digits
             return float(text)
     except ValueError:
         pass
@@ -195,9 +196,9 @@ def _value(text: str, mark: str) -> float:
 
 
 def _plain(text: str, mark: str) -> str:
-    """Return a number's text with a decimal point and nothing between thousands.
+    """Return a number's text with a decimal point and without marks between thousands.
 
-    Raises ValueError where it is no number.
+    Raises ValueError where it is not a number.
     """
     text = _SPACED.sub("", text.strip().replace("\u2212", "-"))
     if _GROUPED[mark].fullmatch(text):
@@ -208,7 +209,7 @@ def _plain(text: str, mark: str) -> str:
 
 
 def _are_numbers(numbers: NDArray[np.float64], words: Counter[str]) -> bool:
-    """Return whether a column holds numbers, with missing ones among them."""
+    """Return whether a column holds numbers, perhaps with missing values among them."""
     others = {word: times for word, times in words.items() if not _means_missing(word)}
     if not others:
         has_errors = any(word.lower() not in MISSING for word in words)
@@ -221,7 +222,7 @@ def _are_numbers(numbers: NDArray[np.float64], words: Counter[str]) -> bool:
 
 
 def _marker_notes(name: str, numbers: NDArray[np.float64]) -> Iterator[str]:
-    """Yield a note on a number that stands for missing values in many files."""
+    """Yield a note on a number that means a missing value in many files."""
     finite = numbers[np.isfinite(numbers)]
     for marker in _MARKERS:
         count = int((finite == marker).sum())
@@ -234,14 +235,14 @@ def _marker_notes(name: str, numbers: NDArray[np.float64]) -> Iterator[str]:
 
 
 def _mixed_notes(name: str, numbers: NDArray[np.float64], words: Counter[str]) -> Iterator[str]:
-    """Yield a note on a column of texts with many numbers among its cells."""
+    """Yield a note on a column of texts if many of its cells are numbers."""
     filled = len(numbers) - sum(words[word] for word in words if word.lower() in MISSING)
     count = int(np.isfinite(numbers).sum())
     if count and count >= _MIXED * filled:
         word = next(word for word, _ in words.most_common() if word.lower() not in MISSING)
         yield (
-            f"column {name!r:.60}: {count:,} of {filled:,} cells are numbers, others are words, as "
-            f"{word!r:.40}: read as texts"
+            f"column {name!r:.60}: {count:,} of {filled:,} cells are numbers, others are words "
+            f"such as {word!r:.40}: read as texts"
         )
 
 
@@ -251,7 +252,7 @@ def _means_missing(word: str) -> bool:
 
 
 def _missing_notes(missing: Mapping[str, Counter[str]]) -> Iterator[str]:
-    """Yield one note on all cells among numbers that hold none."""
+    """Yield one note on all cells without a number in columns of numbers."""
     found = {name: words for name, words in missing.items() if words}
     if not found:
         return
@@ -267,4 +268,4 @@ def _missing_notes(missing: Mapping[str, Counter[str]]) -> Iterator[str]:
     parts += [f"and {more} more columns"] * bool(more)
     total = sum(words.total() for words in found.values())
     noun = "cells" if total > 1 else "cell"
-    yield f"{total:,} {noun} in columns of numbers taken for missing values: {'; '.join(parts)}"
+    yield f"{total:,} {noun} in columns of numbers read as missing values: {'; '.join(parts)}"

@@ -1,7 +1,7 @@
-"""Tables in Parquet, by pyarrow (Apache-2.0; the extra `tables`): columns of numbers and texts.
+"""Read Parquet tables with pyarrow (Apache-2.0; the extra `tables`): numbers and texts.
 
 The sizes that a file states are checked before it is read. It is read a batch of rows at a time,
-and only the columns that are taken.
+and only the chosen columns are read.
 
 libarrow aborts its process on some damaged files, so the reader runs in a child process
 (storage/child_process.py).
@@ -33,11 +33,11 @@ from stereocell.storage.child_process import Bounds, run_in_child
 from stereocell.storage.library_errors import DamagedError, damage_words, one_line
 from stereocell.storage.location import Location
 
-_EXPECTED = "a Parquet file that is whole"
-_BATCH = 1 << 16  # rows
-_MOST_S = 600.0  # s, longest time for a table; 10 million rows take less than a tenth of it
-_MAX_BYTES = 1 << 28  # most bytes of a column in a group of rows
-_INDEX = "__index_level_"  # how pandas calls an index without a name
+_EXPECTED = "a complete Parquet file"
+_BATCH = 1 << 16  # rows read at a time
+_MOST_S = 600.0  # s; time limit for a table. 10 million rows take less than a tenth of it
+_MAX_BYTES = 1 << 28  # bytes of a column in a group of rows
+_INDEX = "__index_level_"  # pandas' name for an index without a name
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class _Request:
 
 
 def read_parquet(location: Location, key: str, wanted: tuple[str, ...]) -> Table:
-    """Return a table of Parquet. Raises SourceError."""
+    """Return a Parquet table. Raises SourceError."""
     where = location.shown
     extras.require_installed("pyarrow", "tables", where, "Parquet")
     request = _Request(where, key, wanted, _MAX_BYTES)
@@ -67,11 +67,11 @@ def _read_file(path: str, request: _Request) -> Table:
         try:
             return _read(parquet, source, request)
         except (import_module("pyarrow").ArrowException, OSError) as error:
-            # names of Arrow's own classes follow
-            said = ValueError(str(error).partition(":")[0])
+            # The rest of the message names Arrow's own classes.
+            short = ValueError(str(error).partition(":")[0])
             if isinstance(error, NotImplementedError):
-                raise said from error
-            raise DamagedError(damage_words(said)) from error
+                raise short from error
+            raise DamagedError(damage_words(short)) from error
 
 
 def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
@@ -96,7 +96,7 @@ def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
             )
     taken, left_out = choose_columns(where, names, chosen, wanted)
     _require_small(stated, request, {chosen, *taken})
-    # a text that stands in many rows stays one
+    # Dictionary-encoded, a text that many rows share is stored only once.
     texts = [name for name in (chosen, *taken) if kinds[name] == _TEXT]
     file = parquet.ParquetFile(
         source, metadata=stated, read_dictionary=texts, page_checksum_verification=True
@@ -109,7 +109,7 @@ def _read(parquet: Any, source: BinaryIO, request: _Request) -> Table:
             column = batch.column(name)
             found.append(_numbers(column) if kinds[name] == _NUMBER else _words(column))
     if len(keys) != rows:
-        raise SourceError(f"{where}: found {len(keys)} rows, expected {rows} as it states")
+        raise SourceError(f"{where}: found {len(keys)} rows, expected {rows}, as the file states")
     columns = {name: _column(name, kinds[name], found) for name, found in parts.items()}
     plain = {
         name: columns[name].texts or () for name in taken if _is_plain_text(schema.field(name).type)
@@ -124,7 +124,7 @@ _NUMBER, _TEXT = "number", "text"
 
 
 def _kind(type_: Any) -> str:
-    """Return what a column of a type holds; empty: neither numbers nor texts."""
+    """Return the kind of a column's values; empty: neither numbers nor texts."""
     types = import_module("pyarrow.types")
     held = type_.value_type if types.is_dictionary(type_) else type_
     tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_decimal, types.is_null)
@@ -154,13 +154,13 @@ def _require_small(stated: Any, request: _Request, names: set[str]) -> None:
 
 
 def _numbers(column: Any) -> NDArray[np.float64]:
-    """Return numbers; NaN: missing."""
+    """Return a column's numbers; NaN: missing."""
     cast = import_module("pyarrow.compute").cast(column, "float64", safe=False)
     return np.asarray(cast.to_numpy(zero_copy_only=False), np.float64)
 
 
 def _words(column: Any) -> list[str]:
-    """Return texts; empty: missing."""
+    """Return a column's texts; empty: missing."""
     coded = column if hasattr(column, "dictionary") else column.cast("string").dictionary_encode()
     words = [word_of(str(text)) for text in coded.dictionary.to_pylist()]
     return ["" if code is None else words[code] for code in coded.indices.to_pylist()]

@@ -1,7 +1,7 @@
-"""Open tables of AnnData in a Zarr store or in an HDF5 file (.h5ad).
+"""Open AnnData tables in a Zarr store or in an HDF5 file (.h5ad).
 
 libhdf5 loops without end over some damaged heaps of texts. It does so in C and holds Python's lock,
-so no signal can end it. A .h5ad holds such heaps, so it is read in a child process
+so no signal can end it. A .h5ad file holds such heaps, so a child process reads it
 (storage/child_process.py).
 """
 
@@ -30,14 +30,14 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _EXPECTED = "a table of AnnData (obs, var, X)"
-_MOST_S = 300.0  # s, longest time for a table of HDF5; a million rows take less than a tenth of it
-_TEXT_BYTES = 1024  # bytes of a text, on average in its chunk
+_MOST_S = 300.0  # s; time limit for a table in HDF5. A million rows take less than a tenth of it
+_TEXT_BYTES = 1024  # bytes of a text, on average within its chunk
 _LARGEST_CHUNK = 1 << 28  # bytes
-_LONGEST_TEXT = 4096  # bytes, of texts of one length
+_LONGEST_TEXT = 4096  # bytes of a fixed-length text
 
 
 def read_anndata_zarr(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
-    """Return a table of AnnData in Zarr. Raises SourceError."""
+    """Return an AnnData table in Zarr. Raises SourceError."""
     where = location.shown
     with zarr_boundary(where, _EXPECTED):
         store = open_store(location)
@@ -46,7 +46,7 @@ def read_anndata_zarr(location: Location, key: str, wanted: tuple[str, ...], lab
 
 
 def read_h5ad(location: Location, key: str, wanted: tuple[str, ...], labels: str) -> Table:
-    """Return a table of AnnData in HDF5. Raises SourceError."""
+    """Return an AnnData table in HDF5. Raises SourceError."""
     with one_line(location.shown, _EXPECTED):
         table: Table = run_in_child(
             _read_h5ad, location, key, wanted, labels, bounds=Bounds(_MOST_S)
@@ -113,7 +113,9 @@ class _Hdf5Node:
             found = "records" if self._node.dtype.kind == "V" else f"values of {item} bytes"
             raise SourceError(f"{where}: found {found}, expected numbers or texts")
         if item * math.prod(self._node.chunks or ()) > _LARGEST_CHUNK:
-            raise SourceError(f"{where}: found a chunk over {_LARGEST_CHUNK} bytes, expected less")
+            raise SourceError(
+                f"{where}: found a chunk of over {_LARGEST_CHUNK} bytes, expected a smaller one"
+            )
         if not self._is_sound:
             ChunkIndex(self._node, where).require_found()
             self._is_sound = True

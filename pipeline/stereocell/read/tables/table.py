@@ -10,27 +10,27 @@ from numpy.typing import NDArray
 
 from stereocell.model.errors import SourceError
 
-# Columns of objects' numbers, as MCMICRO, scikit-image, Cellpose, Xenium, SpatialData call them
+# Names of the column of objects' numbers in MCMICRO, scikit-image, Cellpose, Xenium, SpatialData
 KEYS = ("CellID", "label", "cell_id", "instance_id", "object_id", "ObjectNumber", "id")
-MAX_COLUMNS = 128  # most columns that are taken where none are named
-MAX_NAMES = 100_000  # columns of a file
+MAX_COLUMNS = 128  # columns that are read if the user names none
+MAX_NAMES = 100_000  # columns that a file may have
 MAX_ROWS = 1 << 24
 _LONGEST = 200  # characters of a category
 _SHOWN = 8  # names that a message lists
-# words for a missing value, in small letters; pandas takes the same
+# words for a missing value, in lower case, as in pandas
 MISSING = (
     *("", "na", "nan", "n/a", "null", "none", "<na>", "-nan"),
     *("#n/a", "#n/a n/a", "#na", "-1.#ind", "-1.#qnan", "1.#ind", "1.#qnan"),
 )
-_MAX_DIGITS = 20  # highest power of ten: numbers of 64 bits have up to 20 digits
+_MAX_DIGITS = 20  # largest power of ten: 64-bit numbers have up to 20 digits
 
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """One column. Exactly one of the two has a value a row.
+    """One column. Exactly one of `numbers` and `texts` is given, with a value per row.
 
-    numbers  float64 (n,), NaN: missing
-    texts    empty: missing
+    numbers  float64 (n,); NaN: missing
+    texts    (n,); empty: missing
     """
 
     name: str
@@ -40,13 +40,13 @@ class TableColumn:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table with a row an object.
+    """A table with one row per object.
 
-    shown     the file, for messages
-    key       the column of the objects' numbers
-    labels    uint64 (n,), each once
+    shown     name of the file, for messages
+    key       name of the column of the objects' numbers
+    labels    uint64 (n,): the objects' numbers, without repeats
     left_out  number of columns that are not read
-    notes     on how the cells were read, a sentence each
+    notes     sentences on how the cells were read
     """
 
     shown: str
@@ -58,7 +58,7 @@ class Table:
 
 
 def choose_key(where: str, names: Sequence[str], key: str) -> str:
-    """Return the name of the key's column. Raises SourceError."""
+    """Return the name of the column of the objects' numbers. Raises SourceError."""
     if key:
         if key not in names:
             raise SourceError(f"{where}: no column {key!r:.60}, expected one of {shown(names)}")
@@ -68,7 +68,7 @@ def choose_key(where: str, names: Sequence[str], key: str) -> str:
         if one.lower() in lower:
             return lower[one.lower()]
     raise SourceError(
-        f"{where}: no column of the objects' numbers: found {shown(names)}; expected "
+        f"{where}: no column holds the objects' numbers: found {shown(names)}; expected "
         f"{', '.join(KEYS)}, or --table-key COLUMN"
     )
 
@@ -76,7 +76,7 @@ def choose_key(where: str, names: Sequence[str], key: str) -> str:
 def choose_columns(
     where: str, names: Sequence[str], key: str, wanted: Sequence[str]
 ) -> tuple[list[str], int]:
-    """Return the names of the columns to take, and how many are left out. Raises SourceError."""
+    """Return the names of the columns to read, and how many are left out. Raises SourceError."""
     for name in wanted:
         if name not in names:
             raise SourceError(f"{where}: no column {name!r:.60}, expected one of {shown(names)}")
@@ -89,9 +89,9 @@ def choose_columns(
 def keys_of(
     where: str, key: str, values: NDArray[np.float64] | Sequence[str], hint: str = ""
 ) -> NDArray[np.uint64]:
-    """Return the objects' numbers of all rows. Raises SourceError for a fraction, or one twice.
+    """Return the objects' numbers of all rows. Raises SourceError for fractions or repeats.
 
-    hint  the end of the message about a value that is no number of an object
+    hint  end of the message on a value that is not an object's number
     """
     found: list[int] = []
     for row, value in enumerate(values):
@@ -101,8 +101,8 @@ def keys_of(
             number = -1
         if not 0 < number < 1 << 64:
             raise SourceError(
-                f"{where}: {key}, row {row + 1}: found {value!s:.40}, expected a number of an "
-                f"object: a whole number above 0{hint}"
+                f"{where}: {key}, row {row + 1}: found {value!s:.40}, expected an object's "
+                f"number: a whole number above 0{hint}"
             )
         found.append(number)
     labels = np.array(found, np.uint64)
@@ -117,40 +117,40 @@ def keys_of(
 
 
 def require_once(where: str, names: Sequence[str]) -> None:
-    """Raise SourceError where two columns have one name."""
+    """Raise SourceError where two columns have the same name."""
     twice = sorted(name for name, times in Counter(names).items() if times > 1)
     if twice:
         raise SourceError(f"{where}: found columns twice ({shown(twice)}), expected each name once")
 
 
 def named(names: Sequence[str]) -> list[str]:
-    """Return the names of a header as they are shown; a nameless column goes by its place."""
+    """Return a header's names as they are shown; a column without a name gets its number."""
     return [clean(name) or f"column {place}" for place, name in enumerate(names, start=1)]
 
 
 def listed(values: Sequence[object]) -> str:
-    """Return the first few of a list, and that there are more."""
+    """Return the first few values, with `...` if there are more."""
     return ", ".join(map(str, values[:5])) + ", ..." * (len(values) > 5)
 
 
 def shown(names: Sequence[str]) -> str:
-    """Return the first names of a list, as a message may show them."""
+    """Return the first names of a list, cleaned and shortened for a message."""
     cut = [f"{clean(name):.40}" for name in names[:_SHOWN]]
     return ", ".join(cut) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
 
 
 def word_of(text: str) -> str:
-    """Return a category's name as it is shown; empty: missing."""
+    """Return a category's name for display; empty: missing."""
     return "" if text.strip().lower() in MISSING else clean(text[:_LONGEST])
 
 
 def clean(name: str) -> str:
-    """Return a name as it may be shown: no control characters, one space for several."""
+    """Return a name for display: without control characters and repeated spaces."""
     return " ".join("".join(c if c.isprintable() else " " for c in name).split())
 
 
 def _whole_of(text: str) -> int:
-    """Return a text's whole number to the last digit, also of `9223372036854775807.0`."""
+    """Return a text's whole number, exact to the last digit even for `9223372036854775807.0`."""
     try:
         return int(text)
     except ValueError:

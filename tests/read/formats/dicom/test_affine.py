@@ -1,7 +1,6 @@
 """The affine of every series agrees with dicom2nifti's, ITK's and nibabel's within 1e-4 mm.
 
-Compared are columns of the matrix from (slice, row, column) to LPS, so also where the last voxels
-lie is held: 1e-4 mm a step.
+The columns of the matrix from (slice, row, column) to LPS are compared, each in mm per step.
 """
 
 import os
@@ -34,14 +33,14 @@ def layout_of(source: Path) -> StackLayout:
 
 
 def by_dicom2nifti(files: list[Path]) -> NDArray[np.float64]:
-    """(column, row, slice) to LPS; rows and columns as the files have them, no flips."""
+    """(column, row, slice) to LPS; rows and columns as in the files, without flips."""
     headers = common.sort_dicoms([pydicom.dcmread(file) for file in files])
     affine, _ = common.create_affine(headers)
     return RAS_TO_LPS @ affine
 
 
 def by_itk(files: list[Path]) -> NDArray[np.float64]:
-    """(column, row, slice) to LPS; the files go in by place along the normal."""
+    """(column, row, slice) to LPS; the files are sorted by position along the normal."""
     image = sitk.ReadImage([str(file) for file in files] if len(files) > 1 else str(files[0]))
     affine = np.eye(4)
     affine[:3, :3] = np.reshape(image.GetDirection(), (3, 3)) * image.GetSpacing()
@@ -52,7 +51,7 @@ def by_itk(files: list[Path]) -> NDArray[np.float64]:
 def by_nibabel(file: Path) -> NDArray[np.float64]:
     """(row, column, slice) to LPS of an enhanced file."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # its DICOM part is experimental, and says so
+        warnings.simplefilter("ignore")  # it warns that its DICOM part is experimental
         from nibabel.nicom.dicomwrappers import wrapper_from_file
     return np.asarray(wrapper_from_file(str(file)).affine, np.float64)
 
@@ -72,7 +71,7 @@ def to_ours(affine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def difference(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> float:
-    """The largest of any entry; a stack that they count from its other end is turned first."""
+    """The largest difference of any entry, after a stack of the opposite order is turned."""
     theirs = theirs.copy()
     if theirs[:3, 0] @ ours[:3, 0] < 0:
         theirs[:3, 3] += (SHAPE[0] - 1) * theirs[:3, 0]
@@ -106,7 +105,7 @@ def test_single_frame_series_agree_with_itk(tmp_path: Path, name: str) -> None:
     assert difference(layout_of(tmp_path / "s").affine, theirs) < TOLERANCE_MM
 
 
-def test_series_with_missing_slices_has_the_affine_of_the_whole(tmp_path: Path) -> None:
+def test_series_with_missing_slices_has_the_affine_of_the_complete_one(tmp_path: Path) -> None:
     affine = grid("coronal", rotation=OBLIQUE)
     write_series(tmp_path / "all", affine)
     write_series(tmp_path / "some", affine, indices=[k for k in range(22) if k not in (4, 9, 10)])
@@ -124,9 +123,9 @@ def test_enhanced_images_agree_with_itk_and_nibabel(tmp_path: Path, modality: st
     in_order = write_enhanced(tmp_path / "b.dcm", affine, SHAPE, modality, seed=None)
     ours = layout_of(shuffled).affine
     assert difference(ours, affine) < TOLERANCE_MM
-    # the peers take frames as they come
+    # the other readers keep the order of frames
     assert difference(ours, to_ours(by_itk([in_order]))) < TOLERANCE_MM
-    if modality == "MR":  # nibabel knows no enhanced CT
+    if modality == "MR":  # nibabel doesn't read enhanced CT
         assert difference(ours, by_nibabel(in_order)[:, [2, 0, 1, 3]]) < TOLERANCE_MM
 
 

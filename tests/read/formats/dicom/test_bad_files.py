@@ -1,4 +1,4 @@
-"""DICOM that makes no volume is refused in one line, or left out with a note."""
+"""DICOM that doesn't make a volume is refused in one line, or left out with a note."""
 
 import os
 import re
@@ -44,7 +44,7 @@ def refusal(source: Path) -> str:
     line = str(caught.value)
     assert "\n" not in line
     assert "expected" in line
-    assert caught.value.__cause__ is None  # whose text might quote the file
+    assert caught.value.__cause__ is None  # its text might quote the file
     return line
 
 
@@ -88,24 +88,25 @@ REFUSED: dict[str, tuple[Change, str]] = {
     "two numbers for a place": (setting(ImagePositionPatient=[1, 2]), "6 without a place"),
     "all at one place": (setting(ImagePositionPatient=[0, 0, 0]), "at least 2 slices: found 1"),
     "absurd spacing": (
-        setting(PixelSpacing=[1e9, 1e9]), r"6 of an absurd PixelSpacing \(1e\+09 and 1e\+09 mm\)"
+        setting(PixelSpacing=[1e9, 1e9]),
+        r"6 with an implausible PixelSpacing \(1e\+09 and 1e\+09 mm\)",
     ),
-    "colours": (colours, "6 of colours"),
+    "colours": (colours, "6 in colour"),
     "no pixels": (without("PixelData"), "6 without pixels"),
-    "one bit": (setting(BitsAllocated=1, BitsStored=1, HighBit=0), "6 of 1 bits a pixel"),
-    "impossible bits": (setting(BitsStored=17), "6 of 17 bits"),
-    "slope of 0": (setting(RescaleSlope=0), "6 of values that no rescale slope gives"),
+    "one bit": (setting(BitsAllocated=1, BitsStored=1, HighBit=0), "6 with 1 bits per pixel"),
+    "impossible bits": (setting(BitsStored=17), "6 with 17 bits"),
+    "slope of 0": (setting(RescaleSlope=0), "6 with an unusable rescale slope"),
     "planes larger than their pixels": (setting(Rows=4000), "6 cut short"),
     "terabytes claimed": (setting(Rows=65535, Columns=65535), "6 cut short"),
-    "film": (junk_in(MPEG2MPML), "6 compressed in a way that is not read"),
-    "junk in J2K": (junk_in(JPEG2000Lossless), "file 1 of 6 .* pixels can't be decoded"),
-    "junk in JPEG-LS": (junk_in(JPEGLSLossless), "pixels can't be decoded"),
-    "junk in RLE": (junk_in(RLELossless), "pixels can't be decoded"),
+    "film": (junk_in(MPEG2MPML), "6 compressed in a way that is not supported"),
+    "junk in J2K": (junk_in(JPEG2000Lossless), "file 1 of 6 .* found pixels that can't be decoded"),
+    "junk in JPEG-LS": (junk_in(JPEGLSLossless), "pixels that can't be decoded"),
+    "junk in RLE": (junk_in(RLELossless), "pixels that can't be decoded"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_is_refused_in_one_line(
+def test_a_bad_source_is_refused_in_one_line(
     tmp_path: Path, name: str, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
     change, words = REFUSED[name]
@@ -115,7 +116,9 @@ def test_is_refused_in_one_line(
     assert capfd.readouterr() == ("", "")
 
 
-def test_claims_of_compressed_pixels_are_checked_before_memory_is_taken(tmp_path: Path) -> None:
+def test_stated_sizes_of_compressed_pixels_are_checked_before_memory_is_allocated(
+    tmp_path: Path,
+) -> None:
     def claim(ds: pydicom.Dataset) -> None:
         junk_in(JPEG2000Lossless)(ds)
         ds.Rows = ds.Columns = 65535
@@ -135,7 +138,7 @@ def test_streams_state_their_size(tmp_path: Path, syntax: str) -> None:
     assert plane_size(stream) == (40, 36)
 
 
-# the size 40 x 36 as streams state it, and what is claimed instead
+# the size 40 x 36 as streams state it, and a false size in its place
 _SIZES = {
     JPEG2000Lossless: (b"\0\0\0\x28", b"\0\0\xea\x60"),
     JPEGLSLossless: (b"\0\x28\0\x24", b"\xea\x60\xea\x60"),
@@ -143,7 +146,7 @@ _SIZES = {
 
 
 @pytest.mark.parametrize("syntax", _SIZES)
-def test_streams_that_claim_more_than_the_header_are_not_decoded(
+def test_streams_that_state_a_larger_size_than_the_header_are_not_decoded(
     tmp_path: Path, syntax: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shape = (3, 40, 36)
@@ -162,7 +165,7 @@ def test_streams_that_claim_more_than_the_header_are_not_decoded(
         content = path.read_bytes()
         start = content.index(b"\xff\x51" if syntax == JPEG2000Lossless else b"\xff\xd8", 132)
         path.write_bytes(content[:start] + content[start:].replace(stated, claimed, 1))
-    assert "pixels can't be decoded" in refusal(tmp_path / "s")
+    assert "pixels that can't be decoded" in refusal(tmp_path / "s")
     assert len(decoded) == 3
 
 
@@ -170,7 +173,7 @@ def test_streams_that_claim_more_than_the_header_are_not_decoded(
 def test_streams_on_which_gdcm_aborts_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """It is far away: neither its end nor what it says reaches this process."""
+    """GDCM runs in another process: neither its end nor its output reaches this one."""
     shape = (2, 40, 36)
     random = np.random.default_rng(0)
     for path in write_series(tmp_path / "s", grid(shape=shape), shape, dtype=np.uint16):
@@ -180,11 +183,11 @@ def test_streams_on_which_gdcm_aborts_are_refused(
         content[start + 14 : -8] = random.integers(0, 256, len(content) - start - 22)
         content[start : start + 14] = 0xFF
         path.write_bytes(content.tobytes())
-    assert "pixels can't be decoded" in refusal(tmp_path / "s")
+    assert "pixels that can't be decoded" in refusal(tmp_path / "s")
     assert capfd.readouterr() == ("", "")
 
 
-def test_deflated_files_are_not_unpacked(tmp_path: Path) -> None:
+def test_deflated_files_are_not_decompressed(tmp_path: Path) -> None:
     def deflate(ds: pydicom.Dataset) -> None:
         ds.file_meta.TransferSyntaxUID = DeflatedExplicitVRLittleEndian
 
@@ -209,7 +212,7 @@ def test_files_without_images_are_named_by_their_kind(tmp_path: Path) -> None:
     assert "1 without pixels (RT Structure Set Storage)" in line
     assert "1 without pixels (Basic Text SR Storage)" in line
     assert "1 without pixels;" in line
-    assert "1.2.3.4.5" not in line  # what is private may tell whose it is
+    assert "1.2.3.4.5" not in line  # private data may identify the patient
     assert "found 1 file: 1 without pixels" in refusal(save(ds, tmp_path / "t" / "a").parent)
 
 
@@ -221,10 +224,10 @@ def test_several_frames_without_places_are_refused(tmp_path: Path) -> None:
     ds = image(np.zeros((4, 8, 9), np.int16), grid(), 0)
     ds.NumberOfFrames = 4
     path = save(ds, tmp_path / "f.dcm")
-    assert "several frames without a place for each" in refusal(path)
+    assert "several frames but no place for each" in refusal(path)
 
 
-def test_files_cut_short_are_left_out_and_their_gap_is_told(tmp_path: Path) -> None:
+def test_truncated_files_are_left_out_and_their_gap_is_noted(tmp_path: Path) -> None:
     paths = series(tmp_path / "s")
     paths[2].write_bytes(paths[2].read_bytes()[:-500])
     notes = read.open(tmp_path / "s").notes
@@ -239,8 +242,8 @@ def test_too_few_slices_for_their_gaps_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.slow
-def test_garbled_headers_raise_nothing_else(tmp_path: Path, seed: int) -> None:
-    """Bytes are changed at random; a series opens all the same, or is refused in one line."""
+def test_garbled_headers_raise_no_other_error(tmp_path: Path, seed: int) -> None:
+    """Bytes are changed at random; a series still opens, or is refused in one line."""
     random = np.random.default_rng(seed)
     write_enhanced(tmp_path / "e", grid(shape=(3, 8, 9)), (3, 8, 9))
     content = np.frombuffer((tmp_path / "e").read_bytes(), np.uint8)
@@ -260,13 +263,13 @@ def test_files_without_preamble_are_read(tmp_path: Path) -> None:
     assert error(read.open(tmp_path / "s")) <= 0.51
 
 
-def test_files_that_others_may_not_stay_for_are_passed_by(tmp_path: Path) -> None:
+def test_pipes_in_a_folder_are_skipped(tmp_path: Path) -> None:
     series(tmp_path / "s")
-    os.mkfifo(tmp_path / "s" / "pipe")  # opening it would wait for ever
+    os.mkfifo(tmp_path / "s" / "pipe")  # opening it would wait forever
     assert read.open(tmp_path / "s").notes == ("file left out: 1 not DICOM",)
 
 
-def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> None:
+def test_a_folder_of_another_format_is_named_by_its_content(tmp_path: Path) -> None:
     for name in ("JANE.nii", "DOE.nii.gz"):
         (tmp_path / name).write_bytes(b"")
     (tmp_path / "plate.zarr").mkdir()
@@ -276,8 +279,8 @@ def test_a_folder_of_another_format_is_told_by_what_it_holds(tmp_path: Path) -> 
     assert "DOE" not in told
 
 
-def test_a_preamble_that_begins_as_a_tiff_does_changes_nothing(tmp_path: Path) -> None:
-    """DICOM leaves it to the writer: some make a file that readers of TIFF open too."""
+def test_a_preamble_like_that_of_a_tiff_changes_nothing(tmp_path: Path) -> None:
+    """DICOM leaves the preamble to the writer: some files are valid as TIFF, too."""
     path = tmp_path / "both of mine"
     write_enhanced(path, grid(shape=SHAPE), SHAPE)
     content = path.read_bytes()

@@ -39,16 +39,16 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
     ),
     "absent slices": (
         setting(NumberOfSlices=20),
-        "NumberOfSlices states 20, and 10 are there: 50% of the stated slices are absent",
+        "NumberOfSlices states 20, but there are 10: 50% of the stated slices are missing",
     ),
-    "more slices": (setting(NumberOfSlices=8), "states 8, and 10 are there: all of them are read"),
+    "more slices": (setting(NumberOfSlices=8), "states 8, but there are 10: all of them are read"),
     "numbers": (
         by_number("InstanceNumber", lambda n: (7 * n) % 11),
-        "order of slices: ImagePositionPatient states the order that is built, InstanceNumber",
+        "order of slices: ImagePositionPatient states the order that is used, InstanceNumber",
     ),
     "order of locations": (
         by_number("SliceLocation", lambda n: 2.5 * (n + (n == 4) - (n == 5))),
-        "SliceLocation states another one (1 of 9 steps leads back)",
+        "SliceLocation states another order (1 of 9 steps leads back)",
     ),
     "gantry": (
         setting(GantryDetectorTilt=20.0),
@@ -66,7 +66,7 @@ CONTRADICTIONS: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("name", CONTRADICTIONS)
-def test_a_contradiction_is_one_note_and_positions_are_used(tmp_path: Path, name: str) -> None:
+def test_a_contradiction_makes_one_note_and_positions_are_used(tmp_path: Path, name: str) -> None:
     change, words = CONTRADICTIONS[name]
     write_series(tmp_path / "s", AFFINE, SHAPE, change=change)
     dataset = read.open(tmp_path / "s")
@@ -99,7 +99,7 @@ def test_attributes_that_agree_need_no_note(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("stated", [15.0, -15.0])
-def test_a_stated_tilt_that_positions_show_is_no_contradiction(
+def test_a_stated_tilt_that_agrees_with_positions_makes_no_note(
     tmp_path: Path, stated: float
 ) -> None:
     affine = tilted(AFFINE, SHAPE, 15.0)

@@ -60,7 +60,7 @@ def test_the_echo_in_phase_is_built_and_both_are_named(
         ((5.0, 20.0), {}),
     ],
 )
-def test_other_echoes_have_no_phase_and_the_first_is_built(
+def test_other_echoes_have_no_name_of_a_phase_and_the_first_is_built(
     tmp_path: Path, echoes: tuple[float, float], values: dict[str, Any]
 ) -> None:
     for add, echo in zip((100, 200), echoes, strict=True):
@@ -71,7 +71,7 @@ def test_other_echoes_have_no_phase_and_the_first_is_built(
 
 @pytest.mark.parametrize("order", ["slices first", "times first"])
 @pytest.mark.slow
-def test_trigger_times_that_change_with_the_heart_rate_are_points_in_time(
+def test_trigger_times_that_change_with_the_heart_rate_are_time_points(
     tmp_path: Path, order: str
 ) -> None:
     for time in range(3):
@@ -79,7 +79,7 @@ def test_trigger_times_that_change_with_the_heart_rate_are_points_in_time(
         def change(ds: pydicom.Dataset, time: int = time) -> None:
             place = ds.InstanceNumber - 1
             ds.TriggerTime = 50.0 * time + 7 * place
-            # no order of instance numbers may decide
+            # the order of instance numbers must not decide
             ds.InstanceNumber = (
                 1 + 3 * place + 2 - time if order == "times first" else 40 - 10 * time + place
             )
@@ -89,13 +89,13 @@ def test_trigger_times_that_change_with_the_heart_rate_are_points_in_time(
     assert not any("InstanceNumber" in note for note in read.open(tmp_path).notes)
 
 
-def test_directions_of_diffusion_are_named_as_such(tmp_path: Path) -> None:
+def test_directions_of_diffusion_are_named(tmp_path: Path) -> None:
     for number in range(3):
         change = setting(DiffusionBValue=1000.0, AcquisitionNumber=number + 1)
         write_kind(tmp_path, 100 * (number + 1), change, first_number=1 + 10 * number)
     dataset = read.open(tmp_path)
     assert dataset.time_points == 3
-    note = "3 images at a place are directions of diffusion (AcquisitionNumber tells them apart)"
+    note = "3 images at a place are directions of diffusion (they differ in AcquisitionNumber)"
     assert any(note in one for one in dataset.notes)
 
 
@@ -104,5 +104,5 @@ def test_repetition_times_are_named_and_in_rising_order(tmp_path: Path) -> None:
     for add, ms in ((200, 500), (300, 2000), (100, 100)):
         write_kind(tmp_path, add, setting(RepetitionTime=ms), first_number=add)
     assert [added(tmp_path, time=time) for time in range(3)] == [100, 200, 300]
-    note = "3 images at a place are repetition times (RepetitionTime tells them apart)"
+    note = "3 images at a place are repetition times (they differ in RepetitionTime)"
     assert any(note in one for one in read.open(tmp_path).notes)

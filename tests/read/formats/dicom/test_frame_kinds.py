@@ -1,4 +1,4 @@
-"""A series that holds several kinds of frames falls apart into one volume for each kind."""
+"""A series that holds several kinds of frames is divided into one volume for each kind."""
 
 from collections.abc import Callable, Iterable
 from itertools import product
@@ -36,7 +36,7 @@ PARTS: dict[str, tuple[Change, Change]] = {
 
 
 @pytest.mark.parametrize("maker", PARTS)
-def test_magnitude_is_built_and_phase_is_a_series_of_its_own(tmp_path: Path, maker: str) -> None:
+def test_magnitude_is_built_and_phase_is_a_separate_series(tmp_path: Path, maker: str) -> None:
     phase, magnitude = PARTS[maker]
     write_kind(tmp_path, 100, phase)
     write_kind(tmp_path, 300, magnitude, first_number=20)
@@ -64,7 +64,7 @@ def test_without_a_magnitude_the_real_part_is_built(tmp_path: Path) -> None:
     assert added(tmp_path) == 20
 
 
-def test_a_phase_series_of_its_own_follows_a_smaller_magnitude_series(tmp_path: Path) -> None:
+def test_a_separate_phase_series_follows_a_smaller_magnitude_series(tmp_path: Path) -> None:
     write_series(tmp_path / "p", AFFINE, SHAPE, series="1.2.4", change=image_type("P"))
     small = grid(shape=(6, 12, 14))
     write_series(tmp_path / "m", small, (6, 12, 14), series="1.2.5", change=image_type("M"))
@@ -88,7 +88,7 @@ FEW, ALL = (0.5, 3.5, 6.5), range(10)
     ("words", "indices"),
     sweep(product(ROLES, (FEW, ALL)), kept=[*product(ROLES, [FEW]), (("ADC",), ALL)]),
 )
-def test_derived_images_are_no_slices_of_the_originals(
+def test_derived_images_are_not_mixed_with_the_originals(
     tmp_path: Path, words: tuple[str, ...], indices: Iterable[float]
 ) -> None:
     write_kind(tmp_path, 100, setting(ImageType=["ORIGINAL", "PRIMARY", "AXIAL"]))
@@ -101,7 +101,7 @@ def test_derived_images_are_no_slices_of_the_originals(
     assert not any("uneven" in note for note in dataset.notes)
 
 
-def test_derived_images_without_a_word_for_it_are_told_apart_by_their_origin(
+def test_derived_images_that_are_not_named_so_are_distinguished_by_their_origin(
     tmp_path: Path,
 ) -> None:
     write_kind(tmp_path, 900, setting(ImageType=["DERIVED", "SECONDARY", "XYZ"]))
@@ -150,7 +150,7 @@ PROPERTIES: dict[str, tuple[Change, Change, str]] = {
         kept=[*product(PROPERTIES, [0.0]), ("kernel", 0.5), ("echo time", 0.5)],
     ),
 )
-def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
+def test_a_property_separates_slices_at_equal_positions_and_interleaved_ones(
     tmp_path: Path, name: str, shift: float
 ) -> None:
     modality = "CT" if name in ("kernel", "energy", "monoenergetic", "contrast") else "MR"
@@ -170,7 +170,7 @@ def test_a_property_separates_slices_at_the_same_places_and_between_each_other(
 
 
 @pytest.mark.parametrize("told", [setting(AcquisitionNumber=2), setting()])
-def test_acquisitions_between_each_other_are_two_series(tmp_path: Path, told: Change) -> None:
+def test_interleaved_acquisitions_are_two_series(tmp_path: Path, told: Change) -> None:
     write_kind(tmp_path, 100, setting(AcquisitionNumber=1) if told.__closure__ else setting())
     write_kind(tmp_path, 300, told, indices=[k + 0.5 for k in range(9)], first_number=30)
     assert len(read.list_series(tmp_path)) == 2
@@ -204,7 +204,7 @@ def test_an_acquisition_for_each_slice_is_one_volume(tmp_path: Path) -> None:
     assert len(read.list_series(tmp_path)) == 1
 
 
-def test_a_kernel_that_is_free_text_is_counted_and_not_shown(tmp_path: Path) -> None:
+def test_a_kernel_in_free_text_is_counted_and_not_shown(tmp_path: Path) -> None:
     write_kind(tmp_path, 100, setting(ConvolutionKernel="JANE DOE"))
     write_kind(tmp_path, 300, setting(ConvolutionKernel="JOHN DOE"), first_number=30)
     first, second = read.list_series(tmp_path)
@@ -230,7 +230,7 @@ PHASES: dict[str, Callable[[int], Change]] = {
     ),
 )
 @pytest.mark.slow
-def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
+def test_an_incomplete_last_time_point_is_noted_and_complete_ones_are_kept(
     tmp_path: Path, name: str, rest: range
 ) -> None:
     for time, indices in enumerate((range(10), range(10), rest)):
@@ -239,22 +239,22 @@ def test_an_incomplete_last_point_in_time_is_told_and_whole_ones_are_kept(
     dataset = read.open(tmp_path)
     assert dataset.time_points == 2
     assert [whole(dataset).min(), added(tmp_path, time=1)] == [100, 200]
-    note = f"1 of 3 points in time ({name}), because slices are missing ({len(rest)} of 10 are"
+    note = f"1 of 3 time points ({name}), because slices are missing ({len(rest)} of 10 are"
     assert any(note in one for one in dataset.notes)
-    assert "incomplete point in time 3" in read.list_series(tmp_path)[1]
+    assert "incomplete time point 3" in read.list_series(tmp_path)[1]
     assert added(tmp_path, series=2) == 300
     with pytest.raises(UsageError, match="--time: found 2, expected 0 to 1"):
         read.open(tmp_path, time=2)
 
 
-def test_a_phase_of_contrast_that_covers_a_part_is_a_series_of_its_own(tmp_path: Path) -> None:
+def test_a_contrast_phase_that_covers_a_part_is_a_separate_series(tmp_path: Path) -> None:
     write_kind(tmp_path, 100, setting(AcquisitionNumber=1), modality="CT")
     write_kind(tmp_path, 400, setting(AcquisitionNumber=2), indices=range(5, 10), modality="CT",
                first_number=30)  # fmt: skip
     assert (added(tmp_path), added(tmp_path, series=2)) == (100, 400)
 
 
-def test_points_in_time_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+def test_time_points_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     for time in (1, 0):
         change = setting(TemporalPositionIdentifier=time + 1)
         write_kind(tmp_path, 100 * (time + 1), change, first_number=50 - 20 * time)
@@ -262,7 +262,7 @@ def test_points_in_time_are_in_the_order_of_their_numbers(tmp_path: Path) -> Non
 
 
 def enhanced_kinds(path: Path, describe: Callable[[pydicom.Dataset, int], None]) -> Path:
-    """Write an enhanced MR image of two frames at each place; the second ones are 50 brighter."""
+    """Write an enhanced MR image of two frames at each position, the second 50 brighter."""
     ds = pydicom.dcmread(write_enhanced(path, AFFINE, SHAPE))
     groups = []
     for kind in (1, 0):
@@ -313,7 +313,7 @@ ENHANCED: dict[str, tuple[Callable[[pydicom.Dataset, int], None], str]] = {
 
 
 @pytest.mark.parametrize("name", ENHANCED)
-def test_frames_of_an_enhanced_image_fall_apart_by_kind(tmp_path: Path, name: str) -> None:
+def test_frames_of_an_enhanced_image_are_divided_by_kind(tmp_path: Path, name: str) -> None:
     describe, words = ENHANCED[name]
     path = enhanced_kinds(tmp_path / "e.dcm", describe)
     lines = read.list_series(path)
@@ -323,7 +323,7 @@ def test_frames_of_an_enhanced_image_fall_apart_by_kind(tmp_path: Path, name: st
     assert np.array_equal(np.unique(difference), [50])
 
 
-def test_points_in_time_of_an_enhanced_image_are_in_the_order_of_their_indices(
+def test_time_points_of_an_enhanced_image_are_in_the_order_of_their_indices(
     tmp_path: Path,
 ) -> None:
     def describe(group: pydicom.Dataset, kind: int) -> None:
@@ -334,8 +334,8 @@ def test_points_in_time_of_an_enhanced_image_are_in_the_order_of_their_indices(
     assert np.array_equal(np.unique(difference), [50])
 
 
-def test_scouts_of_a_ct_are_no_volume(tmp_path: Path) -> None:
-    """Even two in the same direction, which lie one behind the other."""
+def test_scouts_of_a_ct_do_not_make_a_volume(tmp_path: Path) -> None:
+    """This holds even for two in the same direction, one behind the other."""
     scout = setting(ImageType=["ORIGINAL", "PRIMARY", "LOCALIZER"])
     write_kind(tmp_path, 0, scout, indices=[0, 5], modality="CT")
     with pytest.raises(SourceError, match=r"localizers \(scouts\) of a CT are projections"):
@@ -343,7 +343,7 @@ def test_scouts_of_a_ct_are_no_volume(tmp_path: Path) -> None:
 
 
 def test_a_localizer_of_mr_follows_the_other_series(tmp_path: Path) -> None:
-    """It has more voxels, and is a volume by itself."""
+    """It has more voxels than they have, and would make a volume."""
     write_series(tmp_path / "l", AFFINE, SHAPE, series="1.2.4", change=image_type("LOCALIZER"))
     small = grid("coronal", shape=(5, 12, 14))
     write_series(tmp_path / "m", small, (5, 12, 14), series="1.2.5", change=image_type("M"))
@@ -352,7 +352,7 @@ def test_a_localizer_of_mr_follows_the_other_series(tmp_path: Path) -> None:
     assert "localizer, axial, 10 x" in second
 
 
-def test_kinds_in_files_that_itk_wrote_are_told_apart(tmp_path: Path) -> None:
+def test_kinds_in_files_of_itk_are_distinguished(tmp_path: Path) -> None:
     writer = SimpleITK.ImageFileWriter()
     writer.KeepOriginalImageUIDOn()
     for number, (word, value) in enumerate((("P", 40), ("M", 90))):

@@ -1,4 +1,4 @@
-"""RT Dose and NM: the planes of one multi-frame image follow from the first one's place."""
+"""RT Dose and NM: the position of the first plane of a multi-frame image gives all others."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ SCALING = 0.25
 
 
 def write_dose(path: Path, affine: np.ndarray[Any, Any], offsets: str = "relative") -> Path:
-    """Write the scene as doses; offsets from the first plane, or places along z of the patient."""
+    """Write the scene as doses; offsets are relative to the first plane, or positions along z."""
     stored = np.rint(sample(affine, SHAPE) / SCALING).astype(np.uint32)
     ds = image(stored[0], affine, 0, slope=None)
     ds.PixelData = stored.tobytes()
@@ -42,24 +42,24 @@ def write_dose(path: Path, affine: np.ndarray[Any, Any], offsets: str = "relativ
 
 @pytest.mark.parametrize("offsets", ["relative", "absolute"])
 @pytest.mark.parametrize("turned", [None, "down", "over"])
-def test_every_dose_lies_where_the_scene_has_it(
+def test_every_dose_lies_at_its_position_in_the_scene(
     tmp_path: Path, offsets: str, turned: str | None
 ) -> None:
     affine = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.0))
     if turned == "down":  # from the last plane to the first
         affine[:3, 3] += affine[:3, 0] * (SHAPE[0] - 1)
         affine[:3, 0] *= -1
-    elif turned == "over":  # prone: rows and slices run the other way
+    elif turned == "over":  # prone: rows and slices run in the opposite direction
         affine = grid(shape=SHAPE, spacing=(3.0, 2.0, 2.0), rotation=turn((1, 0, 0), 180))
     dataset = read.open(write_dose(tmp_path / "d.dcm", affine, offsets))
     assert error(dataset) <= SCALING / 2 + 1e-3
     assert (dataset.modality, dataset.dtype) == ("RTDOSE", np.float32)
 
 
-def test_itk_finds_the_same_doses_at_the_same_places(tmp_path: Path) -> None:
+def test_itk_reads_the_same_doses_at_the_same_positions(tmp_path: Path) -> None:
     path = write_dose(tmp_path / "d.dcm", grid(shape=SHAPE, spacing=(3.0, 2.0, 2.0)))
     dataset, theirs = read.open(path), sitk.ReadImage(path)
-    stored = sitk.GetArrayFromImage(theirs)  # without the scaling
+    stored = sitk.GetArrayFromImage(theirs)  # before scaling
     points = lps_mm(dataset)
     index = [
         theirs.TransformPhysicalPointToIndex(point) for point in points.reshape(-1, 3).tolist()
@@ -68,14 +68,14 @@ def test_itk_finds_the_same_doses_at_the_same_places(tmp_path: Path) -> None:
     assert np.allclose(whole(dataset).ravel(), stored[z, y, x] * SCALING, rtol=1e-6)
 
 
-def test_absolute_places_of_oblique_planes_are_refused(tmp_path: Path) -> None:
+def test_absolute_positions_of_oblique_planes_are_refused(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, rotation=turn((1, 2, 3), 20))
-    with pytest.raises(SourceError, match=r"without a place for each \(RT Dose Storage\)"):
+    with pytest.raises(SourceError, match=r"no place for each \(RT Dose Storage\)"):
         read.open(write_dose(tmp_path / "d.dcm", affine, "absolute"))
 
 
 def write_nm(path: Path, affine: np.ndarray[Any, Any], **values: Any) -> Path:
-    """Write reconstructed slices; the detector states the first one's place."""
+    """Write reconstructed slices; the detector states the position of the first one."""
     stored = np.rint(sample(affine, SHAPE)).astype(np.uint16)
     ds = image(stored[0], affine, 0, slope=None)
     ds.PixelData = stored.tobytes()
@@ -109,7 +109,7 @@ def test_slices_of_nuclear_medicine_are_stacked_by_the_sign_of_their_spacing(
     dataset = read.open(path)
     assert error(dataset) < 0.51
     assert dataset.modality == "NM"
-    if not downwards:  # ITK knows no spacing below 0
+    if not downwards:  # ITK doesn't accept a spacing below 0
         theirs = sitk.ReadImage(path)
         points = lps_mm(dataset).reshape(-1, 3).tolist()
         x, y, z = np.transpose([theirs.TransformPhysicalPointToIndex(point) for point in points])
@@ -140,11 +140,11 @@ def test_other_frames_of_nuclear_medicine_are_refused(
             1,
             "without a place in the patient (Secondary Capture Image",
         ),
-        (UltrasoundMultiFrameImageStorage, 3, "a place for each (Ultrasound Multi-frame Image"),
+        (UltrasoundMultiFrameImageStorage, 3, "no place for each (Ultrasound Multi-frame Image"),
         ("1.2.3.4.5", 1, "without a place in the patient; expected"),
     ],
 )
-def test_what_has_no_place_is_told_by_its_kind(
+def test_an_image_without_a_position_is_named_by_its_kind(
     tmp_path: Path, kind: str, frames: int, told: str
 ) -> None:
     ds = image(np.zeros((8, 8), np.uint8), grid(), 0)

@@ -1,4 +1,4 @@
-"""What makes one stack of DICOM frames, and what is said where a series falls apart."""
+"""Which DICOM frames make one stack, and the notes on a series that is divided."""
 
 from pathlib import Path
 from typing import Any
@@ -36,9 +36,7 @@ def two_stacks(path: Path, shift_mm: float) -> Path:
 
 
 @pytest.mark.parametrize("shift_mm", [50.0, 1.25])
-def test_stacks_of_an_enhanced_image_are_series_of_their_own(
-    tmp_path: Path, shift_mm: float
-) -> None:
+def test_stacks_of_an_enhanced_image_are_separate_series(tmp_path: Path, shift_mm: float) -> None:
     path = two_stacks(tmp_path / "e.dcm", shift_mm)
     lines = read.list_series(path)
     assert len(lines) == 2
@@ -54,7 +52,7 @@ def test_stacks_of_an_enhanced_image_are_series_of_their_own(
 
 
 def alternating(name: str, values: list[Any]) -> Any:
-    """Return a change that gives slices the values in turn, in the order of instance numbers."""
+    """Return a change that alternates between values, in the order of instance numbers."""
 
     def change(ds: pydicom.Dataset) -> None:
         setattr(ds, name, values[int(ds.InstanceNumber) % len(values)])
@@ -62,7 +60,7 @@ def alternating(name: str, values: list[Any]) -> Any:
     return change
 
 
-def test_rounded_pixel_spacings_are_one_series(tmp_path: Path) -> None:
+def test_slices_with_rounded_pixel_spacings_are_one_series(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, spacing=(2.5, 0.48825, 0.48825))
     spacings = [["0.48825", "0.488249"], ["0.488249", "0.48825"], ["0.4882", "0.4883"]]
     write_series(tmp_path / "s", affine, SHAPE, change=alternating("PixelSpacing", spacings))
@@ -72,7 +70,7 @@ def test_rounded_pixel_spacings_are_one_series(tmp_path: Path) -> None:
     assert dataset.levels[0].spacing_um == pytest.approx((488.25, 2500, 488.25), rel=1e-4)
 
 
-def test_other_pixel_spacings_are_another_series_and_that_is_said(tmp_path: Path) -> None:
+def test_slices_with_other_pixel_spacings_are_another_series_with_a_note(tmp_path: Path) -> None:
     spacings = [["2", "2.2"], ["2.01", "2.2"]]
     write_series(tmp_path / "s", AFFINE, SHAPE, change=alternating("PixelSpacing", spacings))
     assert len(read.list_series(tmp_path / "s")) == 2
@@ -88,10 +86,10 @@ def cosines(degrees: float, axis: tuple[int, int, int]) -> list[str]:
 
 @pytest.mark.parametrize("wobble", [8e-4, 9.5e-4])
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0)])
-def test_orientations_that_wobble_are_one_series_of_their_mean(
+def test_slices_whose_orientations_wobble_are_one_series_of_the_mean(
     tmp_path: Path, wobble: float, axis: tuple[int, int, int]
 ) -> None:
-    """To and fro about a mean; the first alone is off by the wobble."""
+    """The orientations alternate about a mean, from which the first one differs by the wobble."""
     degrees = float(np.degrees(wobble))
     turned = alternating(
         "ImageOrientationPatient", [cosines(degrees, axis), cosines(-degrees, axis)]
@@ -106,10 +104,10 @@ def test_orientations_that_wobble_are_one_series_of_their_mean(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0, 1, 0)])
-def test_planes_that_wobble_about_their_middles_make_no_tilt(
+def test_planes_that_wobble_about_their_centres_make_no_tilt(
     tmp_path: Path, axis: tuple[int, int, int]
 ) -> None:
-    """The first pixels of 256 x 256 move by a tenth of a millimetre, to and fro."""
+    """The first pixels of 256 x 256 move alternately by a tenth of a millimetre."""
     shape = (10, 256, 256)
     affine = grid(shape=shape, spacing=(3.0, 0.9, 0.9))
 
@@ -128,7 +126,7 @@ def test_planes_that_wobble_about_their_middles_make_no_tilt(
     assert error(dataset) <= 0.51 + 0.01 * 1000 / 3.5  # um, by the steepest body's slope
 
 
-def test_truly_different_orientations_stay_apart(tmp_path: Path) -> None:
+def test_slices_of_different_orientations_stay_separate(tmp_path: Path) -> None:
     turned = alternating(
         "ImageOrientationPatient", [cosines(0, (0, 0, 1)), cosines(0.5, (0, 0, 1))]
     )
@@ -138,7 +136,7 @@ def test_truly_different_orientations_stay_apart(tmp_path: Path) -> None:
     assert any("5 more images" in n and "ImageOrientationPatient" in n for n in notes)
 
 
-def test_localizers_of_one_series_are_not_said_to_interleave(tmp_path: Path) -> None:
+def test_localizers_of_one_series_get_no_note_on_interleaving(tmp_path: Path) -> None:
     for plane in ("axial", "coronal"):
         write_series(
             tmp_path / plane,
@@ -157,7 +155,7 @@ def new_reference(ds: pydicom.Dataset) -> None:
 
 
 @pytest.mark.parametrize("plane", ["axial", "sagittal"])
-def test_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, plane: str) -> None:
+def test_slices_with_a_frame_of_reference_each_are_joined(tmp_path: Path, plane: str) -> None:
     affine = grid(plane, SHAPE, (2.5, 2.0, 2.2), rotation=turn((1, 2, -0.5), 23.0))
     write_series(tmp_path / "s", affine, SHAPE, change=new_reference)
     dataset = read.open(tmp_path / "s")
@@ -166,7 +164,7 @@ def test_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, plane: s
     assert note.startswith("each of 10 slices has a FrameOfReferenceUID of its own")
 
 
-def test_points_in_time_of_joined_slices_stay(tmp_path: Path) -> None:
+def test_joined_slices_keep_their_time_points(tmp_path: Path) -> None:
     for time in range(2):
 
         def change(ds: pydicom.Dataset, time: int = time) -> None:
@@ -179,14 +177,14 @@ def test_points_in_time_of_joined_slices_stay(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("indices", [[0, 1, 2.3, 3, 4, 5.6], [0, 1]])
-def test_slices_of_a_frame_of_reference_each_at_irregular_places_are_refused(
+def test_slices_with_a_frame_of_reference_each_at_irregular_positions_are_refused(
     tmp_path: Path, indices: list[float]
 ) -> None:
     write_series(tmp_path / "s", AFFINE, SHAPE, indices=indices, change=new_reference)
     with pytest.raises(SourceError) as caught:
         read.open(tmp_path / "s")
     line = str(caught.value)
-    assert "stacks of one slice each, told apart by FrameOfReferenceUID" in line
+    assert "stacks of one slice each, which differ in FrameOfReferenceUID" in line
     assert len(indices) < 3 or "irregular positions (gaps of" in line
 
 
@@ -196,7 +194,7 @@ def jump_sideways(ds: pydicom.Dataset) -> None:
     ds.ImagePositionPatient = [x + (20 if ds.InstanceNumber > 5 else 0), y, z]
 
 
-def test_slices_of_a_frame_of_reference_each_that_jump_sideways_are_refused(
+def test_slices_with_a_frame_of_reference_each_that_jump_sideways_are_refused(
     tmp_path: Path,
 ) -> None:
     def change(ds: pydicom.Dataset) -> None:
@@ -208,7 +206,7 @@ def test_slices_of_a_frame_of_reference_each_that_jump_sideways_are_refused(
         read.open(tmp_path / "s")
 
 
-def test_a_sideways_jump_of_one_series_is_named_and_is_no_tilt(tmp_path: Path) -> None:
+def test_a_sideways_jump_in_one_series_is_noted_and_makes_no_tilt(tmp_path: Path) -> None:
     write_series(tmp_path / "s", AFFINE, SHAPE, change=jump_sideways)
     notes = read.open(tmp_path / "s").notes
     assert any("jump sideways by up to 20 mm" in note for note in notes)
@@ -216,7 +214,9 @@ def test_a_sideways_jump_of_one_series_is_named_and_is_no_tilt(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_runs_of_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, count: int) -> None:
+def test_runs_of_slices_with_a_frame_of_reference_each_are_joined(
+    tmp_path: Path, count: int
+) -> None:
     def change(ds: pydicom.Dataset) -> None:
         ds.FrameOfReferenceUID = f"1.2.{(ds.InstanceNumber - 1) // count + 1}"
 
@@ -227,7 +227,7 @@ def test_runs_of_slices_of_a_frame_of_reference_each_are_joined(tmp_path: Path, 
     assert note.startswith(f"10 slices have {-(-10 // count)} FrameOfReferenceUIDs")
 
 
-def test_runs_of_slices_with_a_gap_between_them_stay_apart(tmp_path: Path) -> None:
+def test_runs_of_slices_with_a_gap_between_them_stay_separate(tmp_path: Path) -> None:
     def change(ds: pydicom.Dataset) -> None:
         ds.FrameOfReferenceUID = f"1.2.{(ds.InstanceNumber - 1) // 3 + 1}"
 
@@ -236,7 +236,7 @@ def test_runs_of_slices_with_a_gap_between_them_stay_apart(tmp_path: Path) -> No
     assert len(read.list_series(tmp_path / "s")) == 3
 
 
-def test_slices_of_three_frames_of_reference_in_turn_stay_apart(tmp_path: Path) -> None:
+def test_slices_of_three_alternating_frames_of_reference_stay_separate(tmp_path: Path) -> None:
     def change(ds: pydicom.Dataset) -> None:
         ds.FrameOfReferenceUID = f"1.2.{ds.InstanceNumber % 3 + 1}"
 
@@ -244,7 +244,7 @@ def test_slices_of_three_frames_of_reference_in_turn_stay_apart(tmp_path: Path) 
     assert len(read.list_series(tmp_path / "s")) == 3
 
 
-def test_stacks_of_two_frames_of_reference_stay_apart(tmp_path: Path) -> None:
+def test_stacks_of_two_frames_of_reference_stay_separate(tmp_path: Path) -> None:
     def change(ds: pydicom.Dataset) -> None:
         ds.FrameOfReferenceUID = f"1.2.{ds.InstanceNumber % 2 + 1}"
 

@@ -1,4 +1,4 @@
-"""One volume whose series UIDs were replaced is joined; two series that are two stay apart."""
+"""One volume whose series UIDs were replaced is joined; two separate series stay separate."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +27,7 @@ BATCHES: dict[str, Batch] = {
 
 
 def batched(batch: Batch, *names: str, **values: Any) -> Change:
-    """Return a change that gives each batch UIDs of its own."""
+    """Return a change that gives each batch separate UIDs."""
 
     def change(ds: pydicom.Dataset) -> None:
         for name in names:
@@ -101,12 +101,12 @@ def test_halves_that_differ_are_two_series(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("is_numbered", [True, False])
-def test_series_that_share_a_place_stay_apart(tmp_path: Path, is_numbered: bool) -> None:
+def test_series_with_a_common_position_stay_separate(tmp_path: Path, is_numbered: bool) -> None:
     change = setting(**({"SeriesNumber": 4} if is_numbered else {}))
     assert halves(tmp_path, change, change, indices=range(4, 10)) == 2
 
 
-def test_series_that_count_from_1_again_stay_apart_unless_they_have_one_number(
+def test_series_that_count_from_1_again_stay_separate_unless_they_have_one_number(
     tmp_path: Path,
 ) -> None:
     again = setting(InstanceNumber=1)
@@ -115,17 +115,17 @@ def test_series_that_count_from_1_again_stay_apart_unless_they_have_one_number(
     assert halves(tmp_path / "y", four, setting(InstanceNumber=1, SeriesNumber=4)) == 1
 
 
-def test_thick_slices_between_each_other_are_two_series(tmp_path: Path) -> None:
+def test_interleaved_thick_slices_are_two_series(tmp_path: Path) -> None:
     change = batched(BATCHES["in turn"], "SeriesInstanceUID", SliceThickness=5.0)
     write_series(tmp_path, AFFINE, SHAPE, change=change)
     assert len(read.list_series(tmp_path)) == 2
 
 
-def test_series_with_a_gap_between_them_stay_apart(tmp_path: Path) -> None:
+def test_series_with_a_gap_between_them_stay_separate(tmp_path: Path) -> None:
     assert halves(tmp_path, setting(), setting(), indices=range(7, 12)) == 2
 
 
-def test_two_volumes_of_a_series_for_each_file_are_two_series(tmp_path: Path) -> None:
+def test_two_volumes_with_a_series_for_each_file_are_two_series(tmp_path: Path) -> None:
     def change(ds: pydicom.Dataset) -> None:
         ds.SeriesInstanceUID = generate_uid()
 
@@ -136,7 +136,7 @@ def test_two_volumes_of_a_series_for_each_file_are_two_series(tmp_path: Path) ->
     assert len(read.list_series(tmp_path)) == 2
 
 
-def test_a_series_for_each_slice_at_irregular_places_is_refused_with_the_reason(
+def test_a_series_for_each_slice_at_irregular_positions_is_refused_with_the_reason(
     tmp_path: Path,
 ) -> None:
     def change(ds: pydicom.Dataset) -> None:
@@ -146,5 +146,5 @@ def test_a_series_for_each_slice_at_irregular_places_is_refused_with_the_reason(
     with pytest.raises(SourceError) as caught:
         read.open(tmp_path)
     line = str(caught.value)
-    assert "found 6 stacks of one slice each, told apart by SeriesInstanceUID" in line
+    assert "found 6 stacks of one slice each, which differ in SeriesInstanceUID" in line
     assert "irregular positions (gaps of" in line

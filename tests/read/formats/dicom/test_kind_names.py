@@ -1,4 +1,4 @@
-"""Kernels and image types have names in known words, and free texts among them are not shown."""
+"""Kernels and image types are named with known words, and free text in them is not shown."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def test_a_kernel_of_several_values_is_named_by_those_that_are_codes(
     assert found == [f"CT, {name}" for name in names]
 
 
-def test_kernels_of_several_values_name_series_of_their_own(tmp_path: Path) -> None:
+def test_kernels_of_several_values_name_separate_series(tmp_path: Path) -> None:
     for number, code in enumerate(("Br59d", "Br40d")):
         series = f"1.2.{number}"
         write_series(tmp_path / code, AFFINE, SHAPE, series=series, modality="CT",
@@ -58,7 +58,7 @@ def test_kernels_of_several_values_name_series_of_their_own(tmp_path: Path) -> N
         (("ORIGINAL", "M", "JANE"), ("ORIGINAL", "M", "DOE"), ["original no. 1", "original no. 2"]),
     ],
 )  # fmt: skip
-def test_image_types_are_named_by_the_words_that_makers_document(
+def test_image_types_are_named_with_documented_words(
     tmp_path: Path, first: tuple[str, ...], second: tuple[str, ...], names: list[str]
 ) -> None:
     types = [setting(ImageType=[word[0], "PRIMARY", *word[1:]]) for word in (first, second)]
@@ -66,7 +66,7 @@ def test_image_types_are_named_by_the_words_that_makers_document(
     assert found == [f"MR, magnitude, {name}" for name in names]
 
 
-def test_the_magnitude_goes_before_the_susceptibility_weighted_image(tmp_path: Path) -> None:
+def test_the_magnitude_precedes_the_susceptibility_weighted_image(tmp_path: Path) -> None:
     weighted = setting(ImageType=["DERIVED", "PRIMARY", "M", "SWI"])
     names_of_two(tmp_path, weighted, setting(ImageType=["ORIGINAL", "PRIMARY", "M", "ND"]))
     assert [added(tmp_path), added(tmp_path, series=2)] == [300, 100]

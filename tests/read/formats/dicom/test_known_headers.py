@@ -23,7 +23,7 @@ from support.dicom_series import grid, setting, write_series
 SHAPE = (6, 20, 24)
 
 
-def test_a_series_is_parsed_once_and_its_pixels_are_read_where_the_headers_say(
+def test_a_series_is_parsed_once_and_its_pixels_are_read_at_the_known_offsets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     paths = write_series(tmp_path / "s", grid("axial"), SHAPE)
@@ -64,7 +64,7 @@ def as_(syntax: str) -> Callable[[pydicom.FileDataset], None]:
         (np.int16, None, uid.ExplicitVRBigEndian, False),
     ],
 )
-def test_values_read_at_their_place_are_those_that_pydicom_decodes(
+def test_values_read_at_their_offset_equal_those_of_pydicom(
     tmp_path: Path, dtype: Any, bits: int | None, syntax: str, is_plain: bool
 ) -> None:
     paths = write_series(
@@ -86,18 +86,20 @@ def test_values_read_at_their_place_are_those_that_pydicom_decodes(
     assert len(np.unique(found)) > 20
 
 
-def test_a_file_that_was_cut_after_its_header_was_read_is_refused_in_one_line(
+def test_a_file_truncated_after_its_header_was_read_is_refused_in_one_line(
     tmp_path: Path,
 ) -> None:
     paths = write_series(tmp_path / "s", grid("axial"), SHAPE)
     frames = [frame for i, path in enumerate(paths) for frame in read_frames(path, i)]
     paths[3].write_bytes(paths[3].read_bytes()[:-10])
-    with pytest.raises(SourceError, match="file 4 of 6 in the order of names: its pixels can't"):
+    with pytest.raises(
+        SourceError, match="file 4 of 6 in the order of names: found pixels that can't"
+    ):
         decode(frames, paths, dtype_of(frames), "s")
 
 
-def test_headers_that_differ_by_any_element_are_told_apart(tmp_path: Path) -> None:
-    """Each slice after the first states one thing that the slices before it do not."""
+def test_headers_that_differ_in_any_element_are_distinguished(tmp_path: Path) -> None:
+    """Each slice after the first states one element that the earlier slices don't state."""
     changes = [
         setting(),
         setting(RescaleSlope=3.0),
@@ -128,7 +130,7 @@ def test_headers_that_differ_by_any_element_are_told_apart(tmp_path: Path) -> No
     assert len(apart) == len(changes)
 
 
-def test_nothing_that_names_a_patient_is_kept_of_a_header(
+def test_kept_headers_hold_nothing_that_identifies_a_patient(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     secrets = ("Doe^Jane", "MRN-4711", "1.2.840.99.4711", "knee of Jane")

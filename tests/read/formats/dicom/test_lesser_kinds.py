@@ -1,4 +1,4 @@
-"""A source without plain images says so: phases, projections and the like alone are no anatomy."""
+"""A note reports that a source has no plain images but only phases, projections and the like."""
 
 from itertools import product
 from pathlib import Path
@@ -62,7 +62,7 @@ ALONE: dict[str, tuple[str, Change, Change, str]] = {
         ],
     ),
 )
-def test_a_kind_is_noted_where_the_images_that_it_belongs_to_are_absent(
+def test_a_kind_is_noted_if_the_images_that_it_belongs_to_are_absent(
     tmp_path: Path, name: str, beside: str
 ) -> None:
     modality, change, better, note = ALONE[name]
@@ -78,12 +78,12 @@ def test_a_kind_is_noted_where_the_images_that_it_belongs_to_are_absent(
     assert "XYZ" not in "".join(notes)
 
 
-def test_images_as_acquired_have_no_such_note(tmp_path: Path) -> None:
+def test_acquired_images_have_no_such_note(tmp_path: Path) -> None:
     write_kind(tmp_path, 100, image_type("M", "ND"))
     assert read.open(tmp_path).notes == ()
 
 
-def test_an_image_of_another_modality_is_no_magnitude(tmp_path: Path) -> None:
+def test_an_image_of_another_modality_does_not_count_as_magnitude(tmp_path: Path) -> None:
     write_kind(tmp_path, 100, image_type("P"))
     small = range(4)
     write_series(tmp_path / "c", AFFINE, SHAPE, indices=small, series="1.2.9", modality="CT")

@@ -1,4 +1,4 @@
-"""Values that a Modality LUT gives: pydicom's own function says which."""
+"""Values after a Modality LUT equal those of pydicom's own function."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -45,27 +45,27 @@ def greys_of_pydicom(paths: list[Path]) -> list[int]:
 
 @pytest.mark.parametrize("vr", ["US", "OW"])
 @pytest.mark.parametrize("first", [0, -5, 40])
-def test_the_table_gives_the_values(tmp_path: Path, vr: str, first: int) -> None:
+def test_the_table_is_applied_to_the_values(tmp_path: Path, vr: str, first: int) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising(), first, vr=vr)
 
     paths = write(tmp_path, change, dtype=np.int16)
     dataset = read.open(tmp_path)
     assert sorted(whole(dataset).ravel().tolist()) == greys_of_pydicom(paths)
-    assert any("of 10 images are by a table (ModalityLUTSequence)" in n for n in dataset.notes)
+    assert any("of 10 images come from a table (ModalityLUTSequence)" in n for n in dataset.notes)
 
 
-def test_a_table_for_each_slice_is_applied_to_its_slice(tmp_path: Path) -> None:
+def test_each_table_is_applied_to_its_own_slice(tmp_path: Path) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising(step=ds.InstanceNumber))
 
     paths = write(tmp_path, change)
     dataset = read.open(tmp_path)
     assert sorted(whole(dataset).ravel().tolist()) == greys_of_pydicom(paths)
-    assert any("by a table of its own" in note for note in dataset.notes)
+    assert any("from separate tables (ModalityLUTSequence)" in note for note in dataset.notes)
 
 
-def test_a_file_of_implicit_vr_is_read_alike(tmp_path: Path) -> None:
+def test_a_file_of_implicit_vr_has_the_same_values(tmp_path: Path) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising(), vr="OW")
 
@@ -78,7 +78,7 @@ def test_a_file_of_implicit_vr_is_read_alike(tmp_path: Path) -> None:
     assert np.array_equal(whole(read.open(tmp_path)), explicit)
 
 
-def test_a_table_of_65536_entries_states_0_of_them(tmp_path: Path) -> None:
+def test_a_table_of_65536_entries_states_0_entries(tmp_path: Path) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(np.arange(1 << 16)[::-1].copy(), vr="OW")
 
@@ -95,7 +95,7 @@ def test_inverted_images_are_inverted_after_the_table(tmp_path: Path) -> None:
     assert sorted(whole(read.open(tmp_path)).ravel().tolist()) == expected
 
 
-def test_the_table_is_used_beside_a_rescale_and_the_note_says_so(tmp_path: Path) -> None:
+def test_the_table_takes_precedence_over_a_rescale_with_a_note(tmp_path: Path) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising())
         if ds.InstanceNumber == 3:
@@ -107,7 +107,7 @@ def test_the_table_is_used_beside_a_rescale_and_the_note_says_so(tmp_path: Path)
     assert any("1 of 10 images states RescaleSlope and" in note for note in dataset.notes)
 
 
-def test_a_ct_by_a_table_has_no_hounsfield_units(tmp_path: Path) -> None:
+def test_a_ct_with_a_table_has_no_hounsfield_units(tmp_path: Path) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising())
 
@@ -115,7 +115,7 @@ def test_a_ct_by_a_table_has_no_hounsfield_units(tmp_path: Path) -> None:
     assert any("states no Hounsfield units" in note for note in read.open(tmp_path).notes)
 
 
-def test_an_empty_sequence_is_no_table(tmp_path: Path) -> None:
+def test_an_empty_sequence_counts_as_no_table(tmp_path: Path) -> None:
     write_series(
         tmp_path / "s", AFFINE, SHAPE, change=lambda ds: setattr(ds, "ModalityLUTSequence", [])
     )
@@ -123,7 +123,7 @@ def test_an_empty_sequence_is_no_table(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", ["short", "no data", "depth"])
-def test_a_damaged_table_is_refused_with_a_way_out(tmp_path: Path, fault: str) -> None:
+def test_a_damaged_table_is_refused_with_a_remedy(tmp_path: Path, fault: str) -> None:
     def change(ds: Dataset) -> None:
         ds.ModalityLUTSequence = table(rising(), depth=8 if fault == "depth" else 16)
         item = ds.ModalityLUTSequence[0]

@@ -1,4 +1,4 @@
-"""Mosaics of slices become volumes: against the scene, and against nibabel's own reader of them."""
+"""Mosaics of slices become volumes that agree with the scene and with nibabel's own reader."""
 
 import warnings
 from collections.abc import Callable
@@ -29,17 +29,17 @@ def affine_of(turned: bool, downwards: bool) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("downwards", [False, True])
-def test_every_voxel_lies_where_the_scene_has_it(
+def test_every_voxel_lies_at_its_position_in_the_scene(
     tmp_path: Path, turned: bool, downwards: bool
 ) -> None:
     path = write_mosaic(tmp_path / "m.dcm", affine_of(turned, downwards))
     dataset = read.open(path)
     assert sorted(dataset.levels[0].shape) == sorted(SHAPE)
-    assert error(dataset) < 0.51  # whole numbers
-    assert dataset.notes == ("mosaics of 7 slices in one image: taken apart",)
+    assert error(dataset) < 0.51  # rounded to integers
+    assert dataset.notes == ("mosaics of 7 slices in one image: separated into slices",)
 
 
-def test_nibabel_finds_the_same_voxels_at_the_same_places(tmp_path: Path) -> None:
+def test_nibabel_reads_the_same_voxels_at_the_same_positions(tmp_path: Path) -> None:
     path = write_mosaic(tmp_path / "m.dcm", affine_of(True, True))
     dataset = read.open(path)
     with warnings.catch_warnings():
@@ -56,7 +56,7 @@ def test_nibabel_finds_the_same_voxels_at_the_same_places(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("is_compressed", [False, True])
-def test_mosaics_of_a_series_are_points_in_time(tmp_path: Path, is_compressed: bool) -> None:
+def test_mosaics_of_a_series_are_time_points(tmp_path: Path, is_compressed: bool) -> None:
     affine = affine_of(True, False)
     series = generate_uid()
     for number, name in ((2, "a"), (3, "b"), (1, "c")):
@@ -70,7 +70,7 @@ def test_mosaics_of_a_series_are_points_in_time(tmp_path: Path, is_compressed: b
         assert np.array_equal(later, first * (time + 1))
 
 
-def test_a_grid_whose_slices_have_places_of_their_own(tmp_path: Path) -> None:
+def test_a_grid_of_slices_with_separate_positions_is_read(tmp_path: Path) -> None:
     """UIH's VFRAME: 7 slices in 3 columns and 3 rows, each with its position."""
     affine = affine_of(True, False)
 
@@ -116,14 +116,14 @@ def _without_gap(ds: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (_without_header, "of a mosaic of several slices, without the private header"),
+        (_without_header, "with a mosaic of several slices, without the private header"),
         (_cut_short, "without the private header"),
-        (_of_another_size, "of a mosaic of 17 slices in an image of 54 x 60 pixels"),
-        (_askew, "of a mosaic of 7 slices without a direction or a distance"),
-        (_without_gap, "of a mosaic of 7 slices without a direction or a distance"),
+        (_of_another_size, "with a mosaic of 17 slices in an image of 54 x 60 pixels"),
+        (_askew, "with a mosaic of 7 slices without their direction or distance"),
+        (_without_gap, "with a mosaic of 7 slices without their direction or distance"),
     ],
 )
-def test_a_mosaic_that_can_not_be_placed_is_one_line(
+def test_a_mosaic_without_a_position_is_refused_in_one_line(
     tmp_path: Path, change: Callable[[Any], None], told: str
 ) -> None:
     path = write_mosaic(tmp_path / "m.dcm", affine_of(False, False), change=change)

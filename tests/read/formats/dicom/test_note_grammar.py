@@ -1,4 +1,4 @@
-"""Notes on images that are left out agree with their number, for one and for several."""
+"""Notes on omitted images agree with their number, for one and for several."""
 
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ def notes_of(folder: Path) -> str:
         (3, "left out: 3 images of the same series (localizer), because they are of another kind;"),
     ],
 )
-def test_other_kinds(tmp_path: Path, count: int, words: str) -> None:
+def test_other_kinds_are_counted(tmp_path: Path, count: int, words: str) -> None:
     write_kind(tmp_path, 100, image_type("M"))
     write_kind(tmp_path, 0, image_type("LOCALIZER"), indices=range(count), first_number=50)
     assert words in notes_of(tmp_path)
@@ -32,7 +32,7 @@ def test_other_kinds(tmp_path: Path, count: int, words: str) -> None:
     ("kinds", "words"),
     [(6, "1 more kind of images is in `--s"), (7, "2 more kinds of images are in `--series list`")],
 )
-def test_more_kinds_than_are_listed(tmp_path: Path, kinds: int, words: str) -> None:
+def test_kinds_beyond_the_listed_ones_are_counted(tmp_path: Path, kinds: int, words: str) -> None:
     for echo in range(kinds):
         write_kind(tmp_path, echo, setting(EchoTime=5.0 * (echo + 1)), indices=range(3))
     assert words in notes_of(tmp_path)
@@ -41,13 +41,15 @@ def test_more_kinds_than_are_listed(tmp_path: Path, kinds: int, words: str) -> N
 @pytest.mark.parametrize(
     ("rests", "words"),
     [
-        ((8,), "1 of 3 points in time (AcquisitionNumber), because slices are missing (8 of 10 "
+        ((8,), "1 of 3 time points (AcquisitionNumber), because slices are missing (8 of 10 "
          "are there); it is a series of `--series list`"),
-        ((8, 7), "2 of 4 points in time (AcquisitionNumber), because slices are missing (8, 7 of "
+        ((8, 7), "2 of 4 time points (AcquisitionNumber), because slices are missing (8, 7 of "
          "10 are there); each is a series of `--series list`"),
     ],
 )  # fmt: skip
-def test_incomplete_points_in_time(tmp_path: Path, rests: tuple[int, ...], words: str) -> None:
+def test_incomplete_time_points_are_counted(
+    tmp_path: Path, rests: tuple[int, ...], words: str
+) -> None:
     for time, count in enumerate((10, 10, *rests)):
         change = setting(AcquisitionNumber=time + 1)
         write_kind(tmp_path, 100 * time, change, indices=range(count), first_number=1 + 10 * time)
@@ -66,7 +68,7 @@ def write_twice(folder: Path, copies: int, change: Any) -> None:
     ("copies", "words"),
     [(1, "file left out: 1 copy of another"), (2, "files left out: 2 copies of others")],
 )
-def test_copies(tmp_path: Path, copies: int, words: str) -> None:
+def test_copies_are_counted(tmp_path: Path, copies: int, words: str) -> None:
     write_twice(tmp_path, copies, lambda ds: None)
     assert notes_of(tmp_path) == words
 
@@ -75,7 +77,7 @@ def test_copies(tmp_path: Path, copies: int, words: str) -> None:
     ("copies", "words"),
     [(1, "1 duplicate slice with the same"), (2, "2 duplicate slices with the same pixels as")],
 )
-def test_duplicates(tmp_path: Path, copies: int, words: str) -> None:
+def test_duplicates_are_counted(tmp_path: Path, copies: int, words: str) -> None:
     uids = iter(("1.2.77.1", "1.2.77.2"))
     write_twice(tmp_path, copies, lambda ds: setattr(ds, "SOPInstanceUID", next(uids)))
     assert words in notes_of(tmp_path)
@@ -88,7 +90,7 @@ def test_duplicates(tmp_path: Path, copies: int, words: str) -> None:
         ((3, 6), "2 missing slices of 10 (20.0%), gaps of 6, 6 mm among slices 3 mm apart"),
     ],
 )
-def test_missing_slices(tmp_path: Path, lost: tuple[int, ...], words: str) -> None:
+def test_missing_slices_are_counted(tmp_path: Path, lost: tuple[int, ...], words: str) -> None:
     write_series(tmp_path, AFFINE, SHAPE, indices=[k for k in range(10) if k not in lost])
     assert words in notes_of(tmp_path)
 
@@ -96,11 +98,11 @@ def test_missing_slices(tmp_path: Path, lost: tuple[int, ...], words: str) -> No
 @pytest.mark.parametrize(
     ("without", "words"),
     [
-        (1, "1 of 10 images states no rescale: its stored values are taken"),
-        (2, "2 of 10 images state no rescale: their stored values are taken"),
+        (1, "1 of 10 images states no rescale: its stored values are used"),
+        (2, "2 of 10 images state no rescale: their stored values are used"),
     ],
 )
-def test_images_without_rescale(tmp_path: Path, without: int, words: str) -> None:
+def test_images_without_rescale_are_counted(tmp_path: Path, without: int, words: str) -> None:
     def change(ds: pydicom.Dataset) -> None:
         if ds.InstanceNumber <= without:
             del ds.RescaleSlope, ds.RescaleIntercept

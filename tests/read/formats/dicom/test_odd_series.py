@@ -1,4 +1,4 @@
-"""Odd series as users report them: each is read right, or the note says what is assumed."""
+"""Odd series that users have reported: each is read correctly, or a note states the assumption."""
 
 from pathlib import Path
 from typing import Any
@@ -19,18 +19,18 @@ def notes_of(folder: Path) -> str:
 
 @pytest.mark.parametrize(
     ("words", "assumed"),
-    [(("M", "ND"), "points in time are"), (("DIFFUSION", "NONE"), "directions or b-values of")],
+    [(("M", "ND"), "time points"), (("DIFFUSION", "NONE"), "directions or b-values of diffusion")],
 )
-def test_images_that_only_numbers_tell_apart_are_an_assumption(
+def test_images_that_differ_only_in_numbers_are_noted_as_an_assumption(
     tmp_path: Path, words: tuple[str, ...], assumed: str
 ) -> None:
     for time in range(3):
         write_kind(tmp_path, 100 * time, image_type(*words), first_number=1 + 10 * time)
-    note = f"3 images at a place: InstanceNumber alone tells them apart, {assumed}"
+    note = f"3 images at a place: only InstanceNumber separates them, so {assumed} are assumed"
     assert note in notes_of(tmp_path)
 
 
-def test_points_of_dynamic_pet_are_told_apart_by_their_time(tmp_path: Path) -> None:
+def test_points_of_dynamic_pet_are_distinguished_by_their_time(tmp_path: Path) -> None:
     for time in (1, 0):
         change = setting(Modality="PT", FrameReferenceTime=1000.0 * time)
         write_kind(tmp_path, 100 * time, change, first_number=30 - 10 * time)
@@ -45,7 +45,7 @@ def test_b_values_of_a_sequence_name_separate_images(tmp_path: Path) -> None:
     assert "(b 1000 s/mm2)" in notes_of(tmp_path)
 
 
-def test_siemens_minimum_projection_is_no_image(tmp_path: Path) -> None:
+def test_siemens_minimum_projection_is_left_out(tmp_path: Path) -> None:
     write_kind(tmp_path, 200, setting(ImageType=["DERIVED", "PRIMARY", "MNIP", "MNIP"]))
     write_kind(tmp_path, 100, image_type("M", "SWI"), first_number=50)
     assert "(minimum intensity projection)" in notes_of(tmp_path)
@@ -55,7 +55,10 @@ def test_slices_of_another_matrix_in_one_series_are_named(tmp_path: Path) -> Non
     write_series(tmp_path / "a", AFFINE, SHAPE, series="1.2.3", indices=range(4))
     fine = grid(shape=(10, 24, 28), spacing=(3.0, 1.0, 1.1))
     write_series(tmp_path / "b", fine, (10, 24, 28), series="1.2.3", indices=range(4, 10))
-    note = "4 more images of the same series lie beside these and are not built: another Columns"
+    note = (
+        "4 more images of the same series lie beside these and are not built, because they differ "
+        "in Columns"
+    )
     assert note in notes_of(tmp_path)
     assert read.open(tmp_path).levels[0].shape == (24, 6, 28)
 
@@ -76,7 +79,7 @@ def write_dose(path: Path, **values: Any) -> None:
     [
         ({"DoseUnits": "GY", "DoseGridScaling": "0.001"}, "dose values are in gray"),
         ({"DoseUnits": "RELATIVE", "DoseGridScaling": "0.001"}, "relative to a reference"),
-        ({"DoseUnits": "GY"}, "in no unit: DoseGridScaling is not stated"),
+        ({"DoseUnits": "GY"}, "without a unit: DoseGridScaling is not stated"),
     ],
 )
 def test_the_unit_of_a_dose_is_named(tmp_path: Path, values: dict[str, Any], words: str) -> None:

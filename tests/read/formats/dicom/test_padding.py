@@ -22,7 +22,7 @@ OUTSIDE = np.hypot(*np.meshgrid(np.arange(30) - 14.5, np.arange(26) - 12.5, inde
 
 
 def measured() -> NDArray[np.int16]:
-    """Stored values of CT: 24 (-1000 HU) and more, each slice its own least; 1000 and more, 20."""
+    """Stored values of CT: one is 24 (-1000 HU), all others are 30 or more."""
     values = np.random.default_rng(0).integers(30, 1500, SHAPE).astype(np.int16)
     values[2, 15, 13] = 24
     return values
@@ -56,18 +56,18 @@ def test_padding_becomes_the_smallest_measured_value(tmp_path: Path) -> None:
     assert np.array_equal(as_stored(dataset), inside - 1024)
 
 
-def test_a_region_has_the_values_of_the_whole(tmp_path: Path) -> None:
+def test_a_region_has_the_values_of_the_full_volume(tmp_path: Path) -> None:
     folder = write(tmp_path / "s", padded(measured(), -2000), PixelPaddingValue=-2000)
-    box = Box((5, 4, 0), (25, 6, 20))  # without the slice that holds the least value
+    box = Box((5, 4, 0), (25, 6, 20))  # without the slice that holds the smallest value
     part = read.open(folder).read(0, box).voxels
     assert np.array_equal(part, whole(read.open(folder))[box.slices])
     assert part.min() == -1000
 
 
 @pytest.mark.slow
-def test_the_window_of_padded_ct_is_that_of_what_was_measured(tmp_path: Path) -> None:
+def test_the_window_of_padded_ct_is_that_of_the_measured_values(tmp_path: Path) -> None:
     folder = write(tmp_path / "s", padded(measured(), -2000), PixelPaddingValue=-2000)
-    # the preset of CT has a window of its own
+    # the preset of CT has its own window
     flags = ["-o", str(tmp_path / "out"), "--preset", "none"]
     assert main(["slices", str(folder), *flags]) == 0
     low, high = json.loads((tmp_path / "out" / "slices.json").read_text("utf-8"))["window"]
@@ -76,7 +76,7 @@ def test_the_window_of_padded_ct_is_that_of_what_was_measured(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("value", "limit"), [(-2000, -1990), (-1990, -2000), (2900, 3000)])
-def test_a_range_pads_from_either_end(tmp_path: Path, value: int, limit: int) -> None:
+def test_a_padding_range_may_start_at_either_end(tmp_path: Path, value: int, limit: int) -> None:
     stored = padded(measured(), value)
     stored[:, 0, 0], stored[:, 0, 1] = limit, (value + limit) // 2
     folder = write(tmp_path / "s", stored, PixelPaddingValue=value, PixelPaddingRangeLimit=limit)
@@ -84,8 +84,8 @@ def test_a_range_pads_from_either_end(tmp_path: Path, value: int, limit: int) ->
 
 
 @pytest.mark.parametrize("bits", [16, 12])
-def test_unsigned_padding_without_a_stated_vr(tmp_path: Path, bits: int) -> None:
-    """In implicit VR it is the sign of the pixels that says what two bytes are."""
+def test_unsigned_padding_is_read_without_a_stated_vr(tmp_path: Path, bits: int) -> None:
+    """In implicit VR the sign of the pixels determines the type of the padding."""
     value = 63536 if bits == 16 else 4095  # -2000 if it were signed
     stored = measured().astype(np.uint16)
     folder = write(tmp_path / "s", padded(stored, value), PixelPaddingValue=value, bits=bits)
@@ -96,14 +96,14 @@ def test_unsigned_padding_without_a_stated_vr(tmp_path: Path, bits: int) -> None
     assert np.array_equal(as_stored(read.open(folder)), np.where(OUTSIDE, 24, measured()) - 1024)
 
 
-def test_padding_above_the_bits_that_are_stored(tmp_path: Path) -> None:
-    """12 bits of 16: 0x8000 is in no stored bit, and is no air."""
+def test_padding_above_the_stored_bits_is_ignored(tmp_path: Path) -> None:
+    """12 bits of 16 are stored: 0x8000 is outside them, and is not air."""
     stored = padded(measured().astype(np.uint16), 0x8000)
     folder = write(tmp_path / "s", stored, PixelPaddingValue=0x8000, bits=12)
     assert np.array_equal(as_stored(read.open(folder)), np.where(OUTSIDE, 24, measured()) - 1024)
 
 
-def test_inverted_images_are_padded_by_what_is_stored(tmp_path: Path) -> None:
+def test_padding_of_inverted_images_is_compared_with_stored_values(tmp_path: Path) -> None:
     """MONOCHROME1: the highest stored value is black."""
     stored = padded(measured().astype(np.uint16), 0)
     folder = write(
@@ -116,20 +116,20 @@ def test_inverted_images_are_padded_by_what_is_stored(tmp_path: Path) -> None:
 
 
 def test_no_signal_stays_0_in_mr(tmp_path: Path) -> None:
-    """A brain cut out on 0: its least value, 24, is no background."""
+    """A brain is cut out on 0: its smallest value, 24, is not the background."""
     folder = write(
         tmp_path / "s", padded(measured(), 0), PixelPaddingValue=0, modality="MR", intercept=0.0
     )
     assert np.array_equal(as_stored(read.open(folder)), np.where(OUTSIDE, 0, measured()))
 
 
-def test_padding_within_the_range_stays(tmp_path: Path) -> None:
+def test_padding_within_the_range_is_kept(tmp_path: Path) -> None:
     stored = padded(measured(), 1024)
     folder = write(tmp_path / "s", stored, PixelPaddingValue=1024)
     assert np.array_equal(as_stored(read.open(folder)), stored - 1024)
 
 
-def test_a_slice_that_is_all_padding_takes_the_others_least_value(tmp_path: Path) -> None:
+def test_a_slice_of_padding_alone_gets_the_smallest_value_of_the_others(tmp_path: Path) -> None:
     stored = padded(measured(), -2000)
     stored[4] = -2000
     dataset = read.open(write(tmp_path / "s", stored, PixelPaddingValue=-2000))
@@ -138,7 +138,7 @@ def test_a_slice_that_is_all_padding_takes_the_others_least_value(tmp_path: Path
 
 @pytest.mark.slow
 @pytest.mark.parametrize("syntax", [JPEGLosslessSV1, RLELossless])
-def test_compressed_images_are_padded_alike(tmp_path: Path, syntax: str) -> None:
+def test_compressed_images_are_padded_in_the_same_way(tmp_path: Path, syntax: str) -> None:
     stored = padded(measured(), -2000)
     folder = write(tmp_path / "s", stored, PixelPaddingValue=-2000)
     for path in folder.iterdir():
@@ -147,7 +147,7 @@ def test_compressed_images_are_padded_alike(tmp_path: Path, syntax: str) -> None
     assert np.array_equal(as_stored(read.open(folder)), inside - 1024)
 
 
-def test_where_all_is_padding_it_stays(tmp_path: Path) -> None:
+def test_padding_is_kept_if_there_is_nothing_else(tmp_path: Path) -> None:
     stored = np.full(SHAPE, -2000, np.int16)
     dataset = read.open(write(tmp_path / "s", stored, PixelPaddingValue=-2000))
     assert np.unique(whole(dataset)).tolist() == [-3024]

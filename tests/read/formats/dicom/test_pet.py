@@ -1,4 +1,4 @@
-"""PET series as scanners write them: values, units, corrections, points in time, bed positions."""
+"""PET series as scanners write them: values, units, corrections, time points, bed positions."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ def notes_of(folder: Path) -> str:
     return "\n".join(read.open(folder).notes)
 
 
-def test_each_slice_has_its_own_scale_and_the_unit_is_said(tmp_path: Path) -> None:
+def test_each_slice_has_its_own_scale_and_the_unit_is_noted(tmp_path: Path) -> None:
     write_pet(tmp_path)
     dataset = read.open(tmp_path)
     assert error(dataset) < 0.02  # half a step of the coarsest scale; the scene reaches 1000
@@ -71,7 +71,7 @@ TIMES: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", TIMES)
 @pytest.mark.slow
-def test_frames_of_dynamic_pet_are_points_in_time(tmp_path: Path, name: str) -> None:
+def test_frames_of_dynamic_pet_are_time_points(tmp_path: Path, name: str) -> None:
     for time in (2, 0, 1):
         values: dict[str, Any] = {"FrameReferenceTime": 5000.0 * time, **TIMES[name]}
         if callable(per_slice := values["FrameReferenceTime"]):
@@ -79,7 +79,7 @@ def test_frames_of_dynamic_pet_are_points_in_time(tmp_path: Path, name: str) -> 
         write_pet(
             tmp_path,
             100 * (time + 1),
-            first=101 - 10 * time,  # against the order of time
+            first=101 - 10 * time,  # in the reverse order of time
             SeriesType=["DYNAMIC", "IMAGE"],
             NumberOfTimeSlices=3,
             NumberOfSlices=10,
@@ -89,14 +89,14 @@ def test_frames_of_dynamic_pet_are_points_in_time(tmp_path: Path, name: str) -> 
     found = [added(tmp_path, time=time) for time in range(3)]
     assert found == pytest.approx([100, 200, 300], abs=0.1)
     assert "InstanceNumber" not in notes_of(tmp_path)
-    assert "number of points in time" not in notes_of(tmp_path)
+    assert "number of time points" not in notes_of(tmp_path)
 
 
-def test_points_in_time_that_are_stated_and_absent_are_said(tmp_path: Path) -> None:
+def test_stated_but_absent_time_points_are_noted(tmp_path: Path) -> None:
     for time in range(2):
         write_pet(tmp_path, 9 * time, first=1 + 10 * time, FrameReferenceTime=1e3 * time,
                   NumberOfTimeSlices=3)  # fmt: skip
-    assert "NumberOfTimeSlices states 3, and 2 are there" in notes_of(tmp_path)
+    assert "NumberOfTimeSlices states 3, but there are only 2" in notes_of(tmp_path)
 
 
 @pytest.mark.parametrize("told", ["FrameReferenceTime", "AcquisitionNumber", "InstanceNumber"])
@@ -123,7 +123,7 @@ def test_beds_that_overlap_are_one_volume_of_their_inner_slices(tmp_path: Path, 
     assert beds == pytest.approx([0.0] * 8 + [10.0] * 6 + [20.0] * 8, abs=0.1)
 
 
-def test_a_projection_of_the_volume_is_no_image(tmp_path: Path) -> None:
+def test_a_projection_of_the_volume_is_left_out(tmp_path: Path) -> None:
     write_pet(tmp_path, 300, SeriesType=["WHOLE BODY", "REPROJECTION"])
     write_pet(tmp_path, 100, first=50, SeriesType=["WHOLE BODY", "IMAGE"])
     assert added(tmp_path) == pytest.approx(100, abs=0.1)
@@ -138,7 +138,7 @@ def test_images_of_two_units_are_two_series(tmp_path: Path) -> None:
     assert any("uptake values in grams per millilitre (Units GML), SUVType LBM" in n for n in note)
 
 
-def test_philipss_factor_to_uptake_values_is_said(tmp_path: Path) -> None:
+def test_the_factor_of_philips_to_uptake_values_is_noted(tmp_path: Path) -> None:
     write_pet(tmp_path, Units="CNTS")
     for path in tmp_path.iterdir():
         ds = pydicom.dcmread(path)

@@ -33,23 +33,23 @@ OBLIQUE = turn((1, 2, -0.5), 23.0)
 
 @pytest.mark.parametrize("plane", ["axial", "coronal", "sagittal"])
 @pytest.mark.parametrize("rotation", [None, OBLIQUE, turn((0, 1, 1), 97.0)])
-def test_every_voxel_lies_where_the_scene_has_it(
+def test_every_voxel_lies_at_its_position_in_the_scene(
     tmp_path: Path, plane: str, rotation: NDArray[np.float64] | None
 ) -> None:
     write_series(tmp_path / "s", grid(plane, rotation=rotation, shift=(3, -5, 8)))
     dataset = read.open(tmp_path / "s")
-    assert error(dataset) <= 0.51  # rounding to whole numbers
+    assert error(dataset) <= 0.51  # rounded to integers
     assert (dataset.name, dataset.modality, dataset.channels[0].name) == ("MR", "MR", "MR")
     assert dataset.dtype == np.int16
     assert dataset.notes == ()
     turned = np.array(dataset.placement)[:3, :3]
     assert np.linalg.det(turned) == pytest.approx(1)
-    assert (np.diag(turned) > 0.5).all()  # near the identity: flips and permutations did the rest
+    assert (np.diag(turned) > 0.5).all()  # near the identity: flips and permutations align the axes
 
 
 @pytest.mark.slow
 def test_the_letter_f_is_the_same_from_dicom_and_nifti(tmp_path: Path) -> None:
-    """Its axes are canonical, so that nothing is left for the placement."""
+    """Its axes are canonical, so that the placement is only an offset."""
     write_f_dicom(tmp_path / "dicom", f_phantom(), (0.5, 0.2, 0.3))
     write_f_nifti(tmp_path / "f.nii", f_phantom(), (0.5, 0.2, 0.3))
     for source in ("dicom", "f.nii"):
@@ -62,7 +62,7 @@ def test_the_letter_f_is_the_same_from_dicom_and_nifti(tmp_path: Path) -> None:
 def test_rows_run_down_columns_to_the_left_of_the_patient_slices_to_the_front(
     tmp_path: Path,
 ) -> None:
-    """Unturned planes leave nothing to the placement but the offset."""
+    """For planes that are not turned the placement is only an offset."""
     write_series(tmp_path / "s", grid("sagittal"))
     dataset = read.open(tmp_path / "s")
     assert np.array_equal(np.array(dataset.placement)[:3, :3], np.eye(3))
@@ -71,7 +71,7 @@ def test_rows_run_down_columns_to_the_left_of_the_patient_slices_to_the_front(
     assert (z[1], y[2], x[0]) == pytest.approx((-2.2, -2.0, 2.5))  # anterior, inferior, left
 
 
-def test_missing_slices_are_interpolated_and_the_gap_is_told(tmp_path: Path) -> None:
+def test_missing_slices_are_interpolated_and_the_gap_is_noted(tmp_path: Path) -> None:
     kept = [k for k in range(22) if k not in (7, 8, 15)]
     write_series(tmp_path / "s", grid(spacing=(1.5, 2, 2.2)), indices=kept)
     dataset = read.open(tmp_path / "s")
@@ -88,7 +88,7 @@ def test_missing_slices_are_interpolated_and_the_gap_is_told(tmp_path: Path) -> 
     assert np.abs(full[7] - between).max() <= 0.51
 
 
-def test_uneven_gaps_become_even_ones_of_their_median(tmp_path: Path) -> None:
+def test_uneven_distances_become_even_ones_of_their_median(tmp_path: Path) -> None:
     steps = np.array([1.0, 1.4, 1.0, 0.8, 1.0, 1.3] * 4)
     write_series(tmp_path / "s", grid(spacing=(1.5, 2, 2.2)), indices=np.cumsum(steps).tolist())
     dataset = read.open(tmp_path / "s")
@@ -98,7 +98,7 @@ def test_uneven_gaps_become_even_ones_of_their_median(tmp_path: Path) -> None:
     assert error(dataset) <= interpolation_bound(2.1)
 
 
-def test_rounded_positions_are_even_and_do_not_add_up(tmp_path: Path) -> None:
+def test_rounding_of_positions_does_not_accumulate(tmp_path: Path) -> None:
     def rounded(ds: pydicom.Dataset) -> None:
         x, y, z = ds.ImagePositionPatient
         ds.ImagePositionPatient = [x, y, round(float(z), 2)]
@@ -119,11 +119,12 @@ def test_tilted_gantry_is_resampled_onto_an_orthogonal_grid(tmp_path: Path, degr
     inside = whole(dataset) > 0
     difference = np.abs(whole(dataset) - scene(lps_mm(dataset)))[inside]
     assert difference.max() <= interpolation_bound(2.0)
-    assert error(dataset) < 200  # what no slice reaches is empty, and the scene's edge is there
+    # voxels that no slice reaches are empty, and the scene has an edge there
+    assert error(dataset) < 200
     assert dataset.levels[0].shape[0] > 30  # grown by the drift
 
 
-def test_copies_are_dropped_without_a_word_about_pixels(tmp_path: Path) -> None:
+def test_copies_are_dropped_without_a_note_on_pixels(tmp_path: Path) -> None:
     paths = write_series(tmp_path / "s", grid())
     (tmp_path / "s" / "again").mkdir()
     for path in paths[:3]:
@@ -134,7 +135,7 @@ def test_copies_are_dropped_without_a_word_about_pixels(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("brighter", [0, 5])
-def test_duplicates_give_the_first_by_instance_number_and_say_so(
+def test_of_duplicates_the_first_by_instance_number_is_read_with_a_note(
     tmp_path: Path, brighter: int
 ) -> None:
     paths = write_series(tmp_path / "s", grid())
@@ -151,7 +152,7 @@ def test_duplicates_give_the_first_by_instance_number_and_say_so(
 
 
 @pytest.mark.slow
-def test_as_many_at_every_place_are_points_in_time(tmp_path: Path) -> None:
+def test_equally_many_images_at_every_position_are_time_points(tmp_path: Path) -> None:
     def later(ds: pydicom.Dataset) -> None:
         ds.InstanceNumber += 100
         ds.RescaleIntercept = 7
@@ -165,7 +166,7 @@ def test_as_many_at_every_place_are_points_in_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_largest_series_is_taken_and_any_can_be_named(tmp_path: Path) -> None:
+def test_the_largest_series_is_read_and_any_can_be_chosen(tmp_path: Path) -> None:
     write_series(tmp_path / "s" / "deep" / "er", grid("coronal"), name="{}".format)
     small = grid("axial", (6, 10, 12))
     write_series(
@@ -205,18 +206,18 @@ def test_the_largest_series_is_taken_and_any_can_be_named(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("modality", ["MR", "CT"])
-def test_enhanced_frames_have_their_own_place_and_rescale(tmp_path: Path, modality: str) -> None:
+def test_enhanced_frames_have_their_own_position_and_rescale(tmp_path: Path, modality: str) -> None:
     path = write_enhanced(tmp_path / "frames", grid("sagittal", rotation=OBLIQUE), SHAPE, modality)
     dataset = read.open(path)
     assert error(dataset) <= 1.01  # slopes of up to 2
     assert dataset.modality == modality
     slope, intercept = dataset.notes[:2]
-    assert slope == "RescaleSlope differs among the images (1 to 2): each has its own"
-    assert intercept.startswith("RescaleIntercept differs among the images (-20 to 0)")
+    assert slope == "RescaleSlope differs between images (1 to 2): each image has its own"
+    assert intercept.startswith("RescaleIntercept differs between images (-20 to 0)")
 
 
 def as_patients_come(ds: pydicom.Dataset) -> None:
-    """What highdicom wants of a single frame before it converts it."""
+    """Set the attributes that highdicom requires in a single frame before it converts it."""
     for name in ("PatientBirthDate", "PatientSex", "AccessionNumber", "ReferringPhysicianName",
                  "StudyID", "PositionReferenceIndicator", "Laterality"):  # fmt: skip
         setattr(ds, name, "")
@@ -230,10 +231,10 @@ def as_patients_come(ds: pydicom.Dataset) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("modality", ["MR", "CT"])
-def test_enhanced_images_that_highdicom_converts_lie_where_the_slices_did(
+def test_enhanced_images_that_highdicom_converts_lie_at_the_slices_positions(
     tmp_path: Path, modality: str
 ) -> None:
-    from highdicom import legacy  # 1 s
+    from highdicom import legacy  # the import takes 1 s
 
     kinds = {
         "MR": legacy.LegacyConvertedEnhancedMRImage,
@@ -257,9 +258,9 @@ SYNTAXES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYNTAXES)
-def test_compressed_pixels_are_what_was_compressed(tmp_path: Path, name: str) -> None:
+def test_compressed_pixels_equal_the_original_ones(tmp_path: Path, name: str) -> None:
     syntax, dtype, tolerance = SYNTAXES[name]
-    shape, affine = (4, 40, 36), grid(shape=(4, 40, 36))  # JPEG 2000 takes no planes below 32
+    shape, affine = (4, 40, 36), grid(shape=(4, 40, 36))  # JPEG 2000 doesn't accept planes below 32
     height = 250 / 1000 if dtype == np.uint8 else 1
     paths = []
     for k, plane in enumerate(sample(affine, shape)):
@@ -286,7 +287,7 @@ def test_signed_values_of_fewer_bits_in_jpeg_ls_keep_their_signs(tmp_path: Path,
     assert np.array_equal(np.sort(whole(dataset).ravel()), values.ravel())
 
 
-def test_twelve_of_sixteen_bits_signed_with_an_overlay_above(tmp_path: Path) -> None:
+def test_signed_values_of_12_bits_are_read_below_an_overlay(tmp_path: Path) -> None:
     values = np.arange(-2048, -2048 + 12 * 10 * 3).reshape(3, 12, 10)
     for k, plane in enumerate(values):
         stored = (plane & 0x0FFF) | 0xA000  # bits 13 and 15 belong to an overlay
@@ -305,7 +306,7 @@ def test_monochrome1_is_inverted_within_its_bits(tmp_path: Path) -> None:
     assert np.array_equal(whole(inverted), 4095 - whole(plain))
 
 
-def test_slopes_of_each_slice_make_real_numbers(tmp_path: Path) -> None:
+def test_separate_slopes_for_each_slice_give_real_numbers(tmp_path: Path) -> None:
     for k in range(6):
         pixels = np.full((8, 9), 100, np.uint16)
         save(image(pixels, grid(), k, slope=0.5 + k, intercept=k), tmp_path / "s" / f"{k}")
@@ -314,7 +315,7 @@ def test_slopes_of_each_slice_make_real_numbers(tmp_path: Path) -> None:
     assert np.array_equal(whole(dataset)[0, ::-1, 0], [100 * (0.5 + k) + k for k in range(6)])
 
 
-def test_no_pixels_are_read_before_they_are_asked_for(
+def test_pixels_are_not_read_before_they_are_requested(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_series(tmp_path / "s", grid())
@@ -327,11 +328,11 @@ def test_no_pixels_are_read_before_they_are_asked_for(
     assert calls == []
     whole(dataset)
     whole(dataset)
-    assert calls == [1]  # once a process
+    assert calls == [1]  # once in each process
 
 
 @pytest.mark.slow
-def test_fingerprint_is_of_geometry_modality_and_pixels(tmp_path: Path) -> None:
+def test_fingerprint_depends_on_geometry_modality_and_pixels(tmp_path: Path) -> None:
     first = read.open(write_series(tmp_path / "a", grid())[0].parent).fingerprint
 
     def renamed(ds: pydicom.Dataset) -> None:

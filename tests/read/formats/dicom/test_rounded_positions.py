@@ -1,4 +1,4 @@
-"""Slices whose positions were rounded lie at the regular distance that other attributes state."""
+"""Slices with rounded positions lie at the regular distance that other attributes state."""
 
 from pathlib import Path
 from typing import Any
@@ -82,7 +82,7 @@ def test_oblique_slices_that_were_rounded_are_regular(tmp_path: Path, falls: boo
     assert np.abs(lps_mm(rounded) - lps_mm(exact)).max() <= 1.0
 
 
-def test_a_slice_that_lacks_among_rounded_ones_is_interpolated(tmp_path: Path) -> None:
+def test_a_missing_slice_among_rounded_ones_is_interpolated(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, spacing=SPACING)
     write_rounded(tmp_path, affine, 1.0)
     lacking = next(p for p in tmp_path.iterdir() if pydicom.dcmread(p).InstanceNumber == 12)
@@ -92,7 +92,9 @@ def test_a_slice_that_lacks_among_rounded_ones_is_interpolated(tmp_path: Path) -
     assert any("1 missing slice of 25" in note for note in dataset.notes)
 
 
-def test_an_image_stored_twice_at_whole_millimetres_is_no_rounding(tmp_path: Path) -> None:
+def test_an_image_stored_twice_at_integer_millimetres_does_not_count_as_rounded(
+    tmp_path: Path,
+) -> None:
     affine = grid(shape=(9, 12, 14), spacing=(1.0, 0.7, 0.5))
     paths = write_series(tmp_path, affine, (9, 12, 14), modality="CT")
     for number, path in enumerate(paths, start=1):
@@ -107,7 +109,7 @@ def test_an_image_stored_twice_at_whole_millimetres_is_no_rounding(tmp_path: Pat
     assert not any("rounded" in note for note in dataset.notes)
 
 
-def test_points_in_time_at_whole_millimetres_are_no_rounding(tmp_path: Path) -> None:
+def test_time_points_at_integer_millimetres_do_not_count_as_rounded(tmp_path: Path) -> None:
     shape = (9, 12, 14)
     affine = grid(shape=shape, spacing=(1.0, 0.7, 0.5))
     for time in (0, 1):
@@ -122,7 +124,7 @@ def test_points_in_time_at_whole_millimetres_are_no_rounding(tmp_path: Path) -> 
     assert read.open(tmp_path).time_points == 2
 
 
-def test_uneven_slices_that_rounding_does_not_explain_stay_where_they_are(tmp_path: Path) -> None:
+def test_uneven_slices_that_rounding_does_not_explain_keep_their_positions(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, spacing=SPACING)
 
     def change(ds: pydicom.Dataset, index: int) -> None:

@@ -1,4 +1,4 @@
-"""DICOM segmentations: one label map, or a mask of the segment that is asked for."""
+"""DICOM segmentations: one label map, or a mask of the requested segment."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -21,12 +21,12 @@ from support.dicom_reading import lps_mm, whole
 from support.dicom_segmentations import SPACING, write_segmentation
 from support.dicom_series import grid, tilted, turn
 
-SHAPE = (6, 9, 7)  # of 63 bits a plane, which fill no bytes
+SHAPE = (6, 9, 7)  # 63 bits a plane, so that planes don't begin at whole bytes
 AFFINE = grid(shape=SHAPE, spacing=SPACING)
 
 
 def masks() -> NDArray[np.uint8]:
-    """Two segments that overlap, in every plane: (slices, rows, columns, segments)."""
+    """Two segments that overlap in every plane: (slices, rows, columns, segments)."""
     both = np.zeros((*SHAPE, 2), np.uint8)
     both[:, 1:5, 1:4, 0] = 1
     both[:, 3:8, 2:6, 1] = 1
@@ -35,7 +35,7 @@ def masks() -> NDArray[np.uint8]:
 
 
 def apart() -> NDArray[np.uint8]:
-    """The same, without what they share: the first one has it."""
+    """The same segments without their overlap: the first one keeps it."""
     voxels = masks()
     voxels[..., 1] &= 1 - voxels[..., 0]
     return voxels
@@ -61,7 +61,7 @@ def on_our_grid(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["BINARY", "FRACTIONAL", "LABELMAP"])
-def test_a_segmentation_ends_the_plan_by_a_line_without_its_texts(
+def test_a_segmentation_adds_a_line_without_its_texts_to_the_plan(
     tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     voxels = apart() if kind == "LABELMAP" else masks()
@@ -77,7 +77,7 @@ def test_a_segmentation_ends_the_plan_by_a_line_without_its_texts(
 
 @pytest.mark.parametrize("kind", ["BINARY", "FRACTIONAL"])
 @pytest.mark.slow
-def test_each_segment_is_a_mask_of_its_own(tmp_path: Path, kind: str) -> None:
+def test_each_segment_is_a_separate_mask(tmp_path: Path, kind: str) -> None:
     path = write_segmentation(tmp_path, kind, masks())
     lines = read.list_series(path)
     assert [line.split(", ")[1] for line in lines] == ["segment 1", "segment 2"]
@@ -89,14 +89,14 @@ def test_each_segment_is_a_mask_of_its_own(tmp_path: Path, kind: str) -> None:
         assert np.count_nonzero(volume.array) == np.count_nonzero(whole(dataset))
 
 
-def test_the_image_is_built_where_its_segmentation_lies_beside_it(tmp_path: Path) -> None:
+def test_the_image_is_built_if_its_segmentation_is_beside_it(tmp_path: Path) -> None:
     write_segmentation(tmp_path, "BINARY", masks())
     dataset = read.open(tmp_path)
     assert (dataset.modality, dataset.labels) == ("MR", "")
     assert "3 series or orientations" in dataset.notes[0]
 
 
-def test_a_segmentation_without_a_place_is_told_as_one(
+def test_a_segmentation_without_a_position_is_named_as_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = write_segmentation(tmp_path, "BINARY", masks())
@@ -106,12 +106,12 @@ def test_a_segmentation_without_a_place_is_told_as_one(
     ds.save_as(path)
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
-    assert "of a segmentation of 2 segments, without a place in the patient" in told
+    assert "holding a segmentation of 2 segments, without a place in the patient" in told
     assert "expected the image that it was drawn on" in told
 
 
 @pytest.mark.parametrize("overlap", ["NO", "UNDEFINED", None])
-def test_segments_of_bits_are_one_label_map(tmp_path: Path, overlap: str | None) -> None:
+def test_binary_segments_are_one_label_map(tmp_path: Path, overlap: str | None) -> None:
     def change(ds: Any) -> None:
         ds.SegmentsOverlap = overlap
         if overlap is None:
@@ -124,7 +124,7 @@ def test_segments_of_bits_are_one_label_map(tmp_path: Path, overlap: str | None)
 
 
 @pytest.mark.parametrize("overlap", ["YES", "UNDEFINED"])
-def test_segments_that_overlap_are_a_channel_each(tmp_path: Path, overlap: str) -> None:
+def test_overlapping_segments_are_separate_channels(tmp_path: Path, overlap: str) -> None:
     def change(ds: Any) -> None:
         ds.SegmentsOverlap = overlap
 
@@ -135,7 +135,7 @@ def test_segments_that_overlap_are_a_channel_each(tmp_path: Path, overlap: str) 
         assert np.array_equal(labels_of(dataset, index), expected)
 
 
-def test_segments_that_overlap_although_none_shall_are_told(tmp_path: Path) -> None:
+def test_segments_that_overlap_against_the_header_are_noted(tmp_path: Path) -> None:
     def change(ds: Any) -> None:
         ds.SegmentsOverlap = "NO"
 
@@ -169,7 +169,7 @@ def test_a_label_map_with_a_palette_keeps_its_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
 @pytest.mark.parametrize("kept", [(0, 5), (0, 1, 4), (3,)])
 @pytest.mark.parametrize("states_spacing", [True, False])
-def test_planes_that_are_left_out_are_empty(
+def test_omitted_planes_are_empty(
     tmp_path: Path, kind: str, kept: tuple[int, ...], states_spacing: bool
 ) -> None:
     def change(ds: Any) -> None:
@@ -181,10 +181,10 @@ def test_planes_that_are_left_out_are_empty(
     voxels[[plane for plane in range(SHAPE[0]) if plane not in kept]] = 0
     path = write_segmentation(tmp_path, kind, voxels, change, omit_empty=True)
     if kept == (3,) and not states_spacing:
-        with pytest.raises(UsageError, match="of one plane, without SpacingBetweenSlices"):
+        with pytest.raises(UsageError, match="with one plane and without SpacingBetweenSlices"):
             read.open(path)
         return
-    if kept == (0, 5) and not states_spacing:  # nothing says that planes lay between
+    if kept == (0, 5) and not states_spacing:  # nothing states that there were planes between them
         assert max(read.open(path).levels[0].spacing_um) == 5 * 1000 * SPACING[0]
         return
     dataset = read.open(path)
@@ -196,7 +196,9 @@ def test_planes_that_are_left_out_are_empty(
     assert np.count_nonzero(there) == np.count_nonzero(voxels)
 
 
-def test_fractions_are_no_labels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fractions_are_not_read_as_labels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     half = masks() * 0.5
     path = write_segmentation(tmp_path, "FRACTIONAL", half)
     out = str(tmp_path / "out")
@@ -204,13 +206,13 @@ def test_fractions_are_no_labels(tmp_path: Path, capsys: pytest.CaptureFixture[s
     for flags in ([str(path), "--labels", "."], [images, "--labels", f"a={path}"]):
         assert main(["plan", *flags, "-o", out]) == 2
         told = capsys.readouterr().err
-        assert "of fractions (FRACTIONAL), not of bits or numbers" in told
+        assert "with fractions (FRACTIONAL) instead of bits or numbers" in told
         assert "--series N --as intensity" in told
     with pytest.raises(SourceError, match=r"found 0\.50.*, expected whole numbers in labels"):
         labels_of(read.open(path, series=1))
 
 
-def test_objects_have_the_standards_words_alone(tmp_path: Path) -> None:
+def test_objects_are_named_with_the_standards_words_alone(tmp_path: Path) -> None:
     def change(ds: Any) -> None:
         left = pydicom.Dataset()
         left.CodeValue, left.CodingSchemeDesignator = "7771000", "SCT"
@@ -244,7 +246,7 @@ def test_objects_have_the_standards_words_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_free_text_names_segments_where_it_is_asked_for(tmp_path: Path) -> None:
+def test_free_text_names_segments_if_requested(tmp_path: Path) -> None:
     def change(ds: Any) -> None:
         ds.SegmentSequence[0].SegmentLabel = "node  1\n\x1b[31m"
         ds.SegmentSequence[1].SegmentLabel = ""
@@ -265,17 +267,17 @@ def test_free_text_names_segments_where_it_is_asked_for(tmp_path: Path) -> None:
     assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
 
 
-def test_planes_that_are_oblique_lie_where_they_are(tmp_path: Path) -> None:
+def test_oblique_planes_keep_their_position(tmp_path: Path) -> None:
     affine = grid(shape=SHAPE, spacing=SPACING, rotation=turn((1, 2, -0.5), 23.0))
     path = write_segmentation(tmp_path, "BINARY", apart(), affine=affine)
     dataset = read.open(path)
     assert np.array_equal(labels_of(dataset), on_our_grid(numbered(apart()), dataset, affine))
 
 
-def test_planes_of_a_tilted_gantry_are_refused_in_words(tmp_path: Path) -> None:
+def test_planes_of_a_tilted_gantry_are_refused(tmp_path: Path) -> None:
     affine = tilted(AFFINE, SHAPE, 18)
     path = write_segmentation(tmp_path, "BINARY", apart(), affine=affine)
-    with pytest.raises(UsageError, match="with planes beside each other, not one over the other"):
+    with pytest.raises(UsageError, match="with planes side by side, not on top of each other"):
         read.open(path)
 
 
@@ -302,11 +304,11 @@ def moved(ds: Any, step: Sequence[float]) -> None:
     [
         (turned, "with planes of 2 orientations or sizes"),
         (nameless, "with frames that name no segment"),
-        (lambda ds: moved(ds, AFFINE[:3, 1]), "with planes beside each other"),
+        (lambda ds: moved(ds, AFFINE[:3, 1]), "with planes side by side"),
         (lambda ds: moved(ds, 0.4 * AFFINE[:3, 0]), "with uneven gaps between planes"),
     ],
 )
-def test_planes_that_make_no_label_map_are_told(
+def test_planes_that_do_not_make_a_label_map_are_refused(
     tmp_path: Path, spoil: Callable[[Any], None], told: str
 ) -> None:
     path = write_segmentation(tmp_path, "BINARY", apart(), spoil)
@@ -314,7 +316,7 @@ def test_planes_that_make_no_label_map_are_told(
         read.open(path)
 
 
-def test_of_two_segmentations_one_is_asked_for(tmp_path: Path) -> None:
+def test_two_segmentations_are_refused_unless_one_is_chosen(tmp_path: Path) -> None:
     first, second = (
         write_segmentation(tmp_path / name, "LABELMAP", apart()) for name in ("a", "b")
     )
@@ -327,7 +329,7 @@ def test_of_two_segmentations_one_is_asked_for(tmp_path: Path) -> None:
     assert labels_of(read.open(folder, series=2)).max() == 2
 
 
-def test_numbers_beyond_a_byte_stay(tmp_path: Path) -> None:
+def test_numbers_beyond_a_byte_are_kept(tmp_path: Path) -> None:
     def change(ds: Any) -> None:
         ds.SegmentSequence[1].SegmentNumber = 40_000
         for group in ds.PerFrameFunctionalGroupsSequence:
@@ -343,8 +345,8 @@ def test_numbers_beyond_a_byte_stay(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["BINARY", "LABELMAP"])
-def test_garbled_segmentations_raise_nothing_else(tmp_path: Path, kind: str) -> None:
-    """Bytes are changed at random; a label map is read all the same, or refused in one line."""
+def test_garbled_segmentations_raise_no_other_error(tmp_path: Path, kind: str) -> None:
+    """Bytes are changed at random; a label map is still read, or refused in one line."""
     random = np.random.default_rng(0)
     path = write_segmentation(tmp_path, kind, apart())
     content = np.frombuffer(path.read_bytes(), np.uint8)

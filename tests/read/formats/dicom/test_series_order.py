@@ -27,7 +27,7 @@ def test_dixon_images_are_in_phase_then_water_then_opposed_phase_then_fat(
     assert added(tmp_path) == 100
 
 
-def test_echo_times_do_not_put_the_opposed_phase_before_the_phase(tmp_path: Path) -> None:
+def test_the_opposed_phase_does_not_precede_the_phase_by_echo_time(tmp_path: Path) -> None:
     for add, word, echo in ((200, "OPP_PHASE", 1.23), (100, "IN_PHASE", 2.46)):
         change = setting(ImageType=["ORIGINAL", "PRIMARY", "M", word], EchoTime=echo)
         write_kind(tmp_path, add, change)
@@ -42,7 +42,7 @@ def test_derived_water_comes_before_an_original_opposed_phase(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_dixon_images_in_series_of_their_own_have_the_same_order(tmp_path: Path) -> None:
+def test_dixon_images_in_separate_series_have_the_same_order(tmp_path: Path) -> None:
     for name, word, intercept in (("a", "FAT", 2), ("b", "OPP_PHASE", 3), ("c", "IN_PHASE", 1)):
         change = image_type("M", word)
         write_series(tmp_path / name, AFFINE, SHAPE, intercept=intercept, change=change)
@@ -72,7 +72,7 @@ def test_a_soft_kernel_comes_before_one_that_sharpens(tmp_path: Path) -> None:
     assert (added(tmp_path), added(tmp_path, 2)) == (100, 200)
 
 
-def test_pet_without_attenuation_correction_is_a_series_of_its_own(tmp_path: Path) -> None:
+def test_pet_without_attenuation_correction_is_a_separate_series(tmp_path: Path) -> None:
     for add, words in ((200, ["DECY", "RAN"]), (100, ["DECY", "ATTN", "SCAT"])):
         write_kind(tmp_path, add, setting(Modality="PT", CorrectedImage=words), first_number=add)
     assert (added(tmp_path), added(tmp_path, 2)) == (100, 200)

@@ -1,4 +1,4 @@
-"""A CT whose intercept was applied before it was stored is not taken for Hounsfield units."""
+"""A CT whose intercept was applied before storage is not read as Hounsfield units."""
 
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ def notes_of(dataset: Any) -> list[str]:
 
 
 @pytest.mark.parametrize("intercept", [-1024, -1000])
-def test_an_intercept_that_was_applied_twice_is_told_once(tmp_path: Path, intercept: int) -> None:
+def test_an_intercept_that_was_applied_twice_is_noted_once(tmp_path: Path, intercept: int) -> None:
     dataset = read.open(write_ct(tmp_path / "s", stored_offset=0, intercept=intercept))
     assert not dataset.has_hounsfield_units
     (note,) = notes_of(dataset)
@@ -59,14 +59,14 @@ def test_an_intercept_that_was_applied_twice_is_told_once(tmp_path: Path, interc
 def test_a_ct_that_is_stored_with_the_offset_is_in_hounsfield_units(
     tmp_path: Path, padding: int
 ) -> None:
-    """Also where padding, whose pixels no header names, lies far below air."""
+    """This holds even if padding that no header names lies far below air."""
     folder = write_ct(tmp_path / "s", stored_offset=1024, intercept=-1024, padding=padding)
     dataset = read.open(folder)
     assert dataset.has_hounsfield_units
     assert notes_of(dataset) == []
 
 
-def test_hounsfield_units_without_an_offset_are_none_that_were_applied_twice(
+def test_hounsfield_units_without_an_offset_do_not_count_as_applied_twice(
     tmp_path: Path,
 ) -> None:
     dataset = read.open(write_ct(tmp_path / "s", stored_offset=0, intercept=0))
@@ -74,7 +74,7 @@ def test_hounsfield_units_without_an_offset_are_none_that_were_applied_twice(
     assert notes_of(dataset) == []
 
 
-def test_the_flags_of_the_note_are_the_preset_moved_by_the_intercept(
+def test_the_flags_in_the_note_are_the_preset_shifted_by_the_intercept(
     tmp_path: Path,
 ) -> None:
     preset = load("ct", None, flags={})

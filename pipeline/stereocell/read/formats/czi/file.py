@@ -1,4 +1,4 @@
-"""An open CZI file, read by pylibCZIrw. The object lives in a child process (image.py)."""
+"""An open CZI file, read with pylibCZIrw. The object lives in a child process (image.py)."""
 
 import os
 import struct
@@ -12,15 +12,15 @@ from stereocell.read.formats.czi.tiles import SEGMENT, CziTiles
 from stereocell.storage.library_errors import one_line
 
 _PLACES = struct.Struct("<2q")  # places of the directory of voxels and of the metadata
-_PLACES_AT = 84  # bytes from the file's start
+_PLACES_AT = 84  # bytes from the start of the file
 Rectangle = tuple[int, int, int, int]  # x, y, width, height
 
 
 @dataclass(frozen=True, slots=True)
-class CziFacts:
+class CziMetadata:
     """The metadata of a file.
 
-    bounds    first index and the index behind the last one, by axis
+    bounds    first index and the index after the last one, by axis
     types     pixel types, by channel
     scenes    numbers and rectangles of the scenes; empty: the file has no scenes
     metadata  XML
@@ -42,18 +42,18 @@ class CziFile:
         import pylibCZIrw.czi as library
 
         self._where = where
-        with one_line(where, "a CZI file that is whole"):
+        with one_line(where, "a complete CZI file"):
             path = os.path.realpath(path)
             directory = _require_whole(path, where)
             self._tiles = CziTiles(path, directory, where)
             self._opened = library.open_czi(path)
             self._file = self._opened.__enter__()
 
-    def facts(self) -> CziFacts:
+    def metadata(self) -> CziMetadata:
         """Return the file's metadata. Raises SourceError."""
-        with one_line(self._where, "a CZI file that is whole"):
+        with one_line(self._where, "a complete CZI file"):
             scenes = sorted(self._file.scenes_bounding_rectangle.items())
-            return CziFacts(
+            return CziMetadata(
                 bounds=dict(self._file.total_bounding_box),
                 types=tuple(str(kind) for _, kind in sorted(self._file.pixel_types.items())),
                 scenes=tuple((index, (box.x, box.y, box.w, box.h)) for index, box in scenes),
@@ -63,7 +63,7 @@ class CziFile:
 
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
         """Return the pixels of a window of a plane. Raises SourceError."""
-        with one_line(self._where, "planes that are whole"):
+        with one_line(self._where, "undamaged planes"):
             self._tiles.require_plane(plane)
             voxels: NDArray[Any] = self._file.read(roi=window, plane=plane, scene=scene)
             return voxels[..., 0]
@@ -93,7 +93,7 @@ def _require_whole(path: str, where: str) -> int:
                 needed = max(needed, place + SEGMENT.size + max(0, length))
     if needed > size:
         raise SourceError(
-            f"{where}: cut short at byte {size} of {needed} or more, expected a CZI file that is "
-            "whole (copy or download it again)"
+            f"{where}: cut short at byte {size} of {needed} or more, expected a complete CZI file "
+            "(copy or download it again)"
         )
     return directory

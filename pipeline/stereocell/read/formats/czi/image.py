@@ -1,9 +1,9 @@
-"""Zeiss CZI, by pylibCZIrw (the extra `czi`), which composes the tiles of a mosaic.
+"""Read Zeiss CZI with pylibCZIrw (the extra `czi`), which composes the tiles of a mosaic.
 
-It is Zeiss's own library, under LGPL-3.0. czifile (BSD) asks for Python 3.12, and composes
-a mosaic whole, not a window of it; bioio-czi stands on this one. The finest level alone is read.
-Scenes are series. The library decodes in C++, so it runs in a child process
-(storage/child_process.py); voxels come back through a pipe.
+pylibCZIrw is Zeiss's own library, under LGPL-3.0. czifile (BSD) needs Python 3.12 and composes a
+mosaic as a whole, not a window of it; bioio-czi builds on pylibCZIrw. Only the finest level is
+read. Scenes are series. The library decodes in C++, so it runs in a child process
+(storage/child_process.py), and voxels come back through a pipe.
 
 References: https://zeiss.github.io/libczi/
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from stereocell.model.emission_color import color_of_channel
 from stereocell.model.errors import SourceError
 from stereocell.read.dataset import VoxelArray
-from stereocell.read.formats.czi.file import CziFacts, CziFile, Rectangle
+from stereocell.read.formats.czi.file import CziFile, CziMetadata, Rectangle
 from stereocell.read.image import MAX_CHANNELS, Color, Image
 from stereocell.read.plane_array import PlaneArray
 from stereocell.read.repeats import record_xml
@@ -37,10 +37,10 @@ from stereocell.storage.location import Location
 _TYPES = {"Gray8": "u1", "Gray16": "u2", "Gray32Float": "f4"}
 _OTHERS = {"V": "views", "H": "phases", "I": "illuminations", "R": "rotations", "B": "blocks"}
 _UM_PER_METER = 1e6
-_ABSENT = "read as 0, as the format has it for tiles that were not acquired, and as lost ones are"
+_ABSENT = "read as 0, which the format uses for tiles that were not acquired; they may be lost"
 _INTERVAL = "Metadata/Information/Image/Dimensions/Z/Positions/Interval/Increment"
 _DEPTH = Subject("voxel spacing along z", "um", 0.01, "--spacing-um z,y,x replaces it")
-_MAX_DIGITS = 10  # of a size in the metadata
+_MAX_DIGITS = 10  # digits of a size in the metadata
 
 
 class _File:
@@ -48,18 +48,18 @@ class _File:
 
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
-        with one_line(self.where, "a CZI file that is whole"):
+        with one_line(self.where, "a complete CZI file"):
             self._child = stack.enter_context(Child(CziFile, location.path, self.where))
-            facts: CziFacts = self._child.call("facts")
-            self.metadata = _parsed(facts.metadata)
-        self.bounds, self.types, self._tiles = facts.bounds, facts.types, facts.tiles
+            stated: CziMetadata = self._child.call("metadata")
+            self.metadata = _parsed(stated.metadata)
+        self.bounds, self.types, self._tiles = stated.bounds, stated.types, stated.tiles
         x, y = self.bounds.get("X", (0, 0)), self.bounds.get("Y", (0, 0))
         all_of_it = (x[0], y[0], x[1] - x[0], y[1] - y[0])
-        self.scenes: Sequence[tuple[int | None, Rectangle]] = facts.scenes or [(None, all_of_it)]
+        self.scenes: Sequence[tuple[int | None, Rectangle]] = stated.scenes or [(None, all_of_it)]
         self.spacing, self.spacing_notes = _spacing(self.metadata)
 
     def read(self, window: Rectangle, plane: dict[str, int], scene: int | None) -> NDArray[Any]:
-        """Return the pixels of a window of a plane. Raises SourceError, ChildError."""
+        """Return the pixels of a window of a plane. Raises SourceError and ChildError."""
         voxels: NDArray[Any] = self._child.call("read", window, plane, scene)
         return voxels
 
@@ -68,10 +68,10 @@ class _File:
         return high - low
 
     def absent_notes(self, scene: int | None, time: int) -> tuple[str, ...]:
-        """Return a note on tiles that are not there at a point in time, which are read as 0.
+        """Return a note on tiles that are missing at a time point; they are read as 0.
 
-        Each plane is compared with the one that has most tiles. Raises SourceError where no plane
-        has one.
+        Each plane is compared with the one that has the most tiles. Raises SourceError where no
+        plane has any.
         """
         if not self._tiles:
             return ()
@@ -85,7 +85,7 @@ class _File:
         absent = total - held[first + time].total()
         if absent == total:
             raise SourceError(
-                f"{self.where}: time point {time}: found no tile, expected {total}: the "
+                f"{self.where}: time point {time}: found none of {total} tiles, expected some: the "
                 "acquisition ended early, or the file is damaged: choose another --time"
             )
         note = f"{absent} of {total} tiles ({absent / total:.2%}) are not stored: {_ABSENT}"
@@ -104,7 +104,7 @@ class _File:
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
-    """Return one scene; 0 is the largest. Raises SourceError, UsageError for no such scene."""
+    """Return one scene; 0 is the largest. Raises SourceError, and UsageError for no such scene."""
     return read_chosen(location, series, _File, _image)
 
 
@@ -118,19 +118,21 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
         if file.size(axis) > 1:
             raise SourceError(
                 f"{file.where}: {kind} ({axis}): found {file.size(axis)}, expected one: export one "
-                "from ZEN"
+                "of them from ZEN"
             )
     found = sorted(set(file.types))
     if len(found) != 1 or found[0] not in _TYPES:
         raise SourceError(
             f"{file.where}: pixel types: found {', '.join(found) or 'none'}, expected one of "
-            f"{', '.join(_TYPES)} in all channels (of a colour image, export its channels as "
+            f"{', '.join(_TYPES)} in all channels (for a colour image, export its channels as "
             "OME-TIFF from ZEN)"
         )
     scene, (left, top, width, height) = file.scenes[index]
     shape = (file.size("T"), file.size("C"), file.size("Z"), height, width)
     if not 0 < shape[1] <= MAX_CHANNELS or min(shape) < 1:
-        raise SourceError(f"{file.where}: size (t, c, z, y, x): found {shape}, expected voxels")
+        raise SourceError(
+            f"{file.where}: size (t, c, z, y, x): found {shape}, expected 1 or more along each axis"
+        )
     first = {axis: file.bounds.get(axis, (0, 1))[0] for axis in "TCZ"}
 
     def read(place: tuple[int, ...], rows: slice, columns: slice) -> NDArray[Any]:
@@ -154,7 +156,7 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
 
 
 def _size_notes(file: _File) -> tuple[str, ...]:
-    """Return a note for each axis along which the metadata state more than the tiles have."""
+    """Return a note for each axis along which the metadata and the tiles differ in number."""
     notes = []
     sizes = {axis: file.size(axis) for axis in ("C", "Z", "T", *_OTHERS)}
     for axis, held in {**sizes, "S": len(file.scenes)}.items():
@@ -164,7 +166,7 @@ def _size_notes(file: _File) -> tuple[str, ...]:
             why = "the acquisition ended early, or a part is missing"
             reason = why if stated > held else "all of them are read"
             notes.append(
-                f"the metadata state {stated} along {_named(axis)}, and tiles are there for "
+                f"the metadata state {stated} along {_named(axis)}, but there are tiles for "
                 f"{held}: {reason}"
             )
     return tuple(notes)
@@ -187,9 +189,9 @@ def _parsed(text: str) -> ElementTree.Element:
 
 
 def _spacing(metadata: ElementTree.Element) -> tuple[PartialTriple, tuple[str, ...]]:
-    """Return the spacing (z, y, x), um, and notes. None each: not stated, or 0.
+    """Return the spacing (z, y, x), um, and notes. None for each one not stated, or 0.
 
-    The scaling is in m. The interval of the planes, in um, states the spacing along z as well.
+    The scaling is in m. The interval between planes, in um, states the spacing along z as well.
     """
     found: dict[str, float | None] = dict.fromkeys("ZYX")
     for node in metadata.findall("Metadata/Scaling/Items/Distance"):
@@ -199,7 +201,7 @@ def _spacing(metadata: ElementTree.Element) -> tuple[PartialTriple, tuple[str, .
     statements = [] if found["Z"] is None else [Statement(found["Z"], "Scaling")]
     step = abs(_number(metadata.findtext(_INTERVAL, "")))
     if step > 0:
-        statements.append(Statement(step, "the interval of the planes", Trust.REPEATED))
+        statements.append(Statement(step, "the interval between planes", Trust.REPEATED))
     if not statements:
         return (None, found["Y"], found["X"]), ()
     settled = settle(_DEPTH, statements)
@@ -207,7 +209,7 @@ def _spacing(metadata: ElementTree.Element) -> tuple[PartialTriple, tuple[str, .
 
 
 def _number(text: str) -> float:
-    """Return a finite number; 0: it is none."""
+    """Return a finite number; 0: the text is not one."""
     try:
         number = float(text)
     except ValueError:
@@ -236,7 +238,7 @@ def _channels(
 
 
 def _color(text: str) -> tuple[int, int, int] | None:
-    """Return R, G and B of `#AARRGGBB` or `#RRGGBB`."""
+    """Return R, G and B from `#AARRGGBB` or `#RRGGBB`."""
     match = re.fullmatch(r"#(?:[0-9a-fA-F]{2})?([0-9a-fA-F]{6})", text.strip())
     if match is None:
         return None

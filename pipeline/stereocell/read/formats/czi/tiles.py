@@ -1,7 +1,7 @@
-"""Compare the directory of a CZI file with the copy of each entry at its tile.
+"""Compare each entry in the directory of a CZI file with its copy at the tile.
 
-libCZI places a tile by the directory, and decodes it by the copy. A tile whose two entries differ
-is drawn at another size or place. Neither entry has a checksum.
+libCZI places a tile by the directory, and decodes it by the copy. If the two entries of a tile
+differ, it is drawn at a wrong size or place. Neither entry has a checksum.
 
 Reference: ZISRAW (CZI) File Format, "SubBlockDirectory" and "DirectoryEntryDV"
 """
@@ -13,24 +13,24 @@ from typing import BinaryIO
 
 from stereocell.model.errors import SourceError
 
-SEGMENT = struct.Struct("<16s2q")  # a segment's name, its length, and how much of it is used
-_COUNT = struct.Struct("<i")  # of entries, at the start of a directory
-_COUNT_BYTES = 128  # bytes of the count and the reserved ones behind it
+SEGMENT = struct.Struct("<16s2q")  # name of a segment, its length, and the used length
+_COUNT = struct.Struct("<i")  # number of entries, at the start of a directory
+_COUNT_BYTES = 128  # bytes of the count and of the reserved bytes after it
 _ENTRY = struct.Struct("<2siqiiB5si")  # schema, pixel type, place, part, packing, pyramid, -, axes
 _AXIS = struct.Struct("<4siifi")  # name, start, size, coordinate, stored size
-_SIZES = struct.Struct("<iiq")  # of a tile's metadata, attachment and voxels
+_SIZES = struct.Struct("<iiq")  # sizes of a tile's metadata, attachment and voxels
 _DIRECTORY, _TILE = b"ZISRAWDIRECTORY", b"ZISRAWSUBBLOCK"
-_SCHEMA = b"DV"  # entries of any number of axes; DE, of early files, has a fixed form
+_SCHEMA = b"DV"  # entries with any number of axes; DE, in early files, has a fixed form
 _MOST_AXES = 64
 _PLANE = "CTZ"
-_COMPARED = "CSTXYZ"  # axes by which voxels are read: channel, scene, time and place
+_COMPARED = "CSTXYZ"  # axes that determine which voxels are read: channel, scene, time and position
 
 
 @dataclass(frozen=True, slots=True)
 class _Entry:
     """The fields of an entry that determine which voxels a tile holds.
 
-    axes  name, start, size and stored size of each axis by which voxels are read
+    axes  name, start, size and stored size of each axis in _COMPARED
     """
 
     place: int
@@ -49,7 +49,7 @@ class _Entry:
 
     @property
     def is_finest(self) -> bool:
-        """Whether the tile is of the finest level: it is stored as large as it is shown."""
+        """Whether the tile belongs to the finest level: its stored size is its shown size."""
         return all(size == stored for name, _, size, stored in self.axes if name in "XY")
 
 
@@ -58,8 +58,8 @@ class CziTiles:
 
     at  place of the directory in the file
 
-    `counts` has the number of tiles of the finest level, by scene and plane (c, t, z); none for an
-    early file.
+    `counts` has the number of tiles of the finest level, by scene and plane (c, t, z); it is empty
+    for an early file.
     """
 
     def __init__(self, path: str, at: int, where: str) -> None:
@@ -89,15 +89,15 @@ class CziTiles:
 
 
 def _entries(file: BinaryIO, at: int) -> list[_Entry]:
-    """Return the entries of a directory; an early file's (DE) are not compared, so it has none.
+    """Return the entries of a directory; empty for an early file (DE), which is not compared.
 
-    Raises ValueError or struct.error where the directory isn't whole.
+    Raises ValueError or struct.error where the directory is incomplete.
     """
     file.seek(at)
     name, _, used = SEGMENT.unpack(file.read(SEGMENT.size))
     content = file.read(max(0, used))
     if name.rstrip(b"\0") != _DIRECTORY or len(content) < _COUNT_BYTES:
-        raise ValueError(f"no directory of tiles at byte {at}")
+        raise ValueError(f"found no directory of tiles at byte {at}")
     (count,) = _COUNT.unpack_from(content)
     if content.startswith(b"DE", _COUNT_BYTES):
         return []
@@ -109,10 +109,13 @@ def _entries(file: BinaryIO, at: int) -> list[_Entry]:
 
 
 def _entry(content: bytes, start: int) -> tuple[_Entry, int]:
-    """Return the entry at an offset, and the offset behind it. Raises ValueError, struct.error."""
+    """Return the entry at an offset, and the offset after it.
+
+    Raises ValueError and struct.error.
+    """
     schema, kind, place, _, packing, _, _, count = _ENTRY.unpack_from(content, start)
     if schema != _SCHEMA or not 0 <= count <= _MOST_AXES:
-        raise ValueError(f"no entry of a tile (DV) at byte {start} of its segment")
+        raise ValueError(f"found no entry of a tile (DV) at byte {start} of its segment")
     start += _ENTRY.size
     axes = []
     for at in range(start, start + count * _AXIS.size, _AXIS.size):
@@ -128,13 +131,13 @@ def _copy(file: BinaryIO, place: int) -> _Entry:
     file.seek(max(0, place))
     head = file.read(SEGMENT.size + _SIZES.size + _ENTRY.size + _MOST_AXES * _AXIS.size)
     if head[: len(_TILE) + 1] != _TILE + b"\0":
-        raise ValueError(f"no tile at byte {place}")
+        raise ValueError(f"found no tile at byte {place}")
     entry, _ = _entry(head, SEGMENT.size + _SIZES.size)
     return _Entry(place, entry.pixel_type, entry.packing, entry.axes)
 
 
 def _shown(entry: _Entry, other: _Entry) -> str:
-    """Return the fields of an entry that differ from another one, in words."""
+    """Return the fields in which an entry differs from another one, in words."""
     parts = [
         f"axis {name} start {start}, size {size}, stored size {stored}"
         for name, start, size, stored in sorted(set(entry.axes) - set(other.axes))

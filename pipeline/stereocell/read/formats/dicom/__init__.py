@@ -1,4 +1,4 @@
-"""DICOM: a folder at any depth, or one file."""
+"""DICOM: a folder with files at any depth, or one file."""
 
 import os
 
@@ -43,7 +43,7 @@ FORMAT = Format(
     loose_endings=(".dcm", ".dicom", ".ima"),
     may_hold=_is_folder,
     marks=(Mark("a DICOM file", rb"DICM", at=128),),
-    is_unmarked=is_unknown,  # files of before 1993 have no mark
+    is_unmarked=is_unknown,  # files from before 1993 have no mark
     read_free_labels=_read_free_labels,
     guides=(Guide("DICOM", "a folder or a file", "[DICOM and NIfTI](dicom.md)"),),
 )

@@ -1,8 +1,8 @@
-"""Join the bed positions of a whole-body PET scan that overlap, so that each place has one image.
+"""Join overlapping bed positions of a whole-body PET scan, so that each place has one image.
 
 A scanner is less sensitive towards the ends of its field of view, so each bed overlaps the next.
-Most scanners merge the overlap; others write both images. Of two the one farther from the end of
-its bed is taken, since it has less noise.
+Most scanners merge the overlap; others write both images. The image that is farther from the end of
+its bed has less noise and is used.
 """
 
 from collections import defaultdict
@@ -18,12 +18,12 @@ from stereocell.model.counted import agreeing, counted
 from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.formats.dicom.split_kinds import find_runs
 
-_LEAST_SLICES = 3  # of a bed position
+_LEAST_SLICES = 3  # slices of a bed position
 
 
 @dataclass(frozen=True, slots=True)
 class _Bed:
-    """Frames of one bed position, with the places of the first and the last one, mm."""
+    """Frames of one bed position, with the positions of the first and the last one, mm."""
 
     frames: tuple[Frame, ...]
     low: float
@@ -33,10 +33,10 @@ class _Bed:
 def join_beds(
     frames: Sequence[Frame], normal: NDArray[np.float64], near_mm: float
 ) -> tuple[tuple[Frame, ...], tuple[str, ...]]:
-    """Return one frame for each place of PET beds that overlap, and a note; other frames as given.
+    """Return one frame for each place of overlapping PET beds, and a note; other frames unchanged.
 
-    normal   (3,), of all planes
-    near_mm  planes at a smaller distance count as one place
+    normal   (3,), normal of all planes
+    near_mm  planes that are closer together count as one place
     """
     given = tuple(frames)
     if any(frame.modality != "PT" for frame in given):
@@ -52,8 +52,8 @@ def join_beds(
     )
     lost = len(given) - len(taken)
     note = (
-        f"{counted(len(beds), 'bed position')} overlap: where two beds have images of one place, "
-        f"that farther from the end of its bed is taken, and {counted(lost, 'image')} "
+        f"{counted(len(beds), 'bed position')} overlap: where two beds have images at one place, "
+        f"the image farther from the end of its bed is used, and {counted(lost, 'image')} "
         f"{agreeing(lost, 'is', 'are')} left out"
     )
     return taken, (note,)
@@ -62,7 +62,7 @@ def join_beds(
 def _find_beds(
     frames: tuple[Frame, ...], normal: NDArray[np.float64], near_mm: float
 ) -> list[_Bed]:
-    """Return the beds from one end to the other; none where nothing tells beds apart."""
+    """Return the beds from one end to the other; empty: no attribute separates beds."""
     by_value = [_by(frames, lambda f: f.kind.reference_time), _by(frames, _acquisition)]
     for groups in (*by_value, find_runs(frames, normal, near_mm)):
         if len(groups) < 2 or min(map(len, groups)) < _LEAST_SLICES:
@@ -99,13 +99,13 @@ def _has_one_each(bed: _Bed, normal: NDArray[np.float64], near_mm: float) -> boo
 
 
 def _is_deepest(height: float, bed: _Bed, beds: Sequence[_Bed], near_mm: float) -> bool:
-    """Return whether no other bed that covers a place lies deeper around it."""
+    """Return whether the image is at least as far from its bed's ends as images of other beds."""
     own = min(height - bed.low, bed.high - height)
     for other in beds:
         depth = min(height - other.low, other.high - height)
         if other is bed or depth < -near_mm:
             continue
-        # the lower bed is taken where two lie equally deep
+        # At equal distances, the image of the lower bed is used.
         if depth > own + near_mm or (abs(depth - own) <= near_mm and other.low < bed.low):
             return False
     return True

@@ -1,7 +1,7 @@
-"""Compare what DICOM headers state about the geometry of a stack with the geometry that is used.
+"""Compare what DICOM headers state about a stack's geometry with the geometry that is used.
 
 The order of trust: ImagePositionPatient and ImageOrientationPatient were written for each image
-while it was acquired; PixelSpacing is the attribute that the standard defines; all others repeat
+while it was acquired. PixelSpacing is the attribute that the standard defines. All others repeat
 them. Each contradiction becomes one note.
 
 References: DICOM PS3.3 C.7.6.2.1.1 (positions and orientation), C.7.6.2 (Image Plane module).
@@ -25,18 +25,18 @@ _ASPECT = Subject("spacing of rows over that of columns", tolerance=0.01, remedy
 _ORDER = Subject("order of slices")
 _TILT = Subject("gantry tilt", "degrees")
 _LETTERS = Subject("directions of rows and columns in the patient")
-_TILT_DEG = 0.5  # degrees by which a stated tilt may differ from the one that positions show
-_WOBBLE = 2e-4  # rad: orientations that differ more were not rounded alone
-_GAP = 1.5  # slices that lie more thicknesses apart leave gaps
-_OVERLAP = 3.0  # slices thicker than this many distances overlap more than reconstructions do
-_AXES = ("LR", "PA", "HF")  # letters of the directions of growing and falling x, y, z (LPS)
-_ALONG = 0.5  # least cosine between a direction and the axis that a letter names
+_TILT_DEG = 0.5  # degrees by which a stated tilt may differ from the one in the positions
+_WOBBLE = 2e-4  # rad; orientations that differ more are not just rounded
+_GAP = 1.5  # slices that are more thicknesses apart leave gaps
+_OVERLAP = 3.0  # slices thicker than this many distances overlap more than in usual reconstructions
+_AXES = ("LR", "PA", "HF")  # letters for the directions of growing and falling x, y, z (LPS)
+_ALONG = 0.5  # smallest cosine between a direction and the axis that a letter names
 
 
 def geometry_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...]:
     """Return a sentence for each contradiction.
 
-    frames  of one point in time, rising along the normal, as they were laid out
+    frames  frames of one time point that were laid out, rising along the normal
     """
     return (
         *dict.fromkeys(note for frame in frames for note in frame.stated.count_notes),
@@ -52,16 +52,16 @@ def geometry_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, .
 
 
 def _slice_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, ...]:
-    """Return a note where NumberOfSlices states another number of slices than there are."""
+    """Return a note if NumberOfSlices differs from the number of slices."""
     stated = [int(f.stated.slices) for f in frames if f.stated.slices and f.stated.slices > 0]
     count = len(frames)
     if not stated or count in stated or count + layout.missing in stated:
         return ()
-    words = f"number of slices: NumberOfSlices states {stated[0]}, and {count} are there"
+    words = f"number of slices: NumberOfSlices states {stated[0]}, but there are {count}"
     if count > stated[0]:
         return (f"{words}: all of them are read",)
     return (
-        f"{words}: {1 - count / stated[0]:.0%} of the stated slices are absent (copy the series "
+        f"{words}: {1 - count / stated[0]:.0%} of the stated slices are missing (copy the series "
         "again if they were lost)",
     )
 
@@ -76,7 +76,7 @@ def _distance_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, 
         statements.append(Statement(float(np.median(between)), "SpacingBetweenSlices"))
     by_location, rounding = _location_step(frames)
     steps = (np.array(frames[-1].position) - frames[0].position) / (len(frames) - 1)
-    # locations are counted along the table, too, which a tilted gantry is not perpendicular to
+    # Locations are also counted along the table, and a tilted gantry is oblique to the table.
     along = (distance, float(np.linalg.norm(steps)), abs(float(steps[2])))
     if by_location and not any(
         abs(by_location - one) <= max(REGULAR * one, rounding) for one in along
@@ -86,9 +86,9 @@ def _distance_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str, 
 
 
 def _location_step(frames: Sequence[Frame]) -> tuple[float, float]:
-    """Return the mean distance of SliceLocations, and its error where they are whole numbers.
+    """Return the mean distance of SliceLocations, and its error if they are whole numbers.
 
-    The distance is 0 where some have no location, or all have the same.
+    The distance is 0 if some frames have no location, or all have the same.
     """
     found = [f.stated.location_mm for f in frames if f.stated.location_mm is not None]
     if len(found) < len(frames):
@@ -107,7 +107,7 @@ def _thickness_notes(frames: Sequence[Frame], layout: StackLayout) -> tuple[str,
         return (
             f"slices are {thickness:.4g} mm thick (SliceThickness) and {distance:.4g} mm apart "
             f"({_POSITION}): {1 - thickness / distance:.0%} of the distance lies in gaps between "
-            "slices, of which nothing was imaged",
+            "slices, where nothing was imaged",
         )
     if thickness > _OVERLAP * distance:
         return (
@@ -132,8 +132,8 @@ def _pixel_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
 
 
 def _order_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
-    """Return a note where other attributes count the slices in another order."""
-    statements = [Statement("the order that is built", _POSITION, Trust.MEASURED)]
+    """Return a note if other attributes count the slices in another order."""
+    statements = [Statement("the order that is used", _POSITION, Trust.MEASURED)]
     counted: tuple[tuple[str, list[float | None]], ...] = (
         ("InstanceNumber", [float(f.number) for f in frames]),
         ("InStackPositionNumber", [f.stated.in_stack for f in frames]),
@@ -147,14 +147,15 @@ def _order_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
         back = int(min((steps < 0).sum(), (steps > 0).sum()))
         if back:
             text = (
-                f"another one ({back} of {len(steps)} steps {agreeing(back, 'leads', 'lead')} back)"
+                f"another order ({back} of {len(steps)} steps "
+                f"{agreeing(back, 'leads', 'lead')} back)"
             )
             statements.append(Statement(text, name, Trust.REPEATED))
     return settle(_ORDER, statements).notes
 
 
 def _wobble_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
-    """Return a note where the orientation changes by more than rounding."""
+    """Return a note if the orientation changes by more than rounding."""
     directions = np.array([(f.along_row, f.along_column) for f in frames])
     turned = float(np.linalg.norm(directions - directions.mean(axis=0), axis=2).max())
     if turned <= _WOBBLE:

@@ -1,8 +1,9 @@
-"""Find the echoes of MR at which water and fat are opposed, where no header word names them.
+"""Find echoes of MR at which water and fat are opposed, where no header word names them.
 
-The protons of fat precess 3.4 parts per million slower than those of water. So a gradient echo
-shows both added or subtracted, by its echo time and the field. Series of two echoes, as GE writes
-them, state the times alone. Phases are named only where one acquisition has echoes of either kind.
+The protons of fat precess 3.4 parts per million more slowly than those of water. So a gradient echo
+shows both added or subtracted, depending on its echo time and the field. Series with two echoes, as
+GE writes them, only state the times. Phases are named only if one acquisition has echoes of both
+kinds.
 
 References: Dixon (1984). Simple proton spectroscopic imaging. Radiology 153:189-194.
 doi:10.1148/radiology.153.1.6089263
@@ -16,16 +17,17 @@ from dataclasses import replace
 from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.formats.dicom.frame_kind import IN_PHASE, OPPOSED_PHASE
 
-_SHIFT_HZ_PER_T = 3.4 * 42.577  # difference in frequency of fat and water
-_CLEAR = 0.5  # least |cosine| of an echo's phase that is named
-# Echo times in ms of the opposed phase at 3 T and 1.5 T, with the ratio of the phase that follows,
-# for headers that state no field
+_SHIFT_HZ_PER_T = 3.4 * 42.577  # Hz per T; difference in frequency of fat and water
+_CLEAR = 0.5  # smallest |cosine| of an echo's phase that is named
+
+# For headers without a field strength: echo times in ms of the opposed phase at 3 T and 1.5 T, and
+# the ratio of the echo time in phase to it.
 _USUAL_OPPOSED = (1.0, 2.6)
 _USUAL_RATIO = (1.7, 2.3)
 
 
 def with_echo_phases(frames: Iterable[Frame]) -> list[Frame]:
-    """Return the frames; gradient echoes in phase and opposed phase have it among their contrasts.
+    """Return the frames, with the phase of gradient echoes added to their contrasts.
 
     Frames of one acquisition have the same frame of reference, field, flip angle and repetition
     time.
@@ -59,7 +61,7 @@ def _named(frame: Frame, phases: dict[tuple[object, ...], dict[float, str]]) -> 
 
 
 def _phases(times_ms: Sequence[float], field_t: object) -> dict[float, str]:
-    """Return a name for each echo time; none where not both phases are there."""
+    """Return the name of the phase at each echo time; empty: not both phases occur."""
     if isinstance(field_t, float) and field_t > 0:
         turns = {ms: math.cos(math.tau * _SHIFT_HZ_PER_T * field_t * ms / 1000) for ms in times_ms}
         named = {

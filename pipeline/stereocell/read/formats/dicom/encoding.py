@@ -1,4 +1,4 @@
-"""Read how a DICOM frame's values are stored: bits, sign, rescale or table, padding.
+"""Read how a DICOM frame stores its values: bits, sign, rescale or table, padding.
 
 References: DICOM PS3.3 C.7.6.3 (Image Pixel module), C.7.5.1.1.2 (Pixel Padding).
 """
@@ -23,7 +23,7 @@ def encoding_of(
     is_float: bool,
     scale: ValueScale,
 ) -> Encoding:
-    """Return how a frame's values are stored. Raises NoPlaneError where they can't be read so."""
+    """Return how a frame stores its values. Raises NoPlaneError for values that can't be read."""
     sequence = "PixelValueTransformationSequence"
     slope = find_value(header, groups, sequence, "RescaleSlope")
     intercept = find_value(header, groups, sequence, "RescaleIntercept")
@@ -35,17 +35,17 @@ def encoding_of(
         slope = 1 / float(header.get("MaximumFractionalValue") or 255)
     slope, intercept = (1.0 if slope is None else float(slope)), float(intercept or 0.0)
     if not (math.isfinite(slope) and math.isfinite(intercept)) or slope == 0:
-        raise NoPlaneError("of values that no rescale slope gives")
+        raise NoPlaneError("with an unusable rescale slope")
     allocated = int(header.get("BitsAllocated") or 0)
     table = _table(header)
     if is_float and table is not None:
-        raise NoPlaneError("of a modality table for floats")
+        raise NoPlaneError("with a modality table for floats")
     if is_float:
         return Encoding(allocated, 0, 0, True, False, slope, intercept)
     bits = int(header.get("BitsStored") or allocated)
     high_bit = int(header["HighBit"].value if "HighBit" in header else bits - 1)
     if not 1 <= bits <= high_bit + 1 <= allocated:
-        raise NoPlaneError(f"of {bits} bits up to bit {high_bit} of {allocated}")
+        raise NoPlaneError(f"with {bits} bits up to bit {high_bit} of {allocated}")
     signed = bool(header.get("PixelRepresentation") or 0)
     padding = _padding(header)
     if table is not None:
@@ -63,14 +63,14 @@ def _table(header: Any) -> ModalityTable | None:
 
 
 def _padding(header: Any) -> tuple[int, int] | None:
-    """Return the lowest and highest padding value, encoded as the pixels are; None: none named.
+    """Return the lowest and highest padding value, encoded as the pixels are; None: not stated.
 
     References: DICOM PS3.3 C.7.5.1.1.2.
     """
     ends = []
     for key in ("PixelPaddingValue", "PixelPaddingRangeLimit"):
         value = header.get(key)
-        if isinstance(value, bytes) and len(value) == 2:  # where the VR is unknown
+        if isinstance(value, bytes) and len(value) == 2:  # bytes, because the VR is unknown
             little = header.original_encoding[1]
             value = int.from_bytes(value, "little" if little else "big")
         if isinstance(value, int):

@@ -1,4 +1,4 @@
-"""The header of one plane of pixels, before decoding: how it is stored, where it lies."""
+"""The header of one plane of pixels, before decoding: how it is stored and where it lies."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,11 @@ Vector = tuple[float, float, float]
 class Encoding:
     """The map from a stored to a grey value: bits, sign, then slope * value + intercept or a table.
 
-    bits, high_bit  of the value inside its container of `allocated` bits; 0 bits: floats
+    bits, high_bit  bits of the value inside its container of `allocated` bits; 0 bits: floats
     is_inverted     MONOCHROME1: the lowest value is the brightest
     padding         lowest and highest stored value outside the image, before the inversion;
-                    None: the header names none
-    table           gives the grey values in place of slope and intercept; None: there is none
+                    None: not stated
+    table           table of grey values that replaces slope and intercept; None: there is none
 
     References: DICOM PS3.3 C.7.6.3 (Image Pixel module).
     """
@@ -37,7 +37,7 @@ class Encoding:
 
     @property
     def grey_ends(self) -> tuple[float, float]:
-        """The grey values between which all lie that this many bits can become."""
+        """The smallest and largest grey value that this many bits can give."""
         if self.table is not None:
             return self.table.grey_range(is_inverted=self.is_inverted)
         low, high = (self.slope * value + self.intercept for value in self.stored_range)
@@ -54,26 +54,27 @@ class Encoding:
 class Frame:
     """One plane of pixels and its place in the patient (LPS, mm).
 
-    file, index        file in the order of names, frame in the file; both from 0
+    file, index        index of the file in the order of names, and of the frame in the file; from 0
     series, instance   digests of the UIDs of the series and of the image
     reference          digest of the frame of reference
     stack              digest of the stack ID in an enhanced image
     position           centre of the first pixel
-    along_row          unit vector of growing column index; `along_column` of growing row index
+    along_row          unit vector along a row, towards larger column indices
+    along_column       unit vector along a column, towards larger row indices
     rows, columns      pixels of the plane
     spacing            mm between (rows, columns)
-    tile, corner       which slice of a mosaic, and its first pixel (row, column) in the image
-    segment            the number of the one that it shows, in a segmentation; 0: of none or all
-    segmentation       the file's; None: it is an image
-    is_quadruped       the axes of the place are those of an animal on four legs
-    parts              of an image that is stored in several files: a digest of its UID, and the
+    tile, corner       index of the slice in a mosaic, and its first pixel (row, column) there
+    segment            number of the segment that it shows, in a segmentation; 0: none or all
+    segmentation       the file's segmentation; None: it is an image
+    is_quadruped       whether the axes of the place are those of an animal on four legs
+    parts              for an image that is stored in several files: a digest of its UID, and the
                        number of files; 0: it is stored in one file, or the number isn't stated
-    kind               magnitude, projection, echo and the like; of a segmentation nothing
+    kind               magnitude, projection, echo and so on; empty for a segmentation
     stated             values that repeat the geometry
-    scale              what is stated about the values
+    scale              statements on the values
     origin             study and series, beside their UIDs
     start              byte of the file at which its values begin, little-endian, row by row; None:
-                       they have to be decoded, or are a part of an image
+                       they must be decoded, or are a part of an image
 
     References: DICOM PS3.3 C.7.6.2 (Image Plane module).
     """

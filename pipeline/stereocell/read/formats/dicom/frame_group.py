@@ -1,10 +1,10 @@
 """A group of DICOM frames that are parallel and equal in all attributes that separate stacks.
 
-Decimal strings are rounded, in each slice anew, so pixel spacings and orientations that differ by
-rounding count as equal. They are compared with the group's mean, so that a wobble about it
-keeps the frames together, and the mean is the stack's. A plane is turned into the mean orientation
-about its first pixel, which has a stated place, or about its middle: the pivot that gives the more
-even steps is taken, since a wobble moves the one and not the other.
+Each slice rounds its own decimal strings, so pixel spacings and orientations that differ only by
+rounding count as equal. They are compared with the group's mean, so that a wobble around it keeps
+the frames together; the mean is used for the stack. A plane is turned into the mean orientation
+around its first pixel, whose position is stated, or around its middle. The pivot that gives the
+more even steps is used, since a wobble moves only one of the two.
 """
 
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from stereocell.read.formats.dicom.frame import Frame, Vector
 
-PARALLEL = 2e-3  # rad: planes that differ more in orientation belong to different stacks
+PARALLEL = 2e-3  # rad; planes that differ more in orientation belong to different stacks
 ALIKE = 1e-3  # share of the pixel spacing: half a pixel over 512 pixels
 _SAME_WAY = np.cos(np.radians(5.0))  # cosine; stacks whose normals are closer can interleave
 
@@ -36,13 +36,14 @@ class Group:
 
     def __init__(self, first: Frame) -> None:
         self.frames = [first]
-        self.words: tuple[str, ...] = ()  # of the properties that separate it from other groups
-        self.order: tuple[int, ...] = ()  # sorts it among those
+        self.words: tuple[str, ...] = ()  # properties that separate it from other groups, in words
+        self.order: tuple[int, ...] = ()  # key that sorts it among those groups
         self.notes: tuple[str, ...] = ()
-        self.unjoined = ""  # why slices with UIDs of their own are not one stack
+        self.unjoined = ""  # why slices with different UIDs were not joined to one stack
         self._directions = _directions(first)
         self._spacing = np.array(first.spacing)
-        self._is_exact = True  # all frames state the same: no mean, which rounds
+        # all frames state the same values, so no mean, which rounds, is needed
+        self._is_exact = True
 
     def takes(self, frame: Frame) -> bool:
         """Return whether a frame with equal attributes matches in orientation and pixel spacing."""
@@ -61,7 +62,7 @@ class Group:
         self._spacing = self._spacing + frame.spacing
 
     def straighten(self) -> None:
-        """Turn the planes into the mean orientation; call it after the last `add`."""
+        """Turn the planes into the mean orientation. Call it after the last `add`."""
         if self._is_exact or len(self.frames) < 3:
             return
         first = self.frames[0]
@@ -78,19 +79,19 @@ class Group:
 
     @property
     def along_row(self) -> Vector:
-        """The mean, a unit vector, as is `along_column`."""
+        """Mean unit vector along a row, towards larger column indices."""
         return self.frames[0].along_row if self._is_exact else _vector(self._mean_directions[0])
 
     @property
     def along_column(self) -> Vector:
-        """The mean, a unit vector of growing row index."""
+        """Mean unit vector along a column, towards larger row indices."""
         if self._is_exact:
             return self.frames[0].along_column
         return _vector(self._mean_directions[1])
 
     @property
     def spacing(self) -> tuple[float, float]:
-        """The mean, mm between (rows, columns)."""
+        """Mean of the mm between (rows, columns)."""
         if self._is_exact:
             return self.frames[0].spacing
         rows, columns = (self._spacing / len(self.frames)).tolist()
@@ -106,7 +107,7 @@ class Group:
         return bool((np.abs(frame.spacing - mean) > ALIKE * mean).any())
 
     def differences(self, other: "Group") -> list[str]:
-        """Return the attributes that differ from another stack's, in the standard's words."""
+        """Return the standard's names of the attributes that differ from another stack's."""
         a, b = self.frames[0], other.frames[0]
         found = [word for name, word in _STATED if getattr(a, name) != getattr(b, name)]
         mean, step = np.array(other.spacing), ALIKE * np.array(self.spacing)
@@ -117,16 +118,16 @@ class Group:
         return found
 
     def interleaves(self, other: "Group") -> bool:
-        """Return whether these planes lie, at least in part, between the other stack's."""
+        """Return whether these planes lie, at least in part, between the other stack's planes."""
         axes = axes_of(self)
         if abs(axes[0] @ axes_of(other)[0]) < _SAME_WAY:
             return False
         ours, theirs = self._box(axes), other._box(axes)
         shared = np.minimum(ours[1], theirs[1]) - np.maximum(ours[0], theirs[0])
-        return bool(shared[0] >= 0 and (shared[1:] > 0).all())  # a single plane is not thick
+        return bool(shared[0] >= 0 and (shared[1:] > 0).all())  # a single plane has no thickness
 
     def _box(self, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return lowest and highest place (2, 3), mm along the axes (3, 3), one a row."""
+        """Return lowest and highest position (2, 3), mm along the axes (3, 3), one per row."""
         first = self.frames[0]
         size = np.array(self.spacing) * (first.rows, first.columns)
         corner = _directions(first)[::-1] * size[:, None]  # down the rows, then along them

@@ -1,8 +1,8 @@
 """The kind of a DICOM frame: the part of a complex signal, the derivation, the contrast.
 
 One series may hold the magnitude and the phase of the same slices, projections of them, or several
-echoes. The kind tells them apart (split_kinds.py). Words for the user come from the
-tables here and never from the file, whose texts may identify a patient.
+echoes. The kind separates them (split_kinds.py). Words for the user come from the tables here and
+never from the file, whose texts may identify a patient.
 
 References: DICOM PS3.3 C.7.6.1.1.2 (Image Type), C.8.3.1.1.1 (MR), C.8.13.3.1 (Complex Image
 Component), C.8.16.2.1.3 (Volume Based Calculation Technique), C.8.15.3 (CT).
@@ -33,16 +33,16 @@ from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS
 
 MAGNITUDE, PHASE, REAL, IMAGINARY = "magnitude", "phase", "real part", "imaginary part"
 LOCALIZER = "localizer"
-# words of ImageType and of ComplexImageComponent -> part of the complex signal, of MR
+# words of ImageType and of ComplexImageComponent -> part of MR's complex signal
 _COMPONENTS = {
     **dict.fromkeys(("M", "MAGNITUDE", "MODULUS"), MAGNITUDE),
     **dict.fromkeys(("P", "PHASE", "PHASE MAP", "VELOCITY MAP"), PHASE),
     **dict.fromkeys(("R", "REAL"), REAL),
     **dict.fromkeys(("I", "IMAGINARY"), IMAGINARY),
 }
-_PHILIPS = re.compile(r"([MPRI])_[A-Z0-9]+")  # as `M_FFE`, `R_IR`
+_PHILIPS = re.compile(r"([MPRI])_[A-Z0-9]+")  # such as `M_FFE`, `R_IR`
 _GE = (MAGNITUDE, PHASE, REAL, IMAGINARY)  # by the number in GE's private element
-# roles, each with its rank: an image (0) is shown first, a screen save last
+# role -> rank: an image (0) is shown first, a screen save last
 _RANKS = {
     "": 0,
     "reformatted": 1,
@@ -58,10 +58,10 @@ _RANKS = {
     "screen save": 5,
     "dose or protocol sheet": 5,
 }
-# ranks of the parts of a complex image; a magnitude has 0
+# part of a complex image -> rank; a magnitude has 0
 _PART_RANKS = {REAL: 2, IMAGINARY: 3, PHASE: 3}
-_UNCORRECTED_RANK = 2  # of PET without attenuation correction
-# patterns of words of ImageType -> role, the first that matches
+_UNCORRECTED_RANK = 2  # rank of PET without attenuation correction
+# patterns of words in ImageType -> role; the first match counts
 _ROLES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), role)
     for pattern, role in (
@@ -97,9 +97,9 @@ _CONTRASTS = {
     "VMI": "virtual monoenergetic",
     **dict.fromkeys(("SWI", "SWAN", "SWIP"), "susceptibility-weighted"),
 }
-# contrasts of gradient echoes that only the echo time shows (echo_phase.py)
+# contrasts of gradient echoes that only the echo time reveals (echo_phase.py)
 IN_PHASE, OPPOSED_PHASE = "in phase by its echo time", "opposed phase by its echo time"
-# contrast -> rank; an image without such a word has 0. In phase and uniform images look like
+# contrast -> rank; an image without such a word has 0. In-phase and uniform images look like
 # conventional ones and come first. The others are computed from them, or show less.
 _CONTRAST_RANKS = {
     "in phase": 0,
@@ -129,7 +129,8 @@ _B_VALUES = (
     (0x2001, 0x03, "PHILIPS IMAGING", "FL"),
     (0x0065, 0x09, "IMAGE PRIVATE HEADER", "FD"),
 )
-_SEQUENCE_B = re.compile(r"[*]?ep_b(\d{1,5})(#.*|t)?")  # Siemens's SequenceName, as `ep_b1000#2`
+# Siemens's SequenceName, such as `ep_b1000#2`
+_SEQUENCE_B = re.compile(r"[*]?ep_b(\d{1,5})(#.*|t)?")
 _GE_B_STEP = 1_000_000_000  # GE adds a multiple of it to some b-values
 KIND_TAGS: list[Any] = [
     "ImageType",
@@ -163,21 +164,21 @@ KIND_TAGS: list[Any] = [
 
 @dataclass(frozen=True, slots=True)
 class FrameKind:
-    """The properties of a frame by which one series falls apart; None and empty: not stated.
+    """The properties by which the frames of one series are separated; None or empty: not stated.
 
-    part             of a complex signal: a name above
+    part             part of a complex signal: one of the names above
     role             a key of _RANKS; empty: an image as it was acquired
     contrasts        contrasts for the user: keys of _CONTRAST_RANKS
     image_type       ImageType, compared and never shown
     kernel           values of ConvolutionKernel (kernel_names.py)
-    has_agent        a contrast agent is stated
-    is_attenuation_corrected  of PET
-    energy_kev       of a virtual monoenergetic image
+    has_agent        whether a contrast agent is stated
+    is_attenuation_corrected  whether PET is corrected for attenuation
+    energy_kev       keV of a virtual monoenergetic image
     echo_time, repetition_time, inversion_time, trigger_time, reference_time  ms
-    is_gradient_echo  of MR: a gradient echo that is not echo-planar; None: not stated
-    field_t          strength of the magnetic field
-    temporal, cardiac, acquisition, time_slice  number of the point in time, of the cardiac phase
-                     (%), of the acquisition, of PET's volume
+    is_gradient_echo  whether MR is a gradient echo that is not echo-planar; None: not stated
+    field_t          T; strength of the magnetic field
+    temporal, cardiac, acquisition, time_slice  number of the time point, cardiac phase (%), number
+                     of the acquisition, number of PET's volume
     """
 
     part: str = ""
@@ -206,7 +207,7 @@ class FrameKind:
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first: images and magnitudes have 0."""
+        """Order in which kinds are shown, lowest first; images and magnitudes have 0."""
         uncorrected = _UNCORRECTED_RANK * (self.is_attenuation_corrected is False)
         return max(
             _PART_RANKS.get(self.part, 0), _RANKS[self.role], int(self.is_derived), uncorrected
@@ -214,20 +215,21 @@ class FrameKind:
 
     @property
     def is_derived(self) -> bool:
-        """Whether ImageType says DERIVED and no contrast: water and fat are computed from echoes,
-        and are no lesser images.
+        """Whether ImageType states DERIVED and no contrast.
+
+        Water and fat are computed from echoes, but are not lesser images.
         """
         is_named = any(word in _CONTRASTS.values() for word in self.contrasts)
         return self.image_type[:1] == ("DERIVED",) and not is_named
 
     @property
     def contrast_rank(self) -> int:
-        """Among equal `rank`, lower ones are shown first: in phase, water, opposed phase, fat."""
+        """Order among equal `rank`: in phase, water, opposed phase, fat."""
         return min((_CONTRAST_RANKS[word] for word in self.contrasts), default=0)
 
     @property
     def part_is_angle(self) -> bool:
-        """Whether the frame is the phase of a complex signal, and no intensity."""
+        """Whether the frame is the phase of a complex signal, and so not an intensity."""
         return self.part == PHASE
 
     @property
@@ -237,7 +239,7 @@ class FrameKind:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The part and the role for the user; a plain image has none."""
+        """The part and the role, for the user; empty for a plain image."""
         return tuple(word for word in (self.part, self.role) if word)
 
 
@@ -319,7 +321,7 @@ def _image_type(header: Any, groups: Sequence[Any]) -> tuple[str, ...]:
 
 
 def _part(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
-    """Return the part of the complex signal: by the standard's attribute, ImageType, GE's own."""
+    """Return the part of the complex signal: from the standard's attribute, ImageType or GE's."""
     stated = [
         find_text(header, groups, sequence, "ComplexImageComponent").upper()
         for sequence in ("MRImageFrameTypeSequence", "")
@@ -349,7 +351,7 @@ def _role(header: Any, groups: Sequence[Any], words: Sequence[str]) -> str:
 
 
 def _has_agent(header: Any, groups: Sequence[Any]) -> bool:
-    """Return whether a contrast agent is stated, whose name is a text that is never shown."""
+    """Return whether a contrast agent is stated. Its name is free text and never shown."""
     try:
         usage = find_value(
             {}, groups, "ContrastBolusUsageSequence", "ContrastBolusAgentAdministered"

@@ -1,7 +1,7 @@
-"""The planes of multi-frame images without functional groups: RT Dose and reconstructed NM.
+"""Place the planes of multi-frame images without functional groups: RT Dose, reconstructed NM.
 
-One position is stated, the first frame's. Those of the others follow along the planes' normal, as a
-vector says (dose) or at even steps (nuclear medicine).
+Only the first frame's position is stated. The others follow along the planes' normal, at stated
+offsets (dose) or at even steps (nuclear medicine).
 
 References: DICOM PS3.3 C.8.8.3.2 (Grid Frame Offset Vector), C.8.4.15 (NM Reconstruction).
 """
@@ -15,22 +15,23 @@ from pydicom.uid import NuclearMedicineImageStorage, RTDoseStorage
 from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS
 
 _ALONG = 0.999  # cosine between an axial plane's normal and z
-_RECONSTRUCTED = "RECON TOMO"  # value in ImageType: slices, and no projections, energies or phases
+# value in ImageType for slices, rather than projections, energies or phases
+_RECONSTRUCTED = "RECON TOMO"
 _STATED_ONCE = ("ImagePositionPatient", "ImageOrientationPatient")
 
 
 def is_dose(header: Any) -> bool:
-    """Return whether the values are doses, which have a scaling of their own."""
+    """Return whether the values are doses, which have their own scaling."""
     return bool(header.get("SOPClassUID") == RTDoseStorage)
 
 
 def has_offsets(header: Any) -> bool:
-    """Return whether an image is of a kind whose frames may follow from the first."""
+    """Return whether the frames of this kind of image may follow from the first."""
     return is_dose(header) or bool(header.get("SOPClassUID") == NuclearMedicineImageStorage)
 
 
 def place_first(header: Any) -> None:
-    """Take the first frame's place from the detector where nuclear medicine states it."""
+    """Copy the first frame's place from the detector, where nuclear medicine states it."""
     detectors = header.get("DetectorInformationSequence")
     if header.get("SOPClassUID") != NuclearMedicineImageStorage or not detectors:
         return
@@ -40,12 +41,10 @@ def place_first(header: Any) -> None:
 
 
 def frame_offsets(header: Any, count: int, normal: NDArray[np.float64]) -> tuple[float, ...] | None:
-    """Return how far each of several frames lies from the first, mm along the normal.
+    """Return the distance of each frame from the first, mm along the normal; None: not stated.
 
-    header  of an image of which `has_offsets` is true
+    header  header of an image for which `has_offsets` is true
     normal  (3,), LPS, right-handed to a row and a column
-
-    None: nothing says so.
     """
     try:
         values = _of_dose(header, normal) if is_dose(header) else _of_slices(header, count)
@@ -56,7 +55,7 @@ def frame_offsets(header: Any, count: int, normal: NDArray[np.float64]) -> tuple
 
 
 def _of_dose(header: Any, normal: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Offsets from the first plane, or, where the first isn't 0, places along z of the patient."""
+    """Return offsets from the first plane; if the first isn't 0, they are positions along z."""
     values = np.array(header.GridFrameOffsetVector, np.float64)
     if values[0] == 0:
         return values
@@ -66,7 +65,7 @@ def _of_dose(header: Any, normal: NDArray[np.float64]) -> NDArray[np.float64] | 
 
 
 def _of_slices(header: Any, count: int) -> NDArray[np.float64] | None:
-    """Even steps, whose sign is the direction of stacking; SliceVector numbers the frames."""
+    """Return even steps, signed by the direction of stacking; SliceVector numbers the frames."""
     if _RECONSTRUCTED not in (header.get("ImageType") or ()):
         return None
     numbers = np.array(header.get("SliceVector") or range(1, count + 1), np.int64)

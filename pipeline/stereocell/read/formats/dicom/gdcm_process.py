@@ -1,4 +1,4 @@
-"""GDCM in a process of its own: it aborts on some damaged JPEG streams, and it prints to stderr."""
+"""Run GDCM in a separate process, because it aborts on some damaged JPEGs and prints to stderr."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from stereocell.storage.child_process import Child, ChildError
 
 
 class GdcmProcess:
-    """Decodes files by GDCM; the process starts with the first file and ends with the block."""
+    """Decodes files with GDCM. The first file starts the process; leaving the block ends it."""
 
     def __init__(self) -> None:
         self._child: Child | None = None
@@ -37,13 +37,13 @@ class GdcmProcess:
 
 
 class _Decoder:
-    """The object in the process: it decodes the frames of one file after another."""
+    """The object in the process, which decodes the frames of one file after another."""
 
     def __init__(self) -> None:
         self._frames: Iterator[NDArray[Any]] = iter(())
 
     def open(self, path: Path, indices: Sequence[int]) -> None:
-        """Open a file. Raises ValueError, without the values of tags that other errors quote."""
+        """Open a file. Raises ValueError without text, since other errors quote values of tags."""
         try:
             with quiet():
                 dataset, plugin = open_pixels(path)
@@ -52,7 +52,7 @@ class _Decoder:
             raise ValueError from None
 
     def next_frame(self) -> NDArray[Any]:
-        """Return the next frame of the open file. Raises ValueError as `open` does."""
+        """Return the next frame of the open file. Raises ValueError like `open`."""
         try:
             with quiet():
                 return next(self._frames)

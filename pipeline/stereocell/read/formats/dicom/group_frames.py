@@ -32,7 +32,7 @@ def find_groups(frames: Iterable[Frame]) -> list[Group]:
 
 
 def _parts(group: Group) -> list[Group]:
-    """Return the group, or one for each kind of frame in it."""
+    """Return the group, or one group for each kind of frame in it."""
     normal, near = axes_of(group)[0], SAME_PLACE * min(group.spacing)
     parts = split_kinds(group.frames, normal, near)
     found = []
@@ -47,13 +47,13 @@ def _parts(group: Group) -> list[Group]:
 
 
 def describe_neighbours(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
-    """Return a sentence, or none, about other stacks of the series between a group's planes."""
+    """Return a sentence if other stacks of the series lie between a group's planes."""
     among = [other for other in _others(group, groups) if group.interleaves(other)]
     return _describe(group, among, "among")
 
 
 def describe_elsewhere(group: Group, groups: Sequence[Group]) -> tuple[str, ...]:
-    """Return a sentence, or none, about other stacks of the series beside a group's planes."""
+    """Return a sentence if other stacks of the series lie beside a group's planes."""
     beside = [
         other
         for other in _others(group, groups)
@@ -83,6 +83,7 @@ def _describe(group: Group, others: Sequence[Group], where: str) -> tuple[str, .
     apart = sorted({word for other in others for word in group.differences(other)})
     return (
         counted(images, "more image of the same series lies", "more images of the same series lie")
-        + f" {where} these and {agreeing(images, 'is', 'are')} not built: another "
-        f"{', '.join(apart)} (`--series list` shows {agreeing(images, 'it', 'them')})",
+        + f" {where} these and {agreeing(images, 'is', 'are')} not built, because "
+        f"{agreeing(images, 'it differs', 'they differ')} in {', '.join(apart)} "
+        f"(`--series list` shows {agreeing(images, 'it', 'them')})",
     )

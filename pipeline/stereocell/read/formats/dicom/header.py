@@ -1,9 +1,9 @@
-"""The part of a DICOM file's header that is read: geometry, modality, storage of the pixels.
+"""Read the needed part of a DICOM file's header: geometry, modality, storage of the pixels.
 
-Privacy begins here. pydicom reads the tags of `_TAGS` alone and skips the values of all others.
+Privacy begins here. pydicom reads only the tags in `_TAGS` and skips the values of all others.
 UIDs, which identify series and copies, become digests. Logs, warnings and texts of exceptions of
-pydicom may quote values; they are discarded. A file is named by its number in the order of names,
-never by its name.
+pydicom may quote values, so they are discarded. Messages name a file by its number in the order of
+names, never by its name.
 """
 
 import hashlib
@@ -35,6 +35,7 @@ from stereocell.read.formats.dicom.modality_table import TABLE_TAGS
 from stereocell.read.formats.dicom.mosaic import Mosaic, MosaicError, Tile, find_mosaic
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
 from stereocell.read.formats.dicom.origin import ORIGIN_TAGS, origin_of
+from stereocell.read.formats.dicom.remedies import class_name, remedy_for
 from stereocell.read.formats.dicom.segmentation import (
     LABELMAP,
     Segmentation,
@@ -44,7 +45,6 @@ from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.formats.dicom.stated import STATED_TAGS, count_frames, stated_of
 from stereocell.read.formats.dicom.stored_values import PLUGINS, is_compressed
 from stereocell.read.formats.dicom.value_scale import SCALE_TAGS, ValueScale, scale_of
-from stereocell.read.formats.dicom.ways_out import class_name, way_out
 
 T = TypeVar("T")
 
@@ -90,13 +90,14 @@ _NAMED: list[Any] = [
     *SCALE_TAGS,
     *TABLE_TAGS,
 ]
-_TAGS = [Tag(name) for name in _NAMED]  # once: pydicom would look them up for each file
-SEGMENTATION = "of a segmentation"  # how a reason begins
+# converted once, because pydicom would look them up for each file
+_TAGS = [Tag(name) for name in _NAMED]
+SEGMENTATION = "holding a segmentation"  # first words of a reason
 _NO_PLACE = "without a place in the patient"
 _NO_SPACING = "without a PixelSpacing above 0"
 _UNDEFINED = 0xFFFFFFFF  # length of an element that ends with a delimiter
-_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # whose length has four bytes
-# attributes without which pydicom decodes no pixels
+_LONG_VRS = (b"OB", b"OW", b"OF", b"OD", b"UN")  # their length has four bytes
+# attributes that pydicom needs to decode pixels
 _ASKED = (
     "Rows",
     "Columns",
@@ -106,7 +107,7 @@ _ASKED = (
     "BitsStored",
     "PixelRepresentation",
 )
-# smallest and largest spacing of pixels in mm; distances in pixels are meaningless beyond them
+# mm; smallest and largest pixel spacing. Beyond them distances in pixels are meaningless.
 _SPACINGS = (1e-6, 100.0)
 
 
@@ -123,7 +124,10 @@ def is_dicom(path: Path) -> bool:
 
 
 def _lacks_preamble(head: bytes) -> bool:
-    """Files without preamble begin with an element of group 2 or 8, little-endian, a low number."""
+    """Return whether a file may be DICOM without preamble.
+
+    It then begins with an element of group 2 or 8, little-endian, with a low number.
+    """
     if len(head) < 8:
         return False
     group, element = struct.unpack_from("<HH", head)
@@ -134,9 +138,9 @@ def _lacks_preamble(head: bytes) -> bool:
 class _File:
     """A file whose header is read.
 
-    number  in the order of names
-    known   values of the headers before it
-    key     of its header among them; None: it is compared with no other
+    number  index in the order of names
+    known   values of the headers read before it
+    key     key of its header among them; None: it is not compared with others
     """
 
     path: Path
@@ -145,17 +149,17 @@ class _File:
     key: bytes | None
 
     def once(self, name: str, find: Callable[[], T]) -> T:
-        """Return a value that all files with such a header share; see `KnownHeaders.once`."""
+        """Return a value that all files with the same header share; see `KnownHeaders.once`."""
         return self.known.once(self.key, name, find)
 
 
 def read_frames(path: Path, file: int, known: KnownHeaders | None = None) -> list[Frame]:
     """Return the planes of a file, from its header alone.
 
-    file   the file's number in the order of names
-    known  values of the headers before it, of one folder
+    file   index of the file in the order of names
+    known  values of headers in the same folder that were read before
 
-    Raises NoPlaneError, whose text holds no value of the file.
+    Raises NoPlaneError, whose text contains no value of the file.
     """
     try:
         with quiet(), path.open("rb") as opened:
@@ -168,7 +172,7 @@ def read_frames(path: Path, file: int, known: KnownHeaders | None = None) -> lis
             header = pydicom.dcmread(
                 opened, stop_before_pixels=True, force=True, specific_tags=_TAGS
             )
-            # before a value is asked for, which would be converted
+            # Digest the header before any value is accessed and so converted.
             own = _File(path, file, known or KnownHeaders(), digest_of(header))
             segmentation = segmentation_of(header)
             try:
@@ -180,19 +184,19 @@ def read_frames(path: Path, file: int, known: KnownHeaders | None = None) -> lis
 
 
 def _explained(error: NoPlaneError, header: Any, segmentation: Segmentation | None) -> NoPlaneError:
-    """Return the error with the kind of the file, and a way out."""
+    """Return the error with the kind of the file, and a remedy."""
     if segmentation is not None:
         return NoPlaneError(f"{SEGMENTATION} of {segmentation.words}, {error}")
     found = NoPlaneError(f"{_NO_PLACE}{_kind(header)}") if str(error) == _NO_PLACE else error
-    found.way_out = way_out(header, kind_of(header, ()), str(found))
+    found.remedy = remedy_for(header, kind_of(header, ()), str(found))
     return found
 
 
 def _refuse_deflated(path: Path) -> None:
-    """Raise NoPlaneError for a deflated file: it would be unpacked whole, at any size."""
+    """Raise NoPlaneError for a deflated file: it would be unpacked as a whole, to any size."""
     meta = pydicom.filereader.read_file_meta_info(path)
     if meta.get("TransferSyntaxUID") == DeflatedExplicitVRLittleEndian:
-        raise NoPlaneError("deflated as a whole, which is not read")
+        raise NoPlaneError("deflated as a whole, which is not supported")
 
 
 def _frames(
@@ -204,10 +208,10 @@ def _frames(
         raise NoPlaneError(f"without pixels{_kind(header)}")
     grey = ["MONOCHROME1", "MONOCHROME2"]
     if segmentation is not None and segmentation.kind == LABELMAP:
-        grey.append("PALETTE COLOR")  # of numbers
+        grey.append("PALETTE COLOR")  # the palette colours numbers
     colours = str(header.get("PhotometricInterpretation") or "MONOCHROME2").strip()
     if int(header.get("SamplesPerPixel") or 1) != 1 or colours not in grey:
-        raise NoPlaneError(f"of colours, not of grey values{_kind(header)}")
+        raise NoPlaneError(f"in colour, not in grey values{_kind(header)}")
     shared = first_item(header.get("SharedFunctionalGroupsSequence"))
     own: Sequence[Any] = header.get("PerFrameFunctionalGroupsSequence") or ()
     is_mask = segmentation is not None
@@ -233,7 +237,7 @@ def _frames(
             normal = np.cross(*np.array(_axes(header, [None])[0]))
             offsets = frame_offsets(header, count, normal)
         if offsets is None:
-            raise NoPlaneError(f"of several frames without a place for each{_kind(header)}")
+            raise NoPlaneError(f"with several frames but no place for each{_kind(header)}")
     frames = []
     for index in range(count):
         groups = [own[index] if own else None, shared]
@@ -297,7 +301,7 @@ def _mosaic(
     directions: tuple[Vector, Vector],
     spacing: tuple[float, float],
 ) -> Mosaic:
-    """Return the slices of an image of pixels (rows, columns): most hold one."""
+    """Return the slices of an image with pixels (rows, columns); most images hold one."""
     stated = find_value(header, groups, "PlanePositionSequence", "ImagePositionPatient")
     position = None if stated is None else _vector(stated)
     try:
@@ -328,7 +332,7 @@ def _vector(values: Any) -> Vector:
 
 
 def _kind(header: Any) -> str:
-    """Return the kind of a file without pixels, in the standard's words: " (...)", or nothing."""
+    """Return the standard's name of the kind of a file without pixels, as " (...)", or nothing."""
     name = class_name(header)
     return f" ({name})" if name else ""
 
@@ -336,16 +340,16 @@ def _kind(header: Any) -> str:
 def _check_pixels(
     header: Any, opened: BinaryIO, size: int, pixels: int, *, is_mask: bool
 ) -> tuple[bool, int | None, int | None]:
-    """Return whether the pixels are floats, how many whole frames there are, and where they begin.
+    """Return whether the pixels are floats, the number of complete frames, and where they begin.
 
-    opened   stands at the element of the pixels: tag, (VR, 2 bytes,) length
-    size     of the file in bytes
-    pixels   of a frame
-    is_mask  a pixel may be one bit
+    opened   file at the element of the pixels: tag, (VR, 2 bytes,) length
+    size     size of the file in bytes
+    pixels   number of pixels of a frame
+    is_mask  whether a pixel may be one bit
 
-    The number of compressed frames is None: it takes a decoder. The byte of the file at which
-    frames begin is None where their values are not those of this machine, one after the other.
-    Raises NoPlaneError where the pixels can't be read.
+    The number of compressed frames is None, because it needs a decoder. The first byte of the
+    frames is None if their values aren't stored one after the other in this machine's form. Raises
+    NoPlaneError where the pixels can't be read.
     """
     implicit, little = header.original_encoding
     order = "<" if little else ">"
@@ -355,11 +359,11 @@ def _check_pixels(
     bits = int(header.get("BitsAllocated") or 0)
     is_float = element in (0x0008, 0x0009)
     if bits not in (32, 64) if is_float else bits not in (1, 8, 16, 32)[not is_mask :]:
-        raise NoPlaneError(f"of {bits} bits a pixel, not of 8, 16 or 32")
+        raise NoPlaneError(f"with {bits} bits per pixel, not 8, 16 or 32")
     syntax = header.file_meta.get("TransferSyntaxUID") if header.file_meta else None
     if is_compressed(syntax):
         if syntax not in PLUGINS:
-            raise NoPlaneError("compressed in a way that is not read")
+            raise NoPlaneError("compressed in a way that is not supported")
         return is_float, None, None
     begin = opened.tell() - (4 if implicit else 0)
     is_plain = (
@@ -395,6 +399,6 @@ def _axes(header: Any, groups: Sequence[Any]) -> tuple[tuple[Vector, Vector], tu
         raise NoPlaneError(_NO_SPACING)
     if not _SPACINGS[0] <= min(between) <= max(between) <= _SPACINGS[1]:
         shown = " and ".join(f"{value:g}" for value in between)
-        raise NoPlaneError(f"of an absurd PixelSpacing ({shown} mm)")
+        raise NoPlaneError(f"with an implausible PixelSpacing ({shown} mm)")
     along_row, along_column = ((a, b, c) for a, b, c in (cosines / lengths[:, None]).tolist())
     return (along_row, along_column), (between[0], between[1])

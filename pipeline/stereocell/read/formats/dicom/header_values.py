@@ -1,6 +1,6 @@
 """Single values of a DICOM header: from functional groups, from private blocks, as numbers.
 
-These values describe an image and place nothing, so a value that can't be read counts as absent.
+These values describe an image and don't affect its place, so an unreadable value counts as absent.
 
 References: DICOM PS3.3 C.7.6.16 (Multi-frame Functional Groups module); PS3.5 7.8 (private tags).
 """
@@ -26,10 +26,11 @@ def first_item(sequence: Any) -> Any:
 
 
 def find_value(header: Any, groups: Sequence[Any], sequence: str, key: str) -> Any:
-    """Return a value from the frame's group, the shared one, or the header itself; None: nowhere.
+    """Return a value from the frame's group, the shared group or the header; None: not stated.
 
-    An enhanced image states the values of its frames in functional groups. One that was converted
-    from single frames keeps other attributes of them in groups of their own. Raises DICOM_FAULTS.
+    An enhanced image states the values of its frames in functional groups. An image that was
+    converted from single frames keeps their other attributes in special groups. Raises
+    DICOM_FAULTS.
     """
     stated = [group for group in groups if group is not None]
     for name in (sequence, *_CONVERTED) if stated else ():
@@ -41,12 +42,12 @@ def find_value(header: Any, groups: Sequence[Any], sequence: str, key: str) -> A
 
 
 def find_words(header: Any, groups: Sequence[Any], key: str) -> tuple[str, ...]:
-    """Return the words of a coded attribute, in capitals; none where it can't be read."""
+    """Return the words of a coded attribute, in capitals; empty: it can't be read."""
     return tuple(word.upper() for word in find_texts(header, groups, "", key))
 
 
 def find_texts(header: Any, groups: Sequence[Any], sequence: str, key: str) -> tuple[str, ...]:
-    """Return the values of an attribute that may have several; none where it can't be read."""
+    """Return the values of an attribute that may have several; empty: it can't be read."""
     try:
         found = find_value(header, groups, sequence, key) or ()
         texts = (found,) if isinstance(found, str) else tuple(found)
@@ -56,7 +57,7 @@ def find_texts(header: Any, groups: Sequence[Any], sequence: str, key: str) -> t
 
 
 def find_number(header: Any, groups: Sequence[Any], sequence: str, key: str) -> float | None:
-    """Return a finite number, the first where there are several; None: absent or unreadable."""
+    """Return a finite number, the first of several; None: absent or unreadable."""
     try:
         return as_number(find_value(header, groups, sequence, key))
     except DICOM_FAULTS:
@@ -64,7 +65,7 @@ def find_number(header: Any, groups: Sequence[Any], sequence: str, key: str) -> 
 
 
 def find_text(header: Any, groups: Sequence[Any], sequence: str, key: str) -> str:
-    """Return a text without spaces at its ends; empty: absent or unreadable."""
+    """Return a text without surrounding spaces; empty: absent or unreadable."""
     try:
         value = find_value(header, groups, sequence, key)
         return "" if value is None else str(value).strip()
@@ -73,7 +74,7 @@ def find_text(header: Any, groups: Sequence[Any], sequence: str, key: str) -> st
 
 
 def as_number(value: Any) -> float | None:
-    """Return a finite number, the first of several; None: it is none. Raises DICOM_FAULTS."""
+    """Return a finite number, the first of several; None: not a number. Raises DICOM_FAULTS."""
     if value is None or (isinstance(value, str) and not value.strip()):
         return None
     if not isinstance(value, str | int | float) and hasattr(value, "__len__"):
@@ -83,16 +84,16 @@ def as_number(value: Any) -> float | None:
 
 
 def private_tags(group: int, element: int) -> list[int]:
-    """Return the tags to ask pydicom for, of a private element and of its possible creators."""
+    """Return the tags of a private element and of its possible creators, to ask pydicom for."""
     creators = [(group << 16) + block for block in _BLOCKS]
     return creators + [(group << 16) + (block << 8) + element for block in _BLOCKS]
 
 
 def private_number(header: Any, group: int, element: int, creator: str, vr: str) -> float | None:
-    """Return a number of a private block; None: there is none.
+    """Return a number from a private block; None: there is none.
 
-    creator  beginning of the name of the block's creator
-    vr       `SS`, `FL` or `FD`, or `IS` for text, where the file states none
+    creator  start of the name of the block's creator
+    vr       `SS`, `FL` or `FD`, or `IS` for text, where the file states no VR
     """
     try:
         for block in _BLOCKS:
@@ -113,7 +114,7 @@ def _text(value: Any) -> str:
 
 
 def _unpacked(header: Any, value: Any, vr: str) -> Any:
-    """Return the value of an element whose VR may be unknown, so that it is bytes."""
+    """Return an element's value, unpacked if its VR is unknown and it is bytes."""
     if not isinstance(value, bytes):
         return value
     code = _PACKED.get(vr)

@@ -1,7 +1,7 @@
-"""DICOM: a folder at any depth, or one file, single-frame or enhanced multi-frame.
+"""Read DICOM: a folder at any depth, or one file, single-frame or enhanced multi-frame.
 
-header.py lists the attributes that are read, series.py sorts frames into
-volumes, read/plane_stack.py lays out the planes. Files are found by content, not by name.
+header.py lists the attributes that are read, series.py sorts frames into volumes, and
+read/plane_stack.py lays out the planes. Files are found by content, not by name.
 
 References: DICOM PS3.3 (information object definitions).
 """
@@ -31,12 +31,12 @@ from stereocell.read.formats.dicom.label_stack import stack_labels
 from stereocell.read.formats.dicom.lesser_kind import lesser_notes
 from stereocell.read.formats.dicom.no_plane import NoPlaneError
 from stereocell.read.formats.dicom.pixels import decode, dtype_of
+from stereocell.read.formats.dicom.remedies import in_words
 from stereocell.read.formats.dicom.segmentation import LABELMAP, free_labels
 from stereocell.read.formats.dicom.series import find_stacks, is_other_kind
 from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS, quiet
 from stereocell.read.formats.dicom.stack import Stack
 from stereocell.read.formats.dicom.twice_rescaled import describe_values
-from stereocell.read.formats.dicom.ways_out import in_words
 from stereocell.read.image import Image
 from stereocell.read.known_formats import identify
 from stereocell.read.plane_stack import NoStackError, StackLayout
@@ -48,16 +48,16 @@ from stereocell.read.whole_array import WholeArray
 from stereocell.storage.location import Location, first_bytes, is_own
 
 _INSTEAD = "expected the image that it was drawn on"
-_MOST_KINDS = 4  # most kinds of images that notes name
+_MOST_KINDS = 4  # kinds of images that notes name
 _COPIES = "copies of others"
 UNKNOWN = "DICOM"  # name of a dataset of unknown modality
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The DICOM files of a folder in the order of names, their stacks, and counts of the others.
+    """The DICOM files of a folder in the order of names, their stacks, and counts of other files.
 
-    frames    of all stacks
+    frames    frames of all stacks
     left_out  reason -> number of files without a usable plane
     """
 
@@ -70,8 +70,8 @@ class Found:
 def read_image(location: Location, *, series: int = 0) -> Image:
     """Return one series; 0 is the largest, others count from 1 as `list_series` does.
 
-    Where there are segmentations alone, 0 is the label map of all segments. Raises SourceError
-    where it makes no volume, UsageError where the source lacks the series.
+    If there are only segmentations, 0 is the label map of all segments. Raises SourceError where
+    the series is not a volume, UsageError where the source lacks the series.
     """
     found = _find(location)
     if series > len(found.stacks):
@@ -81,7 +81,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         )
     stack = found.stacks[max(series, 1) - 1]
     if (segmentation := stack.first.segmentation) is not None:
-        if not series or segmentation.kind == LABELMAP:  # whose numbers have no mean
+        if not series or segmentation.kind == LABELMAP:  # numbers of objects have no mean
             return _label_map(found, stack, series, location.shown)
         if stack.layout is None:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
@@ -111,7 +111,8 @@ def read_image(location: Location, *, series: int = 0) -> Image:
         modality=modality,
         has_hounsfield_units=is_hounsfield,
         placement=canonical.placement,
-        has_sides=not stack.first.is_quadruped,  # its axes are left, dorsal and cranial
+        # the axes of an animal are left, dorsal and cranial
+        has_sides=not stack.first.is_quadruped,
         labels=_labels(stack, len(found.stacks)),
         acquired=_acquired(stack, layout, canonical, found.paths, dtype, location.shown),
         notes=(
@@ -127,7 +128,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
 
 
 def _require_parts(stack: Stack, shown: str) -> None:
-    """Raise SourceError where files are missing of an image that is stored in several."""
+    """Raise SourceError where files of an image that is stored in several files are missing."""
     held: dict[tuple[bytes, int], set[int]] = {}
     for frame in (frame for frames in stack.times for frame in frames):
         held.setdefault(frame.parts, set()).add(frame.file)
@@ -140,9 +141,9 @@ def _require_parts(stack: Stack, shown: str) -> None:
 
 
 def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:
-    """Return a segmentation as numbers of objects: one channel, or one a segment if they overlap.
+    """Return a segmentation as object numbers: one channel, or one per segment if they overlap.
 
-    Raises SourceError, UsageError.
+    Raises SourceError and UsageError.
     """
     own = stack.first.segmentation
     files = {frame.file for frame in found.frames if frame.segmentation is not None}
@@ -183,14 +184,15 @@ def _label_map(found: Found, stack: Stack, series: int, shown: str) -> Image:
 
 def _no_labels(stack: Stack, stacks: int, shown: str, problem: str) -> UsageError:
     return UsageError(
-        f"{shown}: is a label map: found {_labels(stack, stacks)}, {problem}; {_INSTEAD}, or a "
-        "mask by --series N --as intensity"
+        f"{shown}: this is a label map: found {_labels(stack, stacks)}, {problem}; {_INSTEAD}, or "
+        "a mask by --series N --as intensity"
     )
 
 
 def read_free_labels(location: Location) -> dict[int, str]:
-    """Return the labels of a segmentation's segments by number: free text, which may tell who the
-    patient is. Empty: there are none, or it is no segmentation. Raises SourceError, UsageError.
+    """Return the labels of a segmentation's segments, by number; empty: it has none.
+
+    Labels are free text and may identify the patient. Raises SourceError and UsageError.
     """
     found = _find(location)
     first = found.stacks[0].first
@@ -205,13 +207,13 @@ def read_free_labels(location: Location) -> dict[int, str]:
             return free_labels(header)
     except DICOM_FAULTS:
         raise SourceError(
-            f"{location.shown}: segments' labels can't be read, expected a segmentation that is "
-            "whole"
+            f"{location.shown}: segments: found labels that can't be read, expected a complete "
+            "segmentation"
         ) from None
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each series, as `--series` counts them. Raises SourceError."""
+    """Return a line for each series, numbered as for `--series`. Raises SourceError."""
     found = _find(location)
     lines = [f"{i:3d}  {stack.label}" for i, stack in enumerate(found.stacks, start=1)]
     for i, stack in enumerate(found.stacks):
@@ -229,7 +231,7 @@ def _find(location: Location) -> Found:
         left_out["not DICOM"] = len(files) - len(paths)
     frames: dict[bytes, Frame] = {}
     copies: list[tuple[Frame, Frame]] = []
-    ways: list[str] = []
+    remedies: list[str] = []
     known = KnownHeaders()
     for index, path in enumerate(paths):
         try:
@@ -240,10 +242,11 @@ def _find(location: Location) -> Found:
                     copies.append((earlier, frame))
         except NoPlaneError as error:
             left_out[str(error)] += 1
-            ways.append(error.way_out)
+            remedies.append(error.remedy)
     compare = partial(_are_equal, paths, location.shown)
     twice = set()
-    for earlier, frame in copies:  # one image stored twice; with other pixels it is another image
+    # the same image stored twice; with other pixels it is another image
+    for earlier, frame in copies:
         if earlier.position == frame.position and compare(earlier, frame):
             twice.add(frame.file)
         else:
@@ -257,37 +260,37 @@ def _find(location: Location) -> Found:
             left_out[f"not DICOM ({first})"] = left_out.pop("not DICOM")
         held = "; ".join(f"{count} {reason}" for reason, count in sorted(left_out.items()))
         if not root.is_dir():
-            held = f"one file, {next(iter(left_out), 'which is none')}"
+            held = f"one file, {next(iter(left_out), 'which is not DICOM')}"
         if left_out and all(reason.startswith(SEGMENTATION) for reason in left_out):
-            raise UsageError(f"{location.shown}: is a label map: found {held}; {_INSTEAD}")
+            raise UsageError(f"{location.shown}: this is a label map: found {held}; {_INSTEAD}")
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
             f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
             f"{'' if paths else ', or a volume of another format'}"
-            f"{or_one_of(root, 'dicom')}{in_words(ways)}"
+            f"{or_one_of(root, 'dicom')}{in_words(remedies)}"
         )
     every = tuple(frames.values())
     return Found(tuple(paths), every, find_stacks(every, compare), left_out)
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return all files below a folder, sorted: the order doesn't depend on the disk."""
+    """Return all files below a folder, sorted, so that the order doesn't depend on the disk."""
     found = [Path(at) / name for at, _, names in os.walk(folder) for name in names]
     return sorted(found, key=lambda path: path.relative_to(folder).parts)
 
 
 def _require_own(location: Location, files: Sequence[Path]) -> None:
-    """Raise SourceError for a link that leads out of the folder, by its number: names are private.
+    """Raise SourceError for a link that leads out of the folder. Its number stands for its name.
 
-    Pipes, devices and broken links are skipped: the reader doesn't open them.
+    Pipes, devices and broken links are skipped, because the reader doesn't open them.
     """
     own = [location.folder]
     for number, path in enumerate(files, start=1):
         if path.is_file() and not is_own(path, own):
             raise SourceError(
-                f"{location.shown}: file {number} of {len(files)} in the order of names: is a link "
-                "that leads out of the folder, expected files in it or below "
+                f"{location.shown}: file {number} of {len(files)} in the order of names: found a "
+                "link that leads out of the folder, expected files inside it "
                 "(`cp -rL` copies what links lead to)"
             )
 
@@ -340,14 +343,14 @@ def _acquired(
 
 
 def _choice(found: Found, stack: Stack, series: int) -> tuple[str, ...]:
-    """Return what is built of several stacks, and which other kinds the same series holds."""
+    """Return which of several stacks is built, and other kinds of image in the same series."""
     if len(found.stacks) == 1:
         return ()
     number = found.stacks.index(stack) + 1
     sizes = [other.voxels * len(other.times) for other in found.stacks]
     why = "the largest" if sizes.count(max(sizes)) == 1 else "the first of the largest"
     if sizes[number - 1] < max(sizes):
-        why = "the first image of all"
+        why = "the first image series"
     choice = (
         f"{len(found.stacks)} series or orientations; building --series {number}, "
         f"{'asked for' if series else why}: {stack.label}"

@@ -1,9 +1,9 @@
 """Join stacks whose UIDs change along one volume, as after de-identification.
 
-Tools that remove identities may replace SeriesInstanceUID or FrameOfReferenceUID in each file anew,
-or in each batch of files. Stacks are joined where all else is equal and the positions of all
-images are those of one regular stack. Two series that were acquired as two must stay apart: they
-share a place, or have another number, description or kind, or count their images from 1 again.
+De-identification may replace SeriesInstanceUID or FrameOfReferenceUID with a new UID in each file,
+or in each batch of files. Stacks are joined if everything else is equal and the positions of all
+images form one regular stack. Two series that were acquired as two must stay separate: they share a
+place, differ in number, description or kind, or each count their images from 1.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,10 +27,10 @@ _EQUAL = {
 
 @dataclass(frozen=True, slots=True)
 class _Family:
-    """Groups that only UIDs tell apart, and the group of all their frames.
+    """Groups that differ only in UIDs, and the group of all their frames.
 
-    places  of all frames, rising along the normal, one for each place
-    held    for each group the places where it has frames, as indices, rising
+    places  positions of all frames, rising along the normal, without repeats
+    held    for each group the rising indices of the places where it has frames
     """
 
     groups: tuple[Group, ...]
@@ -45,7 +45,7 @@ class _Family:
 
     @property
     def runs(self) -> list[tuple[int, int]]:
-        """The first and the last place of each group, rising."""
+        """The first and the last place of each group, in rising order."""
         return sorted((indices[0], indices[-1]) for indices in self.held)
 
     def count(self, find: Callable[[Frame], bytes]) -> int:
@@ -54,7 +54,7 @@ class _Family:
 
 
 def join_uids(groups: Sequence[Group]) -> list[Group]:
-    """Return the groups, of which some are joined, with a note."""
+    """Return the groups. Some are joined, with a note."""
     by_reference = _join(groups, _reference_key, _LEAST_REFERENCES, _are_references_of_one)
     if len({group.frames[0].series for group in by_reference}) < 2:
         return by_reference
@@ -87,11 +87,11 @@ def _reference_key(group: Group) -> object:
 
 
 def _series_key(group: Group) -> object:
-    """Return all that must be equal in the images of one series."""
+    """Return everything that must be equal in the images of one series."""
     first = group.frames[0]
     if first.segmentation is not None:
         return id(group)
-    # these count images and times, and may change along a volume
+    # The fields left out here count images and times, and may change along a volume.
     kinds = frozenset(
         replace(frame.kind, acquisition=None, trigger_time=None, reference_time=None,
                 time_slice=None)
@@ -152,7 +152,7 @@ def _note(family: _Family) -> str:
 
 def _are_references_of_one(family: _Family) -> bool:
     """Return whether no run of slices with one frame of reference reaches into another run."""
-    # Points in time share a place, which is fine; runs that share several places are volumes apart.
+    # Time points may share a single place; runs that share several places are separate volumes.
     return not any(
         after[0] <= before[1] and not (before == after and before[0] == before[1])
         for before, after in pairwise(family.runs)
@@ -160,7 +160,7 @@ def _are_references_of_one(family: _Family) -> bool:
 
 
 def _are_series_of_one(family: _Family) -> bool:
-    """Return whether no place is in two of the series, and the images are counted as one series."""
+    """Return whether the series share no place, and their images are counted as one series."""
     is_shared = sum(map(len, family.held)) > len(family.places)
     if is_shared or family.count(lambda frame: frame.series) < len(family.groups):
         return False
@@ -177,7 +177,7 @@ def _are_series_of_one(family: _Family) -> bool:
 def _have_room(family: _Family) -> bool:
     """Return whether the series follow each other, or their slices fill each other's gaps.
 
-    Thicker slices between each other would be two scans that cover the same body.
+    Thicker slices between each other's would be two scans that cover the same body.
     """
     if family.are_single or all(b[0] > a[1] for a, b in pairwise(family.runs)):
         return True
@@ -188,13 +188,13 @@ def _have_room(family: _Family) -> bool:
 
 
 def _share_acquisitions(family: _Family) -> bool:
-    """Return whether acquisitions do not tell the series apart."""
+    """Return whether acquisition numbers don't separate the series."""
     found = [{frame.kind.acquisition for frame in group.frames} for group in family.groups]
     return family.are_single or all(a & b for a, b in combinations(found, 2))
 
 
 def _irregularity(family: _Family) -> str:
-    """Return why the places are no regular stack; empty: they are one."""
+    """Return why the places don't form a regular stack; empty: they do."""
     joined, first = family.joined, family.joined.frames[0]
     try:
         layout = lay_out(
@@ -208,7 +208,7 @@ def _irregularity(family: _Family) -> str:
         return str(error)
     if layout.jump_mm:
         return f"a sideways jump of {layout.jump_mm:.3g} mm between neighbouring positions"
-    # between slices that each have a UID of their own, others may be missing
+    # If each slice has a UID of its own, further slices may be missing between them.
     if not layout.is_even or (layout.missing and not family.are_single):
         gaps = layout.gaps_mm
         return f"irregular positions (gaps of {gaps.min():.3g} to {gaps.max():.3g} mm)"

@@ -1,4 +1,4 @@
-"""Decode JPEG-LS in DICOM by the CharLS library, which imagecodecs contains.
+"""Decode JPEG-LS in DICOM with the CharLS library in imagecodecs.
 
 pydicom's own plugin needs pyjpegls, which has no wheels for Python 3.14. GDCM refuses precisions of
 6 and 7 bits.
@@ -24,9 +24,10 @@ def decode_frame(stream: bytes, runner: DecodeRunner) -> bytearray:
     """Return the values of one grey plane. Raises ValueError for colours, and CharLS's errors."""
     plane = imagecodecs.jpegls_decode(stream)
     if plane.ndim != 2:
-        raise ValueError(f"a stream of {plane.shape}, expected one component")
+        raise ValueError(f"found a stream of {plane.shape}, expected one component")
     runner.set_option("bits_allocated", 8 * plane.dtype.itemsize)
-    return bytearray(plane.tobytes())  # pydicom extends signs in place
+    # pydicom extends signs in place, so it needs a writable array
+    return bytearray(plane.tobytes())
 
 
 for _decoder in (JPEGLSLosslessDecoder, JPEGLSNearLosslessDecoder):

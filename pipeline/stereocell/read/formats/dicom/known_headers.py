@@ -1,8 +1,8 @@
-"""The header values that the files of a series share, which are decoded once.
+"""Header values that the files of a series share, which are decoded only once.
 
-Slices of a series differ in their places and numbers. All else in their headers is mostly the same,
-byte by byte, and pydicom takes longer to turn it into values than to read it. Headers are compared
-by digests, so that nothing of a file is kept.
+Slices of a series differ in their places and numbers. Everything else in their headers is mostly
+the same, byte by byte, and pydicom takes longer to decode it than to read it. Headers are compared
+by digests, so that no content of a file is stored.
 """
 
 import hashlib
@@ -15,22 +15,22 @@ from pydicom.tag import Tag
 
 T = TypeVar("T")
 
-# elements that differ from slice to slice; no value that is found `once` may depend on one of them
+# Elements that differ from slice to slice. No value that is found with `once` may depend on them.
 OF_A_SLICE = ("SOPInstanceUID", "InstanceNumber", "ImagePositionPatient", "SliceLocation")
 _OF_A_SLICE = frozenset(map(Tag, OF_A_SLICE))
 
 
 class KnownHeaders:
-    """Values of headers by what the headers state, for the time in which a folder is read."""
+    """Decoded values by the content of headers, while a folder is read."""
 
     def __init__(self) -> None:
         self._values: dict[tuple[bytes, str], Any] = {}
 
     def once(self, key: bytes | None, name: str, find: Callable[[], T]) -> T:
-        """Return what `find` returns: at its first call for headers of that key.
+        """Return the result of `find`, which is called once for all headers with the same key.
 
-        key   see `digest_of`; None: the header is compared with no other
-        name  of the value, with all that it depends on beside the header
+        key   result of `digest_of`; None: the header is not compared with others
+        name  name of the value, including everything that it depends on beside the header
         """
         if key is None:
             return find()
@@ -42,9 +42,9 @@ class KnownHeaders:
 
 
 def digest_of(header: Any) -> bytes | None:
-    """Return a digest of all elements of a header that was just read, but for OF_A_SLICE.
+    """Return a digest of a header that was just read, without the elements in OF_A_SLICE.
 
-    None: an element is a sequence or was converted, so that its bytes are not at hand.
+    None: an element is a sequence or was converted, so its bytes are not available.
     """
     digest = hashlib.sha256(repr(header.original_encoding).encode())
     for tag in header.keys():  # noqa: SIM118  (the items would be converted)

@@ -1,8 +1,8 @@
 """The planes of a segmentation as one label map: a voxel is its segment's number, 0: none.
 
-Segmentations leave out planes on which there is nothing, however many, so that the gaps between
-the others are no measure of the spacing. It is the stated one where all gaps are multiples of it,
-else the smallest gap. Planes that are left out are empty: nothing is interpolated.
+Segmentations leave out all planes without segments, so gaps between the others don't show the
+spacing. The stated spacing is used if all gaps are multiples of it, otherwise the smallest gap.
+Planes that are left out are empty, so nothing is interpolated.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,19 +20,19 @@ from stereocell.read.formats.dicom.pixels import decode, dtype_of
 from stereocell.read.formats.dicom.segmentation import BINARY, LABELMAP, Segmentation
 from stereocell.read.plane_stack import DRIFT, REGULAR, NoStackError, normal_of
 
-_AT_ONCE = 1 << 28  # pixels that are decoded together: a file is read anew for each such part
+_AT_ONCE = 1 << 28  # pixels that are decoded together; the file is read again for each such part
 _MAX_PLANES = 1 << 16
-_NEAR = 0.2  # planes: a gap that is further from a whole number of them is none
+_NEAR = 0.2  # planes; a gap may differ this much from a whole number of planes
 
 
 @dataclass(frozen=True, slots=True)
 class LabelStack:
     """One segmentation's frames on an even grid.
 
-    frames  by plane, and on one plane by segment
-    planes  where on the grid each lies
+    frames  frames in the order of planes, and on one plane of segments
+    planes  index of each frame's plane in the grid
     shape   voxels (plane, row, column)
-    affine  (4, 4) for columns: from (plane, row, column, 1) to LPS, mm
+    affine  (4, 4) for column vectors: from (plane, row, column, 1) to LPS, mm
     """
 
     segmentation: Segmentation
@@ -43,18 +43,18 @@ class LabelStack:
 
     @property
     def numbers(self) -> list[int]:
-        """The segments' numbers that frames of bits have."""
+        """The segment numbers of frames of bits, in rising order."""
         return sorted({frame.segment for frame in self.frames})
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The dtype of the segments' numbers."""
+        """The dtype of the segment numbers."""
         if self.segmentation.kind == LABELMAP:
             return dtype_of(self.frames)
         return np.min_scalar_type(self.numbers[-1])
 
     def do_overlap(self, paths: Sequence[Path], shown: str) -> bool:
-        """Return whether segments do, as stated; where nothing is, look. Raises SourceError."""
+        """Return whether segments overlap, as stated or by decoding them. Raises SourceError."""
         if self.segmentation.kind == LABELMAP:
             return False
         if self.segmentation.overlap in ("YES", "NO"):
@@ -70,19 +70,19 @@ class LabelStack:
     def load(
         self, paths: Sequence[Path], shown: str, numbers: Sequence[int]
     ) -> NDArray[np.generic]:
-        """Return the label map of these segments (of a LABELMAP all), (plane, row, column).
+        """Return the label map of these segments (in a LABELMAP, all), (plane, row, column).
 
-        Raises SourceError where a frame can't be decoded, and where segments overlap that should
-        not.
+        Raises SourceError where a frame can't be decoded, and where segments overlap although the
+        file states that they don't.
         """
         volume = np.zeros(self.shape, self.dtype)
         for plane, frame, pixels in self._decoded(numbers, paths, shown):
             if self.segmentation.kind == LABELMAP:
-                low, high = frame.encoding.padding or (0, 0)  # the background's number
+                low, high = frame.encoding.padding or (0, 0)  # padding is the background's number
                 volume[plane] = np.where((pixels >= low) & (pixels <= high), 0, pixels)
             elif not _draw(volume[plane], pixels, frame.segment):
                 raise SourceError(
-                    f"{shown}: found segments that overlap, expected none: the file says that "
+                    f"{shown}: found segments that overlap, expected none: the file states that "
                     "they don't (SegmentsOverlap NO)"
                 )
         return volume
@@ -104,10 +104,10 @@ class LabelStack:
 def stack_labels(segmentation: Segmentation, frames: Sequence[Frame]) -> LabelStack:
     """Return the grid of all frames of a segmentation.
 
-    Raises NoStackError for fractions, and where the planes make no volume.
+    Raises NoStackError for fractions, and where the planes don't form a volume.
     """
     if segmentation.kind not in (BINARY, LABELMAP):
-        raise NoStackError("of fractions (FRACTIONAL), not of bits or numbers")
+        raise NoStackError("with fractions (FRACTIONAL) instead of bits or numbers")
     if segmentation.kind == BINARY and not all(frame.segment > 0 for frame in frames):
         raise NoStackError("with frames that name no segment")
     groups = find_groups([replace(frame, segment=0, stack=b"") for frame in frames])
@@ -121,7 +121,7 @@ def stack_labels(segmentation: Segmentation, frames: Sequence[Frame]) -> LabelSt
     first = places[places[:, 0].argmin()].copy()
     places -= first
     if (np.abs(places[:, 1:]) > DRIFT * np.array(group.spacing)).any():
-        raise NoStackError("with planes beside each other, not one over the other")
+        raise NoStackError("with planes side by side, not on top of each other")
     planes, spacing = _planes(places[:, 0], segmentation.between_mm)
     if segmentation.kind == LABELMAP and len(set(planes)) < len(planes):
         raise NoStackError("with several planes at one place")
@@ -133,7 +133,8 @@ def stack_labels(segmentation: Segmentation, frames: Sequence[Frame]) -> LabelSt
         segmentation,
         tuple(frames[i] for i in order),
         tuple(planes[i] for i in order),
-        (max(planes[order[-1]] + 1, 2), frames[0].rows, frames[0].columns),  # a volume has two
+        # a volume has at least two planes
+        (max(planes[order[-1]] + 1, 2), frames[0].rows, frames[0].columns),
         affine,
     )
 
@@ -142,16 +143,16 @@ def _planes(heights_mm: NDArray[np.float64], stated_mm: float) -> tuple[list[int
     """Return each frame's plane, from 0, and the spacing in mm."""
     gaps = np.diff(np.unique(heights_mm))
     least = REGULAR * (stated_mm or gaps.max(initial=0))
-    gaps = gaps[gaps > least]  # frames on one plane
+    gaps = gaps[gaps > least]  # smaller gaps lie between frames on one plane
     if not len(gaps) and not stated_mm:
-        raise NoStackError("of one plane, without SpacingBetweenSlices")
+        raise NoStackError("with one plane and without SpacingBetweenSlices")
     for step in (stated_mm, float(gaps.min(initial=np.inf))):
         if not 0 < step < np.inf:
             continue
         exact = heights_mm / step
         planes = np.rint(exact)
         last = float(planes.max())
-        if last:  # the stated one may be rounded, which adds up
+        if last:  # a stated spacing may be rounded, which adds up
             step = float(heights_mm.max()) / last
             exact = heights_mm / step
             planes = np.rint(exact)
@@ -161,7 +162,7 @@ def _planes(heights_mm: NDArray[np.float64], stated_mm: float) -> tuple[list[int
 
 
 def _draw(numbers: NDArray[Any], pixels: NDArray[Any], segment: int) -> bool:
-    """Write a segment into a plane (rows, columns); return False where another one is there."""
+    """Write a segment into a plane (rows, columns). Returns False if it overlaps another one."""
     is_drawn = pixels > 0
     there = numbers[is_drawn]
     numbers[is_drawn] = segment

@@ -1,7 +1,7 @@
-"""Tell the user where a source holds no plain images, and what is built instead.
+"""Note when a source holds no plain images, and what is built instead.
 
-Phases, projections, subtractions and the like follow the images that they belong to. Where these
-are absent, such a series is built, and its voxels are no intensities of a body's tissues.
+Phases, projections, subtractions and the like are listed after the images that they belong to. If
+those are missing, such a series is built, and its voxels are not intensities of body tissue.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,15 +17,15 @@ from stereocell.read.formats.dicom.frame_kind import (
 from stereocell.read.formats.dicom.pet_kind import NOT_CORRECTED
 from stereocell.read.formats.dicom.stack import Stack
 
-_SIGNED = "values have a sign, and 0 is no signal"
-_FLAT = "each shows many slices at once, so that no depth is in it"
-# part of a complex signal -> its images, with what a user should know about the values
+_SIGNED = "values have a sign, and 0 means no signal"
+_FLAT = "each shows many slices at once, so it has no depth"
+# part of a complex signal -> name of its images, and a remark on their values
 _PARTS = {
     PHASE: ("phase images", "values are angles or velocities, and noise outside a body is strong"),
     REAL: ("real parts of a complex signal", _SIGNED),
     IMAGINARY: ("imaginary parts of a complex signal", _SIGNED),
 }
-# roles of frames likewise
+# role -> name of its images, and a remark on their values
 _ROLES = {
     "reformatted": ("reformatted images", "they are interpolated from original slices"),
     "subtraction": ("subtraction images", "values are differences of two images"),
@@ -33,17 +33,17 @@ _ROLES = {
         "traces of diffusion",
         "they are computed from several directions",
     ),
-    "parametric map": ("parametric maps", "values are computed quantities, no intensities"),
+    "parametric map": ("parametric maps", "values are computed quantities, not intensities"),
     "projection": ("projections", _FLAT),
     "maximum intensity projection": ("maximum intensity projections", _FLAT),
     "minimum intensity projection": ("minimum intensity projections", _FLAT),
     "average of a slab": ("averages of slabs", "each is computed from several slices"),
     LOCALIZER: ("localizers (scouts)", "they are few and coarse, to plan other images with"),
-    "rendering": ("renderings", "values are the shades of a picture"),
-    "screen save": ("screen saves", "values are the shades of a picture"),
+    "rendering": ("renderings", "values are the shades of a rendered image"),
+    "screen save": ("screen saves", "values are the shades of a screen image"),
     "dose or protocol sheet": ("dose or protocol sheets", "values are those of a page of text"),
 }
-# contrasts -> images, the better ones that are absent, what a user should know
+# contrast -> name of its images, better images that are missing, remark on the values
 _CONTRASTS = {
     NOT_CORRECTED: (
         "PET images without attenuation correction",
@@ -66,9 +66,9 @@ _CONTRASTS[OPPOSED_PHASE] = _CONTRASTS["opposed phase"]
 
 
 def lesser_notes(stack: Stack, stacks: Iterable[Stack]) -> tuple[str, ...]:
-    """Return a note where a stack holds no plain images and no stack of the source does.
+    """Return a note if neither this stack nor another stack of the source holds plain images.
 
-    stacks  all of the source
+    stacks  all stacks of the source
     """
     first, kind = stack.first, stack.first.kind
     if first.segmentation is not None:
@@ -88,7 +88,7 @@ def lesser_notes(stack: Stack, stacks: Iterable[Stack]) -> tuple[str, ...]:
 
 
 def _lacking(kind: FrameKind) -> list[tuple[str, str, str, Callable[[FrameKind], bool]]]:
-    """Return what a kind lacks: its name, what is absent, a remark, and a test of other kinds."""
+    """Return what a kind lacks: its name, what is missing, a remark, and a test of other kinds."""
     found: list[tuple[str, str, str, Callable[[FrameKind], bool]]] = []
     if kind.part in _PARTS:
         name, remark = _PARTS[kind.part]

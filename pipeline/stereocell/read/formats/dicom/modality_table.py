@@ -1,6 +1,7 @@
-"""The lookup table that turns stored values into grey values, where a file has no rescale.
+"""The lookup table from stored values to grey values, in files without a rescale.
 
-pydicom's `apply_modality_lut` takes no table of, say, 12 bits, so the values are looked up here.
+pydicom's `apply_modality_lut` accepts no table of 12 bits, for example, so the values are looked up
+here.
 
 References: DICOM PS3.3 C.11.1 (Modality LUT module).
 """
@@ -28,10 +29,10 @@ class ModalityTableError(Exception):
 class ModalityTable:
     """A table of grey values.
 
-    first    stored value of the first entry; lower ones have the value of the first entry, and
-             values beyond the last entry have that of the last
+    first    stored value of the first entry; lower values get the first entry too, and values
+             beyond the last entry get the last one
     depth    bits of a grey value
-    entries  the grey values, uint16 in the order of this machine
+    entries  grey values, uint16 in the byte order of this machine
     """
 
     first: int
@@ -50,7 +51,7 @@ class ModalityTable:
         return (most - ends[1], most - ends[0]) if is_inverted else ends
 
     def apply(self, stored: NDArray[Any], *, is_inverted: bool) -> NDArray[np.uint16]:
-        """Return the grey values of stored ones; inverted where the lowest is the brightest."""
+        """Return the grey values of stored ones, inverted if the lowest is the brightest."""
         places = np.clip(stored.astype(np.int64) - self.first, 0, len(self.values) - 1)
         grey = self.values[places]
         return np.uint16((1 << self.depth) - 1) - grey if is_inverted else grey
@@ -64,7 +65,7 @@ def table_of(header: Any) -> ModalityTable | None:
     try:
         return _read(header, first_item(tables))
     except DICOM_FAULTS:
-        raise ModalityTableError("of a modality table that is damaged") from None
+        raise ModalityTableError("with a modality table that is damaged") from None
 
 
 def _read(header: Any, item: Any) -> ModalityTable:
@@ -77,7 +78,7 @@ def _read(header: Any, item: Any) -> ModalityTable:
         first -= 1 << 16
     data = item.LUTData
     if isinstance(data, bytes) and depth <= 8 and len(data) in (count, count + 1):
-        values = np.frombuffer(data, np.uint8)[:count].astype(np.uint16)  # two entries a word
+        values = np.frombuffer(data, np.uint8)[:count].astype(np.uint16)  # two entries per word
     else:
         values = np.asarray(_words(data, little), np.int64).astype(np.uint16)
     if len(values) != count or not 1 <= depth <= 16 or int(values.max()) >= 1 << depth:
@@ -86,7 +87,7 @@ def _read(header: Any, item: Any) -> ModalityTable:
 
 
 def _words(value: Any, little: bool) -> Sequence[int] | NDArray[np.uint16]:
-    """Return whole numbers, also where the VR is unknown, so that they are bytes."""
+    """Return whole numbers, decoded from bytes if their VR is unknown."""
     if isinstance(value, bytes):
         return np.frombuffer(value, "<u2" if little else ">u2")
     return [int(number) for number in value] if hasattr(value, "__len__") else [int(value)]

@@ -1,8 +1,8 @@
-"""Images that hold all slices of a volume side by side: Siemens' mosaics and UIH's VFRAME.
+"""Images that hold all slices of a volume side by side: Siemens's mosaics and UIH's VFRAME.
 
-Siemens states one position, that of a slice as large as the whole mosaic about the same middle; the
-slices' direction and number are in its private header (CSA, read by nibabel). UIH states the
-position of every slice. The rules are those of dcm2niix and of nibabel's MosaicWrapper.
+Siemens states one position, that of a slice as large as the whole mosaic with the same middle. The
+direction and number of the slices are in its private header (CSA, read by nibabel). UIH states the
+position of every slice. The rules follow dcm2niix and nibabel's MosaicWrapper.
 
 References: https://nipy.org/nibabel/dicom/dicom_mosaic.html
 """
@@ -27,13 +27,13 @@ _SIEMENS_TAGS: list[Any] = [
     "SliceThickness",
     0x00190010,
     _NUMBER,
-    # the private header and its creator, in the block that it usually has or in one of the next
+    # The private header and its creator, in their usual block or one of the next two.
     *(0x00290000 + block for block in (0x10, 0x11, 0x12)),
     *(0x00290010 + (block << 8) for block in (0x10, 0x11, 0x12)),
 ]
 _UIH_SLICES = 0x00651051
 _MAX_SLICES = 4096  # slices of one image
-_MAX_COSINE_ERROR = 0.01  # largest error of the cosine of the stated and the computed normal
+_MAX_COSINE_ERROR = 0.01  # difference of the cosine between stated and computed normal from 1
 
 
 class MosaicError(Exception):
@@ -68,11 +68,12 @@ def find_mosaic(
     spacing: tuple[float, float],
     position: Vector | None,
 ) -> Mosaic | None:
-    """Return the slices of a file's one image, or None where it is a plain image.
+    """Return the slices of a file's single image; None: it is a plain image.
 
     image_type  the header's ImageType
-    shape       of the whole image, pixels (rows, columns)
-    directions  unit vectors along a row and along a column; `spacing` between (rows, columns), mm
+    shape       pixels (rows, columns) of the whole image
+    directions  unit vectors along a row and along a column
+    spacing     mm between (rows, columns)
     position    ImagePositionPatient; None: not stated
 
     Raises MosaicError where the slices have no place.
@@ -94,7 +95,7 @@ def _siemens(
     header = pydicom.dcmread(path, stop_before_pixels=True, force=True, specific_tags=_SIEMENS_TAGS)
     count, normal = _private_header(header)
     count = count or int(header[_NUMBER].value if _NUMBER in header else 0)
-    subject = f"of a mosaic of {count or 'several'} slices"
+    subject = f"with a mosaic of {count or 'several'} slices"
     if count < 1 or normal is None or position is None:
         raise MosaicError(
             f"{subject}, without the private header (0029,1010) that places them: export it with "
@@ -108,7 +109,7 @@ def _siemens(
         not 0 < gap < math.inf
         or abs(abs(normal @ np.cross(along_row, along_column)) - 1) > _MAX_COSINE_ERROR
     ):
-        raise MosaicError(f"{subject} without a direction or a distance of theirs")
+        raise MosaicError(f"{subject} without their direction or distance")
     down, across = spacing
     first = (
         np.array(position)
@@ -120,9 +121,9 @@ def _siemens(
 
 
 def _private_header(header: Any) -> tuple[int, NDArray[np.float64] | None]:
-    """Return the number of slices and their direction by Siemens' CSA header; 0, None: no such."""
+    """Return number and direction of the slices from Siemens's CSA header; (0, None): none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of nibabel, that this part of it may change
+        warnings.simplefilter("ignore")  # nibabel warns that this part of it may change
         from nibabel.nicom import csareader
 
         try:
@@ -148,7 +149,7 @@ def _uih(path: Path, shape: tuple[int, int]) -> Mosaic | None:
     items = header[_UIH_SLICES].value if _UIH_SLICES in header else ()
     if not isinstance(items, pydicom.Sequence) or not items:
         return None
-    subject = f"of a grid of {len(items)} slices"
+    subject = f"with a grid of {len(items)} slices"
     try:
         places = np.array([item.ImagePositionPatient for item in items], np.float64)
     except DICOM_FAULTS:
@@ -163,7 +164,7 @@ def _uih(path: Path, shape: tuple[int, int]) -> Mosaic | None:
 def _tile(
     shape: tuple[int, int], down: int, across: int, count: int, subject: str
 ) -> tuple[int, int]:
-    """Return the pixels (rows, columns) of a slice in a grid of so many down and across."""
+    """Return the pixels (rows, columns) of a slice in a grid of `down` x `across` slices."""
     if count > _MAX_SLICES or shape[0] % down or shape[1] % across:
         raise MosaicError(
             f"{subject} in an image of {shape[0]} x {shape[1]} pixels, which they don't fill"
@@ -173,7 +174,7 @@ def _tile(
 
 def _mosaic(rows: int, columns: int, across: int, places: NDArray[np.float64]) -> Mosaic:
     if not np.isfinite(places).all():
-        raise MosaicError("of a mosaic of slices without a place in the patient")
+        raise MosaicError("with a mosaic of slices without a place in the patient")
     tiles = []
     for k, (x, y, z) in enumerate(places.tolist()):
         row, column = divmod(k, across)

@@ -1,7 +1,7 @@
 """Name series of one size by the properties in which they differ, such as kernels or echo times.
 
-Kinds of frames in one series are named while they are separated (split_kinds.py). Series
-of their own are named here, since a list of equal lines would not tell which one is which.
+Kinds of frames within a series are named when they are separated (split_kinds.py). Separate series
+are named here, because equal lines in a list would not show which series is which.
 """
 
 from collections import defaultdict
@@ -15,13 +15,13 @@ from stereocell.read.formats.dicom.split_kinds import NAMED, Property, by_value,
 from stereocell.read.formats.dicom.stack import Stack
 from stereocell.read.plane_stack import normal_of
 
-_MOST_NAMED = 3  # most properties that are added to a name
+_MOST_NAMED = 3  # properties that are added to a name
 
 
 def name_apart(stacks: Sequence[Stack]) -> list[Stack]:
-    """Return the stacks; those of several series with the same size have their differences named.
+    """Return the stacks; several series of the same size are named by their differences.
 
-    The places of the values among those of the other series become `among`.
+    The index of each value among those of the other series is added to `among`.
     """
     families: dict[tuple[Any, ...], list[int]] = defaultdict(list)
     for index, stack in enumerate(stacks):
@@ -61,7 +61,7 @@ def _named(members: Sequence[Stack]) -> list[Stack]:
 
 
 def _places(members: Sequence[Stack], one: Property) -> list[int] | None:
-    """Return the place of each stack's value; None: they have one value, or a stack has several."""
+    """Return the index of each stack's value; None: all are equal, or a stack has several."""
     if any(_has_several(stack, one.find) for stack in members):
         return None
     values = by_value([stack.first for stack in members], one)

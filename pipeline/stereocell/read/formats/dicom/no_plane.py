@@ -1,10 +1,10 @@
-"""The error of a DICOM file without a usable plane, which is counted and left out."""
+"""The error for a DICOM file without a usable plane, which is counted and left out."""
 
 
 class NoPlaneError(Exception):
     """A file holds no usable plane; the text gives the reason without the file's values.
 
-    way_out  what the file is, and what to name or to export instead; empty: nothing is known
+    remedy  what the file is, and what to name or export instead; empty: not known
     """
 
-    way_out = ""
+    remedy = ""

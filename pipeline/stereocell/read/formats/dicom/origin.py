@@ -1,7 +1,7 @@
-"""The study and the series that an image states beside its SeriesInstanceUID, as a digest.
+"""A digest of the study and series that an image states beside its SeriesInstanceUID.
 
-De-identification may replace that UID in each file anew. The digest tells whether two images may
-come from one series all the same. The texts themselves go nowhere.
+De-identification may replace that UID in each file. The digest shows whether two images may still
+come from one series. The texts themselves are not stored.
 """
 
 import hashlib
@@ -18,8 +18,8 @@ ORIGIN_TAGS: list[Any] = ["StudyInstanceUID", "SeriesNumber", *_DESCRIPTIONS]
 class Origin:
     """The origin of an image.
 
-    digest      of the study's UID, the number of the series and its descriptions
-    is_counted  the number of the series is stated
+    digest      digest of the study's UID, and of the series' number and descriptions
+    is_counted  whether the number of the series is stated
     """
 
     digest: bytes = b""

@@ -1,16 +1,16 @@
-"""Pixels outside the image: Pixel Padding Value and Range Limit of DICOM.
+"""Replace pixels outside the image: Pixel Padding Value and Range Limit of DICOM.
 
-CT fills the area outside its circle with, say, -2000, which the rescale turns into -3024: nothing
-measured this value, and it distorts window, histogram and threshold. So padding becomes the
-smallest grey value of the other pixels of all slices at that time point (of all slices, so that a
-slice with few dark pixels makes no step in the background). Two kinds stay as they are:
+CT fills the area outside its circle with a value such as -2000, which the rescale turns into -3024.
+It was never measured, and it distorts window, histogram and threshold. So padding becomes the
+smallest grey value of the other pixels of all slices at that time point. (With all slices, a slice
+with few dark pixels makes no step in the background.) Two kinds of padding stay unchanged:
 
-- Values within the range of the other pixels, which they don't stretch. They can't be
-  distinguished from measured ones: writers name values as padding that their images contain.
-- Grey value 0 below all others: no signal in MR and PET, often named as padding. A brain cut out
-  on 0 would else lie on the value of its darkest voxel.
+- Values within the range of the other pixels, because they don't stretch it. They can't be
+  distinguished from measured values: some writers name values as padding that their images contain.
+- Grey value 0 below all others: no signal in MR and PET, often named as padding. A brain extracted
+  onto 0 would otherwise get the value of its darkest voxel as background.
 
-Where all pixels are padding there is no other value, and they stay.
+If all pixels are padding, there is no other value, and they stay unchanged.
 
 References: DICOM PS3.3 C.7.5.1.1.2.
 """
@@ -29,7 +29,8 @@ def is_padding(
     """Return a mask of the pixels that are padding; None: no pixel is.
 
     contained  values with all bits of their containers, integers of any shape
-    stored     the same values of the stored bits alone, inverted as `encoding` states; same shape
+    stored     the same values reduced to the stored bits, and inverted if `encoding` says so; same
+               shape
     """
     if encoding.padding is None or encoding.bits == 0:
         return None
@@ -45,7 +46,7 @@ def is_padding(
 
 
 class Padding:
-    """The padding masks of planes, a bit per pixel, and the range of the other pixels."""
+    """The padding masks of planes, one bit per pixel, and the range of the other pixels."""
 
     def __init__(self) -> None:
         self._masks: dict[int, NDArray[np.uint8]] = {}
@@ -61,7 +62,7 @@ class Padding:
             self._masks[place] = np.packbits(mask)
 
     def fill(self, planes: NDArray[np.generic]) -> None:
-        """Replace the padding of planes (n, rows, columns) by its new value, in place."""
+        """Replace the padding of planes (n, rows, columns) with its new value, in place."""
         if self._low > self._high:
             return
         for place, packed in self._masks.items():

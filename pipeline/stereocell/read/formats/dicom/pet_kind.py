@@ -1,4 +1,4 @@
-"""The kind of a PET frame: corrected for attenuation or not, a projection, which point in time.
+"""The kind of a PET frame: attenuation correction, projection, and time point.
 
 References: DICOM PS3.3 C.8.9.1 (PET Series module), C.8.9.4 (PET Image module), C.8.22.5.4 (PET
 Frame Correction Factors).
@@ -10,7 +10,7 @@ from typing import Any
 
 from stereocell.read.formats.dicom.header_values import find_number, find_text, find_words
 
-NOT_CORRECTED = "not attenuation corrected"  # for the user
+NOT_CORRECTED = "not attenuation corrected"  # words for the user
 PET_TAGS: list[Any] = [
     "CorrectedImage",
     "AttenuationCorrectionMethod",
@@ -20,7 +20,7 @@ PET_TAGS: list[Any] = [
     "ImageIndex",
     "NumberOfSlices",
 ]
-# Words of a free description. Only their presence is used, and the text goes nowhere.
+# Words of a free description. Only their presence is used; the text is not stored.
 _WITHOUT = re.compile(
     r"\b(NAC|NO[ -]?AC|NON[ -]?AC|NON?[ -]?ATTENUATION|UNCORR(ECTED)?|WITHOUT AC|W/O AC)\b"
 )
@@ -28,10 +28,10 @@ _WITH = re.compile(r"\b(AC|CTAC|MRAC|ATTENUATION CORR\w*|CORRECTED)\b")
 
 
 def is_attenuation_corrected(header: Any, groups: Sequence[Any]) -> bool | None:
-    """Return whether PET is corrected for attenuation; None: nothing states it.
+    """Return whether PET is corrected for attenuation; None: not stated.
 
-    CorrectedImage lists the corrections. Where it is absent, the method and the flag of enhanced
-    images count, and then words of the series description.
+    CorrectedImage lists the corrections. Without it, the flag of enhanced images and the method
+    count, and then words of the series description.
     """
     words = find_words(header, groups, "CorrectedImage")
     if words:
@@ -56,9 +56,9 @@ def is_reprojection(header: Any, groups: Sequence[Any]) -> bool:
 
 
 def time_slice(header: Any, groups: Sequence[Any]) -> float | None:
-    """Return the number of the volume among those of a dynamic or gated series, from 0.
+    """Return the number of the volume in a dynamic or gated series, from 0.
 
-    ImageIndex counts the slices of the first volume, then those of the second one, and so on.
+    ImageIndex counts the slices of the first volume, then those of the second, and so on.
     """
     index = find_number(header, groups, "", "ImageIndex")
     slices = find_number(header, groups, "", "NumberOfSlices")

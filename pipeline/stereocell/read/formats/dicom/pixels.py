@@ -18,11 +18,11 @@ from stereocell.read.formats.dicom.stored_values import open_pixels, stored_valu
 from stereocell.read.rescale import dtype_for, rescale
 from stereocell.storage.library_errors import raise_if_short
 
-_HALF = 16  # bits: values of so many are unpacked in 32
+_HALF = 16  # bits; values with at most so many are unpacked in 32
 
 
 def dtype_of(frames: Sequence[Frame]) -> np.dtype[Any]:
-    """Return the dtype that holds the grey values of all frames, from their headers alone."""
+    """Return a dtype that holds the grey values of all frames, from their headers alone."""
     encodings = {frame.encoding for frame in frames}
     if any(encoding.bits == 0 for encoding in encodings):
         return np.dtype(np.float32)
@@ -38,11 +38,11 @@ def decode(
     """Return the grey values of frames of one size, (n, rows, columns), `dtype`, in their order.
 
     paths  the files; `Frame.file` is the index
-    shown  the source's name, for messages
+    shown  name of the source, for messages
 
-    Each file is read once; the frames' padding is replaced (padding.py). Raises
-    SourceError where a frame can't be decoded; the message names the file by its number among
-    `paths`, never by its name.
+    Each file is read once; the frames' padding is replaced (padding.py). Raises SourceError where a
+    frame can't be decoded. The message names the file by its number among `paths`, never by its
+    name.
     """
     padding = Padding()
     planes = np.empty((len(frames), frames[0].rows, frames[0].columns), dtype)
@@ -52,7 +52,7 @@ def decode(
         for file, places in groupby(order, key=lambda place: frames[place].file):
             wanted = list(places)
             where = f"{shown}: file {file + 1} of {len(paths)} in the order of names"
-            of_index: dict[int, list[int]] = {}  # of a mosaic all slices are in one frame
+            of_index: dict[int, list[int]] = {}  # all slices of a mosaic are in one frame
             for place in wanted:
                 of_index.setdefault(frames[place].index, []).append(place)
             indices = list(of_index)
@@ -68,11 +68,12 @@ def decode(
                             if has_padding:
                                 mask = is_padding(values, raw, encoding)
                                 padding.add(place, planes[place], mask)
-            except DICOM_FAULTS as error:  # its text may quote values of the file
+            except DICOM_FAULTS as error:  # the error's text may quote values of the file
                 raise_if_short(error, where)
                 raise SourceError(
-                    f"{where}: its pixels can't be decoded, expected {frames[wanted[0]].rows} x "
-                    f"{frames[wanted[0]].columns} whole ones, as its header says"
+                    f"{where}: found pixels that can't be decoded, expected "
+                    f"{frames[wanted[0]].rows} x {frames[wanted[0]].columns} undamaged ones, as in "
+                    "the header"
                 ) from None
     padding.fill(planes)
     return planes
@@ -81,7 +82,7 @@ def decode(
 def _stored(path: Path, frames: Sequence[Frame], apart: GdcmProcess) -> Iterable[NDArray[Any]]:
     """Return the stored values of a file's frames, each once, in their order.
 
-    The header is read anew for those alone that have to be decoded. Raises DICOM_FAULTS.
+    The header is read again only if frames must be decoded. Raises DICOM_FAULTS.
     """
     by_index = {frame.index: frame for frame in frames}
     if all(frame.start is not None for frame in frames):
@@ -103,7 +104,7 @@ def _plain_values(path: Path, frame: Frame) -> NDArray[Any]:
 
 
 def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:
-    """Return the pixels of a plane: of a mosaic one slice, a view."""
+    """Return the pixels of a plane as a view; a mosaic's plane is one of its slices."""
     row, column = frame.corner
     return whole[row : row + frame.rows, column : column + frame.columns]
 
@@ -111,10 +112,10 @@ def _plane_of(whole: NDArray[Any], frame: Frame) -> NDArray[Any]:
 def _grey_values(
     values: NDArray[Any], raw: NDArray[Any], encoding: Encoding, dtype: np.dtype[Any]
 ) -> NDArray[Any]:
-    """Return grey values, by the table or by slope and intercept.
+    """Return grey values, from the table or from slope and intercept.
 
-    values  in their containers
-    raw     the same, unpacked and inverted as `encoding` states
+    values  values in their containers
+    raw     the same values, unpacked and inverted as `encoding` states
     """
     if encoding.table is None:
         return rescale(raw, encoding.slope, encoding.intercept, dtype)
@@ -127,8 +128,8 @@ def unpack_bits(values: NDArray[Any], encoding: Encoding) -> NDArray[Any]:
 
     values  integers or floats of any shape
 
-    Bits above `high_bit` may hold an overlay; they are cut off. Integers are returned in a
-    signed dtype that holds them, or in their own.
+    Bits above `high_bit` may hold an overlay and are cut off. Integers are returned in a signed
+    dtype that holds them, or in their own.
     """
     if encoding.bits == 0:
         return values

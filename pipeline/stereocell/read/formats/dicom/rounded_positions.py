@@ -1,13 +1,13 @@
-"""Give slices whose positions were rounded the regular distance that other attributes state.
+"""Give slices with rounded positions the regular distance that other attributes state.
 
-Some tools that remove identities round ImagePositionPatient to whole millimetres. Slices 0.625 mm
-apart then lie 0 or 1 mm apart, so that some seem to be duplicates and others seem to be missing.
-Positions are taken for rounded where all of these hold:
+Some tools for de-identification round ImagePositionPatient to whole millimetres. Slices 0.625 mm
+apart are then 0 or 1 mm apart, so some seem to be duplicates and others seem to be missing.
+Positions count as rounded if all of these hold:
 
 - they are multiples of 1 or 0.1 mm, and their gaps are uneven or some are 0;
 - SliceLocation, or the order of InstanceNumber with SpacingBetweenSlices or SliceThickness, states
-  a regular distance that is no multiple of that step;
-- rounding explains all of them: each lies within half a step of its regular place.
+  a regular distance that is not a multiple of that step;
+- rounding explains all of them: each is within half a step of its regular place.
 
 References: DICOM PS3.3 C.7.6.2 (Image Plane module).
 """
@@ -22,9 +22,9 @@ from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.plane_stack import REGULAR
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-_STEPS_MM = (1.0, 0.1)  # positions are rounded to multiples of these; finer ones are even enough
+_STEPS_MM = (1.0, 0.1)  # steps of the rounding; finer ones leave the gaps even enough
 _LEAST = 4  # fewest slices that show a regular distance
-_SAME_PLANE = 1e-3  # share of the step: coordinates and places that differ less are equal
+_SAME_PLANE = 1e-3  # share of the step; coordinates and places that differ less are equal
 _DISTANCE = Subject("distance of slices", "mm", REGULAR, "--spacing-um z,y,x replaces it")
 _BY_NUMBER = "with consecutive InstanceNumbers"
 
@@ -45,9 +45,9 @@ class _Regular:
 def restore_positions(
     frames: Sequence[Frame], normal: NDArray[np.float64]
 ) -> tuple[list[Frame], tuple[str, ...]]:
-    """Return the frames at regular places where theirs were rounded, and the note on it.
+    """Return the frames at regular places if theirs were rounded, and the note on it.
 
-    normal  (3,), of all planes
+    normal  (3,), normal of all planes
     """
     positions = np.array([frame.position for frame in frames])
     heights = positions @ normal
@@ -91,13 +91,13 @@ def _is_multiple(values: NDArray[np.float64] | float, step: float) -> bool:
 def _are_regular(heights: NDArray[np.float64], step: float) -> bool:
     """Return whether the places are even, or whole multiples of one gap with some missing.
 
-    Several frames at each place, equally many, are points in time.
+    The same number of frames at each place are time points.
     """
     rising = np.sort(heights)
     gaps = np.diff(rising)
     is_place = np.concatenate([[True], gaps > _SAME_PLANE * step])
     counts = np.diff(np.append(np.flatnonzero(is_place), len(rising)))
-    if len(counts) < 2:  # all in one plane: there is no distance
+    if len(counts) < 2:  # all lie in one plane, so there is no distance
         return True
     if len(set(counts.tolist())) > 1:
         return False
@@ -133,7 +133,7 @@ def _candidates(frames: Sequence[Frame], heights: NDArray[np.float64]) -> list[_
 
 
 def _distinct(values: Sequence[float | None]) -> NDArray[np.float64] | None:
-    """Return the values as an array; None: some are absent, or two are equal."""
+    """Return the values as an array; None: some are missing, or two are equal."""
     if None in values or len(set(values)) < len(values):
         return None
     return np.array(values, np.float64)
@@ -159,7 +159,7 @@ def _spread(heights: NDArray[np.float64], one: _Regular) -> float:
 def _regular_positions(
     positions: NDArray[np.float64], normal: NDArray[np.float64], one: _Regular, bound: float
 ) -> NDArray[np.float64]:
-    """Return regular positions (n, 3); a sideways drift that rounding explains is removed."""
+    """Return regular positions (n, 3), without a sideways drift that rounding explains."""
     centred = one.order - one.order.mean()
     drift = centred @ positions / (centred @ centred)
     drift -= (drift @ normal) * normal

@@ -1,7 +1,7 @@
 """Notes for the user on the values of DICOM: scales that differ, units, Hounsfield units.
 
-A CT is in Hounsfield units where its rescale reaches far below water, as air is. Where the headers
-leave it open the values decide.
+A CT is in Hounsfield units if its rescale reaches far below water, where air lies. If the headers
+leave it open, the values decide.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,9 +12,9 @@ from stereocell.read.formats.dicom.value_scale import HOUNSFIELD, UNKNOWN_KIND
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _SCALE = Subject("value scale (slope, intercept)")
-_AIR_HU = -500.0  # a scale that reaches no lower can't show air, which has -1000 HU
-_KIND_WORDS = {UNKNOWN_KIND: "none of the standard's terms, such as HU"}
-# Units of PET, as notes name them
+_AIR_HU = -500.0  # HU; a scale that reaches no lower can't show air, which has -1000 HU
+_KIND_WORDS = {UNKNOWN_KIND: "not one of the standard's terms, such as HU"}
+# Units of PET -> words for notes
 _PET_UNITS = {
     "CNTS": "counts, not activity (Units CNTS)",
     "CPS": "counts per second (Units CPS)",
@@ -37,8 +37,8 @@ _DOSE_UNITS = {
 def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
     """Return whether the values of a CT are Hounsfield units.
 
-    lowest  returns the lowest grey value of a slice in the middle; it is called where the headers
-            leave the question open
+    lowest  returns the lowest grey value of a slice in the middle; called only if the headers leave
+            the question open
     """
     if any(frame.scale.kind not in ("", HOUNSFIELD, UNKNOWN_KIND) for frame in frames):
         return False
@@ -56,7 +56,7 @@ def reaches_air(frames: Sequence[Frame], lowest: Callable[[], float]) -> bool:
 def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, ...]:
     """Return a sentence for each thing that a user should know about the values.
 
-    is_hounsfield  the values of a CT are Hounsfield units
+    is_hounsfield  whether the values of a CT are Hounsfield units
     """
     first = frames[0]
     notes = list(_rescale_notes(frames))
@@ -66,9 +66,9 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
         if kinds:
             why = f" (RescaleType is {kinds[0]})"
         notes.append(
-            f"this CT states no Hounsfield units{why}: its levels and window are found as for any "
-            "other volume (--iso-value and --window set them in voxel values; --as hounsfield: "
-            "they are Hounsfield units all the same)"
+            f"this CT states no Hounsfield units{why}: its iso-values and window are found as for "
+            "any other volume (--iso-value and --window set them in voxel values; --as hounsfield "
+            "treats the values as Hounsfield units)"
         )
     elif first.modality == "CT" and not first.scale.has_rescale:
         notes.append(
@@ -87,7 +87,7 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
     if first.scale.philips is not None:
         notes.append(
             f"Philips states a scale slope of {first.scale.philips:.4g} (2005,100e) as well, which "
-            "is not applied: values compare within this series alone"
+            "is not applied: values can only be compared within this series"
         )
     return tuple(notes)
 
@@ -95,7 +95,7 @@ def scale_notes(frames: Sequence[Frame], *, is_hounsfield: bool) -> tuple[str, .
 def _pet_notes(first: Frame) -> list[str]:
     """Return notes on the unit of PET. No other unit is computed, such as SUV from activity."""
     scale = first.scale
-    unit = _PET_UNITS.get(scale.units, "of an unknown unit (no Units)")
+    unit = _PET_UNITS.get(scale.units, "in an unknown unit (no Units)")
     by = f", SUVType {scale.suv_type}" if scale.suv_type and scale.units in ("GML", "CM2ML") else ""
     notes = [f"PET values are {unit}{by}"]
     if scale.suv_factor and scale.units != "GML":
@@ -108,33 +108,33 @@ def _pet_notes(first: Frame) -> list[str]:
 
 def _dose_note(first: Frame) -> str:
     if not first.scale.has_rescale and first.encoding.slope == 1:
-        return "dose values are as they are stored, in no unit: DoseGridScaling is not stated"
-    return f"dose values are {_DOSE_UNITS.get(first.scale.units, 'of an unknown unit')}"
+        return "dose values are read as stored, without a unit: DoseGridScaling is not stated"
+    return f"dose values are {_DOSE_UNITS.get(first.scale.units, 'in an unknown unit')}"
 
 
 def _table_notes(frames: Sequence[Frame], tables: int) -> list[str]:
-    """Return notes on values that a table gives, and on a rescale that the same file states."""
+    """Return notes on values from a table, and on a rescale that the same file states."""
     with_table = sum(frame.encoding.table is not None for frame in frames)
-    own = " of its own" if tables > 1 else ""
+    source = "separate tables" if tables > 1 else "a table"
     notes = [
-        f"values of {with_table} of {len(frames)} images are by a table{own} (ModalityLUTSequence)"
+        f"values of {with_table} of {len(frames)} images come from {source} (ModalityLUTSequence)"
     ]
     both = sum(frame.encoding.table is not None and frame.scale.has_rescale for frame in frames)
     if both:
         notes.append(
             f"{both} of {len(frames)} images {agreeing(both, 'states', 'state')} RescaleSlope and "
-            "RescaleIntercept beside the table: the table is used"
+            "RescaleIntercept as well as the table: the table is used"
         )
     return notes
 
 
 def _other_kinds(frames: Sequence[Frame]) -> list[str]:
-    """Return the frames' RescaleTypes but for Hounsfield units, sorted."""
+    """Return the RescaleTypes of the frames other than Hounsfield units, sorted."""
     return sorted({frame.scale.kind for frame in frames} - {"", HOUNSFIELD})
 
 
 def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
-    """Return notes on rescales that differ among frames, lack in some, or are stated otherwise."""
+    """Return notes on rescales that differ between frames, are missing in some, or contradict."""
     notes: list[str] = []
     encodings = [frame.encoding for frame in frames]
     for name, values in (
@@ -144,13 +144,13 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
         if len(values) > 1:
             low, high = min(values), max(values)
             notes.append(
-                f"{name} differs among the images ({low:.4g} to {high:.4g}): each has its own"
+                f"{name} differs between images ({low:.4g} to {high:.4g}): each image has its own"
             )
     without = sum(not f.scale.has_rescale and f.encoding.table is None for f in frames)
     if 0 < without < len(frames):
         notes.append(
             f"{without} of {len(frames)} images {agreeing(without, 'states', 'state')} no rescale: "
-            f"{agreeing(without, 'its', 'their')} stored values are taken"
+            f"{agreeing(without, 'its', 'their')} stored values are used"
         )
     tables = {encoding.table for encoding in encodings if encoding.table is not None}
     if tables:
@@ -164,7 +164,8 @@ def _rescale_notes(frames: Sequence[Frame]) -> list[str]:
         slope, intercept = used
         return [
             *notes,
-            f"values are by RealWorldValueMapping (slope {slope:.4g}, intercept {intercept:.4g})",
+            f"values are scaled by RealWorldValueMapping (slope {slope:.4g}, intercept "
+            f"{intercept:.4g})",
         ]
     rescale = Statement(used, "RescaleSlope")
     world = Statement(mapped.scale.real_world, "RealWorldValueMapping", Trust.REPEATED)

@@ -1,9 +1,9 @@
-"""What a DICOM segmentation says of its segments: kind, numbers, codes, colours, and no text.
+"""The segments of a DICOM segmentation: kind, numbers, codes and colours, but no free text.
 
-A segment is called by its coded property type, in the words that pydicom's copy of the standard's
-tables has for that code. The file's own words, which are free text, are not looked at: label,
-description, tracking identifier, and the meaning that stands beside the code. Who asks for the
-labels by name gets those alone (`free_labels`).
+A segment is named by its coded property type, in the words that pydicom's copy of the standard's
+tables has for that code. The file's own words are free text and are not read: label, description,
+tracking identifier, and the meaning beside the code. Only a user who asks for the labels gets them
+(`free_labels`).
 
 References: DICOM PS3.3 C.8.20.2 (Segmentation Image module); PS3.3 C.10.7.1.1 (CIELab values);
 PS3.16 (codes).
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from pydicom.sr.coding import Code
 
 BINARY, FRACTIONAL, LABELMAP = "BINARY", "FRACTIONAL", "LABELMAP"
-_LONGEST = 64  # characters of a segment's label: as many as DICOM allows
-_CLASSES = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")  # and the label map
+_LONGEST = 64  # characters of a segment's label, DICOM's limit
+# the second class is that of the label map
+_CLASSES = (SegmentationStorage, "1.2.840.10008.5.1.4.1.1.66.7")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +34,9 @@ class Segmentation:
 
     kind        BINARY: a frame has the bits of one segment; FRACTIONAL: its shares; LABELMAP: a
                 pixel is a segment's number
-    overlap     whether segments do: YES or NO; other words leave it open
-    count       of segments, the background left out
-    between_mm  from plane to plane, as stated; 0: it is not
+    overlap     whether segments overlap: YES or NO; other words leave it open
+    count       number of segments, without the background
+    between_mm  mm from plane to plane, as stated; 0: not stated
     objects     names and colours by number
     """
 
@@ -47,12 +48,12 @@ class Segmentation:
 
     @property
     def words(self) -> str:
-        """How many segments, in words."""
+        """The number of segments, in words."""
         return f"{self.count} segment{'s' * (self.count != 1)}"
 
 
 def segmentation_of(header: Any) -> Segmentation | None:
-    """Return a file's segmentation; None: it is none. Raises DICOM_FAULTS."""
+    """Return a file's segmentation; None: it has none. Raises DICOM_FAULTS."""
     if header.get("SOPClassUID") not in _CLASSES and header.get("Modality") != "SEG":
         return None
     names: dict[int, str] = {}
@@ -71,12 +72,12 @@ def segmentation_of(header: Any) -> Segmentation | None:
         str(header.get("SegmentsOverlap") or "").strip(),
         max(1, len(names)),
         _between_mm(header),
-        ObjectNotes(_told_apart(names), colors),
+        ObjectNotes(_with_numbers_if_equal(names), colors),
     )
 
 
 def free_labels(header: Any) -> dict[int, str]:
-    """Return the segments' labels by number: somebody's words, which may tell who the patient is.
+    """Return the segments' labels by number. They are free text and may identify the patient.
 
     Raises DICOM_FAULTS.
     """
@@ -86,11 +87,11 @@ def free_labels(header: Any) -> dict[int, str]:
         label = " ".join(str(item.get("SegmentLabel") or "").split())
         if number > 0 and label:
             found[number] = "".join(c for c in label if c.isprintable())[:_LONGEST]
-    return _told_apart(found)
+    return _with_numbers_if_equal(found)
 
 
-def _told_apart(names: dict[int, str]) -> dict[int, str]:
-    """Return names of which each is another: ten nodules are ten objects."""
+def _with_numbers_if_equal(names: dict[int, str]) -> dict[int, str]:
+    """Return the names with numbers added to equal ones, since ten nodules are ten objects."""
     alike = Counter(names.values())
     return {
         number: f"{name} (segment {number})" if alike[name] > 1 else name
@@ -99,7 +100,7 @@ def _told_apart(names: dict[int, str]) -> dict[int, str]:
 
 
 def _name(segment: Any) -> str:
-    """Return the standard's words for the property type and its modifiers, as `Kidney, left`."""
+    """Return the standard's words for the property type and its modifiers: `Kidney, left`."""
     for coded in segment.get("SegmentedPropertyTypeCodeSequence") or ():
         name = _meaning(coded)
         modifiers = coded.get("SegmentedPropertyTypeModifierCodeSequence") or ()
@@ -109,17 +110,18 @@ def _name(segment: Any) -> str:
 
 
 def _meaning(coded: Any) -> str:
-    """Return the standard's words for a code; empty: it is none of the standard's."""
+    """Return the standard's words for a code; empty: it is not one of the standard's."""
     scheme, value = str(coded.get("CodingSchemeDesignator")), str(coded.get("CodeValue"))
     if scheme == "SRT":
-        return _of_before_2020(value)
+        return _meaning_of_former_code(value)
     return _meanings().get((scheme, value), "")
 
 
 @cache
-def _of_before_2020(value: str) -> str:
-    """Return the words for one of SNOMED's former codes; pydicom says which code is the same."""
-    from pydicom.sr.coding import Code  # all codes are slow to import, and few files have such
+def _meaning_of_former_code(value: str) -> str:
+    """Return the words for one of SNOMED's former codes, by pydicom's table of current ones."""
+    # imported here because all codes are slow to import and rarely needed
+    from pydicom.sr.coding import Code
 
     former = Code(value, "SRT", "")
     same = (one for (_, one), code in _codes().items() if code == former)
@@ -128,7 +130,7 @@ def _of_before_2020(value: str) -> str:
 
 @cache
 def _codes() -> dict[tuple[str, str], "Code"]:
-    """Return SNOMED's codes, each once."""
+    """Return SNOMED's codes without repeats."""
     from pydicom.sr.codedict import codes
 
     return {(code.scheme_designator, code.value): code for code in codes.SCT.concepts.values()}
@@ -136,7 +138,7 @@ def _codes() -> dict[tuple[str, str], "Code"]:
 
 @cache
 def _meanings() -> dict[tuple[str, str], str]:
-    """Return the shortest words, as `Liver` of `Liver structure (body structure)`, by code."""
+    """Return the shortest words by code, such as `Liver` for `Liver structure (body structure)`."""
     from pydicom.sr.codedict import codes
 
     listed = [code for name in codes.schemes() for code in getattr(codes, name).concepts.values()]

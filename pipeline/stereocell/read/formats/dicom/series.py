@@ -1,14 +1,14 @@
 """Sort DICOM frames into stacks, each a volume, and label each without its description.
 
 A stack has one series, one frame of reference, one StackID, one size of pixels and planes, one
-orientation (group_frames.py) and one kind of frame (split_kinds.py): a
-localizer of three orientations makes three stacks, magnitude and phase make two. Several frames at
-each place are points in time (points_in_time.py); a point that lacks slices is a stack
-of its own. Of other frames at one place the first by instance number is taken.
+orientation (group_frames.py) and one kind of frame (split_kinds.py). A localizer with three
+orientations makes three stacks; magnitude and phase make two. Several frames at each place are time
+points (time_points.py); a time point that lacks slices is a separate stack. If several frames at
+one place are not time points, the first by instance number is used.
 
-Series are in the order of their best stacks, images before phases, projections and localizers, and
-so are the stacks of a series. Larger series come first; of equal ones, images as acquired, and the
-contrast that looks like a conventional image: in phase, water, opposed phase, fat.
+Series are sorted by their best stacks, images before phases, projections and localizers, and so are
+the stacks of a series. Larger series come first. Among equally large ones, images as acquired come
+first, and contrasts that look like a conventional image: in phase, water, opposed phase, fat.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,9 +27,9 @@ from stereocell.read.formats.dicom.group_frames import (
     find_groups,
 )
 from stereocell.read.formats.dicom.name_series import name_apart
-from stereocell.read.formats.dicom.points_in_time import AreEqual, find_points
 from stereocell.read.formats.dicom.stack import Stack
 from stereocell.read.formats.dicom.time_notes import point_name, time_notes
+from stereocell.read.formats.dicom.time_points import AreEqual, find_points
 from stereocell.read.plane_stack import (
     SAME_PLACE,
     NoStackError,
@@ -37,8 +37,9 @@ from stereocell.read.plane_stack import (
     normal_of,
 )
 
-_LAST = 6  # rank of a stack that lacks slices of a point in time
-_SIDE = 2  # from this rank on a series is no image, and follows the others however large it is
+_LAST = 6  # rank of a stack that lacks slices of a time point
+# from this rank on, a series is not an image and follows the others regardless of its size
+_SIDE = 2
 
 
 def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ...]:
@@ -56,7 +57,7 @@ def find_stacks(frames: Iterable[Frame], are_equal: AreEqual) -> tuple[Stack, ..
 
 
 def is_other_kind(other: Stack, stack: Stack) -> bool:
-    """Return whether a stack has whole images of another kind from the same series."""
+    """Return whether a stack has complete images of another kind from the same series."""
     is_same_series = other.first.series == stack.first.series and other is not stack
     return is_same_series and other.words != stack.words and _LAST not in (other.rank, stack.rank)
 
@@ -82,19 +83,19 @@ def _sorted(stacks: Sequence[Stack]) -> tuple[Stack, ...]:
 
 
 def _explain_single(stacks: list[Stack], groups: list[Group]) -> list[Stack]:
-    """Where each of several stacks is one slice, name the attributes that separate them."""
+    """If each of several stacks is one slice, name the attributes that separate them."""
     slices = [stack for stack in stacks if stack.first.kind.role != LOCALIZER]
     if len(slices) < 2 or any(len(stack.times[0]) > 1 for stack in slices):
         return stacks
     apart = sorted({word for group in groups[1:] for word in group.differences(groups[0])})
-    problem = f"found {len(slices)} stacks of one slice each, told apart by {', '.join(apart)}"
+    problem = f"found {len(slices)} stacks of one slice each, which differ in {', '.join(apart)}"
     if reasons := sorted({group.unjoined for group in groups if group.unjoined}):
         problem += f" (not joined: {', '.join(reasons)})"
     return [replace(stack, problem=problem) if stack in slices else stack for stack in stacks]
 
 
 def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> list[Stack]:
-    """Return the stack of a group, and one for each point in time that lacks slices."""
+    """Return the stack of a group, and one for each time point that lacks slices."""
     normal = normal_of(group.along_row, group.along_column)
     near = SAME_PLACE * min(group.spacing)
     points = find_points(_places(group), normal, near, are_equal)
@@ -103,7 +104,7 @@ def _stacks(group: Group, are_equal: AreEqual, neighbours: tuple[str, ...]) -> l
     notes = [*group.notes, *neighbours]
     slices = 1 + max(frame.tile for frame in group.frames)
     if slices > 1:
-        notes.append(f"mosaics of {slices} slices in one image: taken apart")
+        notes.append(f"mosaics of {slices} slices in one image: separated into slices")
     notes += time_notes(points)
     stacks = [
         _stack(points.whole, group, notes, words, (kind.rank, kind.contrast_rank, *group.order))
@@ -124,7 +125,7 @@ def _stack(
 ) -> Stack:
     first = times[0][0]
     if first.modality == "CT" and first.kind.role == LOCALIZER:
-        problem = "localizers (scouts) of a CT are projections through the body, and no slices"
+        problem = "localizers (scouts) of a CT are projections through the body, not slices"
         return Stack(times, None, problem, tuple(notes), words, order)
     try:
         layout = lay_out(
@@ -142,14 +143,14 @@ def _stack(
 
 
 def _contrasts(group: Group) -> tuple[str, ...]:
-    """Return the contrasts that all frames share and that `group.words` doesn't name already."""
+    """Return the contrasts that all frames share and that `group.words` doesn't already name."""
     shared = {frame.kind.contrasts for frame in group.frames}
     named = ", ".join(group.words)
     return tuple(w for w in next(iter(shared)) if w not in named) if len(shared) == 1 else ()
 
 
 def _places(group: Group) -> list[list[Frame]]:
-    """Return frames by place, along the normal; at each place by instance number."""
+    """Return frames by place, along the normal, and at each place by instance number."""
     normal = normal_of(group.along_row, group.along_column)
     near = SAME_PLACE * min(group.spacing)
     rising = sorted(

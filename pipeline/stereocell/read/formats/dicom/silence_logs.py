@@ -1,4 +1,4 @@
-"""Silence pydicom and the codecs: their messages about damaged files may quote the values."""
+"""Silence pydicom and the codecs, whose messages on damaged files may quote their values."""
 
 import logging
 import struct
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pydicom import config as pydicom_config
 from pydicom.errors import BytesLengthException, InvalidDicomError
 
-# Errors of pydicom and its codecs on damaged files; their texts may quote the values of tags.
+# Errors of pydicom and its codecs on damaged files. Their texts may quote the values of tags.
 DICOM_FAULTS = (
     InvalidDicomError,
     BytesLengthException,
@@ -20,7 +20,7 @@ DICOM_FAULTS = (
     KeyError,
     IndexError,
     AttributeError,
-    RuntimeError,  # NotImplementedError and RecursionError (nested sequences) too
+    RuntimeError,  # includes NotImplementedError, and RecursionError (nested sequences)
     ArithmeticError,
     AssertionError,
     MemoryError,
@@ -33,7 +33,7 @@ def quiet() -> Iterator[None]:
     """Suppress all logs and warnings of pydicom and the codecs inside the block."""
     for name in ("pydicom", "pylibjpeg", "openjpeg", "highdicom"):
         logger = logging.getLogger(name)
-        if logger.level <= logging.CRITICAL:  # each setting empties the caches of all loggers
+        if logger.level <= logging.CRITICAL:  # setting a level empties the caches of all loggers
             logger.setLevel(logging.CRITICAL + 1)  # permanently, and for all loggers below
         logger.propagate = False
     mode = pydicom_config.settings.reading_validation_mode

@@ -1,13 +1,13 @@
-"""Split the parallel frames of a series where several pictures of the same slices are in it.
+"""Split the parallel frames of a series if it holds several images of the same slices.
 
-Some properties may change within one volume: each slice of a CT may be an acquisition of its own.
-So frames are separated by a property only where its values compete for the same slices: where two
-values have frames at the same places, or where the slices of one lie regularly between those of
-the other. Frames of values that don't compete stay together.
+Some properties may change within one volume; for example, each slice of a CT may be a separate
+acquisition. So a property separates frames only if its values compete for the same slices. They
+compete if two values have frames at the same places, or if the slices of one lie regularly between
+those of the other. Frames of values that don't compete stay together.
 
-Acquisitions, and runs of instance numbers, are points in time where they have the same places
-(points_in_time.py). Between each other's slices they are two volumes, unless the slices
-are so thin that the one fills the gaps of the other, as interleaved acquisitions do.
+Acquisitions, and runs of instance numbers, are time points if they have the same places
+(time_points.py). If their slices alternate, they are two volumes, unless the slices are so thin
+that they fill each other's gaps, as in interleaved acquisitions.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,13 +23,13 @@ from stereocell.read.formats.dicom.kernel_names import kernel_of, kernel_words
 from stereocell.read.formats.dicom.pet_kind import NOT_CORRECTED
 from stereocell.read.formats.dicom.type_names import type_of, type_words
 
-_SHARED = 0.5  # least share of the fewer slices that compete
+_SHARED = 0.5  # smallest share of the fewer slices that must compete
 _MIN_WOVEN = 3  # fewest slices of a volume between the slices of another one
-_GAPS = 1.5  # an interleaved acquisition's own slices lie at least this many slice distances apart
-_FILLS = 1.25  # and are at most this many slice distances thick
-_MAX_VALUES = 256  # most values of a property that separates volumes
-_MAX_RUNS = 8  # most runs of instance numbers; more are numbers in no order
-_NUMBER_MOST = 9999  # larger numbers of acquisitions are not shown: they may be dates
+_GAPS = 1.5  # an interleaved acquisition's own slices are at least this many slice distances apart
+_FILLS = 1.25  # and at most this many slice distances thick
+_MAX_VALUES = 256  # values of a property; with more, it doesn't separate volumes
+_MAX_RUNS = 8  # runs of instance numbers; with more, the numbers have no order
+_NUMBER_MOST = 9999  # larger acquisition numbers are not shown, because they may be dates
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,10 @@ class Property:
     """One property of frames that may separate volumes.
 
     find       returns a frame's value: a number, a text, a tuple of texts, or None
-    words      returns a value for the user, by its place among the values
-    tolerance  share up to which two numbers count as one, since makers state measured values
-    is_time    values with the same places are points in time
+    words      returns a value in words for the user, given its index among the values
+    tolerance  relative difference up to which two numbers count as one, since makers state measured
+               values
+    is_time    whether values with the same places are time points
     """
 
     find: Callable[[Frame], Any]
@@ -93,16 +94,16 @@ PROPERTIES = (
     Property(lambda frame: frame.stated.thickness_mm, _measured("slices {:g} mm thick"), 0.05),
     _ACQUISITION,
 )
-# properties that tell series apart; types and acquisitions have no word that a user knows
+# Properties that name series. Types and acquisitions have no words that a user knows.
 NAMED = tuple(one for one in PROPERTIES if one.find is not type_of and one is not _ACQUISITION)
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Frames that make one volume, or several points in time of it.
+    """Frames that form one volume, or several time points of it.
 
-    words  of the properties that separate them from others, for the user
-    order  places of these properties' values, for sorting
+    words  words for the properties that separate them from others, for the user
+    order  indices of these properties' values, for sorting
     """
 
     frames: tuple[Frame, ...]
@@ -115,8 +116,8 @@ def split_kinds(
 ) -> tuple[Part, ...]:
     """Return the frames of parallel planes, separated by the properties that compete.
 
-    normal   (3,), of all planes
-    near_mm  planes at a smaller distance count as one place
+    normal   (3,), normal of all planes
+    near_mm  planes that are closer together count as one place
     """
     parts = [Part(tuple(frames))]
     for one in PROPERTIES:
@@ -127,7 +128,7 @@ def split_kinds(
 def find_runs(
     frames: Sequence[Frame], normal: NDArray[np.float64], near_mm: float
 ) -> list[tuple[Frame, ...]]:
-    """Return the runs of frames that lie in one direction, in the order of instance numbers."""
+    """Return the runs of frames that move in one direction, in the order of instance numbers."""
     runs: list[list[Frame]] = []
     way, height = 0, 0.0
     for frame in sorted(frames, key=lambda f: (f.number, f.file, f.index)):
@@ -150,12 +151,12 @@ def _split(part: Part, one: Property, normal: NDArray[np.float64], near_mm: floa
 
 
 def _split_runs(part: Part, normal: NDArray[np.float64], near_mm: float) -> list[Part]:
-    """Separate the runs of instance numbers, where each is a volume of its own."""
+    """Separate the runs of instance numbers if each is a volume of its own."""
     runs = find_runs(part.frames, normal, near_mm)
     if not 2 <= len(runs) <= _MAX_RUNS or min(map(len, runs)) < _MIN_WOVEN:
         return [part]
     if any(frame.stated.thickness_mm is None for frame in part.frames):
-        return [part]  # nothing shows that the slices don't fill each other's gaps
+        return [part]  # the slices may fill each other's gaps
     one = Property(lambda frame: frame.number, lambda _, i: f"run of numbers {i + 1}", is_time=True)
     return _separate(part, runs, one, (normal, near_mm))
 
@@ -166,7 +167,7 @@ def _separate(
     one: Property,
     measure: tuple[NDArray[np.float64], float],
 ) -> list[Part]:
-    """Put the frames of each value to the first ones with which they don't compete."""
+    """Add the frames of each value to the first ones with which they don't compete."""
     merged: list[_Slices] = []
     for frames in values:
         new = _Slices(frames, *measure)
@@ -185,7 +186,7 @@ def _separate(
 
 
 def value_names(one: Property, values: Sequence[Any]) -> list[str]:
-    """Return the values for the user; equal words, of values that differ, are numbered."""
+    """Return the values in words for the user; equal words of different values are numbered."""
     words = [one.words(value, place) for place, value in enumerate(values)]
     return [
         f"{word} no. {place + 1}" if word and words.count(word) > 1 else word
@@ -194,7 +195,7 @@ def value_names(one: Property, values: Sequence[Any]) -> list[str]:
 
 
 def by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
-    """Return the frames by their value, values in rising order, those without one first."""
+    """Return the frames by their value, in rising order; frames without a value come first."""
     pairs = [(one.find(frame), frame) for frame in frames]
     absent = tuple(frame for value, frame in pairs if value is None)
     stated = sorted((pair for pair in pairs if pair[0] is not None), key=lambda pair: pair[0])
@@ -210,7 +211,7 @@ def by_value(frames: Sequence[Frame], one: Property) -> list[tuple[Frame, ...]]:
 
 
 class _Slices:
-    """Frames, and the places of their planes along the normal."""
+    """Frames, and the positions of their planes along the normal."""
 
     def __init__(
         self, frames: Sequence[Frame], normal: NDArray[np.float64], near_mm: float
@@ -242,7 +243,7 @@ def _compete(a: _Slices, b: _Slices, one: Property) -> bool:
 
 
 def _are_woven(a: _Slices, b: _Slices) -> bool:
-    """Return whether the slices of the one lie between those of the other, over a good part."""
+    """Return whether the slices of two sets alternate over much of their common range."""
     fewer = min(len(a.heights), len(b.heights))
     if fewer < _MIN_WOVEN:
         return False
@@ -255,7 +256,7 @@ def _are_woven(a: _Slices, b: _Slices) -> bool:
 
 
 def _fill_gaps(a: _Slices, b: _Slices) -> bool:
-    """Return whether both together are one volume of slices that touch, as if interleaved."""
+    """Return whether both together are one volume of touching slices, as if interleaved."""
     both = _distinct(np.concatenate([a.heights, b.heights]), a.near_mm)
     gap = float(np.median(np.diff(both)))
     thick = [one.thickness_mm for one in (a, b) if one.thickness_mm is not None]

@@ -1,4 +1,4 @@
-"""A stack of DICOM frames: one orientation and one kind, at one or several points in time."""
+"""A stack of DICOM frames: one orientation and one kind, at one or several time points."""
 
 from dataclasses import dataclass
 
@@ -13,13 +13,13 @@ from stereocell.read.plane_stack import StackLayout, normal_of
 class Stack:
     """Frames of one orientation and kind.
 
-    times    for each time point the frames along the normal; each point has the same number
-    layout   the planes' grid; None: they make no volume, and `problem` gives the reason
+    times    frames along the normal for each time point; each time point has the same number
+    layout   grid of the planes; None: they don't form a volume, and `problem` gives the reason
     notes    changes and omissions, a sentence each
-    words    what separates it from other stacks of the series, such as `magnitude`
-    order    sorts it among those: rank of its kind, rank of its contrast, places of other values
-    among    sorts its series among others of the same size
-    elsewhere  a sentence on other images of the series that lie beside these; empty: there are none
+    words    words that separate it from other stacks of the series, such as `magnitude`
+    order    key that sorts it among those: rank of its kind, rank of its contrast, other values
+    among    key that sorts its series among others of the same size
+    elsewhere  sentences on other images of the series that lie beside these; empty: there are none
     """
 
     times: tuple[tuple[Frame, ...], ...]
@@ -43,12 +43,12 @@ class Stack:
 
     @property
     def rank(self) -> int:
-        """Lower ranks are shown first."""
+        """Order in which stacks are shown, lowest first."""
         return self.order[0] if self.order else 0
 
     @property
     def voxels(self) -> int:
-        """The number of voxels of the volume; without a volume, that of the frames' pixels."""
+        """The number of voxels of the volume; without a volume, the number of pixels."""
         if self.layout is not None:
             return int(np.prod(self.layout.shape, dtype=np.int64))
         return len(self.times[0]) * self.first.rows * self.first.columns
@@ -66,5 +66,5 @@ class Stack:
         if self.layout is None:
             return f"{name}, {size}: no volume ({self.problem})"
         spacing = " x ".join(f"{value:.4g}" for value in self.layout.spacing_mm)
-        times = f", {len(self.times)} points in time" if len(self.times) > 1 else ""
+        times = f", {len(self.times)} time points" if len(self.times) > 1 else ""
         return f"{name}, {size} voxels (slices, rows, columns), {spacing} mm{times}"

@@ -1,4 +1,4 @@
-"""Header values that repeat the geometry of a frame, or describe it: compared, and never used.
+"""Header values that repeat or describe a frame's geometry. They are compared, and never used.
 
 References: DICOM PS3.3 C.7.6.2 (Image Plane module), C.7.3.1.1.2 (Patient Position), C.7.6.1.1.1
 (Patient Orientation), C.8.15.3.2 (CT Position).
@@ -35,18 +35,19 @@ _DIRECTION = re.compile(r"[LRAPHF]{1,3}")
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """Values beside ImagePositionPatient and ImageOrientationPatient; None and empty: not stated.
+    """Values beside ImagePositionPatient and ImageOrientationPatient; None or empty: not stated.
 
     thickness_mm, between_mm, location_mm  SliceThickness, SpacingBetweenSlices, SliceLocation
-    detector_mm  spacing (rows, columns) of the detector or scanner, and the attribute's name
+    detector_mm    mm between (rows, columns) of the detector or scanner
+    detector_name  name of the attribute that states detector_mm
     tilt_deg     GantryDetectorTilt
     in_stack     InStackPositionNumber
     position     PatientPosition, one of the standard's codes
-    directions   PatientOrientation: where rows and columns lead, as ("L", "P")
+    directions   PatientOrientation: the directions of rows and columns, such as ("L", "P")
     slices       NumberOfSlices of the volume
-    volumes      number of points in time, and the attribute that states it
+    volumes      number of time points, and the attribute that states it
     aspect       PixelAspectRatio: spacing of rows over that of columns
-    count_notes  contradictions in the number of the file's frames
+    count_notes  notes on contradictions in the number of the file's frames
     """
 
     thickness_mm: float | None = None
@@ -69,11 +70,11 @@ def count_frames(stated: int, groups: int, held: int | None) -> tuple[int, tuple
 
     stated  NumberOfFrames, or 1
     groups  items of PerFrameFunctionalGroupsSequence; 0: it is absent
-    held    whole frames in the pixel data; None: not known
+    held    complete frames in the pixel data; None: not known
     """
     statements = [Statement(stated, "NumberOfFrames")]
     if groups:
-        # the groups describe frames that are there
+        # Groups that match the frames in the pixel data describe real frames.
         trust = Trust.MEASURED if groups == held else Trust.REPEATED
         statements.append(Statement(groups, "PerFrameFunctionalGroupsSequence", trust))
     if held is not None and held > stated:
@@ -83,7 +84,7 @@ def count_frames(stated: int, groups: int, held: int | None) -> tuple[int, tuple
 
 
 def stated_of(header: Any, groups: Sequence[Any], count_notes: tuple[str, ...] = ()) -> Stated:
-    """Return what a frame's header and functional groups state."""
+    """Return the values that a frame's header and functional groups state."""
     measures = "PixelMeasuresSequence"
     between = find_number(header, groups, measures, "SpacingBetweenSlices")
     thickness = find_number(header, groups, measures, "SliceThickness")

@@ -1,14 +1,14 @@
-"""Stored values of a DICOM file's frames, as pydicom returns them, and the decoders behind it.
+"""Stored values of a DICOM file's frames, as pydicom returns them, and the decoders for them.
 
-PLUGINS assigns a decoder to every compressed transfer syntax, since pydicom would take any that is
+PLUGINS assigns a decoder to every compressed transfer syntax, since pydicom would use any that is
 installed, and one of these, pylibjpeg-libjpeg, is under the GPL. GDCM decodes JPEG (baseline,
-extended, lossless), CharLS JPEG-LS, OpenJPEG both forms of JPEG 2000, and pydicom itself RLE: 1 ms
-for 384 x 274 x 16 bits. pylibjpeg-rle takes 0.3 ms, but panics on a stream that is too long, with a
-backtrace that can't be suppressed.
+extended, lossless), CharLS JPEG-LS, OpenJPEG both forms of JPEG 2000, and pydicom itself RLE, in
+1 ms for 384 x 274 x 16 bits. pylibjpeg-rle takes 0.3 ms, but panics on a stream that is too long,
+with a backtrace that can't be suppressed.
 
-A compressed image states its own size, which is checked before a decoder allocates memory for it.
-JPEG and JPEG-LS: in the frame header SOFn. JPEG 2000: in the marker SIZ, bare or inside JP2 boxes.
-RLE states none.
+A compressed image states its own size, which is checked before a decoder allocates memory for it:
+JPEG and JPEG-LS in the frame header SOFn, JPEG 2000 in the marker SIZ, bare or inside JP2 boxes.
+RLE states no size.
 
 References: DICOM PS3.5 A.4 (transfer syntaxes of encapsulated pixels); ITU-T T.81 B.2.2 (JPEG);
 ITU-T T.87 C.2.2 (JPEG-LS); ITU-T T.800 A.5.1 (JPEG 2000).
@@ -48,13 +48,13 @@ _TAGS: list[Any] = [
 
 
 def open_pixels(path: Path) -> tuple[Any, str]:
-    """Return a file's dataset with its pixels, and the decoder's name; empty: none needed.
+    """Return a file's dataset with its pixels, and the decoder's name; empty: none is needed.
 
     Raises DICOM_FAULTS where the file can't be read.
     """
     dataset = pydicom.dcmread(path, force=True, specific_tags=_TAGS)
     syntax = dataset.file_meta.get("TransferSyntaxUID") if dataset.file_meta else None
-    if syntax is None:  # no file meta group: the syntax that the reader detected
+    if syntax is None:  # without a file meta group: use the syntax that the reader detected
         implicit, little = dataset.original_encoding
         syntax = (
             pydicom.uid.ImplicitVRLittleEndian
@@ -72,9 +72,9 @@ def open_pixels(path: Path) -> tuple[Any, str]:
 
 
 def _count_held(dataset: Any) -> None:
-    """Lower a NumberOfFrames that promises more frames than there are pixels; pydicom refuses it.
+    """Lower a NumberOfFrames that exceeds the frames in the pixels, since pydicom would refuse it.
 
-    The header was compared with the pixels before (header.py).
+    header.py has already compared the header with the pixels.
     """
     bits = int(dataset.Rows) * int(dataset.Columns) * int(dataset.BitsAllocated)
     held = 8 * len(dataset.get("PixelData") or b"") // bits
@@ -88,14 +88,14 @@ def stored_values(dataset: Any, plugin: str, indices: Sequence[int]) -> Iterator
         _check_streams(dataset)
     elif dataset.BitsAllocated == 1:
         return _of_bits(dataset, indices)
-    # all bits of the container: padding may use those above the stored ones
+    # Keep all bits of the container: padding may use bits above the stored ones.
     return iter_pixels(
         dataset, indices=indices, raw=True, decoding_plugin=plugin, correct_unused_bits=False
     )
 
 
 def _of_bits(dataset: Any, indices: Sequence[int]) -> Iterator[NDArray[Any]]:
-    """Yield frames of one bit a pixel; pydicom 3.0 fails where a frame begins inside a byte.
+    """Yield frames of one bit per pixel. pydicom 3.0 fails if a frame begins inside a byte.
 
     References: DICOM PS3.5 8.1.1: the first pixel is the lowest bit, and frames follow unpadded.
     """
@@ -108,7 +108,7 @@ def _of_bits(dataset: Any, indices: Sequence[int]) -> Iterator[NDArray[Any]]:
 
 
 def _check_streams(dataset: Any) -> None:
-    """Raise ValueError for a stream of another size than the header's: decoders trust streams."""
+    """Raise ValueError if a stream states another size than the header: decoders trust streams."""
     count = int(dataset.get("NumberOfFrames") or 1)
     offsets = None
     if "ExtendedOffsetTable" in dataset:
@@ -139,17 +139,17 @@ _NATIVE = (uid.ImplicitVRLittleEndian, uid.ExplicitVRLittleEndian, uid.ExplicitV
 
 
 def is_compressed(syntax: str | None) -> bool:
-    """Return whether pixels in this transfer syntax must be decoded; None: it is not stated."""
+    """Return whether pixels in this transfer syntax must be decoded. None means not stated."""
     return syntax is not None and syntax not in _NATIVE
 
 
-_J2K = b"\xff\x4f\xff\x51"  # markers SOC, then SIZ
-# markers SOF0 to SOF15 without DHT, JPG and DAC, which lie between them; SOF55 is JPEG-LS
+_J2K = b"\xff\x4f\xff\x51"  # markers SOC and SIZ
+# markers SOF0 to SOF15 without DHT, JPG and DAC, which are between them; SOF55 is JPEG-LS
 _FRAMES = {*range(0xC0, 0xD0), 0xF7} - {0xC4, 0xC8, 0xCC}
 
 
 def plane_size(stream: bytes) -> tuple[int, int] | None:
-    """Return (rows, columns) of a stream; None: none stated. Raises struct.error if cut short."""
+    """Return (rows, columns) of a stream; None: not stated. Raises struct.error if cut short."""
     start = stream.find(_J2K, 0, 4096)
     if start >= 0:
         right, bottom, left, top = struct.unpack_from(">4I", stream, start + 8)

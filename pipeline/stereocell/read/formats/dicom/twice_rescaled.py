@@ -1,8 +1,8 @@
-"""Find CT images whose rescale was applied before they were stored, and is stated all the same.
+"""Find CT images that were rescaled before they were stored, although a rescale is still stated.
 
-Some exports store Hounsfield units and keep the RescaleIntercept of the scanner, -1024 say. Readers
-apply it again: air lies near -2024 and soft tissue near -1024, below all levels for CT. Padding
-around a scanner's circle lies as low, but it has one value, and tissue lies above it.
+Some exports store Hounsfield units and keep the scanner's RescaleIntercept, -1024 for example.
+Readers apply it again: air is then near -2024 and soft tissue near -1024, below all iso-values for
+CT. Padding around a scanner's circle is as low, but it has a single value, with tissue above it.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,22 +15,22 @@ from stereocell.read.formats.dicom.frame import Frame
 from stereocell.read.formats.dicom.scale_notes import reaches_air, scale_notes
 from stereocell.read.formats.dicom.stack import Stack
 
-_OFFSET_HU = -500.0  # intercepts from here on down are those of a scanner's offset
-_FAR_HU = -1500.0  # half-way between air (-1000) and air whose offset was applied twice
-_FAR_SHARE = 0.05  # least share of the voxels below it
-_VARIED = 0.01  # least share of these that is no single value
-_TISSUE_HU = -300.0  # fat and all denser tissue lies above; twice rescaled, dense bone alone does
-_TISSUE_SHARE = 0.05  # most share of the voxels above it
+_OFFSET_HU = -500.0  # intercepts of a scanner's offset are at most this
+_FAR_HU = -1500.0  # half-way between air (-1000) and air with the offset applied twice
+_FAR_SHARE = 0.05  # smallest share of the voxels below _FAR_HU
+_VARIED = 0.01  # smallest share of these that differ from their minimum
+_TISSUE_HU = -300.0  # fat and denser tissue is above; rescaled twice, only dense bone is
+_TISSUE_SHARE = 0.05  # largest share of the voxels above _TISSUE_HU
 _LOW_HU = -1024.0  # lowest value that most scanners store
-LEVEL_HU, WINDOW_HU = -300.0, (-1024.0, 2000.0)  # of preset `ct`
+LEVEL_HU, WINDOW_HU = -300.0, (-1024.0, 2000.0)  # iso-value and window of preset `ct`
 
 Decode = Callable[[Sequence[Frame]], NDArray[Any]]  # frames -> grey values (n, rows, columns)
 
 
 def describe_values(stack: Stack, decode: Decode) -> tuple[bool, tuple[str, ...]]:
-    """Return whether a CT is in Hounsfield units (else True), and notes on the values.
+    """Return whether a CT is in Hounsfield units (True for others), and notes on the values.
 
-    decode  is called where the headers leave a question open
+    decode  called only if the headers leave a question open
     """
     frames = [frame for point in stack.times for frame in point]
     if stack.first.modality != "CT":
@@ -43,9 +43,9 @@ def describe_values(stack: Stack, decode: Decode) -> tuple[bool, tuple[str, ...]
 
 
 def _note_on_twice(frames: Sequence[Frame], point: Sequence[Frame], decode: Decode) -> str:
-    """Return a note where the intercept of all frames seems to be applied twice; else nothing.
+    """Return a note if the intercept of all frames seems to be applied twice, or else nothing.
 
-    point  the frames of one point in time, along the normal
+    point  frames of one time point, along the normal
     """
     scales = {(f.encoding.slope, f.encoding.intercept) for f in frames}
     (slope, intercept), *others = scales
@@ -61,15 +61,15 @@ def _note_on_twice(frames: Sequence[Frame], point: Sequence[Frame], decode: Deco
     low, high = (end + intercept for end in WINDOW_HU)
     return (
         f"{share:.0%} of the voxels of {len(chosen)} slices lie below {_LOW_HU:g}, and air has "
-        f"-1000 HU: RescaleIntercept {intercept:g} seems to be applied twice, so these are no "
-        "Hounsfield units, and levels and window are found as for any other volume (--iso-value "
-        f"0={LEVEL_HU + intercept:g} --window 0={low:g}:{high:g} are those of CT; --as "
-        "hounsfield: they are Hounsfield units all the same)"
+        f"-1000 HU: RescaleIntercept {intercept:g} seems to be applied twice, so the values are "
+        "not Hounsfield units. Iso-values and window are found as for any other volume "
+        f"(--iso-value 0={LEVEL_HU + intercept:g} --window 0={low:g}:{high:g} are those of CT; "
+        "--as hounsfield treats the values as Hounsfield units)"
     )
 
 
 def _is_far_below(planes: NDArray[Any]) -> bool:
-    """Return whether grey values lie where a second offset puts them."""
+    """Return whether grey values lie where a second offset would put them."""
     far = planes[planes < _FAR_HU]
     if far.size < _FAR_SHARE * planes.size:
         return False

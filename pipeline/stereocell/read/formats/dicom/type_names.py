@@ -1,4 +1,4 @@
-"""Image types for the user, in words of a fixed table: ImageType may hold free text.
+"""Words for image types, from a fixed table, because ImageType may hold free text.
 
 References: DICOM PS3.3 C.7.6.1.1.2 (Image Type).
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from stereocell.read.formats.dicom.frame import Frame
 
 _ORIGINS = {"ORIGINAL": "original", "DERIVED": "derived"}
-# words of ImageType, as makers document them -> for the user
+# words of ImageType in makers' documents -> words for the user
 _DETAILS = {
     **dict.fromkeys(("NORM", "NORMALIZED", "SCIC", "PURE"), "intensity-normalized"),
     **dict.fromkeys(("DIS2D", "DIS3D", "GDC"), "distortion-corrected"),
@@ -36,10 +36,10 @@ _DETAILS = {
 
 
 class TypeValue(NamedTuple):
-    """The image type of a frame; sorted, images as acquired come before derived ones.
+    """The image type of a frame. When sorted, images as acquired come before derived ones.
 
-    contrasts   for the user
-    is_derived  computed from other images
+    contrasts   contrasts for the user
+    is_derived  whether it was computed from other images
     words       ImageType, compared and never shown
     """
 

@@ -1,7 +1,7 @@
 """The scale of a DICOM frame's values, as its header states it.
 
 Stored values become grey values by RescaleSlope and RescaleIntercept. Without them a linear
-RealWorldValueMapping is used, and without that the stored values are.
+RealWorldValueMapping is used, and without that the stored values themselves.
 
 References: DICOM PS3.3 C.11.1 (Modality LUT), C.7.6.16.2.11 (Real World Value Mapping), C.8.9.1.1.3
 (Units of PET).
@@ -23,8 +23,8 @@ from stereocell.read.formats.dicom.silence_logs import DICOM_FAULTS
 _RESCALE = "PixelValueTransformationSequence"
 _MAPPING = "RealWorldValueMappingSequence"
 HOUNSFIELD = "HU"
-UNKNOWN_KIND = "unknown"  # stands for free text, which notes must not quote
-# Units of PET, and DoseUnits
+UNKNOWN_KIND = "unknown"  # replaces free text, which notes must not quote
+# values of PET's Units, and of DoseUnits
 _UNITS = (
     "CNTS",
     "CPS",
@@ -39,7 +39,8 @@ _UNITS = (
     "GY",
     "RELATIVE",
 )
-_TYPES = (HOUNSFIELD, "US", "OD", "PCT", "MGML", "HU_MOD", "Z_EFF", "ED", "EDW")  # RescaleType
+# values of RescaleType
+_TYPES = (HOUNSFIELD, "US", "OD", "PCT", "MGML", "HU_MOD", "Z_EFF", "ED", "EDW")
 # UCUM codes of a RealWorldValueMapping, in capitals -> Units; enhanced PET states no Units
 _UCUM = {
     "BQ/ML": "BQML",
@@ -54,9 +55,9 @@ _UCUM = {
     "/CM": "1CM",
     "%": "PCNT",
 }
-_SUV_TYPES = ("BW", "BSA", "LBM", "LBMJAMES128", "LBMJANMA", "IBW")  # SUVType
-_PHILIPS_SUV = (0x7053, 0x00, "PHILIPS PET PRIVATE GROUP", "IS")  # the factor from counts to SUV
-_PHILIPS = (0x2005, 0x0E, "PHILIPS MR IMAGING DD 001", "FL")  # the scale slope
+_SUV_TYPES = ("BW", "BSA", "LBM", "LBMJAMES128", "LBMJANMA", "IBW")  # values of SUVType
+_PHILIPS_SUV = (0x7053, 0x00, "PHILIPS PET PRIVATE GROUP", "IS")  # factor from counts to SUV
+_PHILIPS = (0x2005, 0x0E, "PHILIPS MR IMAGING DD 001", "FL")  # scale slope
 SCALE_TAGS: list[Any] = [
     "RescaleType",
     "Units",
@@ -70,11 +71,11 @@ SCALE_TAGS: list[Any] = [
 
 @dataclass(frozen=True, slots=True)
 class ValueScale:
-    """The statements of a header on the values of a frame.
+    """The statements in a header on the values of a frame.
 
-    has_rescale  RescaleSlope and RescaleIntercept are stated
+    has_rescale  whether RescaleSlope or RescaleIntercept is stated
     kind         RescaleType, one of the standard's terms; UNKNOWN_KIND: another; empty: none
-    units        of PET or a dose, one of the standard's terms; empty: another, or none
+    units        units of PET or a dose, one of the standard's terms; empty: another, or none
     real_world   slope and intercept of the only RealWorldValueMapping; None: there is none
     philips      Philips's scale slope
     suv_type     SUVType of PET, one of the standard's terms; empty: another, or none
@@ -91,7 +92,7 @@ class ValueScale:
 
 
 def scale_of(header: Any, groups: Sequence[Any]) -> ValueScale:
-    """Return what a frame's header and functional groups state."""
+    """Return the statements in a frame's header and functional groups."""
     slope = find_number(header, groups, _RESCALE, "RescaleSlope")
     intercept = find_number(header, groups, _RESCALE, "RescaleIntercept")
     kind = find_text(header, groups, _RESCALE, "RescaleType").upper()
@@ -119,13 +120,13 @@ def _suv_factor(header: Any) -> float | None:
 
 
 def _kind(text: str) -> str:
-    if text.startswith("HOUNSFIELD"):  # which is spelled out in some exports
+    if text.startswith("HOUNSFIELD"):  # some exports spell it out
         return HOUNSFIELD
     return text if text in _TYPES or not text else UNKNOWN_KIND
 
 
 def _mapped_units(header: Any, groups: Sequence[Any]) -> str:
-    """Return Units by the code of the only RealWorldValueMapping; empty: another, or none."""
+    """Return Units from the code of the only RealWorldValueMapping; empty: another, or none."""
     try:
         for group in (*groups, header):
             mappings = None if group is None else group.get(_MAPPING)
@@ -141,7 +142,8 @@ def _real_world(header: Any, groups: Sequence[Any]) -> tuple[float, float] | Non
     try:
         for group in (*groups, header):
             mappings = None if group is None else group.get(_MAPPING)
-            if not mappings or len(mappings) > 1:  # several are for different ranges of values
+            # several mappings are for different ranges of values
+            if not mappings or len(mappings) > 1:
                 continue
             slope = find_number(first_item(mappings), (), "", "RealWorldValueSlope")
             intercept = find_number(first_item(mappings), (), "", "RealWorldValueIntercept")

@@ -31,7 +31,7 @@ FORMAT = Format(
     endings=(".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".mat", ".emd"),
     marks=(
         Mark("an HDF5 file", SIGNATURE),
-        Mark("a MATLAB 7.3 file", rb"MATLAB 7\.3"),  # HDF5 behind a block of 512 bytes
+        Mark("a MATLAB 7.3 file", rb"MATLAB 7\.3"),  # HDF5 after a block of 512 bytes
     ),
     is_unmarked=is_hdf5,
     decoders=Library(

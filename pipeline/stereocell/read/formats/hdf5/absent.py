@@ -9,7 +9,7 @@ from stereocell.storage.file_states import FileStates
 
 
 def count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None:
-    """Count the chunks of the whole dataset: HDF5 gives their number at no cost."""
+    """Count the chunks of the whole dataset, because HDF5 gives their number at no cost."""
     if hasattr(stored, "view"):
         return count_in_views(stored, spans, states, count_absent)
     dataset = getattr(stored, "dataset", None)

@@ -1,8 +1,8 @@
-"""The dimensions of an HDF5 dataset, by each convention that names them.
+"""Find the dimensions of an HDF5 dataset, by each convention that names them.
 
 | convention | names | positions along a dimension |
 |---|---|---|
-| vigra, ilastik | `axistags` | its `resolution`, where a unit stands beside it |
+| vigra, ilastik | `axistags` | its `resolution`, if a unit is stated beside it |
 | HDF5 | `DIMENSION_LABELS` | |
 | netCDF-4, xarray, HDF5's dimension scales | the scales' names, and CF's `axis` | the scales |
 | NeXus | `axes` of the group or of its signal | the fields of these names |
@@ -10,7 +10,7 @@
 | Zarr's xarray, funlib and others | `_ARRAY_DIMENSIONS`, `axis_names`, ... (read/axis_names.py) | |
 | MATLAB, Octave | columns first: an array V(y, x, z) is stored as z, x, y | |
 | Velox | y, x, frame | |
-| Data Exchange | theta, y, x where angles lie beside the dataset | |
+| Data Exchange | theta, y, x if angles lie beside the dataset | |
 
 References: https://docs.unidata.ucar.edu/nug/, https://emdatasets.com/format/,
 https://manual.nexusformat.org/classes/base_classes/NXdata.html, HDF5 Dimension Scale Specification.
@@ -39,7 +39,7 @@ _BY_COLUMNS = ("z", "x", "y")
 class Described:
     """The dimensions of a dataset by one convention.
 
-    names  of the dimensions, slowest first, with their place in the file
+    names  names of the dimensions, slowest first, with their place in the file
     scales the dataset of positions along each dimension; None: there is none
     steps  the length of a voxel along each dimension and its unit; None: not stated
     """
@@ -50,7 +50,7 @@ class Described:
 
 
 def describe(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
-    """Return the dimensions by each convention that the file follows, best known first."""
+    """Return the dimensions by each convention that the file follows, the best known first."""
     found = [
         _vigra(tree, dataset),
         *_scales(tree, dataset),
@@ -122,7 +122,7 @@ def _nexus(tree: Hdf5Tree, dataset: h5py.Dataset) -> Described | None:
     named, place = tree.texts(dataset, "axes"), f"axes of {dataset.name}"
     if not named and tree.attribute(group, "signal") in (None, own):
         named, place = tree.texts(group, "axes"), f"axes of {group.name}"
-    if len(named) == 1:  # of NeXus before 2014, and of writers of one text
+    if len(named) == 1:  # one text for all axes: NeXus before 2014, and some writers
         named = tuple(named[0].strip("[] ").replace(",", ":").split(":"))
     if len(named) != dataset.ndim:
         return None
@@ -148,7 +148,7 @@ def _listed(tree: Hdf5Tree, dataset: h5py.Dataset) -> list[Described]:
     for name in NAME_LISTS:
         texts = tree.texts(dataset, name) if name in dataset.attrs else ()
         names = listed_names(texts, dataset.ndim)
-        # NeXus has the fields of positions beside its `axes`, see _nexus
+        # A list of texts in `axes` is NeXus and has positions: _nexus reads it.
         if names and not (name == "axes" and len(texts) == dataset.ndim):
             found.append(Described(Statement(names, name)))
     return found
@@ -162,7 +162,7 @@ def _velox(dataset: h5py.Dataset) -> Described | None:
 
 
 def _projections(dataset: h5py.Dataset) -> Described | None:
-    """Return the axes of projections, beside which Data Exchange has their angles."""
+    """Return the axes of projections, which Data Exchange stores beside their angles."""
     angles = dataset_beside(dataset.parent, "theta")
     if angles is None or dataset.ndim != 3 or angles.shape != dataset.shape[:1]:
         return None
@@ -170,7 +170,7 @@ def _projections(dataset: h5py.Dataset) -> Described | None:
 
 
 def _by_columns(dataset: h5py.Dataset) -> Described | None:
-    """Return the order of a file of MATLAB or Octave, whose arrays have rows, columns, planes."""
+    """Return the order of a file of MATLAB or Octave, whose arrays are rows, columns, planes."""
     program = "MATLAB" if _MATLAB in dataset.attrs else ""
     if _OCTAVE in dataset.parent.attrs:
         program = "Octave"
@@ -181,12 +181,12 @@ def _by_columns(dataset: h5py.Dataset) -> Described | None:
     if len(long) == len(_BY_COLUMNS):
         order = dict(zip(long, _BY_COLUMNS, strict=True))
         names = tuple(order.get(place, "_") for place in range(dataset.ndim))
-    reason = f"as {program} stores an array of rows, columns and planes, V(y, x, z)"
+    reason = f"since {program} stores an array of rows, columns and planes, V(y, x, z)"
     return Described(Statement(names, reason, Trust.ASSUMED))
 
 
 def dataset_beside(group: h5py.Group, name: str) -> h5py.Dataset | None:
-    """Return a dataset of a group by its name; None: there is none in the file itself."""
+    """Return a dataset of a group by its name; None: the file itself holds none."""
     if not name or "/" in name or not isinstance(group.get(name, getlink=True), h5py.HardLink):
         return None
     node = group[name]
@@ -197,6 +197,6 @@ def require_plain(where: str, dataset: h5py.Dataset) -> None:
     """Raise SourceError for a dataset of MINC, whose planes are scaled one by one."""
     if str(dataset.name).startswith(_MINC):
         raise SourceError(
-            f"{where}: found a volume of MINC, whose planes have a scale each, expected "
-            "another format: `mnc2nii IN.mnc OUT.nii` makes NIfTI of it"
+            f"{where}: found a volume of MINC, whose planes each have their own scale, expected "
+            "another format: convert it to NIfTI with `mnc2nii IN.mnc OUT.nii`"
         )

@@ -1,8 +1,8 @@
-"""A dataset of an HDF5 file, by h5py: `FILE.h5:/KEY`, and netCDF-4, MATLAB 7.3 and EMD.
+"""Read a dataset of an HDF5 file with h5py: `FILE.h5:/KEY`, also netCDF-4, MATLAB 7.3 and EMD.
 
-HDF5 itself has no convention for axes, voxel sizes and value scales. Known are the dimensions of
-dimensions.py, the sizes of spacing.py and the packed values of
-values.py. Without names of axes three dimensions are z, y, x.
+HDF5 itself has no convention for axes, voxel sizes and value scales. dimensions.py knows the usual
+conventions for dimensions, spacing.py those for sizes, and values.py those for packed values. Three
+dimensions without names are z, y, x.
 
 References: https://kreshuklab.github.io/plant-seg/, https://www.ilastik.org/documentation/
 """
@@ -32,19 +32,19 @@ _LISTED = 12  # datasets that a message names
 
 
 def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str = "") -> Image:
-    """Return the image of one dataset. Raises SourceError where it can't be read, or is unclear.
+    """Return the image of one dataset. Raises SourceError for unreadable or ambiguous sources.
 
-    series, xml  a view of BigDataViewer and the XML that lists it, where the XML was named
+    series, xml  number of a BigDataViewer view, and path of the XML if the user named it
     """
-    tree = Hdf5Tree(location, "an HDF5 file that is whole")
+    tree = Hdf5Tree(location, "a complete HDF5 file")
     try:
-        # all of it asks h5py, which may fail at any name or attribute of a damaged file
-        with one_line(tree.where, "an HDF5 file that is whole"):
+        # h5py may fail at any name or attribute of a damaged file.
+        with one_line(tree.where, "a complete HDF5 file"):
             if not location.key and bdv_hdf5.is_container(tree):
                 if axes:
                     raise UsageError(
                         f"{tree.where}: --axes {axes}: BigDataViewer's axes are z, y, x, expected "
-                        "none"
+                        "no --axes"
                     )
                 return bdv_hdf5.read_image(tree, location, series=series, xml=xml)
             image = _image(tree, location, axes)
@@ -92,7 +92,7 @@ def _choose(tree: Hdf5Tree, key: str) -> tuple[h5py.Dataset, tuple[str, ...]]:
         raise SourceError(f"{tree.where}:{key}: found a named type, expected a dataset")
     found = list(islice(tree.volumes(node), _LISTED + 1))
     if len(found) == 1:
-        return found[0], (f"dataset {found[0].name}, the only volume of the file",)
+        return found[0], (f"dataset {found[0].name}: the only volume of the file",)
     if not found:
         others = [f"{one.name} {one.shape} {one.dtype}" for one in tree.datasets(node, _LISTED)]
         held = f" but {', '.join(others):.300}" if others else ""

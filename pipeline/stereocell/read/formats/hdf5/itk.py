@@ -1,4 +1,4 @@
-"""An image that ITK or SimpleITK wrote as HDF5: `/ITKImage/0/VoxelData` and the fields beside it.
+"""Read an image that ITK or SimpleITK wrote as HDF5: `/ITKImage/0/VoxelData` and its fields.
 
 `Spacing`, `Origin` and `Directions` place it in the patient, as in MetaImage: in LPS, fastest axis
 first, a row of `Directions` for each axis. ITK states no unit; its lengths are mm by convention.
@@ -27,13 +27,13 @@ _UNIT = Subject("unit of length", remedy="--spacing-um z,y,x replaces it")
 
 
 def is_of_itk(dataset: h5py.Dataset) -> bool:
-    """Return whether a dataset holds the voxels of an image of ITK."""
+    """Return whether a dataset holds the voxels of an image by ITK."""
     is_named = str(dataset.name).rpartition("/")[2] == _VOXELS
     return is_named and dataset_beside(dataset.parent, "Directions") is not None
 
 
 def itk_image(tree: Hdf5Tree, dataset: h5py.Dataset, notes: tuple[str, ...]) -> Image:
-    """Return the image of a dataset of ITK, after more notes. Raises SourceError."""
+    """Return the image of a dataset by ITK. `notes` come first. Raises SourceError."""
     where = f"{tree.where}:{dataset.name}"
     sizes = _numbers(tree, dataset, "Dimension")
     rank = len(sizes)
@@ -48,14 +48,16 @@ def itk_image(tree: Hdf5Tree, dataset: h5py.Dataset, notes: tuple[str, ...]) -> 
     if dataset.ndim != len(axes) or (len(axes) > rank and dataset.shape[-1] > MAX_CHANNELS):
         raise SourceError(
             f"{where}: found voxels {dataset.shape} for {rank} dimensions, expected at most one "
-            f"more of up to {MAX_CHANNELS} values"
+            f"further axis of up to {MAX_CHANNELS} values"
         )
     affine = _affine(tree, dataset, rank)
-    unit = settle(_UNIT, [Statement("mm", "as ITK has it", Trust.ASSUMED)]).notes
+    unit = settle(_UNIT, [Statement("mm", "as in files of ITK", Trust.ASSUMED)]).notes
     lengths = np.linalg.norm(affine[:3, :3], axis=0).tolist()
-    told = (*notes, *unit, *size_notes(lengths, [int(n) for n in sizes[:3]]))
+    all_notes = (*notes, *unit, *size_notes(lengths, [int(n) for n in sizes[:3]]))
     stored = Hdf5Array(dataset, where)
-    image = place(where, stored, axes, affine, "Directions").image(NAME, notes=told, has_sides=True)
+    image = place(where, stored, axes, affine, "Directions").image(
+        NAME, notes=all_notes, has_sides=True
+    )
     return replace(image, close=tree.close, files=tree.files)
 
 
@@ -78,7 +80,7 @@ def _affine(tree: Hdf5Tree, dataset: h5py.Dataset, rank: int) -> NDArray[np.floa
 
 
 def _numbers(tree: Hdf5Tree, dataset: h5py.Dataset, name: str) -> NDArray[np.float64]:
-    """Return the numbers of a dataset beside the voxels; none where there is no such dataset."""
+    """Return the numbers of a dataset beside the voxels; empty: there is no such dataset."""
     node = dataset_beside(dataset.parent, name)
     if node is None or node.dtype.kind not in "iuf" or node.size > 16:
         return np.zeros(0)

@@ -1,6 +1,6 @@
-"""The statements of an HDF5 file on the voxel spacing and the directions of a dataset's axes.
+"""Find the voxel spacing and the directions of a dataset's axes in an HDF5 file.
 
-They are the positions along dimensions (dimensions.py), and attributes of the dataset and
+They are stated by positions along dimensions (dimensions.py), and by attributes of the dataset and
 of the groups around it. read/axis_spacings.py compares them.
 """
 
@@ -24,7 +24,7 @@ def settle_spacing(
 ) -> SettledSpacing:
     """Return the spacing of a dataset and the directions of its axes, with notes.
 
-    axes  of the dataset, slowest first
+    axes  names of the dataset's axes, slowest first
     """
     spacings = AxisSpacings(axes)
     for one in described:
@@ -45,7 +45,7 @@ def settle_spacing(
 def _add_positions(
     spacings: AxisSpacings, place: int, tree: Hdf5Tree, scale: h5py.Dataset, count: int
 ) -> None:
-    """Add the positions that a dataset of one dimension holds; another one holds none."""
+    """Add the positions that a one-dimensional dataset holds; other datasets are ignored."""
     if scale.ndim != 1 or scale.dtype.kind not in "iuf" or not 1 < scale.size <= MAX_POSITIONS:
         return
     attributes = {name: tree.attribute(scale, name) for name in PACKING}

@@ -1,8 +1,8 @@
-"""How the numbers of an HDF5 dataset become values, by the conventions of CF and of NeXus.
+"""Convert the numbers of an HDF5 dataset to values, by the conventions of CF and NeXus.
 
-CF's attributes (read/value_scale.py) stand on the dataset. NeXus has datasets beside it, for the
-field `data` these are `data_scaling_factor` and `data_offset`, before 2018 `scaling_factor` and
-`offset`. A value is (stored + offset) * factor.
+CF's attributes (read/value_scale.py) are attributes of the dataset. NeXus has datasets beside it:
+for the field `data` they are `data_scaling_factor` and `data_offset`, before 2018 `scaling_factor`
+and `offset`. A value is (stored + offset) * factor.
 
 References: https://manual.nexusformat.org/classes/base_classes/NXdata.html
 """
@@ -22,9 +22,9 @@ from stereocell.read.value_scale import ATTRIBUTES, ignored_note
 def value_attributes(
     tree: Hdf5Tree, dataset: h5py.Dataset
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the attributes of value_scale.ATTRIBUTES, those of NeXus as CF's, and notes.
+    """Return the attributes in value_scale.ATTRIBUTES, with NeXus factors in CF's form, and notes.
 
-    Raises SourceError where a factor of NeXus is no finite number.
+    Raises SourceError where a factor of NeXus is not a finite number.
     """
     attributes = {name: tree.attribute(dataset, name) for name in ATTRIBUTES}
     groups: dict[str, h5py.Group] = {
@@ -40,16 +40,16 @@ def value_attributes(
         return attributes, tuple(notes)
     named = " and ".join(one[0] for one in (factor, offset) if one is not None)
     if attributes["scale_factor"] is not None or attributes["add_offset"] is not None:
-        notes.append(f"values: {named}, as NeXus has them, are not used, since CF's are there too")
+        notes.append(f"values: {named} of NeXus are not used, since CF's attributes are there too")
         return attributes, tuple(notes)
     slope = 1.0 if factor is None else factor[1]
     intercept = slope * (0.0 if offset is None else offset[1])
-    notes.append(f"values: {named} are applied as NeXus has them: (stored + offset) * factor")
+    notes.append(f"values: {named} are applied by NeXus's rule: (stored + offset) * factor")
     return {**attributes, "scale_factor": slope, "add_offset": intercept}, tuple(notes)
 
 
 def _number_beside(tree: Hdf5Tree, dataset: h5py.Dataset, name: str) -> tuple[str, float] | None:
-    """Return the name and the value of a number of NeXus for a dataset; None: there is none."""
+    """Return the name and the value of a NeXus number for a dataset; None: there is none."""
     group, own = dataset.parent, str(dataset.name).rpartition("/")[2]
     if not _is_nexus(tree, dataset):
         return None
@@ -71,6 +71,6 @@ def _number_beside(tree: Hdf5Tree, dataset: h5py.Dataset, name: str) -> tuple[st
 
 
 def _is_nexus(tree: Hdf5Tree, dataset: h5py.Dataset) -> bool:
-    """Return whether a dataset lies in a group of NeXus that holds data."""
+    """Return whether a dataset lies in a NeXus group that holds data."""
     kind = tree.attribute(dataset.parent, "NX_class")
     return isinstance(kind, str) and kind.strip() in ("NXdata", "NXdetector")

@@ -1,4 +1,4 @@
-"""Imaris, which is HDF5."""
+"""Imaris files, which are HDF5."""
 
 from stereocell.read.format import Format, Guide
 from stereocell.read.hdf5_file.signature import is_hdf5

@@ -1,8 +1,8 @@
-"""Imaris 5.5 (.ims): HDF5 with levels, time points and channels, read by h5py.
+"""Read Imaris 5.5 (.ims), HDF5 with levels, time points and channels, with h5py.
 
-The datasets are padded to whole chunks; the true size stands beside them (`ImageSizeX`), of the
-finest level in `DataSetInfo/Image` too. The extents there give the voxel spacing. Attributes are
-arrays of characters.
+Datasets are padded to whole chunks; their true size is in the attributes beside them (`ImageSizeX`)
+and, for the finest level, in `DataSetInfo/Image` too. The extents there give the voxel spacing.
+Attributes are arrays of characters.
 
 References: https://imaris.oxinst.com/support/imaris-file-format
 """
@@ -29,11 +29,11 @@ _MAX_LEVELS = 64
 _MAX_TIMES = 1_000_000
 _FINEST = "/DataSet/ResolutionLevel 0/TimePoint 0"
 _CHANNEL = re.compile(r"Channel \d+")
-_NO_NAME = "(name not specified)"  # Imaris's own
+_NO_NAME = "(name not specified)"  # Imaris writes this where a channel has no name
 
 
 class _Level:
-    """A level's voxels (t, c, z, y, x), without the padding; a dataset is opened on its first use.
+    """A level's voxels (t, c, z, y, x) without padding. A dataset is opened at its first use.
 
     find  returns the dataset of (time, channel)
     """
@@ -55,18 +55,19 @@ class _Level:
                 n < m for n, m in zip(found.shape, self.shape[2:], strict=True)
             ):
                 raise ValueError(
-                    f"time point {time}, channel {channel}: found {found.dtype} {found.shape}"
+                    f"time point {time}, channel {channel}: found {found.dtype} {found.shape}, "
+                    f"expected {self.dtype} {self.shape[2:]}"
                 )
             self._held[time, channel] = found
         return self._held[time, channel][tuple(place)]
 
 
 def read_image(location: Location) -> Image:
-    """Return the image of the file. Raises SourceError where it isn't one of Imaris 5.5."""
-    tree = Hdf5Tree(location, "an Imaris 5.5 file (HDF5), whole")
+    """Return the image of the file. Raises SourceError where it isn't an Imaris 5.5 file."""
+    tree = Hdf5Tree(location, "a complete Imaris 5.5 file (HDF5)")
     try:
-        # all of it asks h5py, which may fail at any name or attribute of a damaged file
-        with one_line(tree.where, "an Imaris 5.5 file (HDF5), whole"):
+        # h5py may fail at any name or attribute of a damaged file.
+        with one_line(tree.where, "a complete Imaris 5.5 file (HDF5)"):
             image = _image(tree)
             tree.end_texts()
             return image
@@ -100,7 +101,8 @@ def _image(tree: Hdf5Tree) -> Image:
 def _require_stated(tree: Hdf5Tree, times: int, channels: int) -> None:
     """Raise SourceError where the metadata state more time points or channels than the file has.
 
-    FileTimePoints counts those of this file; in a series of files DatasetTimePoints is larger.
+    FileTimePoints counts the time points of this file; in a series of files DatasetTimePoints is
+    larger.
     """
     info = tree.find("/DataSetInfo")
     names = set(info) if isinstance(info, h5py.Group) else set()
@@ -134,7 +136,7 @@ def _count(tree: Hdf5Tree, path: str, kind: str, most: int) -> int:
         )
     if not 0 < count <= most:
         raise SourceError(
-            f"{tree.where}: {path}: found {count} of {kind}, expected 1 to {most} as Imaris 5.5"
+            f"{tree.where}: {path}: found {count} groups {kind}, expected 1 to {most} in Imaris 5.5"
         )
     return count
 
@@ -144,7 +146,9 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
         path = f"/DataSet/ResolutionLevel {level}/TimePoint {time}/Channel {channel}/Data"
         node = tree.find(path)
         if not isinstance(node, h5py.Dataset) or len(node.shape or ()) != 3:
-            raise SourceError(f"{tree.where}: {path}: expected a dataset z, y, x")
+            raise SourceError(
+                f"{tree.where}: {path}: found no dataset, expected one with axes z, y, x"
+            )
         return Hdf5Array(node, f"{tree.where}: {path}")
 
     first = find(0, 0)
@@ -162,7 +166,7 @@ def _level(tree: Hdf5Tree, level: int, times: int, channels: int) -> VoxelArray:
 
 
 def _stated_size(tree: Hdf5Tree, level: int) -> list[float | None]:
-    """Return the voxels (z, y, x) of a level without its padding; None each: not stated."""
+    """Return the voxels (z, y, x) of a level without its padding; None for each one not stated."""
     group = f"/DataSet/ResolutionLevel {level}/TimePoint 0/Channel 0"
     stated = [_number(tree, group, f"ImageSize{axis}") for axis in "ZYX"]
     if level == 0 and None in stated:
@@ -173,7 +177,7 @@ def _stated_size(tree: Hdf5Tree, level: int) -> list[float | None]:
 def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> None:
     """Raise SourceError where the finest level is smaller than DataSetInfo states.
 
-    stated  sizes (z, y, x) beside the dataset
+    stated  sizes (z, y, x) in the attributes beside the dataset
     """
     for axis, own in zip("ZYX", stated, strict=True):
         whole = _number(tree, "/DataSetInfo/Image", axis)
@@ -185,7 +189,7 @@ def _require_size(tree: Hdf5Tree, group: str, stated: list[float | None]) -> Non
 
 
 def _number(tree: Hdf5Tree, path: str, name: str) -> float | None:
-    """Return a number of an attribute; None: there is none. Raises SourceError for another text."""
+    """Return a number from an attribute; None: absent. Raises SourceError for another text."""
     text = tree.attribute(tree.find(path), name)
     if text is None:
         return None

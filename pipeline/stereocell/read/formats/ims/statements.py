@@ -1,7 +1,7 @@
 """Compare the statements on the voxel spacing in `/DataSetInfo/Image` of an Imaris file.
 
 Imaris divides the extents by the size. The microscope's own spacing is in `RecordingEntry...`, in
-um; it differs where a user has corrected the extents, or where a converter has set one alone.
+um. It differs if a user has corrected the extents, or if a converter has set only one of them.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ _RECORDED = {
     "y": "RecordingEntryLineSpacing",
     "x": "RecordingEntrySampleSpacing",
 }
-_INDEX = {"z": 2, "y": 1, "x": 0}  # of ExtMin and ExtMax
+_INDEX = {"z": 2, "y": 1, "x": 0}  # number of each axis in ExtMin and ExtMax
 _SIZE = Subject("size of the image (ImageSizeZ, ImageSizeY, ImageSizeX)", "voxels")
 _UNIT = Subject("unit of length", remedy="--spacing-um z,y,x replaces the spacing")
 
@@ -22,15 +22,15 @@ _UNIT = Subject("unit of length", remedy="--spacing-um z,y,x replaces the spacin
 def settle_lengths(
     number: Callable[[str], float | None], unit: object, shape: Sequence[int]
 ) -> tuple[Triple | None, tuple[str, ...]]:
-    """Return the lengths (z, y, x) of the volume in um, and notes; None: they are not stated.
+    """Return the lengths (z, y, x) of the volume, um, and notes; None: they are not stated.
 
-    number  returns a number of an attribute of `/DataSetInfo/Image`; None: it is absent
-    unit    the attribute Unit; None: it is absent
+    number  returns a number from an attribute of `/DataSetInfo/Image`; None: it is absent
+    unit    value of the attribute Unit; None: it is absent
     shape   voxels (z, y, x)
     """
     notes: list[str] = []
     if unit is None:
-        assumed = settle(_UNIT, [Statement("um", "as Imaris has it", Trust.ASSUMED)])
+        assumed = settle(_UNIT, [Statement("um", "as in files of Imaris", Trust.ASSUMED)])
         unit, notes = str(assumed.value), list(assumed.notes)
     per = um_per(unit)
     found, lengths = [], []
@@ -48,29 +48,30 @@ def settle_lengths(
         notes += settled.notes
     if all(spacing == per for spacing in found):
         notes.append(
-            f"voxel spacing: found exactly 1 {unit} along all axes, which Imaris writes where it "
-            "knows none: is it known? (--spacing-um z,y,x replaces it)"
+            f"voxel spacing: found exactly 1 {unit} along all axes, which Imaris writes if it "
+            "knows no spacing: is it correct? (--spacing-um z,y,x replaces it)"
         )
     z, y, x = lengths
     return (z, y, x), tuple(notes)
 
 
 def size_notes(stated: Sequence[float | None], shape: Sequence[int]) -> tuple[str, ...]:
-    """Return a note where the size without padding is not stated.
+    """Return a note if the size without padding is not stated.
 
-    stated  voxels (z, y, x) of the finest level; None each: not stated
-    shape   the voxels that are read
+    stated  voxels (z, y, x) of the finest level; None for each one not stated
+    shape   voxels that are read
     """
     if None not in stated:
         return ()
-    taken = Statement(tuple(map(float, shape)), "as of the dataset with its padding", Trust.ASSUMED)
+    place = "the size of the dataset with its padding"
+    taken = Statement(tuple(map(float, shape)), place, Trust.ASSUMED)
     return settle(_SIZE, [taken]).notes
 
 
 def _along(
     number: Callable[[str], float | None], axis: str, size: int, length: float | None
 ) -> list[Statement]:
-    """Return the statements of the spacing along an axis, um; `length` is that of the extents."""
+    """Return the statements on the spacing along an axis, um. `length` is from the extents."""
     stated, recorded = number(axis.upper()), number(_RECORDED[axis])
     statements = []
     if length is not None:

@@ -1,7 +1,7 @@
-"""Leica LIF, by liffile (BSD; the extra `lif`). A file holds several images: series.
+"""Read Leica LIF with liffile (BSD; the extra `lif`). A file holds several images, or series.
 
-The images' names are what a person typed, and are not shown. Scan orders such as xzy are turned
-round by the axes' names. readlif, which bioio-lif stands on, is under GPL-3.0.
+A person typed the images' names, so they are never shown. Scan orders such as xzy are reordered by
+the names of the axes. readlif, the base of bioio-lif, is not used because it is under GPL-3.0.
 """
 
 import os
@@ -24,10 +24,10 @@ from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description behind it
-_ABOUT = struct.Struct("<BQBI")  # of a block: 0x2A, bytes of voxels, 0x2A, characters of its name
-_EARLY = struct.Struct("<BIBI")
-_MAX_NAME = 1000  # characters
+_BLOCK = struct.Struct("<2I")  # 0x70, and the length of the description that follows
+_ABOUT = struct.Struct("<BQBI")  # 0x2A, bytes of voxels, 0x2A, characters of the block's name
+_EARLY = struct.Struct("<BIBI")  # the same fields in early files, with 4 bytes for the length
+_MAX_NAME = 1000  # characters of a block's name
 _AGAIN = "copy or download it again"
 _MARK, _TEST = 0x70, 0x2A
 _MAX_BLOCKS = 100_000
@@ -51,7 +51,7 @@ _COLORS = {
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
-    """Return one image; 0 is the largest volume. Raises SourceError, UsageError for no such one."""
+    """Return one image; 0 is the largest volume. Raises SourceError and UsageError."""
     return read_chosen(location, series, _File, _image)
 
 
@@ -67,7 +67,7 @@ class _File:
         import liffile as library
 
         self.where = location.shown
-        with one_line(self.where, "a LIF file that is whole"):
+        with one_line(self.where, "a complete LIF file"):
             path = os.path.realpath(location.path)
             _require_whole(path, self.where)
             self.images: list[Any] = list(stack.enter_context(library.LifFile(path)).images)
@@ -80,10 +80,10 @@ class _File:
 
 
 def _require_whole(path: str, where: str) -> None:
-    """Raise SourceError where a block ends behind the end of the file, or two have the same name.
+    """Raise SourceError where the file ends within a block, or where two blocks have one name.
 
-    A file is a chain of blocks: first the XML, then voxels, each behind their length. The library
-    reads the last block of a name for all images that have it.
+    A file is a chain of blocks, each after its length: first the XML, then voxels. The library
+    would read the last block of a name for all images with that name.
     """
     size, at = os.path.getsize(path), 0
     names: set[bytes] = set()
@@ -107,14 +107,14 @@ def _require_whole(path: str, where: str) -> None:
                 names |= {name} if name else set()
             if end > size:
                 raise SourceError(
-                    f"{where}: cut short at byte {size} of {end} or more, expected a LIF file that "
-                    f"is whole ({_AGAIN})"
+                    f"{where}: cut short at byte {size} of {end} or more, expected a complete LIF "
+                    f"file ({_AGAIN})"
                 )
             at = end
 
 
 def _named_block(file: BinaryIO) -> tuple[int, bytes]:
-    """Return the length of a block's voxels, and its name; of an early file it has 4 bytes."""
+    """Return the length of a block's voxels and its name. Early files have a 4-byte length."""
     about = file.read(_ABOUT.size)
     if len(about) < _EARLY.size:
         return 0, b""
@@ -125,9 +125,9 @@ def _named_block(file: BinaryIO) -> tuple[int, bytes]:
 
 
 def _memory_notes(where: str, image: Any) -> tuple[str, ...]:
-    """Return a note where the file holds more of an image than the XML describes.
+    """Return a note if the file holds more of an image than the XML describes.
 
-    Raises SourceError where it holds less: the library would read on in the next image.
+    Raises SourceError if it holds less: the library would read on into the next image.
     """
     memory = image.xml_element.find("./Memory")
     stated = image.memory_block.size if memory is None else int(memory.get("Size", 0))
@@ -135,14 +135,14 @@ def _memory_notes(where: str, image: Any) -> tuple[str, ...]:
     if held < max(described, stated):
         raise SourceError(
             f"{where}: found {held} bytes of voxels, expected {max(described, stated)} as in the "
-            f"XML: the acquisition ended early, or the file is damaged ({_AGAIN}), or take "
+            f"XML: the acquisition ended early, or the file is damaged ({_AGAIN}), or choose "
             "another --series (`--series list` shows them)"
         )
     if described == held:
         return ()
     return (
         f"the XML describes {described} of {held} bytes of the image's voxels "
-        f"({described / held:.2%}): the others are left out",
+        f"({described / held:.2%}): the rest is left out",
     )
 
 
@@ -169,13 +169,13 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
     for axis, size in _other_axes(image).items():
         raise SourceError(
             f"{where}: found {size} {_OTHERS.get(axis, f'of axis {axis}')}, expected z, y, x, "
-            "channels and time: take another --series, or export it from LAS X"
+            "channels and time: choose another --series, or export it from LAS X"
         )
     missing = [axis for axis in "ZYX" if axis not in image.dims]
     if missing:
         raise SourceError(
             f"{where}: a volume needs at least 2 planes: found axes {', '.join(image.dims)}, "
-            "expected Z, Y, X: take another --series (`--series list` shows them)"
+            "expected Z, Y, X: choose another --series (`--series list` shows them)"
         )
     dims = tuple(image.dims)
 
@@ -185,13 +185,13 @@ def _image(file: _File, index: int, notes: tuple[str, ...], stack: ExitStack) ->
 
     axes = tuple(axis.lower() for axis in dims)
     array = VoxelArray(PlaneArray(image.shape, np.dtype(image.dtype), read), axes)
-    with one_line(where, "a LIF file whose XML fits its voxels"):
+    with one_line(where, "a LIF file whose XML describes its voxels"):
         notes = (*notes, *_memory_notes(where, image))
     if (count := array.size("c")) > MAX_CHANNELS:
         raise SourceError(f"{where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
     places = np.asarray(image.coords.get("Z", ()), float) * _UM_PER_METER
     if len(places) > 1:
-        notes = (*notes, *falling_notes("place along z", float(places[0]), float(places[-1])))
+        notes = (*notes, *falling_notes("position along z", float(places[0]), float(places[-1])))
     names, colors = _channels(image, count)
     spacing, more = settle_lengths(image)
     grid = Grid(array.shape, spacing)

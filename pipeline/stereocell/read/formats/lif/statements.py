@@ -1,8 +1,8 @@
-"""Compare the statements on the voxel spacing of an image of a LIF file.
+"""Compare the statements on the voxel spacing in an image of a LIF file.
 
 A dimension states its length between the first and the last voxel, with a unit, which LAS X writes
-as m. The scanner's own record repeats the spacing in m; it differs where a user has calibrated the
-length again, or where the stage has moved by another step.
+as m. The scanner's own record repeats the spacing in m. The two differ if a user has recalibrated
+the length, or if the stage has moved by another step.
 """
 
 import math
@@ -13,16 +13,16 @@ from stereocell.read.spacing import Triple, um_per
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _DIMENSIONS = "./Data/Image/ImageDescription/Dimensions/DimensionDescription"
-_ID = {"X": "1", "Y": "2", "Z": "3"}  # DimID of an axis
+_ID = {"X": "1", "Y": "2", "Z": "3"}  # DimID of each axis
 _RECORDED = {"X": ("dblVoxelX",), "Y": ("dblVoxelY",), "Z": ("dblVoxelZ", "dblStepSize")}
 _UM_PER_METER = 1e6
 _REMEDY = "--spacing-um z,y,x replaces it"
-# The share by which lengths differ that count the voxels of 200 or more, and not the steps.
+# Relative difference; lengths counted as 200 or more voxels instead of steps differ by less.
 _TOLERANCE = 5e-3
 
 
 def settle_lengths(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
-    """Return the spacing (z, y, x), um, and notes; None: it is not stated along each axis."""
+    """Return the spacing (z, y, x), um, and notes; None: not stated along every axis."""
     nodes = {str(node.get("DimID")): node for node in image.xml_element.findall(_DIMENSIONS)}
     found: list[float] = []
     notes: list[str] = []
@@ -33,7 +33,7 @@ def settle_lengths(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
         unit = str(node.get("Unit") or "")
         if not unit:
             subject = Subject(f"unit of length along {axis.lower()}", remedy=_REMEDY)
-            assumed = settle(subject, [Statement("m", "as LAS X has it", Trust.ASSUMED)])
+            assumed = settle(subject, [Statement("m", "as in files of LAS X", Trust.ASSUMED)])
             unit, notes = str(assumed.value), [*notes, *assumed.notes]
         steps, per = int(node.get("NumberOfElements", 0)) - 1, um_per(unit)
         first = _number(node.get("Origin"))
@@ -51,7 +51,7 @@ def settle_lengths(image: Any) -> tuple[Triple | None, tuple[str, ...]]:
 
 
 def _is_upright(dims: Sequence[str]) -> bool:
-    """Return whether the images are planes of x and y: the scanner's axes are theirs then."""
+    """Return whether the images are planes of x and y, so that the scanner's axes are theirs."""
     return [axis for axis in dims if axis in "ZYX"] == ["Z", "Y", "X"]
 
 
@@ -69,7 +69,7 @@ def _recorded(image: Any, axis: str) -> list[Statement]:
 
 
 def _number(text: str | None) -> float:
-    """Return a finite number; 0: it is none."""
+    """Return a finite number; 0: the text is not one."""
     try:
         number = float(text or "")
     except ValueError:

@@ -1,4 +1,4 @@
-"""MetaImage of ITK."""
+"""MetaImage, ITK's format."""
 
 from stereocell.read.format import Format, Guide
 from stereocell.read.image import Image

@@ -1,8 +1,8 @@
-"""The fields of a MetaImage header that are read, under all their names, and what they contradict.
+"""Read the fields of a MetaImage header under all their names, and note contradictions.
 
-A place, a matrix, a size and the byte order each have synonyms. Where several are there, the one is
-taken that ITK takes, which SimpleITK's reading of such files showed. ITK also takes the last line
-of a field that is there twice, and keeps the scale of a matrix whose rows are longer than 1.
+A position, a matrix, a size and the byte order each have synonyms. If several are given, this
+module uses the one that ITK uses, found by reading such files with SimpleITK. Like ITK, it uses the
+last line of a repeated field, and keeps the scale of a matrix whose rows are longer than 1.
 
 References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 """
@@ -23,7 +23,7 @@ from stereocell.storage.location import Location
 
 NAME = "MetaImage"
 _MAX_HEADER = 1 << 16  # bytes
-# field -> its names, the one that ITK prefers first
+# field -> its names, in ITK's order of preference
 _NAMES = {
     "Offset": ("Origin", "Position", "Offset"),
     "TransformMatrix": ("TransformMatrix", "Rotation", "Orientation"),
@@ -45,9 +45,9 @@ _OPPOSITE = dict(zip("RLAPIS", "LRPASI", strict=True))
 class Header:
     """The header of a file.
 
-    fields  text by the field's usual name
+    fields  texts by the fields' usual names
     end     length of the header in bytes
-    notes   contradictions between its fields
+    notes   notes on contradictions between the fields
     """
 
     fields: dict[str, str]
@@ -56,7 +56,7 @@ class Header:
 
 
 def read_header(location: Location) -> Header:
-    """Return the header of a file. Raises SourceError where it has no end."""
+    """Return the header of a file. Raises SourceError where the header doesn't end."""
     with one_line(location.shown, f"a {NAME} file"), open(location.path, "rb") as file:
         content = file.read(_MAX_HEADER)
     stated: list[tuple[str, str]] = []
@@ -74,13 +74,13 @@ def read_header(location: Location) -> Header:
             fields = {name: text for name, text in texts.items() if name not in _FIELD_OF}
             return Header(fields, end, (*notes, *_settle_names(texts, fields)))
     raise SourceError(
-        f"{location.shown}: header: no ElementDataFile in {len(content)} bytes, "
+        f"{location.shown}: header: found no ElementDataFile in {len(content)} bytes, "
         f"expected {NAME} (.mha, .mhd)"
     )
 
 
 def _settle_names(stated: dict[str, str], fields: dict[str, str]) -> tuple[str, ...]:
-    """Add the fields that have several names to `fields`; return a note for each contradiction."""
+    """Add the fields that have several names to `fields`, and return notes on contradictions."""
     notes: list[str] = []
     for field, names in _NAMES.items():
         statements = [
@@ -99,25 +99,25 @@ def _value(text: str) -> float | str | tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split())
     except ValueError:
-        return text.strip().lower()[:1]  # of a flag, as ITK reads it
+        return text.strip().lower()[:1]  # ITK reads only the first letter of a flag
 
 
 def require_dimensions(where: str, fields: dict[str, str], count: int) -> None:
-    """Raise SourceError where NDims is another number than that of the sizes."""
+    """Raise SourceError where NDims differs from the number of sizes."""
     stated = integers(where, fields, "NDims")
     if stated and stated[0] != count:
         raise SourceError(
-            f"{where}: NDims: found {stated[0]}, but DimSize has {count} numbers "
-            f"({fields['DimSize']:.60}), expected as many: correct the header"
+            f"{where}: NDims: found {stated[0]}, expected {count}, the number of sizes in DimSize "
+            f"({fields['DimSize']:.60}): correct the header"
         )
 
 
 def unit_mm(fields: dict[str, str]) -> tuple[float, tuple[str, ...]]:
-    """Return mm for each unit of lengths, and a note on a unit that is not known."""
+    """Return the length of a unit in mm, and a note on an unknown unit."""
     text = fields.get("DistanceUnits", "mm").strip().lower()
     if text in _UNITS_MM:
         return _UNITS_MM[text], ()
-    reason = f"since DistanceUnits {text!r:.20} is none of mm, um and cm"
+    reason = f"since DistanceUnits {text!r:.20} is not mm, um or cm"
     subject = Subject("unit of length", remedy="--spacing-um z,y,x replaces it")
     return 1.0, settle(subject, [Statement("mm", reason, Trust.ASSUMED)]).notes
 
@@ -125,7 +125,7 @@ def unit_mm(fields: dict[str, str]) -> tuple[float, tuple[str, ...]]:
 def scale_notes(
     spacing: Sequence[float], axes: NDArray[np.float64], mm_per_unit: float
 ) -> tuple[str, ...]:
-    """Return a note where the matrix has a scale, which multiplies the spacing.
+    """Return a note if the matrix has a scale, which multiplies the spacing.
 
     axes  (3, 3): a column for each stored axis
     """
@@ -139,10 +139,10 @@ def scale_notes(
     scaled = "TransformMatrix times ElementSpacing"
     statements = [
         Statement(tuple(lengths.tolist()), scaled),
-        Statement(own, "ElementSpacing alone", Trust.REPEATED),
+        Statement(own, "only ElementSpacing", Trust.REPEATED),
     ]
     notes = settle(subject, statements).notes
-    return tuple(f"{note} (ITK places voxels so)" for note in notes)
+    return tuple(f"{note} (as in ITK)" for note in notes)
 
 
 def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, ...]:
@@ -155,9 +155,10 @@ def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, 
     letters = fields.get("AnatomicalOrientation", "").strip().upper()
     is_stated = len(letters) == 3 and set(letters) <= set(_OPPOSITE)
     if "TransformMatrix" not in fields:
-        said = f", where AnatomicalOrientation states {letters}" if is_stated else ""
+        stated_sides = f"; AnatomicalOrientation states {letters}" if is_stated else ""
         return (
-            f"no TransformMatrix: which side is left is a guess, x to the patient's left{said}",
+            "no TransformMatrix: which side is left is a guess, x to the patient's left"
+            f"{stated_sides}",
         )
     affine = np.eye(4)
     affine[:3, :3] = np.diag([-1.0, -1.0, 1.0]) @ axes
@@ -174,7 +175,7 @@ def side_notes(fields: dict[str, str], axes: NDArray[np.float64]) -> tuple[str, 
 
 
 def value_notes(where: str, fields: dict[str, str]) -> tuple[str, ...]:
-    """Return a note where the header states a scale of values, which ITK does not apply."""
+    """Return a note if the header states a scale of values, which ITK does not apply."""
     names = ("ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset")
     slope, offset = (
         (numbers(where, fields, name, 1) or [default])[0]
@@ -183,18 +184,18 @@ def value_notes(where: str, fields: dict[str, str]) -> tuple[str, ...]:
     if (slope, offset) == (1.0, 0.0):
         return ()
     return (
-        f"values: {names[0]} {slope:g} and {names[1]} {offset:g} are not applied, as in ITK: read "
-        "as stored",
+        f"values: {names[0]} {slope:g} and {names[1]} {offset:g} are not applied, as in ITK: "
+        "voxels are read as stored",
     )
 
 
 def modality_of(fields: dict[str, str]) -> str:
-    """Return DICOM's code of the modality that the header states; empty: none."""
+    """Return DICOM's code for the modality that the header states; empty: none."""
     return _MODALITIES.get(fields.get("Modality", "").strip(), "")
 
 
 def integers(where: str, fields: dict[str, str], name: str) -> list[int]:
-    """Return a field's whole numbers; none: the field isn't there. Raises SourceError."""
+    """Return a field's whole numbers; empty: the field is absent. Raises SourceError."""
     values = numbers(where, fields, name) or []
     if not all(value.is_integer() and abs(value) < 1 << 40 for value in values):
         raise SourceError(f"{where}: {name}: found {fields[name]:.60}, expected whole numbers")
@@ -204,7 +205,7 @@ def integers(where: str, fields: dict[str, str], name: str) -> list[int]:
 def numbers(
     where: str, fields: dict[str, str], name: str, count: int | None = None
 ) -> list[float] | None:
-    """Return a field's numbers; None: the field isn't there. Raises SourceError."""
+    """Return a field's numbers; None: the field is absent. Raises SourceError."""
     if name not in fields:
         return None
     try:

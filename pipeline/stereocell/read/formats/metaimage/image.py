@@ -1,10 +1,10 @@
-"""MetaImage: .mha, and .mhd with its voxels in a file beside it.
+"""Read MetaImage: .mha, and .mhd with its voxels in a file beside it.
 
-The header is lines of `Key = value`, of which a short list is read (fields.py);
-others may identify a patient. As in ITK, `Offset` and the rows of `TransformMatrix` are of LPS, in
-mm unless `DistanceUnits` says otherwise, whatever `AnatomicalOrientation` says. SimpleITK (50 MB),
-which reads the format too, opens the file of the voxels without asking where it lies; the tests
-compare with it.
+The header is lines of `Key = value`. Only a short list of keys is read (fields.py), since others
+may identify a patient. As in ITK, `Offset` and the rows of `TransformMatrix` are in LPS, in mm
+unless `DistanceUnits` states otherwise, and `AnatomicalOrientation` changes nothing. SimpleITK
+(50 MB) reads the format too, but opens a file of voxels anywhere on the machine; the tests compare
+with it.
 
 References: https://itk.org/Wiki/ITK/MetaIO/Documentation
 """
@@ -79,7 +79,7 @@ def read_image(location: Location) -> Image:
 def _array(
     location: Location, fields: dict[str, str], end: int, shape: tuple[int, ...]
 ) -> StoredArray:
-    """Return the voxels, which lie behind the header or in a file beside it."""
+    """Return the voxels, which follow the header or lie in a file beside it."""
     where, stated = location.shown, fields.get("ElementType", "")
     kind = _TYPES.get(stated.removesuffix("_ARRAY"))
     if kind is None:
@@ -88,14 +88,16 @@ def _array(
             f"{', '.join(_TYPES)}"
         )
     if not _flag(fields, "BinaryData", True):
-        raise SourceError(f"{where}: BinaryData: found False (text), expected True: write it anew")
+        raise SourceError(
+            f"{where}: BinaryData: found False (text), expected True: save it again as binary"
+        )
     dtype = np.dtype((">" if _flag(fields, "BinaryDataByteOrderMSB", False) else "<") + kind)
     named = fields["ElementDataFile"]
     path = os.path.realpath(location.path)
     if named.upper() != "LOCAL":
         if named.upper().startswith("LIST") or "%" in named:
             raise SourceError(
-                f"{where}: ElementDataFile: found a list of files, expected one: write it anew as "
+                f"{where}: ElementDataFile: found a list of files, expected one: save it again as "
                 ".mha"
             )
         path, end = os.path.join(os.path.dirname(path), named), 0
@@ -108,7 +110,7 @@ def _array(
         load = partial(unpack_array, path, shape, dtype, "zlib", end)
         return PackedArray(shape, dtype, load)
     skip = (integers(location.shown, fields, "HeaderSize") or [0])[0]
-    if skip < 0:  # the voxels are the last bytes of the file
+    if skip < 0:  # the voxels are then the last bytes of the file
         skip = max(0, os.path.getsize(path) - math.prod(shape) * dtype.itemsize)
         end = 0
     return FileArray(path, shape, dtype, end + skip, where)
@@ -127,14 +129,16 @@ def _affine(
         )
     turned = np.eye(n) if matrix is None else np.array(matrix).reshape(n, n)
     affine = np.eye(4)
-    affine[:3, :3] = turned[:3, :3].T * np.array(spacing[:3])  # a row for each axis of the image
+    # a row of the matrix for each axis of the image
+    affine[:3, :3] = turned[:3, :3].T * np.array(spacing[:3])
     affine[:3, 3], origin_notes = settle_origin("Offset", numbers(where, fields, "Offset", n))
     per, unit_notes = unit_mm(fields)
     affine[:3] *= per
     lengths = np.linalg.norm(affine[:3, :3], axis=0)
     axes = turned[:3, :3].T
     notes = [*header.notes, *unit_notes, *side_notes(fields, axes)]
-    notes += origin_notes if matrix is not None else ()  # else it lies in no patient
+    # without a matrix the image is not placed in a patient
+    notes += origin_notes if matrix is not None else ()
     notes += scale_notes(spacing[:3], axes, per)
     return affine, (*notes, *value_notes(where, fields), *size_notes(lengths.tolist(), shape[:3]))
 

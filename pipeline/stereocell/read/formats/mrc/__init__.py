@@ -14,7 +14,7 @@ def _open(location: Location) -> Image:
 
 
 def _is_unmarked(_path: str, head: bytes) -> bool:
-    """Before 2000 the format had no mark. Packed files are taken, too."""
+    """Return whether a file may be MRC without a mark: before 2000, or compressed."""
     content = identify(head)
     return not content.is_known or content.format == "mrc.gz" or head.startswith(b"BZh")
 

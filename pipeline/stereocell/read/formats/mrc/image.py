@@ -1,8 +1,8 @@
-"""MRC and CCP4 maps (.mrc, .rec, .map), plain or packed by gzip or bzip2; mrcfile reads the header.
+"""Read MRC and CCP4 maps (.mrc, .rec, .map), plain or compressed, with headers from mrcfile.
 
 The voxel size is in Angstrom. Columns, rows and sections lie along any axes (MAPC, MAPR, MAPS). The
-first row is the lowest: y grows upwards and the axes are right-handed. So y is turned round, as in
-pictures that IMOD writes, and a molecule keeps its hand. The labels are free text and are not read.
+first row is the lowest: y grows upwards, and the axes are right-handed. So y is reversed, as in
+images that IMOD writes, and a molecule keeps its hand. Labels are free text and are not read.
 
 References: https://www.ccpem.ac.uk/mrc-format/mrc2014/, and IMOD's `imodStamp` for signed bytes.
 """
@@ -34,7 +34,7 @@ from stereocell.read.spacing import Grid
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_HEADER = 1024  # bytes; an extended header of `nsymbt` follows
+_HEADER = 1024  # bytes; an extended header of `nsymbt` bytes follows
 _MAGIC = {b"\x1f\x8b": "gzip", b"BZ": "bzip2"}
 
 
@@ -49,19 +49,23 @@ def read_image(location: Location) -> Image:
         order, order_notes = settle_order(header)
         offset = _HEADER + int(header["nsymbt"])
     if min(shape) < 1 or offset < _HEADER:
-        raise SourceError(f"{where}: size (z, y, x): found {shape}, expected voxels")
+        raise SourceError(
+            f"{where}: size (z, y, x): found {shape}, expected at least one voxel along each axis"
+        )
     if dtype.kind == "c":
-        raise SourceError(f"{where}: mode: found {int(header['mode'])} (complex), expected numbers")
+        raise SourceError(
+            f"{where}: mode: found {int(header['mode'])} (complex), expected real numbers"
+        )
     if sorted(order) != [1, 2, 3]:
         raise SourceError(f"{where}: MAPS, MAPR, MAPC: found {order}, expected 1, 2 and 3")
     group, sampling = int(header["ispg"]), int(header["mz"])
     count = volumes_of(header)
     is_stack = count == 1 and (group == STACK_OF_VOLUMES or (group == 0 and sampling == 1))
     kind = {STACK_OF_VOLUMES: "volumes"}.get(group, "images")
-    notes = [f"the header says a stack of {kind}: taken for one volume"] if is_stack else []
+    notes = [f"the header states a stack of {kind}: read as one volume"] if is_stack else []
     if count > 1:
         notes.append(
-            f"the header says a stack of {count} volumes of {sampling} sections (mz): --time "
+            f"the header states a stack of {count} volumes of {sampling} sections (mz): --time "
             "counts them"
         )
         shape = (count, sampling, *shape[1:])
@@ -87,16 +91,16 @@ def read_image(location: Location) -> Image:
 
 
 def _header(path: str) -> tuple[Any, str, Any]:
-    """Return the header, how the file is packed, and the extended header; None: it has none.
+    """Return the header, how the file is compressed, and the extended header; None: it has none.
 
     Raises ValueError where the file isn't MRC.
     """
     with open(path, "rb") as file:
         packing = _MAGIC.get(file.read(2), "")
     if not packing and (size := os.path.getsize(path)) < _HEADER:
-        raise ValueError(f"cut short at byte {size}: a header has {_HEADER}")
+        raise ValueError(f"cut short at byte {size}: a header has {_HEADER} bytes")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # on what permits reading all the same
+        warnings.simplefilter("ignore")  # warnings about faults that don't prevent reading
         with mrcfile.open(path, permissive=True, header_only=True) as opened:
             header, extended = opened.header, opened.extended_header
     if header is None or not (bytes(header["map"]).startswith(b"MAP") or _has_size(path, header)):
@@ -105,7 +109,7 @@ def _header(path: str) -> tuple[Any, str, Any]:
 
 
 def _has_size(path: str, header: Any) -> bool:
-    """Whether a file has the size that its header tells: the format before 2000 has no mark."""
+    """Return whether a file's size agrees with its header, since files before 2000 have no mark."""
     count = math.prod(int(header[name]) for name in ("nx", "ny", "nz"))
     expected = _HEADER + int(header["nsymbt"]) + count * data_dtype_from_header(header).itemsize
     return count > 0 and os.path.getsize(path) == expected

@@ -1,9 +1,10 @@
-"""Compare the statements of an MRC header on the voxel spacing and on the sign of bytes.
+"""Compare the statements in an MRC header on the voxel spacing and on the sign of bytes.
 
-The spacing is the cell's length by the sampling of the cell (`mx`, `my`, `mz`). Some writers leave
-another sampling behind, such as that of the stack that a part was cut out of, so the spacing by the
-number of voxels is compared with it. Bytes of mode 0 have a sign in MRC2014, had none in IMOD and
-in older programs; IMOD's flag, the range of the densities and the format's version tell.
+The spacing is the length of the cell divided by its sampling (`mx`, `my`, `mz`). Some writers leave
+an old sampling in the header, such as that of the stack from which a part was cut. So the spacing
+is compared with the length divided by the number of voxels. Bytes of mode 0 are signed in MRC2014
+and were unsigned in IMOD and older programs. IMOD's flag, the range of the densities and the
+version of the format decide.
 """
 
 from typing import Any
@@ -25,7 +26,7 @@ _AXES = "zyx"
 _ORDER = Subject("axes of columns, rows and sections (MAPC, MAPR, MAPS)")
 _SIGN = Subject("bytes of mode 0")
 _RIGHT_ANGLE = 90.0  # degrees
-_MIN_SKEW = 0.01  # degrees; a smaller difference is rounding
+_MIN_SKEW = 0.01  # degrees; a smaller difference is due to rounding
 STACK_OF_VOLUMES = 401  # space group
 
 
@@ -35,7 +36,7 @@ def settle_spacing(
     """Return the spacing (z, y, x), um, and notes; None: the header states no cell or sampling.
 
     extended  bytes of the extended header; None: there are none
-    is_stack  whether the header says that the planes are a stack of images, whose `mz` is 1
+    is_stack  whether the header states a stack of images, which has an `mz` of 1
     """
     cell = [float(header["cella"][axis]) for axis in _AXES]
     counts = [int(header[f"m{axis}"]) for axis in _AXES]
@@ -61,21 +62,21 @@ def settle_spacing(
         notes += settled.notes
     if all(length == count for length, count in zip(cell, counts, strict=True)):
         notes.append(
-            "voxel spacing: found exactly 1 Angstrom along all axes, which programs write that "
-            "know none: is it known? (--spacing-um z,y,x replaces it)"
+            "voxel spacing: found exactly 1 Angstrom along all axes, which programs write if they "
+            "know no spacing: is it correct? (--spacing-um z,y,x replaces it)"
         )
     z, y, x = found
     return (z, y, x), tuple(notes)
 
 
 def _is_like_pixels(cell: list[float], counts: list[int]) -> bool:
-    """Whether the step along z is as long as the pixels are wide, up to a factor of 10."""
+    """Return whether the step along z is like the width of the pixels, up to a factor of 10."""
     step, *wide = (length / count for length, count in zip(cell, counts, strict=True))
     return min(wide) / 10 <= step <= max(wide) * 10
 
 
 def _camera_spacing(header: Any, extended: Any) -> dict[str, float]:
-    """Return the pixel size along x and y, Angstrom, of FEI's extended header; {}: it has none."""
+    """Return the pixel size along x and y, Angstrom, from FEI's extended header; {}: none."""
     if extended is None or bytes(header["exttyp"]) not in (b"FEI1", b"FEI2"):
         return {}
     order = header.dtype["nx"].str[0].replace("|", "=")
@@ -93,7 +94,7 @@ def _camera_spacing(header: Any, extended: Any) -> dict[str, float]:
 
 
 def _sizes(header: Any) -> list[int]:
-    """Return the voxels along z, y and x of the cell, wherever they lie in the file."""
+    """Return the voxels along z, y and x of the cell, in any order of axes in the file."""
     order = [int(header[name]) for name in ("mapc", "mapr", "maps")]
     if sorted(order) != [1, 2, 3]:
         order = [1, 2, 3]
@@ -103,9 +104,9 @@ def _sizes(header: Any) -> list[int]:
 
 
 def volumes_of(header: Any) -> int:
-    """Return the number of volumes in a stack of them, one behind the other along z; else 1.
+    """Return the number of volumes in a stack of volumes along z; 1: it is not such a stack.
 
-    MRC2014 gives such a stack the space group 401 and the sections of one volume as `mz`.
+    MRC2014 gives such a stack the space group 401; `mz` is the number of sections of one volume.
     """
     sections, sampling = int(header["nz"]), int(header["mz"])
     is_stack = int(header["ispg"]) == STACK_OF_VOLUMES and int(header["maps"]) in (0, 3)
@@ -124,19 +125,19 @@ def settle_order(header: Any) -> tuple[list[int], tuple[str, ...]]:
 
 
 def angle_notes(header: Any) -> tuple[str, ...]:
-    """Return a note where the axes of the cell are not at right angles; 0: not stated."""
+    """Return a note if the axes of the cell are not at right angles; 0: not stated."""
     angles = [float(header["cellb"][name]) for name in ("alpha", "beta", "gamma")]
     if not any(angles) or all(abs(angle - _RIGHT_ANGLE) <= _MIN_SKEW for angle in angles):
         return ()
     shown = ", ".join(f"{angle:g}" for angle in angles)
     return (
         f"cell angles (cellb): found {shown} degrees, expected 90 each: the voxels are shown at "
-        "right angles, so the shape is sheared",
+        "right angles, which shears the shape",
     )
 
 
 def settle_sign(header: Any) -> tuple[bool, tuple[str, ...]]:
-    """Return whether bytes have a sign, and notes."""
+    """Return whether bytes are signed, and notes."""
     least, largest = float(header["dmin"]), float(header["dmax"])
     statements = [Statement("signed", "as MRC2014 defines them", Trust.ASSUMED)]
     if int(header["nversion"]) >= _FIRST_OF_2014:
@@ -152,7 +153,7 @@ def settle_sign(header: Any) -> tuple[bool, tuple[str, ...]]:
 
 
 def _imod_flag(header: Any) -> bool | None:
-    """Return IMOD's flag of signed bytes; None: IMOD did not write the file.
+    """Return IMOD's flag for signed bytes; None: IMOD did not write the file.
 
     IMOD's stamp and flags are two 32-bit numbers in MRC2014's `extra2`, at bytes 152 and 156.
     """

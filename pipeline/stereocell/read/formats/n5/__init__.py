@@ -17,7 +17,7 @@ def _open(location: Location, *, axes: str = "") -> Image:
 
 
 def _holds(location: Location) -> bool:
-    """No other format has an `attributes.json`."""
+    """Return whether a folder has an `attributes.json`, which no other format has."""
     return os.path.exists(f"{location.source}/attributes.json")
 
 

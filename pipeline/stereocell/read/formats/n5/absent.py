@@ -21,7 +21,7 @@ def count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None
     if not hasattr(stored, "path_of") or number_of(stored.chunks, spans) > MOST_COUNTED:
         return None
     names = states.names()
-    # Under BigDataViewer's XML the files lie beside the source, not below it.
+    # With BigDataViewer's XML as the source, the files lie beside it, not below it.
     outside = "" if stored.folder == states.location.source else f"{stored.folder.lstrip('/')}/"
     paths = (outside + stored.path_of(place) for place in places_of(stored.chunks, spans))
     return count_keys(paths, names, "block", 0)

@@ -1,7 +1,7 @@
 """Decode a block of N5: its header and codecs. A block that unpacks to much more is refused.
 
-The header is of big-endian numbers: mode (16 bits; 0: dense), number of dimensions (16), the size
-along each (32), fastest first. Blocks at the edge are smaller than `blockSize`.
+The header consists of big-endian numbers: mode (16 bits; 0: dense), number of dimensions (16), and
+the size along each (32), fastest first. Blocks at the edge are smaller than `blockSize`.
 """
 
 import math
@@ -19,10 +19,11 @@ from stereocell.read.packed_stream import PACKINGS, unpack
 _MOST_BEHIND = 1 << 20  # bytes that a block may unpack to beyond its voxels
 _LZ4_HEADER = struct.Struct("<8sBiii")  # magic, token, packed and unpacked bytes, checksum
 _LZ4_MAGIC = b"LZ4Block"
-_LZ4_RAW = 0x10  # token of a part that is stored as it is
-_LZ4_SEED, _LZ4_BITS = 0x9747B28C, 0x0FFFFFFF  # of the checksum: XXH32 of the unpacked bytes
-_ZSTD_UNKNOWN = 1 << 62  # sizes from here on mean that a frame states none
-_BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: unpacked, of a block, packed
+_LZ4_RAW = 0x10  # token of a part that is stored uncompressed
+# seed and used bits of the checksum, the XXH32 of the unpacked bytes
+_LZ4_SEED, _LZ4_BITS = 0x9747B28C, 0x0FFFFFFF
+_ZSTD_UNKNOWN = 1 << 62  # larger sizes mean that a frame states none
+_BLOSC_HEADER = struct.Struct("<4B3I")  # last three, in bytes: unpacked, of a block, packed
 
 
 def unpack_block(
@@ -34,20 +35,23 @@ def unpack_block(
 ) -> NDArray[Any]:
     """Return a block's voxels, axes slowest first.
 
-    least    the size of the part of the dataset at the block's place, slowest first
-    most     the largest block's size
-    packing  `compression` of the attributes
+    least    size of the part of the dataset at the block's place, slowest first
+    most     size of the largest block
+    packing  `compression` in the attributes
 
     Raises OSError, ValueError or a codec's error for damage, struct.error for a header cut short.
     """
     mode, dimensions = struct.unpack_from(">HH", content)
     if mode != 0 or dimensions != len(most):
-        raise OSError(f"a block of mode {mode} and {dimensions} dimensions, not 0 and {len(most)}")
+        raise OSError(
+            f"found a block of mode {mode} with {dimensions} dimensions, not of mode 0 with "
+            f"{len(most)}"
+        )
     shape = struct.unpack_from(f">{dimensions}I", content, 4)[::-1]
     if any(n > m for n, m in zip(shape, most, strict=True)):
-        raise OSError(f"a block of {shape} voxels, over the {tuple(most)} of its attributes")
+        raise OSError(f"found a block of {shape} voxels, more than {tuple(most)}")
     if any(n < m for n, m in zip(shape, least, strict=True)):
-        raise OSError(f"a block of {shape} voxels, fewer than the {tuple(least)} of its place")
+        raise OSError(f"found a block of {shape} voxels, fewer than {tuple(least)}")
     size = math.prod(shape) * dtype.itemsize
     found = _unpack(content[4 + 4 * dimensions :], size, packing)
     if len(found) < size:
@@ -68,26 +72,26 @@ def _unpack(data: bytes, size: int, packing: Mapping[str, Any]) -> bytes:
     if kind == "blosc":
         *_, unpacked, _, packed = _BLOSC_HEADER.unpack_from(data)
         if unpacked > size or packed > len(data):
-            raise OSError(f"a block of {unpacked} bytes, {size} are expected, or cut short")
+            raise OSError(f"found a block of {unpacked} bytes, not {size}, or cut short")
         return bytes(blosc.decompress(data))
     if kind == "lz4":
         return _unpack_lz4(data, size)
-    raise OSError(f"compression {kind!r:.40}, not raw, gzip, bzip2, xz, zstd, blosc or lz4")
+    raise OSError(f"compression: found {kind!r:.40}, not raw, gzip, bzip2, xz, zstd, blosc or lz4")
 
 
 def _unpack_zstd(data: bytes, size: int) -> bytes:
-    """Return the content of a frame, which may not state its size: Java's streams don't."""
+    """Return the content of a frame, whose size may not be stated: Java's streams don't."""
     stated: int = zstandard.get_frame_parameters(data).content_size
     if size < stated < _ZSTD_UNKNOWN:
-        raise OSError(f"a block of {stated} bytes, {size} are expected")
+        raise OSError(f"found a block of {stated} bytes, not {size}")
     if stated < _ZSTD_UNKNOWN:
         return zstandard.ZstdDecompressor().decompress(data)
     return zstandard.ZstdDecompressor().stream_reader(data).read(size + _MOST_BEHIND)
 
 
 def _unpack_lz4(data: bytes, size: int) -> bytes:
-    """Return the content of Java's LZ4BlockOutputStream, a run of packed parts."""
-    from stereocell.kernels.xxhash import xxh32  # numba takes long to import
+    """Return the content of Java's LZ4BlockOutputStream, a sequence of compressed parts."""
+    from stereocell.kernels.xxhash import xxh32  # imported here, since numba is slow to import
 
     parts, left, at = [], size, 0
     while left > 0:
@@ -102,8 +106,8 @@ def _unpack_lz4(data: bytes, size: int) -> bytes:
             raise OSError("a block is damaged: its checksum differs")
         parts.append(part)
         left, at = left - unpacked, at + packed
-    if at < len(data):  # the mark of the end, an empty part
+    if at < len(data):  # an empty part marks the end
         magic, _, packed, unpacked, _ = _LZ4_HEADER.unpack_from(data, at)
         if magic != _LZ4_MAGIC or packed or unpacked:
-            raise OSError("a block is damaged behind its voxels")
+            raise OSError("a block is damaged after its voxels")
     return b"".join(parts)

@@ -1,4 +1,4 @@
-"""The files of an N5 container, on this machine or at an address: none outside the source."""
+"""Read files of an N5 container, on this machine or at an address, and none outside the source."""
 
 import os
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ from stereocell.storage.first_bytes import pointer_words
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own, require_own_key
 
-_MAX_BYTES = 64 << 20  # most bytes of a file of attributes that are read
-_MAX_FOLDERS = 10_000  # most folders that a search for datasets visits
+_MAX_BYTES = 64 << 20  # bytes of a file of attributes that are read
+_MAX_FOLDERS = 10_000  # folders that a search for datasets visits
 _NAME = "attributes.json"
 
 
 class N5Files:
-    """Reads files below a source. `where` is its name for messages."""
+    """Reads files below a source. `where` is the source's name for messages."""
 
     def __init__(self, location: Location) -> None:
         self.where = location.shown
@@ -37,7 +37,7 @@ class N5Files:
         return self._location.source
 
     def read(self, path: str) -> bytes | None:
-        """Return a file's content; None: there is none. Raises OSError, or SourceError."""
+        """Return a file's content; None: there is no such file. Raises OSError or SourceError."""
         named = f"{self.where}: {path!r:.200}"
         if self._folder is not None:
             file = f"{self._location.source}/{path}"
@@ -58,7 +58,10 @@ class N5Files:
         return content
 
     def address(self, path: str) -> str:
-        """Return the folder of a dataset; for `http`, which can't list it, its attributes' file."""
+        """Return the folder of a dataset, or, over `http`, its file of attributes.
+
+        A folder can't be listed over `http`.
+        """
         folder = f"{self._location.source.rstrip('/')}/{path}".rstrip("/")
         is_listed = not self._location.source.startswith("http")
         return folder if is_listed else f"{folder}/{_NAME}"

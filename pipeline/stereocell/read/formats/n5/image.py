@@ -1,11 +1,11 @@
-"""N5: a dataset, a pyramid `s0`, `s1`, ..., or a container of BigDataViewer, a block at a time.
+"""Read N5 block by block: a dataset, a pyramid `s0`, `s1`, ..., or a BigDataViewer container.
 
-zarr-python has dropped N5 since version 3, and tensorstore (20 MB), which has it, opens every file
-below the source wherever a link leads and unpacks a block of any size. A block is simple: a header
-of 16-bit and 32-bit numbers, then one of the usual codecs. So it is read here.
+zarr-python reads no N5 since version 3. tensorstore (20 MB) does, but it opens every file below the
+source wherever a link leads, and unpacks blocks of any size. A block is simple: a header of 16-bit
+and 32-bit numbers, then one of the usual codecs. So this package decodes it itself.
 
-N5 names axes fastest first, and its blocks' paths as well; here all is turned round to z, y, x. An
-absent block is 0.
+N5 lists axes fastest first, also in the paths of its blocks; here everything is reversed to z, y,
+x. An absent block is 0.
 
 References: https://github.com/saalfeldlab/n5 (the specification in its README)
 """
@@ -66,7 +66,7 @@ class N5Array:
         self._files, self._path = files, path
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
-        """Return voxels by whole numbers, and slices of step 1 that lie inside."""
+        """Return the voxels at whole numbers and slices; slices have step 1 and lie inside."""
         bounds = [
             part.indices(size)[:2] if isinstance(part, slice) else (int(part), int(part) + 1)
             for part, size in zip(key, self.shape, strict=True)
@@ -88,7 +88,7 @@ class N5Array:
 
     @property
     def folder(self) -> str:
-        """The source, below which the paths of blocks lie."""
+        """The path or address of the container, to which the paths of blocks are relative."""
         return self._files.source
 
     def path_of(self, index: Sequence[int]) -> str:
@@ -100,7 +100,7 @@ class N5Array:
         content = self._files.read(path)
         if content is None:
             if self._files.read(f"{self._path}/attributes.json".lstrip("/")) is None:
-                raise OSError("attributes.json is gone since it was opened")
+                raise OSError("attributes.json was removed after it was opened")
             return None
         try:
             triples = zip(index, self.chunks, self.shape, strict=True)
@@ -111,12 +111,12 @@ class N5Array:
 
 
 def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str = "") -> Image:
-    """Return the image of a dataset, a pyramid or a container. Raises SourceError, UsageError.
+    """Return the image of a dataset, a pyramid or a container. Raises SourceError and UsageError.
 
-    series, xml  a view of BigDataViewer and the XML that lists it, where the XML was named
+    series, xml  number of a BigDataViewer view, and path of the XML if the user named it
     """
     if location.is_local and not os.path.isdir(location.source):
-        raise SourceError(f"{location.shown}: is a file, expected a folder of N5")
+        raise SourceError(f"{location.shown}: found a file, expected a folder of N5")
     files = N5Files(location)
     attributes = files.attributes("")
     if "dimensions" in attributes:
@@ -143,8 +143,8 @@ def read_image(location: Location, *, axes: str = "", series: int = 0, xml: str 
         return _pyramid(files, attributes, [(found[0], files.attributes(found[0]))], axes)
     if not found:
         raise SourceError(
-            f"{files.where}: no dataset: found no attributes.json with `dimensions`, expected one, "
-            "or s0 below"
+            f"{files.where}: no dataset: found no attributes.json with `dimensions`, expected one "
+            "here or in s0 below"
         )
     labels = {f"/{path}": path for path in found}
     raise SeveralDatasetsError.of(files.where, files.where, labels, most=_LISTED)
@@ -173,7 +173,10 @@ def _pyramid(
     stated = named_axes(finest, group)
     names, notes = settle_stated_axes(files.where, shape, axes, stated)
     if any(len(array.shape) != len(names) for array in arrays):
-        raise SourceError(f"{files.where}: levels: expected {len(names)} dimensions in each")
+        raise SourceError(
+            f"{files.where}: levels: found different numbers of dimensions, expected {len(names)} "
+            "in each"
+        )
     valued = [scaled(files.where, array, finest) for array in arrays]
     voxels = tuple(VoxelArray(array, names) for array, _ in valued)
     if (count := voxels[0].size("c")) > MAX_CHANNELS:
@@ -197,10 +200,10 @@ def _container(
 ) -> Image:
     """Return the image of a view in BigDataViewer's container: its setups are channels.
 
-    folders    the folders of the setups, by number, each with a slash at its end
-    described  the setups and time points of the XML
-    view       number of the view as the XML lists them, from 1 (0: the largest), and the path of
-               the XML that the user named
+    folders    folders of the setups, by number, each with a final slash
+    described  setups and time points of the XML
+    view       number of the view as listed in the XML, from 1 (0: the largest), and the path of the
+               XML that the user named
     """
     times = sorted({time for folder in folders.values() for time in _times(files, folder)})
     described.require_views(files.where, list(folders), times)
@@ -234,7 +237,7 @@ def _common_levels(
 ) -> tuple[list[tuple[str, Mapping[str, Any]]], tuple[str, ...]]:
     """Return the levels of the first setup that all setups have, and notes.
 
-    taken  the views that are there, as pairs of time point and setup
+    taken  views that were taken, as pairs of time point and setup
 
     Raises SourceError where a setup lacks levels that its attributes count.
     """
@@ -248,7 +251,7 @@ def _common_levels(
         if isinstance(factors, list) and len(factors) > len(levels):
             raise SourceError(
                 f"{files.where}: {folders[number]}: found {len(levels)} levels, expected "
-                f"{len(factors)} as downsamplingFactors: a part is missing: copy it again"
+                f"{len(factors)}, as in downsamplingFactors: a part is missing: copy it again"
             )
         every.append(levels)
     fewest, notes = common_levels([len(levels) for levels in every])

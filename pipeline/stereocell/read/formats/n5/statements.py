@@ -1,14 +1,14 @@
-"""The axes and the voxel spacing of an N5 dataset, by every field that states them.
+"""Find the axes and the voxel spacing of an N5 dataset in every field that states them.
 
 | field | axes | spacing |
 |---|---|---|
-| `axes` | fastest first, as all of N5 | |
+| `axes` | fastest first, as everything in N5 | |
 | `_ARRAY_DIMENSIONS`, `axis_names` and others, as Python writes them | slowest first | |
 | `pixelResolution`, `resolution` with `units` | | fastest first |
 | `transform` of COSEM | slowest first | in this order |
 
-COSEM's stands on the dataset, or in the group's `multiscales`. Fields of the dataset go
-before those of the group around it.
+COSEM's `transform` is an attribute of the dataset, or part of the group's `multiscales`. Fields of
+the dataset take precedence over those of the group around it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ _SLOWEST_FIRST = ("x", "y", "z")  # axes, slowest first, if `axes` lists z, y, x
 
 
 def named_axes(level: Attributes, group: Attributes) -> list[Statement]:
-    """Return the names of a dataset's axes, slowest first, by each field that names them."""
+    """Return the names of a dataset's axes, slowest first, for each field that names them."""
     found = []
     rank = len(numbers_of(level.get("dimensions")))
     for attributes, place, trust in (
@@ -48,7 +48,7 @@ def named_axes(level: Attributes, group: Attributes) -> list[Statement]:
 
 
 def order_note(stated: Sequence[Statement], axes: Sequence[str], given: str) -> tuple[str, ...]:
-    """Return a note where `axes` lists z first, which N5 takes for the fastest axis.
+    """Return a note if `axes` lists z first, since N5 lists the fastest axis first.
 
     given  the user's `--axes`
     """
@@ -66,9 +66,9 @@ def order_note(stated: Sequence[Statement], axes: Sequence[str], given: str) -> 
 def settle_spacing(
     level: Attributes, group: Attributes, axes: Sequence[str]
 ) -> tuple[Triple | None, tuple[str, ...]]:
-    """Return the spacing (z, y, x), um, of the finest level, None: not stated; and notes.
+    """Return the spacing (z, y, x) of the finest level, um (None: not stated), and notes.
 
-    axes  of the dataset, slowest first
+    axes  names of the dataset's axes, slowest first
     """
     spacings = AxisSpacings(axes)
     for transform, place, trust in _transforms(level, group):

@@ -1,4 +1,4 @@
-"""ND2 of Nikon."""
+"""Nikon's ND2."""
 
 from stereocell.read.format import Format, Guide, Library
 from stereocell.read.image import Image
@@ -19,7 +19,7 @@ def _list_series(location: Location) -> tuple[str, ...]:
 
 
 def _is_old(_path: str, head: bytes) -> bool:
-    """Before 2006 the format was JPEG 2000."""
+    """Return whether a file is JPEG 2000, as ND2 was before 2006."""
     return head.startswith(b"\0\0\0\x0cjP  ")
 
 

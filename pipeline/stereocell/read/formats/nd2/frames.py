@@ -1,11 +1,11 @@
-"""The frames of an ND2 file, by the map of chunks at its end.
+"""Check the frames of an ND2 file with the map of chunks at the end of the file.
 
-The library nd2 returns zeros for a frame that the map does not list, and for one beyond the file's
-end. It also reads a frame that is not compressed without a look at the chunk's own header. So each
-frame is compared with the map and with its header before it is read.
+The library nd2 returns zeros for a frame that the map does not list, and for one beyond the end of
+the file. It reads an uncompressed frame without checking the chunk's own header. So each frame is
+compared with the map and with its header before it is read.
 
-A file of version 2 or later is a chain of chunks: a mark, the lengths of name and data, the name,
-the data. The map lists the chunks' names, places and sizes. Older files are JPEG 2000.
+A file of version 2 or later is a chain of chunks. Each has a mark, the lengths of name and data,
+the name and the data. The map lists the chunks' names, places and sizes. Older files are JPEG 2000.
 """
 
 import os
@@ -16,21 +16,21 @@ from typing import BinaryIO
 from stereocell.model.errors import SourceError
 from stereocell.storage.library_errors import one_line
 
-BEGIN = b"\xda\xce\xbe\n"  # the mark of a chunk, which such a file begins with
+BEGIN = b"\xda\xce\xbe\n"  # mark at the start of each chunk, and so of the file
 _HEAD = struct.Struct("<4sIQ")  # mark, length of the name, length of the data
 _PLACE = struct.Struct("<2Q")  # place and size of a chunk in the map
-_END = struct.Struct("<32sQ")  # last in a file: signature, place of the map
+_END = struct.Struct("<32sQ")  # last bytes of a file: signature, place of the map
 _END_MARK, _MAP_MARK = b"ND2 CHUNK MAP SIGNATURE 0000001!", b"ND2 FILEMAP SIGNATURE NAME 0001!"
 _FRAME = b"ImageDataSeq|"
-_TIME = 8  # bytes of the time before the voxels of a frame
-_VOXELS_AT = 4096  # bytes from a frame's header to its voxels, as nd2 has it
-_MAX_MAP = 1 << 30  # bytes
+_TIME = 8  # bytes of the time stamp before the voxels of a frame
+_VOXELS_AT = 4096  # bytes from a frame's header to its voxels, the value that nd2 uses
+_MAX_MAP = 1 << 30  # bytes of the map
 
 
 class Nd2Frames:
-    """The frames that the map of a file lists; none of a file that is JPEG 2000.
+    """The frames that the map of a file lists. A JPEG 2000 file has no map.
 
-    frame_bytes  of a frame's voxels; 0: they are compressed
+    frame_bytes  bytes of a frame's voxels; 0: they are compressed
     """
 
     def __init__(self, path: str, where: str, frame_bytes: int) -> None:
@@ -38,12 +38,12 @@ class Nd2Frames:
         self._size = os.path.getsize(path)
         self._places: dict[int, int] | None = None
         self._sound: set[int] = set()
-        with one_line(where, "an ND2 file that is whole"), open(path, "rb") as file:
+        with one_line(where, "a complete ND2 file"), open(path, "rb") as file:
             if file.read(len(BEGIN)) == BEGIN:
                 self._places = dict(self._listed(file))
 
     def missing(self, numbers: Sequence[int]) -> list[int]:
-        """Return those of some frames that the file does not hold."""
+        """Return the numbers of the frames that the file lacks, among those given."""
         return [] if self._places is None else [n for n in numbers if n not in self._places]
 
     def require(self, number: int) -> None:
@@ -63,7 +63,7 @@ class Nd2Frames:
         end = place + _HEAD.size + name_bytes + data_bytes
         found = ""
         if mark != BEGIN or head[_HEAD.size :] != name:
-            found = "no frame of that number"
+            found = "another chunk"
         elif end > self._size:
             found = f"{self._size} bytes in the file, where the frame ends at {end}"
         elif self._frame_bytes and _HEAD.size + name_bytes + _TIME != _VOXELS_AT:
@@ -78,16 +78,16 @@ class Nd2Frames:
         self._sound.add(number)
 
     def _listed(self, file: BinaryIO) -> list[tuple[int, int]]:
-        """Return number and place of each frame in the map. Raises OSError, struct.error."""
+        """Return number and place of each frame in the map. Raises OSError and struct.error."""
         file.seek(max(0, self._size - _END.size))
         signature, place = _END.unpack(file.read(_END.size))
         if signature != _END_MARK or place >= self._size:
-            raise OSError("no map of its chunks")
+            raise OSError("found no map of its chunks")
         file.seek(place)
         mark, name_bytes, data_bytes = _HEAD.unpack(file.read(_HEAD.size))
         name = file.read(min(name_bytes, _VOXELS_AT))
         if mark != BEGIN or not name.startswith(_MAP_MARK) or data_bytes > _MAX_MAP:
-            raise OSError(f"no map of its chunks at byte {place}")
+            raise OSError(f"found no map of its chunks at byte {place}")
         content, found, at = file.read(data_bytes), [], 0
         while not content.startswith(_END_MARK, at):
             end = content.find(b"!", at) + 1

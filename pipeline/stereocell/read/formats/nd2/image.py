@@ -1,4 +1,4 @@
-"""Nikon ND2, by the library nd2 (BSD; the extra `nd2`). Stage positions are series."""
+"""Read Nikon ND2 with the library nd2 (BSD; the extra `nd2`). Stage positions are series."""
 
 import os
 from contextlib import ExitStack
@@ -21,12 +21,12 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
 _END = b"ND2 CHUNK MAP SIGNATURE 0000001!"
-_END_BYTES = 40  # bytes of the signature and of the chunk map's place, last in a file
+_END_BYTES = 40  # last bytes of a file: the signature and the place of the chunk map
 _IN_FRAME = "CYXS"  # axes inside a frame
 
 
 class _File:
-    """An open file: its sizes by axis, of which P counts stage positions."""
+    """An open file with its size along each axis; P counts stage positions."""
 
     def __init__(self, location: Location, stack: ExitStack) -> None:
         self.where = location.shown
@@ -34,7 +34,7 @@ class _File:
 
         path = os.path.realpath(location.path)
         _require_end(path, self.where)
-        with one_line(self.where, "an ND2 file that is whole"):
+        with one_line(self.where, "a complete ND2 file"):
             self.nd2: Any = stack.enter_context(library.ND2File(path))
             self.sizes = {str(axis): int(size) for axis, size in self.nd2.sizes.items()}
             self.dtype = np.dtype(self.nd2.dtype)
@@ -70,14 +70,14 @@ def _require_end(path: str, where: str) -> None:
         ends = file.read()
     if begins == BEGIN and not ends.startswith(_END):
         raise SourceError(
-            f"{where}: cut short at byte {os.path.getsize(path)}, or never closed: the map of its "
-            "chunks, which ends an ND2 file, is missing; expected an ND2 file that is whole: copy "
-            "it again"
+            f"{where}: cut short at byte {os.path.getsize(path)}, or never closed: the map of "
+            "chunks at the end of an ND2 file is missing; expected a complete ND2 file: copy it "
+            "again"
         )
 
 
 def read_image(location: Location, *, series: int = 0) -> Image:
-    """Return the image of one position; 0 is the first. Raises SourceError, UsageError."""
+    """Return the image of one position; 0 is the first. Raises SourceError and UsageError."""
     return read_chosen(location, series, _File, _image)
 
 
@@ -95,7 +95,7 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
             )
     if (count := file.size("C")) > MAX_CHANNELS:
         raise SourceError(f"{file.where}: axis c: found {count}, expected at most {MAX_CHANNELS}")
-    with one_line(file.where, "an ND2 file with metadata of its axes"):
+    with one_line(file.where, "an ND2 file with metadata on its axes"):
         _require_distances(file)
         notes = (*notes, *file.notes, *_order_notes(file))
     loops = [axis for axis in file.sizes if axis not in _IN_FRAME]
@@ -114,7 +114,7 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
 
     shape = (file.size("T"), file.size("Z"), count, file.size("Y"), file.size("X"))
     array = VoxelArray(PlaneArray(shape, file.dtype, read), tuple("tzcyx"))
-    with one_line(file.where, "an ND2 file with metadata of its channels"):
+    with one_line(file.where, "an ND2 file with metadata on its channels"):
         names, colors = _channels(file.nd2, count)
     numbers = [[number(t, z) for z in range(file.size("Z"))] for t in range(file.size("T"))]
     return Image(
@@ -130,27 +130,28 @@ def _image(file: _File, position: int, notes: tuple[str, ...], stack: ExitStack)
 
 
 def _missing_notes(file: _File, numbers: list[list[int]], time: int) -> tuple[str, ...]:
-    """Return a note on frames that the file lacks at other points in time.
+    """Return a note on frames that the file lacks at other time points.
 
-    An acquisition may end early. Raises SourceError where frames of the chosen point are missing.
+    An acquisition may end early. Raises SourceError where frames of the chosen time point are
+    missing.
 
-    numbers  of the frames of each point in time
+    numbers  numbers of the frames of each time point
     """
     held = [len(some) - len(file.frames.missing(some)) for some in numbers]
     depth, count = len(numbers[0]), len(numbers)
     if held[time] < depth:
         whole = [t for t, found in enumerate(held) if found == depth]
-        instead = f": --time {whole[-1]} is whole" if whole else ""
+        instead = f": --time {whole[-1]} is complete" if whole else ""
         raise SourceError(
-            f"{file.where}: time point {time}: found {held[time]} of {depth} frames, expected all "
-            f"of them: the acquisition ended early, or the file is damaged{instead}"
+            f"{file.where}: time point {time}: found {held[time]} of {depth} frames, expected all: "
+            f"the acquisition ended early, or the file is damaged{instead}"
         )
     for number in numbers[time]:
         file.frames.require(number)
     total = depth * count
     missing = total - sum(held)
     share = f"{missing} of {total} frames ({missing / total:.2%})"
-    note = f"{share} are missing, all at other points in time"
+    note = f"{share} are missing, all at other time points"
     return (note,) if missing else ()
 
 
@@ -165,13 +166,13 @@ def _require_distances(file: _File) -> None:
 
 
 def _order_notes(file: _File) -> tuple[str, ...]:
-    """Return a note where planes were taken downwards, so that a volume may be a mirror image."""
+    """Return a note if planes were taken downwards, since the volume may be a mirror image."""
     loops = [loop.parameters for loop in file.nd2.experiment if loop.type == "ZStackLoop"]
     if all(loop.bottomToTop for loop in loops):
         return ()
     return (
-        "the planes were taken from the top to the bottom (the Z loop states it): they are read in "
-        "the order of the file",
+        "the planes were taken from top to bottom, as the Z loop states: they are read in the "
+        "order of the file",
     )
 
 

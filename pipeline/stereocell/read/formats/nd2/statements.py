@@ -1,8 +1,8 @@
-"""Compare the statements on the voxel spacing of an ND2 file.
+"""Compare the statements on the voxel spacing in an ND2 file.
 
-The Z loop states the step, and beside it the lowest and the highest place. They differ where a
-range was typed that is no multiple of the step, by less than a step, or where a program that wrote
-the file has set one alone.
+The Z loop states the step, and also the lowest and the highest position. They disagree by less than
+a step if a user typed a range that is not a multiple of the step. They disagree by more if the
+program that wrote the file set only one of them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,10 +16,10 @@ _REMEDY = "--spacing-um z,y,x replaces it"
 
 
 def settle_spacing(nd2: Any, sizes: Mapping[str, int]) -> tuple[PartialTriple, tuple[str, ...]]:
-    """Return the spacing (z, y, x), um, and notes. None each: not stated, where the library has 1.
+    """Return the spacing (z, y, x), um, and notes. None: not stated, where nd2 itself returns 1.
 
-    nd2    the library's open file
-    sizes  by axis
+    nd2    open file of the library nd2
+    sizes  number of frames or voxels along each axis
     """
     size, volume = nd2.voxel_size(), volume_of(nd2)
     is_stated = (True, True, True) if volume is None else volume.axesCalibrated
@@ -46,7 +46,7 @@ def volume_of(nd2: Any) -> Any:
 
 
 def _ranges(nd2: Any) -> Iterator[tuple[float, float]]:
-    """Yield the lowest and the highest place, um, of each Z loop that states both."""
+    """Yield the lowest and the highest position, um, of each Z loop that states both."""
     if nd2.is_legacy:
         return
     waiting = [nd2.unstructured_metadata(include={_LOOPS}, strip_prefix=False)]

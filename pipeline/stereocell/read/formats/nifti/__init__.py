@@ -14,7 +14,7 @@ def _open(location: Location) -> Image:
 
 
 def _is_unmarked(path: str, head: bytes) -> bool:
-    """Analyze has no mark, and the voxels of a pair may begin with any bytes."""
+    """Return whether a file may have no mark: Analyze has none, nor have the voxels of a pair."""
     return path.lower().endswith((".img", ".img.gz")) or is_unknown(path, head)
 
 
@@ -22,7 +22,7 @@ FORMAT = Format(
     title="NIfTI or Analyze",
     open=_open,
     endings=(".nii", ".nii.gz"),
-    loose_endings=(".hdr", ".img", ".hdr.gz", ".img.gz"),  # of Analyze, and of pairs of NIfTI
+    loose_endings=(".hdr", ".img", ".hdr.gz", ".img.gz"),  # Analyze, and pairs of NIfTI
     packed_endings=(".nii.gz", ".hdr.gz"),
     marks=(
         Mark("a NIfTI file", rb"n[+i]1\0", at=344),

@@ -1,4 +1,4 @@
-"""The b-values of a NIfTI's images, from the file `.bval` beside it, as FSL and BIDS have it.
+"""Read the b-values of a NIfTI's images from the `.bval` file beside it, as FSL and BIDS use.
 
 References: https://bids-specification.readthedocs.io (diffusion imaging data)
 """
@@ -13,16 +13,16 @@ from stereocell.read.diffusion import diffusion_note, order_of
 from stereocell.storage.location import Location, is_own
 
 _MAX_BYTES = 1 << 20
-_PLACE = "the .bval file beside it"  # the name of which may tell who the patient is
+_PLACE = "the .bval file beside it"  # without the file's name, which may identify the patient
 
 
 @dataclass(frozen=True, slots=True)
 class ImageOrder:
     """The order of the images in a file.
 
-    order  for each point in time its place in the file
+    order  stored index of the image at each time point
     notes  a sentence on the b-values
-    files  that were read
+    files  files that were read
     """
 
     order: Sequence[int]
@@ -31,7 +31,7 @@ class ImageOrder:
 
 
 def image_order(location: Location, count: int) -> ImageOrder:
-    """Return the order of a number of images: b 0 first where the b-values are stated."""
+    """Return the order of `count` images; images of b 0 come first if the b-values are stated."""
     stored = range(count)
     stem = location.path.removesuffix(".gz").removesuffix(".nii")
     path = Path(f"{stem}.bval")
@@ -43,7 +43,7 @@ def image_order(location: Location, count: int) -> ImageOrder:
     try:
         values = [float(part) for part in path.read_text("ascii", "replace").split()]
     except ValueError:
-        return ImageOrder(stored, (f"{_PLACE}: found text that is no number: it is not used",))
+        return ImageOrder(stored, (f"{_PLACE}: found text that is not a number: it is not used",))
     if len(values) != count or not np.isfinite(values).all():
         found = f"found {len(values)} b-values, expected {count}, one for each image"
         return ImageOrder(stored, (f"{_PLACE}: {found}: it is not used",))

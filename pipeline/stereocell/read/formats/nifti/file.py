@@ -1,4 +1,4 @@
-"""Open the files of NIfTI, Analyze and FreeSurfer's MGH by nibabel, and read stored voxels."""
+"""Open files of NIfTI, Analyze and FreeSurfer's MGH with nibabel, and read stored voxels."""
 
 import logging
 import math
@@ -24,8 +24,8 @@ from stereocell.storage.library_errors import one_line, raise_if_short
 from stereocell.storage.location import Location, require_own
 
 MGH_ENDINGS = (".mgh", ".mgz", ".mgh.gz")
-_WHOLE = "a whole .nii, .nii.gz, .mgh or .mgz file, or a pair .hdr and .img"
-_MGH_HEADER = 90  # bytes that MGH states before the voxels; the rest is padding
+_WHOLE = "a complete .nii, .nii.gz, .mgh or .mgz file, or a pair .hdr and .img"
+_MGH_HEADER = 90  # bytes before the voxels that MGH defines; the rest is padding
 _MAX_OFFSET = 1 << 28  # bytes of header and extensions; gzip must unpack them before the voxels
 FAULTS = (
     nibabel.filebasedimages.ImageFileError,
@@ -57,12 +57,12 @@ def open_image(location: Location) -> Any:
             image: Any = nibabel.load(location.source, mmap=False)
             if isinstance(image, Cifti2Image):
                 raise SourceError(
-                    f"{location.shown}: CIFTI, values on surfaces and in greyordinates; expected "
-                    "NIfTI with a volume"
+                    f"{location.shown}: found CIFTI (values on surfaces and in greyordinates), "
+                    "expected NIfTI with a volume"
                 )
             if not isinstance(image, nibabel.nifti1.Nifti1Pair | nibabel.analyze.AnalyzeImage):
                 raise TypeError
-            # an invalid quaternion, unit or type fails here rather than later
+            # An invalid quaternion, unit or type fails here rather than later.
             header: Any = image.header
             image.affine.sum()
             if isinstance(image, nibabel.nifti1.Nifti1Pair):
@@ -79,7 +79,7 @@ def open_image(location: Location) -> Any:
 
 
 def _open_mgh(path: str) -> Any:
-    """Return an image of MGH. nibabel's own loader unpacks all voxels to find what follows them."""
+    """Return an MGH image. nibabel's own loader would unpack all voxels to read the end."""
     with ImageOpener(path) as file:
         head = file.read(_MGH_HEADER)
     if len(head) < _MGH_HEADER:
@@ -93,19 +93,19 @@ def _open_mgh(path: str) -> Any:
 
 
 def _cause(error: BaseException) -> str:
-    """Return the reason why nibabel can't open a file, as far as it names a field, and a way."""
+    """Return why nibabel can't open a file, with the field and a remedy if they are known."""
     if isinstance(error, nibabel.spatialimages.HeaderDataError) and "intercept" in str(error):
-        return f"scl_inter: found no finite number beside a scl_slope, expected {_WHOLE}"
+        return f"scl_inter: found no finite number beside scl_slope, expected {_WHOLE}"
     if isinstance(error, ValueError) and "w2 should be positive" in str(error):
         return (
-            "quatern_b, quatern_c, quatern_d: found squares whose sum is over 1, expected those of "
-            "a rotation: set qform_code to 0 to read the voxels by pixdim alone"
+            "quatern_b, quatern_c, quatern_d: found squares whose sum exceeds 1, expected those of "
+            "a rotation: set qform_code to 0 to read the voxels with pixdim alone"
         )
     return f"not readable as NIfTI, expected {_WHOLE}"
 
 
 def _require_own_pair(location: Location) -> None:
-    """Raise SourceError where a file beside the source, which nibabel opens, is not its own."""
+    """Raise SourceError where nibabel would open a file beside the source that isn't its own."""
     stem, suffix = os.path.splitext(location.source)
     packed = suffix if suffix.lower() == ".gz" else ""
     stem, suffix = os.path.splitext(stem) if packed else (stem, suffix)
@@ -123,16 +123,16 @@ def files_of(image: Any) -> set[str]:
 
 
 def require_whole(image: Any, where: str) -> tuple[str, ...]:
-    """Return a note on bytes behind the voxels.
+    """Return a note on bytes after the voxels.
 
-    Raises SourceError where an unpacked file ends before its voxels, or where a pair's packed
-    header is damaged. Packed voxels are checked when they are read.
+    Raises SourceError where an uncompressed file ends before its voxels, or where the compressed
+    header of a pair is damaged. Compressed voxels are checked when they are read.
     """
     name, data = image.file_map["image"].filename, image.dataobj
     held = image.file_map.get("header")
     if held is not None and held.filename != name and _is_packed(held.filename):
         with (
-            one_line(where, "a header of NIfTI that is whole"),
+            one_line(where, "a complete header of NIfTI"),
             open(held.filename, "rb") as file,
         ):
             unpack(file, 0, "gzip", most_behind=_MAX_OFFSET)
@@ -146,7 +146,7 @@ def require_whole(image: Any, where: str) -> tuple[str, ...]:
             f"{data.dtype.name} (the file is cut short)"
         )
     if isinstance(image, nibabel.freesurfer.mghformat.MGHImage):
-        return ()  # its parameters of the scan follow
+        return ()  # MGH stores parameters of the scan after the voxels
     return rest_note(size - end, shape, data.dtype.itemsize)
 
 
@@ -155,7 +155,7 @@ def _is_packed(name: str) -> bool:
 
 
 def stored_header(image: Any) -> Any:
-    """Return the header with its fields as they are stored; nibabel corrects some of them."""
+    """Return the header with its fields as stored, since nibabel corrects some of them."""
     held, header = image.file_map.get("header") or image.file_map["image"], image.header
     with ImageOpener(held.filename) as file:
         raw = file.read(len(header.binaryblock))
@@ -165,7 +165,7 @@ def stored_header(image: Any) -> Any:
 
 
 def stored_voxels(name: str, data: Any, time: int) -> NDArray[Any]:
-    """Return the voxels of a time point, (x, y, z), as they are stored in a file.
+    """Return the voxels of a time point, (x, y, z), as stored in a file.
 
     data  nibabel's proxy of all voxels
     """

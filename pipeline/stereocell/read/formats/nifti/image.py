@@ -1,10 +1,10 @@
-"""NIfTI-1 and -2, .nii and .nii.gz, their pairs .hdr and .img, Analyze 7.5 and FreeSurfer's MGH.
+"""Read NIfTI-1 and -2 (.nii, .nii.gz, pairs of .hdr and .img), Analyze 7.5 and FreeSurfer's MGH.
 
-nibabel reads them. The place of the voxels is that of statements.py. NaN marks voxels
-outside a brain that was cut out; it and infinity are read as the smallest finite value of their
-time point. Analyze states no orientation; nibabel takes x to run to the patient's left, and a
-matrix of SPM beside the pair (.mat) for the affine. Texts in the header (`descrip`, `db_name`,
-the command lines behind the voxels of MGH) and the file's name may identify a patient and are not
+nibabel reads the files; statements.py finds the place of the voxels. NaN marks voxels outside a
+brain that was extracted. NaN and infinity are read as the smallest finite value of their time
+point. Analyze states no orientation: nibabel assumes that x runs to the patient's left, and uses
+SPM's matrix beside the pair (.mat) as the affine. The file's name and texts in the header
+(`descrip`, `db_name`, the command lines after the voxels of MGH) may identify a patient and are not
 read.
 
 References: NIfTI-1 Data Format, https://nifti.nimh.nih.gov/nifti-1/;
@@ -47,9 +47,9 @@ from stereocell.storage.location import Location
 NAME, ANALYZE, MGH = "NIfTI", "Analyze", "MGH"
 _RAS_TO_LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _INTENT_LABEL = 1002
-_LABEL_TABLE = b"<LabelTable"  # element in the files of Connectome Workbench and TotalSegmentator
-_WIDER = 1.05  # factor by which slices lie further apart than pixels
-_SKEW = 1e-3  # cosine between two axes; a smaller one is rounding
+_LABEL_TABLE = b"<LabelTable"  # XML element in files of Connectome Workbench and TotalSegmentator
+_WIDER = 1.05  # ratio of spacings from which slices lie clearly farther apart than pixels
+_SKEW = 1e-3  # cosine between two axes; a smaller one is due to rounding
 
 
 def read_image(location: Location) -> Image:
@@ -60,14 +60,14 @@ def read_image(location: Location) -> Image:
     shape = tuple(int(n) for n in header.get_data_shape())
     if len(shape) < 3 or any(n != 1 for n in shape[4:]) or min(shape) < 1:
         several = math.prod(shape[4:])
-        inner = f", {several} values at each voxel: save one of them alone" * (several > 1)
+        inner = f", {several} values at each voxel: save only one of them" * (several > 1)
         raise SourceError(f"{where}: dim: found {shape}, expected x, y, z, or x, y, z, t{inner}")
     stored = header.get_data_dtype()
     if stored.kind not in "iuf":
         found = {"c": "complex numbers", "V": "colours"}.get(stored.kind, str(stored))
         raise SourceError(
-            f"{where}: datatype: found {found}, expected whole or real numbers: save one part of "
-            "them, such as magnitude or red, alone"
+            f"{where}: datatype: found {found}, expected whole or real numbers: save only one "
+            "part, such as magnitude or red"
         )
     dtype = _dtype(stored, image.dataobj.slope, image.dataobj.inter)
     is_nifti = isinstance(image, nibabel.nifti1.Nifti1Pair)
@@ -116,7 +116,7 @@ def read_image(location: Location) -> Image:
 
 
 def _labels(header: Any) -> str:
-    """Return what in the header says that voxels number objects; of a table only its presence."""
+    """Return the field that says that voxels number objects; empty: none. Names are not read."""
     if header["intent_code"] == _INTENT_LABEL:
         return f"NIfTI's intent code {_INTENT_LABEL} (label)"
     if any(_LABEL_TABLE in text for text in _tables(header)):
@@ -133,10 +133,10 @@ def _tables(header: Any) -> list[bytes]:
 def _image_axis(named: int | None, canonical: Canonical) -> int:
     """Return the axis (of z, y, x) across which the scanner's images lie.
 
-    named  the stored axis that the header's `dim_info` names; None: it names none
+    named  stored axis that the header's `dim_info` names; None: it names none
 
-    Else it is the axis of the widest spacing, or where several
-    are as wide (a share of `_WIDER`), the last stored one: the slowest in the file.
+    Without a name, the axis with the widest spacing is chosen. Among axes that are equally wide, up
+    to the factor _WIDER, it is the last stored one, which is the slowest in the file.
     """
     if named is not None:
         return canonical.order.index(named)
@@ -146,7 +146,7 @@ def _image_axis(named: int | None, canonical: Canonical) -> int:
 
 
 def _count_nan(voxels: WholeArray, counts: dict[int, int], time: int) -> tuple[str, ...]:
-    """Note the number of NaN and infinities at a time point, which this reads; it is cached."""
+    """Read a time point, which is then cached, and note its number of NaN and infinite voxels."""
     _ = voxels[time, slice(0, 0), 0, 0]
     found = counts.get(time, 0)
     note = f"{found:,} voxels are NaN or infinite: read as the smallest finite value"
@@ -157,7 +157,7 @@ def _dtype(stored: np.dtype[Any], slope: float, intercept: float) -> np.dtype[An
     if stored.kind == "f":
         return np.dtype(np.float32)
     if stored.itemsize >= 4 and (slope, intercept) == (1, 0):
-        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py has the rest
+        return stored.newbyteorder("=")  # labels keep their numbers; read/cast.py converts the rest
     limits = np.iinfo(stored)
     return dtype_for([(float(limits.min), float(limits.max), float(slope), float(intercept))])
 
@@ -169,7 +169,7 @@ def _load(
     dtype: np.dtype[Any],
     time: int,
 ) -> tuple[NDArray[Any], int]:
-    """Return one image of the file, and its number of voxels that are no number."""
+    """Return one image of the file, and its number of voxels that are NaN or infinite."""
     count = 0
     try:
         image = open_image(location)
@@ -179,12 +179,12 @@ def _load(
         values = rescale(raw, float(data.slope), float(data.inter), dtype)
     except FAULTS as error:
         raise_if_short(error, location.shown)
-        found = "its voxels can't be read"
+        found = "the voxels can't be read"
         if isinstance(error, EOFError):
             found = f"cut short at byte {os.path.getsize(location.source)}"
         elif isinstance(error, OSError) and not error.strerror:
             found = str(error)
-        raise SourceError(f"{location.shown}: {found}, expected {NAME} that is whole") from None
+        raise SourceError(f"{location.shown}: {found}, expected a complete {NAME} file") from None
     if values.dtype.kind == "f":
         values, count = _without_gaps(values, is_measured, location.shown)
     if skewed is not None:
@@ -195,15 +195,15 @@ def _load(
 def _without_gaps(
     values: NDArray[Any], is_measured: NDArray[np.bool_], where: str
 ) -> tuple[NDArray[Any], int]:
-    """Return the values with the smallest finite one in the place of others, and their number.
+    """Return the values with the smallest finite one in place of NaN and infinity, and a count.
 
     is_measured  where the stored values are finite
 
-    Raises SourceError where none is, or one is beyond float32.
+    Raises SourceError where no value is finite, or one is beyond float32.
     """
     if (is_measured & ~np.isfinite(values)).any():
         raise SourceError(
-            f"{where}: found voxels beyond float32, expected smaller ones: scale them"
+            f"{where}: found voxels beyond float32, expected smaller ones: rescale them"
         )
     count = is_measured.size - int(np.count_nonzero(is_measured))
     if count == 0:

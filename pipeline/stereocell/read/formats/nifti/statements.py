@@ -1,8 +1,8 @@
-"""Everything that headers of NIfTI, Analyze and MGH state about size, direction, unit and values.
+"""Compare what headers of NIfTI, Analyze and MGH state on size, direction, unit and values.
 
-NIfTI states the place of its voxels up to three times: by `sform`, by `qform`, and the voxel
-spacing again by `pixdim`. The order of trust is nibabel's and that of most programs: sform, else
-qform, else pixdim alone. A form that has no three axes is passed over.
+NIfTI states the place of its voxels up to three times: in `sform`, in `qform`, and the voxel
+spacing again in `pixdim`. The order of trust is that of nibabel and most programs: sform, then
+qform, then pixdim alone. A form whose axes don't span three dimensions is skipped.
 """
 
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ _MM = {"mm": 1.0, "meter": 1000.0, "micron": 0.001}
 _REMEDY = "--spacing-um z,y,x replaces it"
 _DIRECTIONS = Subject("directions to which the stored axes run")
 _UNIT = Subject("unit of length", remedy=_REMEDY)
-_MIN_VOLUME = 0.1  # least volume of the three unit axes' parallelepiped; below, they lie in a plane
-_MIN_ANGLE = 1.0  # degrees; a smaller rotation between sform and qform is rounding
-_NO_TIME = ("hz", "ppm", "rads")  # units of a fourth axis that is no time
+_MIN_VOLUME = 0.1  # volume spanned by the three unit axes, 0..1; below it they lie in one plane
+_MIN_ANGLE = 1.0  # degrees; a smaller rotation between sform and qform is due to rounding
+_NO_TIME = ("hz", "ppm", "rads")  # units of a fourth axis that is not time
 
 Affine = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ Affine = NDArray[np.float64]
 class Stated:
     """The place of the voxels as a header states it.
 
-    affine    (4, 4) for columns: from stored indices to RAS in mm
+    affine    (4, 4) for column vectors: from stored indices to RAS in mm
     has_sides whether the header states which side of the patient is which
     """
 
@@ -43,7 +43,7 @@ class Stated:
 
 
 def stated_place(image: Any, where: str) -> Stated:
-    """Return the place of the voxels and notes on contradictions. Raises SourceError for none."""
+    """Return the place of the voxels, and notes. Raises SourceError for an unusable affine."""
     if isinstance(image, MGHImage):
         return _of_mgh(image, where)
     if not isinstance(image, nibabel.nifti1.Nifti1Pair):
@@ -59,12 +59,16 @@ def stated_place(image: Any, where: str) -> Stated:
     ]
     sound = [(name, form) for name, form in forms if _is_sound(form)]
     flat = [name for name, form in forms if not _is_sound(form)]
-    notes = [f"{name}: found no three axes: {sound[0][0]} is used" for name in flat if sound]
+    notes = [
+        f"{name}: its axes don't span three dimensions: {sound[0][0]} is used"
+        for name in flat
+        if sound
+    ]
     affine = sound[0][1] if sound else np.asarray(image.affine, float)
     _require_sound(affine, where, "sform and qform")
     if not forms:
         notes.append(
-            "neither sform nor qform: which side is left is a guess, x to the left of the patient"
+            "neither sform nor qform: which side is left is a guess, x to the patient's left"
         )
     unit, unit_notes = _unit(header)
     notes += [*_size_notes(image, sound, unit), *_direction_notes(sound), *unit_notes]
@@ -73,7 +77,7 @@ def stated_place(image: Any, where: str) -> Stated:
 
 
 def _qform(header: Any) -> Affine:
-    """Return the affine of qform; NaN where its quaternion is no rotation, or damaged."""
+    """Return the affine of qform; NaN where its quaternion is not a rotation, or damaged."""
     try:
         return np.asarray(header.get_qform(), float)
     except ValueError:
@@ -81,9 +85,9 @@ def _qform(header: Any) -> Affine:
 
 
 def value_notes(image: Any) -> tuple[str, ...]:
-    """Return a note where the header states an intercept that no slope goes with.
+    """Return a note if the header states an intercept without a slope.
 
-    NIfTI scales no values where the slope is 0; programs write NaN for that as well.
+    NIfTI scales no values where the slope is 0; programs also write NaN to mean that.
     """
     if not isinstance(image, nibabel.nifti1.Nifti1Pair):
         return ()
@@ -101,7 +105,7 @@ def value_notes(image: Any) -> tuple[str, ...]:
 def _of_analyze(image: Any, where: str) -> Stated:
     affine = np.asarray(image.affine, float)
     _require_sound(affine, where, "affine")
-    notes = ["Analyze states no orientation: x to the left of the patient is a guess"]
+    notes = ["Analyze states no orientation: x to the patient's left is a guess"]
     beside = image.file_map.get("mat")
     if beside is not None and beside.filename and not np.allclose(affine, _own_affine(image)):
         notes += _compared({"the matrix of SPM (.mat)": _lengths(affine)}, _pixdim(image.header))
@@ -122,15 +126,15 @@ def _of_mgh(image: Any, where: str) -> Stated:
     notes: tuple[str, ...] = ()
     if not (has_sides := bool(stored_header(image)["goodRASFlag"])):
         notes = (
-            "goodRASFlag 0: spacing and orientation are not stated: coronal slices of voxels of "
-            f"1 mm are assumed, as FreeSurfer does; {_REMEDY}",
+            "goodRASFlag 0: spacing and orientation are not stated: coronal slices with voxels of "
+            f"1 mm are assumed, as in FreeSurfer; {_REMEDY}",
         )
     return Stated(affine, has_sides, (*notes, *_plausible(image, affine)))
 
 
 def _unit(header: Any) -> tuple[str, tuple[str, ...]]:
     stated = str(header.get_xyzt_units()[0])
-    statements = [Statement("mm", "as most programs of NIfTI do", Trust.ASSUMED)]
+    statements = [Statement("mm", "as in most programs for NIfTI", Trust.ASSUMED)]
     if stated in _MM:
         statements.append(Statement(stated, "xyzt_units"))
     settled = settle(_UNIT, statements)
@@ -138,7 +142,7 @@ def _unit(header: Any) -> tuple[str, tuple[str, ...]]:
 
 
 def _size_notes(image: Any, forms: list[tuple[str, Affine]], unit: str) -> tuple[str, ...]:
-    """Compare the lengths of sform's axes with pixdim, from which qform takes its own."""
+    """Compare the lengths of sform's axes with pixdim, which also gives qform its lengths."""
     stored = stored_header(image)
     pixdim = np.abs(np.asarray(stored["pixdim"][1:4], float))
     if (pixdim == 0).any() and (not forms or forms[0][0] == "qform"):
@@ -165,7 +169,7 @@ def _compared(
 
 
 def _direction_notes(forms: list[tuple[str, Affine]]) -> tuple[str, ...]:
-    """Compare the directions of sform's and qform's axes."""
+    """Compare the directions of sform's axes and qform's axes."""
     if len(forms) < 2:
         return ()
     orientations: Any = nibabel.orientations
@@ -183,11 +187,11 @@ def _direction_notes(forms: list[tuple[str, Affine]]) -> tuple[str, ...]:
 
 
 def _axis_notes(header: Any) -> tuple[str, ...]:
-    """Return a note where the fourth axis is no time."""
+    """Return a note if the fourth axis is not time."""
     shape, unit = header.get_data_shape(), str(header.get_xyzt_units()[1])
     if len(shape) < 4 or shape[3] < 2 or unit not in _NO_TIME:
         return ()
-    return (f"axis t: xyzt_units states {unit}, so its {shape[3]} volumes are no points in time",)
+    return (f"axis t: xyzt_units states {unit}, so its {shape[3]} volumes are not time points",)
 
 
 def _pixdim(header: Any) -> tuple[float, ...]:
@@ -212,4 +216,7 @@ def _is_sound(affine: Affine) -> bool:
 
 def _require_sound(affine: Affine, where: str, fields: str) -> None:
     if not _is_sound(affine):
-        raise SourceError(f"{where}: {fields}: found no three axes, expected an affine")
+        raise SourceError(
+            f"{where}: {fields}: the axes of the affine don't span three dimensions, "
+            "expected three independent axes"
+        )

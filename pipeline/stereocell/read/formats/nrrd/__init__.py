@@ -13,7 +13,7 @@ def _open(location: Location) -> Image:
 
 
 def _is_unmarked(_path: str, head: bytes) -> bool:
-    """The reader names an unknown version."""
+    """Return whether a file is NRRD of any version: the reader names an unknown one."""
     return head.startswith(b"NRRD")
 
 

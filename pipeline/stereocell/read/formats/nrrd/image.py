@@ -1,9 +1,10 @@
-"""NRRD: .nrrd, and .nhdr with its voxels in a file beside it. pynrrd reads the fields.
+"""Read NRRD: .nrrd, and .nhdr with its voxels in a file beside it. pynrrd reads the fields.
 
-Where `space` names anatomical axes the image lies in the patient, in mm unless `space units` says
-otherwise. Without (Fiji, CMTK) it is a stack: x, y, z as stored, the spacing in `space units`.
-pynrrd's own `read_data` reads the whole file, and opens a file of voxels wherever it lies; so the
-voxels are read by file_array.py. Comments and `key:=value` pairs may identify a patient.
+If `space` names anatomical axes, the image lies in the patient, in mm unless `space units` states
+otherwise. Without it (Fiji, CMTK) the image is a stack: x, y, z as stored, with the spacing in
+`space units`. pynrrd's own `read_data` reads the whole file, and opens a file of voxels anywhere on
+the machine, so file_array.py reads the voxels. Comments and `key:=value` pairs may identify a
+patient.
 
 References: https://teem.sourceforge.net/nrrd/format.html
 """
@@ -49,7 +50,7 @@ from stereocell.storage.location import Location, require_own
 NAME = "NRRD"
 _MAX_HEADER = 1 << 20  # bytes
 _LIST = re.compile(rb"^data ?file:\s*LIST\b.*$", re.MULTILINE | re.IGNORECASE)
-_MAX_LINES = 10_000  # `line skip`
+_MAX_LINES = 10_000  # largest `line skip`
 _TYPES = {
     "i1": ("signed char", "int8", "int8_t"),
     "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
@@ -150,10 +151,10 @@ def _stacked(
     fields: Mapping[str, Any], array: StoredArray, names: Sequence[str],
     directions: NDArray[np.float64], spatial: NDArray[np.float64],
 ) -> tuple[VoxelArray, Grid, tuple[str, ...]]:  # fmt: skip
-    """Return the voxels of a stack that lies in no patient, their grid, and notes.
+    """Return the voxels of a stack that is not placed in a patient, their grid, and notes.
 
-    names    of the axes, fastest first
-    spatial  rows of `directions` of i, j, k, in um
+    names    names of the axes, fastest first
+    spatial  rows of `directions` for i, j, k, in um
     """
     shape = [int(n) for n in fields["sizes"]]
     stacked, notes = names_by_labels(names, labelled_axes(fields, shape), shape)
@@ -165,7 +166,7 @@ def _stacked(
 
 
 def _header(location: Location) -> tuple[Mapping[str, Any], int]:
-    """Return the fields and the length of the header, the empty line included, in bytes."""
+    """Return the fields and the length of the header, including the empty line, in bytes."""
     where = location.shown
     with one_line(where, f"an {NAME} file (.nrrd, .nhdr)"), open(location.path, "rb") as file:
         content = file.read(_MAX_HEADER)
@@ -174,7 +175,7 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
         blank = re.search(rb"\n\r?\n", content)
         head = content[: blank.start()] if blank else content
         if listed := _LIST.search(head):
-            head = head[: listed.end()]  # names follow, no fields
+            head = head[: listed.end()]  # file names follow, not fields
         fields = nrrd.read_header([f"{line}\n" for line in head.decode("latin-1").splitlines()])
         missing = {"sizes", "type", "encoding"} - set(fields)
         if missing:
@@ -188,13 +189,14 @@ def _header(location: Location) -> tuple[Mapping[str, Any], int]:
 def _directions(
     where: str, fields: Mapping[str, Any], shape: Sequence[int], labelled: Sequence[str]
 ) -> NDArray[np.float64]:
-    """Return a row of the directions for each axis, (n, 3); NaN: an axis of no direction.
+    """Return a row of the directions for each axis, (n, 3); NaN: an axis without a direction.
 
-    labelled  by `labelled_axes`
+    labelled  result of `labelled_axes`
     """
     stated = fields.get("space directions")
     found = np.full((len(shape), 3), np.nan)
-    if stated is None:  # only lengths; the axes of space are the first three that have one
+    # only lengths are stated; the axes of space are the first three that have one
+    if stated is None:
         lengths = axis_lengths(fields, shape)
         kinds = list(fields.get("kinds", ()))
         known = [i for i, kind in enumerate(kinds[: len(shape)]) if kind in ("domain", "space")]
@@ -235,8 +237,8 @@ def _axes(
         name = "t" if is_time else "c"
         if name in names and shape[index] > 1:
             raise SourceError(
-                f"{where}: kinds: found {kinds[: len(shape)]}, expected one axis of time, and one "
-                "of values, beside those of space"
+                f"{where}: kinds: found {kinds[: len(shape)]}, expected at most one axis of time "
+                "and one of values, beside those of space"
             )
         if name not in names:
             names[index] = name
@@ -244,12 +246,12 @@ def _axes(
 
 
 def _names_sides(fields: Mapping[str, Any]) -> bool:
-    """Return whether the space is one of the patient's; of a scanner's own nothing says that."""
+    """Return whether the space names the patient's sides; a scanner's own space doesn't."""
     return all(word in _SIDES for word in _words(fields))
 
 
 def _words(fields: Mapping[str, Any]) -> list[str]:
-    """Return what the axes of the file's space lead to: `left`, `posterior`, `superior`."""
+    """Return the directions of the axes of the file's space: `left`, `posterior`, `superior`."""
     space = str(fields.get("space", ""))
     return _SHORT.get(space.upper()[:3], space).lower().removesuffix("-time").split("-")
 
@@ -277,19 +279,24 @@ def _spacing(spatial: NDArray[np.float64]) -> PartialTriple:
 
 
 def _turned(fields: Mapping[str, Any], spatial: NDArray[np.float64]) -> tuple[str, ...]:
-    """Note directions that are not along x, y, z: outside a patient they are not followed."""
+    """Note directions that are not along x, y, z: outside a patient they are not applied."""
     notes = []
     is_along_axes = np.array_equal(spatial, np.diag(np.abs(np.diag(spatial))))
     if fields.get("space directions") is not None and not is_along_axes:
-        notes.append("axes turned or mirrored by `space directions`: as stored")
+        notes.append(
+            "`space directions` rotate or mirror the axes: not applied, the voxels stay as stored"
+        )
     if any(step < 0 for step in np.atleast_1d(fields.get("spacings", ()))):
         stated = " ".join(f"{step:g}" for step in fields["spacings"])
         notes.append(
-            f"spacings: found {stated}, of which one is negative: its size is taken and the voxels "
-            "stay as stored, so the volume may be mirrored"
+            f"spacings: found {stated}, one of which is negative: its sign is ignored and the "
+            "voxels stay as stored, so the volume may be mirrored"
         )
     if "left-handed" in str(fields.get("space", "")).lower():
-        notes.append("space: its axes are left-handed: as stored, so the volume may be mirrored")
+        notes.append(
+            "space: the axes are left-handed: the voxels stay as stored, so the volume may be "
+            "mirrored"
+        )
     return tuple(notes)
 
 
@@ -304,7 +311,7 @@ def _files(location: Location, fields: Mapping[str, Any]) -> tuple[str, ...]:
 def _array(
     location: Location, fields: Mapping[str, Any], end: int, shape: Sequence[int]
 ) -> StoredArray:
-    """Return the voxels, which lie behind the header or in a file beside it."""
+    """Return the voxels, which follow the header or lie in a file beside it."""
     where, stated = location.shown, str(fields["type"])
     kind = next((kind for kind, names in _TYPES.items() if stated in names), None)
     if kind is None:
@@ -318,7 +325,7 @@ def _array(
     if named is not None:
         if str(named).upper().startswith("LIST") or "%" in str(named):
             raise SourceError(
-                f"{where}: data file: found a list of files, expected one: write it anew as .nrrd"
+                f"{where}: data file: found a list of files, expected one: save it again as .nrrd"
             )
         path, end = os.path.join(os.path.dirname(path), str(named)), 0
         where = f"{where}: data file {str(named)!r:.200}"
@@ -329,20 +336,20 @@ def _array(
     end = _after_lines(path, end, int(fields.get("line skip", fields.get("lineskip", 0))))
     encoding = str(fields["encoding"]).lower()
     if encoding == "raw":
-        if skip < 0:  # the voxels are the last bytes of the file
+        if skip < 0:  # the voxels are then the last bytes of the file
             end, skip = max(0, os.path.getsize(path) - math.prod(shape) * dtype.itemsize), 0
         return FileArray(path, shape, dtype, end + skip, where)
     if encoding not in _PACKINGS or skip < 0:
         raise SourceError(
             f"{where}: encoding: found {encoding!r:.40}, byte skip {skip}, expected raw, gzip or "
-            "bzip2: write it anew"
+            "bzip2: save it again"
         )
     load = partial(unpack_array, path, shape, dtype, _PACKINGS[encoding], end, skip=skip)
     return PackedArray(shape, dtype, load)
 
 
 def _after_lines(path: str, start: int, count: int) -> int:
-    """Return the place in a file after some lines, in bytes."""
+    """Return the position in a file after some lines, in bytes."""
     if count <= 0:
         return start
     with open(path, "rb") as file:

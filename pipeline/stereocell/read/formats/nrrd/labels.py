@@ -1,7 +1,7 @@
-"""The labels of a NRRD's axes, which may name another order than x, y, z, fastest first.
+"""Read the labels of a NRRD's axes, which may name another order than x, y, z, fastest first.
 
-A label is free text, so it counts where it is an axis by read/axis_names.py. In a patient's space
-`space directions` place the axes, and labels are compared with them.
+A label is free text, so it counts only if read/axis_names.py recognises an axis in it. In a
+patient's space, `space directions` place the axes, and labels are compared with them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ _OF_SPACE = tuple("xyz")
 def labelled_axes(fields: Mapping[str, Any], sizes: Sequence[int]) -> tuple[str, ...]:
     """Return an axis for each label, fastest first, as t, c, z, y, x or another text.
 
-    Empty: no label names an axis of space, or one axis has two labels.
+    Empty: no label names an axis of space, or two labels name the same axis.
     """
     labels = [str(label).strip(' "') for label in fields.get("labels", ())][: len(sizes)]
     axes = axes_of_names(labels)
@@ -34,11 +34,11 @@ def names_by_labels(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the axes of a stack as the labels name them, and notes.
 
-    axes      i, j, k of space, t, c or others, fastest first
-    labelled  by `labelled_axes`; empty: no labels
+    axes      i, j, k for space, t, c or others, fastest first
+    labelled  result of `labelled_axes`; empty: no labels
 
-    Without a label the axes i, j, k are x, y, z. A label keeps its axis; the others are assumed in
-    this order.
+    Without labels the axes i, j, k are x, y, z. An axis keeps the name of its label; the others are
+    assumed in this order.
     """
     plain = tuple(dict(zip("ijk", "xyz", strict=True)).get(axis, axis) for axis in axes)
     if not labelled:
@@ -66,12 +66,12 @@ def names_by_labels(
 def notes_beside_directions(
     labelled: Sequence[str], affine: NDArray[np.float64]
 ) -> tuple[str, ...]:
-    """Return a note where labels name another order of axes than the directions have.
+    """Return a note if labels name another order of axes than the directions.
 
-    labelled  of the axes of space, fastest first; empty: no labels
+    labelled  labels of the axes of space, fastest first; empty: no labels
     affine    (4, 4), from voxels to the patient
 
-    The labels x, y, z, in this order, may be those of the stored axes, and need no note.
+    The labels x, y, z in this order may just name the stored axes, and need no note.
     """
     if sorted(labelled) != sorted(_OF_SPACE) or tuple(labelled) == _OF_SPACE:
         return ()

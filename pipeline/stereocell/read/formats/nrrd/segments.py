@@ -1,8 +1,8 @@
-"""The segments of a segmentation that 3D Slicer saved as NRRD (.seg.nrrd).
+"""Read the segments of a segmentation that 3D Slicer saved as NRRD (.seg.nrrd).
 
-Keys such as `Segment0_LabelValue`, `Segment0_Name` and `Segment0_Color` tell the number, the name
-and the colour of each segment. Segments that overlap lie in layers, which are channels here; names
-of one layer's numbers would not fit those of another, so they are left out then.
+Keys such as `Segment0_LabelValue`, `Segment0_Name` and `Segment0_Color` state the number, the name
+and the colour of each segment. Segments that overlap lie in layers, which become channels here. The
+same number means different segments in different layers, so names and colours are then left out.
 
 References: https://slicer.readthedocs.io/en/latest/developer_guide/modules/segmentations.html
 """
@@ -22,9 +22,9 @@ _LONGEST = 200  # characters of a name
 
 
 def segments_of(fields: Mapping[str, Any]) -> tuple[str, ObjectNotes]:
-    """Return what in the header says that voxels number objects, empty: nothing; and their notes.
+    """Return the field that says that voxels number objects (empty: none), and notes on them.
 
-    fields  of the header, keys with values of their own among them
+    fields  fields of the header, including free keys with values
     """
     segments: dict[str, dict[str, str]] = {}
     for name, value in fields.items():

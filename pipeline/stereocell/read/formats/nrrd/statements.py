@@ -1,8 +1,9 @@
-"""Everything that a header of NRRD states about lengths, units and values, compared.
+"""Compare what a header of NRRD states on lengths, units and values.
 
-An axis has its length by `space directions`, by `spacings`, or by `axis mins` and `axis maxs`; its
-unit by `space units` (of the space's axes) or by `units` (of the array's axes). `space directions`
-goes before `spacings`, and both before the ends of an axis, whose step depends on `centerings`.
+The length of an axis is in `space directions`, in `spacings`, or in `axis mins` and `axis maxs`.
+Its unit is in `space units` (for the space's axes) or in `units` (for the array's axes). `space
+directions` takes precedence over `spacings`, and both over the ends of an axis, whose step depends
+on `centerings`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,7 +24,7 @@ _UNSTATED = ("???", "none", "")  # kinds that state nothing
 
 
 def axis_lengths(fields: Fields, sizes: Sequence[int]) -> NDArray[np.float64]:
-    """Return the voxel spacing along each axis by `spacings`, else by its ends; NaN: not stated."""
+    """Return the voxel spacing along each axis from `spacings` or its ends; NaN: not stated."""
     spacings, by_ends = _spacings(fields, len(sizes)), _by_ends(fields, sizes)
     return np.where(np.isfinite(spacings), spacings, by_ends)
 
@@ -31,10 +32,10 @@ def axis_lengths(fields: Fields, sizes: Sequence[int]) -> NDArray[np.float64]:
 def length_notes(
     fields: Fields, sizes: Sequence[int], directions: NDArray[np.float64], axes: Sequence[int]
 ) -> tuple[str, ...]:
-    """Compare the lengths of `space directions`, `spacings` and the axes' ends.
+    """Compare the lengths in `space directions`, `spacings` and the axes' ends.
 
     directions  a row for each axis; NaN: none
-    axes        the axes of space
+    axes        indices of the axes of space
     """
     spacings, by_ends = _spacings(fields, len(sizes)), _by_ends(fields, sizes)
     stated = [("spacings", spacings), ("the range of axis mins and maxs", by_ends)]
@@ -51,7 +52,7 @@ def length_notes(
 
 
 def kind_notes(fields: Fields, axes: Sequence[int]) -> tuple[str, ...]:
-    """Return a note where `kinds` names other axes of space than those that have a direction."""
+    """Return a note if `kinds` names other axes of space than the axes that have a direction."""
     kinds = [str(kind).lower() for kind in fields.get("kinds", ())]
     stated = [index for index, kind in enumerate(kinds) if kind in _SPATIAL]
     if not stated or any(kind in _UNSTATED for kind in kinds) or stated == list(axes):
@@ -63,13 +64,13 @@ def kind_notes(fields: Fields, axes: Sequence[int]) -> tuple[str, ...]:
 
 
 def value_notes(fields: Fields) -> tuple[str, ...]:
-    """Return a note where the voxels were mapped from other values, which the format keeps."""
+    """Return a note if the voxels were mapped from another range, which the format records."""
     low, high = (fields.get(name, fields.get(name.replace(" ", ""))) for name in _OLD)
     if low is None or high is None:
         return ()
     return (
         f"values: old min {float(low):g} and old max {float(high):g} state the range before the "
-        "voxels were mapped to whole numbers: they are read as stored",
+        "voxels were mapped to whole numbers: the voxels are read as stored",
     )
 
 
@@ -79,11 +80,12 @@ _OLD = ("old min", "old max")
 def units_um(
     fields: Fields, axes: Sequence[int], *, is_patient: bool
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return a factor (3, 3) for each part of the directions, in um, and notes.
+    """Return a factor to um, (3, 3), for each component of the directions, and notes.
 
-    axes  the axes of space; rows of the result are of them, columns of the space's own axes
+    axes  indices of the axes of space, which are the rows of the result; the columns are the
+          space's own axes
 
-    NaN where no unit is stated; in a patient's space it is the mm then.
+    NaN where no unit is stated; in a patient's space mm are assumed instead.
     """
     of_space = _texts(fields.get("space units"))
     listed = _texts(fields.get("units"))
@@ -99,14 +101,14 @@ def units_um(
         reason = "as Slicer and ITK do in a patient's space"
         odd = [unit for unit in (*of_space, *of_axes) if unit and um_per(unit) is None]
         if odd:
-            reason = f"since {odd[0]!r:.40} is no unit of length"
+            reason = f"since {odd[0]!r:.40} is not a unit of length"
         notes = settle(_UNIT, [Statement("mm", reason, Trust.ASSUMED)]).notes
         factors = np.where(np.isnan(factors), 1000.0, factors)
     return np.tile(factors[:, None], (1, 3)), notes
 
 
 def _compared(of_space: Sequence[str], of_axes: Sequence[str]) -> tuple[str, ...]:
-    """Return a note where the space's axes and the array's have one unit each, and not the same."""
+    """Return a note if the units of the space's axes differ from those of the array's axes."""
     one, other = (sorted({um_per(unit) or 0.0 for unit in units}) for units in (of_space, of_axes))
     if one == other:
         return ()
@@ -126,9 +128,9 @@ def _spacings(fields: Fields, count: int) -> NDArray[np.float64]:
 
 
 def _by_ends(fields: Fields, sizes: Sequence[int]) -> NDArray[np.float64]:
-    """Return the steps by the first and last place of each axis; NaN: they don't tell.
+    """Return the steps from the first and last position of each axis; NaN: they state none.
 
-    A place is that of a sample (node), or of the edge of one (cell).
+    A position is that of a sample (node), or of a sample's edge (cell).
     """
     count = len(sizes)
     low, high = (

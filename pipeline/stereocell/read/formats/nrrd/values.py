@@ -1,4 +1,4 @@
-"""The axis of NRRD that is not of space: channels, parts of vectors and tensors, diffusion.
+"""Interpret NRRD's axis that is not spatial: channels, parts of vectors and tensors, diffusion.
 
 References: https://teem.sourceforge.net/nrrd/format.html#kinds,
 https://www.na-mic.org/wiki/NAMIC_Wiki:DTI:Nrrd_format (DWMRI_ fields)
@@ -40,11 +40,11 @@ _B_VALUE = "DWMRI_b-value"
 class ValueAxis:
     """The axis of values at each voxel.
 
-    is_time  its values count as points in time
-    order    for each point in time its place in the file
-    names    of channels; None: not stated
-    colors   the same
-    notes    a sentence on what the values are
+    is_time  whether its values count as time points
+    order    stored index of each time point
+    names    names of channels; None: not stated
+    colors   colours of channels, linear RGB, 0..1; None: not stated
+    notes    a sentence on the meaning of the values
     """
 
     is_time: bool = False
@@ -55,9 +55,9 @@ class ValueAxis:
 
 
 def value_axis(fields: Mapping[str, Any], kind: str, count: int) -> ValueAxis:
-    """Return what the values of an axis are.
+    """Return the meaning of the values along an axis.
 
-    kind   of the axis, by `kinds`; empty: none is stated
+    kind   kind of the axis in `kinds`; empty: none is stated
     count  length of the axis
     """
     if count < 2:
@@ -69,9 +69,9 @@ def value_axis(fields: Mapping[str, Any], kind: str, count: int) -> ValueAxis:
         return ValueAxis(True, tuple(order_of(weights)), (None,), (None,), (note,))
     if str(fields.get("modality", "")).strip().upper() == "DWMRI":
         note = (
-            f"{count} images at a place are of diffusion (modality DWMRI) and count as points in "
-            f"time; {place} states {len(weights)} of them, so that their b-values are not known; "
-            "--time picks one"
+            f"{count} images at a place are of diffusion (modality DWMRI) and count as time "
+            f"points; {place} states only {len(weights)} of them, so their b-values are not "
+            "known; --time picks one"
         )
         return ValueAxis(True, tuple(range(count)), (None,), (None,), (note,))
     names = _PARTS.get(kind.lower(), ())
@@ -89,7 +89,7 @@ def value_axis(fields: Mapping[str, Any], kind: str, count: int) -> ValueAxis:
 def _b_values(fields: Mapping[str, Any]) -> list[float]:
     """Return the b-value of each image, s/mm2; empty: not stated.
 
-    The longest gradient has the stated b-value, and those of others go with the squared length. The
+    The longest gradient has the stated b-value; those of others grow with the squared length. The
     trace of a B-matrix is the b-value itself.
     """
     matrices = _rows(fields, _MATRIX, 6)
@@ -108,7 +108,7 @@ def _b_values(fields: Mapping[str, Any]) -> list[float]:
 def _rows(
     fields: Mapping[str, Any], pattern: re.Pattern[str], numbers: int
 ) -> list[Sequence[float]]:
-    """Return the rows of numbers of numbered fields, which count from 0 without a gap."""
+    """Return the rows of numbers in numbered fields; empty: the numbers don't count up from 0."""
     found: dict[int, Sequence[float]] = {}
     for name, value in fields.items():
         if (numbered := pattern.fullmatch(name)) is None:

@@ -1,4 +1,4 @@
-"""OME-Zarr, and Zarr without its metadata."""
+"""OME-Zarr, and Zarr without the metadata of OME-Zarr."""
 
 import os
 import re
@@ -11,7 +11,7 @@ from stereocell.read.image import Image
 from stereocell.storage.file_states import FileStates
 from stereocell.storage.location import Location
 
-# DANDI names the Zarr in its bucket by a UUID alone
+# DANDI's bucket holds each Zarr under a UUID without an ending.
 _OF_DANDI = re.compile(r"/zarr/[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}(/|$)")
 
 

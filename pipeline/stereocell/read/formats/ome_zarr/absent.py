@@ -24,7 +24,7 @@ def count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None
         return None
     others, members = stored.store.other_names, stored.store.members
     names = members or states.names()
-    # The one image of a container is a group of its own below the source that was listed.
+    # If a container's only image was opened, its path starts below the source that was listed.
     below = stored.store.source.removeprefix(states.location.source).strip("/")
     outside = f"{below}/" if below and members is None else ""
 
@@ -35,7 +35,7 @@ def count_absent(stored: Any, spans: Spans, states: FileStates) -> Absent | None
         return others is not None and outside + others.key_of(key) in names
 
     is_listed = stored.store.is_local and number_of(stored.chunks, spans) <= MOST_COUNTED
-    if stored.shards and is_listed:  # at an address each index is a request
+    if stored.shards and is_listed:  # each index would be a request at an address
         pairs = zip(stored.chunks, spans, strict=True)
         touched = [touched_along(size, ranges) for size, ranges in pairs]
         inner = absent_in_shards(stored, touched, is_present)

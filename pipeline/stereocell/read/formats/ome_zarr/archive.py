@@ -10,9 +10,9 @@ ZARR_FILES = ("zarr.json", ".zgroup", ".zattrs", ".zarray")
 
 
 def zarr_root_in(names: Collection[str]) -> str | None:
-    """Return the folder of a Zarr group among the members of a zip file, with a slash at its end.
+    """Return the folder of a Zarr group among the members of a zip file, with a final slash.
 
-    It is the root, or the only folder there. None: there is no group.
+    It is the root, or else the only folder in it. None: there is no group.
     """
     if any(file in names for file in ZARR_FILES):
         return ""
@@ -22,18 +22,18 @@ def zarr_root_in(names: Collection[str]) -> str | None:
 
 
 def is_archive(path: str) -> bool:
-    """Return whether a file is a zip file that holds a Zarr group, or is named as one that does."""
+    """Return whether a file is a zip file that holds a Zarr group, or is named like one."""
     lower = path.lower()
     if not lower.endswith((".zip", ".ozx")) or not os.path.isfile(path):
         return False
     if lower.endswith(ARCHIVE_ENDINGS) and zipfile.is_zipfile(path):
-        return True  # the reader describes a missing group
+        return True  # the reader reports a missing group
     return zarr_root_in(_members(path, os.path.getmtime(path))) is not None
 
 
 @lru_cache(maxsize=8)
 def _members(path: str, _: float) -> frozenset[str]:
-    """Return the names of a zip file's members; none where it can't be read."""
+    """Return the names of a zip file's members; empty: it can't be read."""
     try:
         with zipfile.ZipFile(path) as archive:
             return frozenset(archive.namelist())

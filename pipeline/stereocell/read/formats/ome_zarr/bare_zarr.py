@@ -1,8 +1,8 @@
-"""A Zarr array (v2 or v3) without the metadata of OME-Zarr.
+"""Read a Zarr array (v2 or v3) without the metadata of OME-Zarr.
 
-Its axes come from `--axes`, from the names of dimensions (v3, or attributes of
-read/axis_names.py), else three dimensions are z, y, x. Its spacing comes from `--spacing-um`, from
-arrays of positions beside it (coordinates.py), or from the attributes of
+Its axes come from `--axes` or from the names of its dimensions (v3, or the attributes in
+read/axis_names.py); three unnamed dimensions are z, y, x. Its spacing comes from `--spacing-um`,
+from arrays of positions beside it (coordinates.py), or from the attributes in
 read/array_spacing.py.
 """
 
@@ -77,9 +77,9 @@ def read_array(location: Location, store: Store, path: str, *, axes: str = "") -
 
 
 def _named_axes(array: "zarr.Array[Any]", around: Beside) -> list[Statement]:
-    """Return the names of an array's dimensions, by each field that states them.
+    """Return the names of an array's dimensions, for each field that states them.
 
-    The `axis` of a dimension's positions goes before the name of the dimension.
+    CF's `axis` of a dimension's positions takes precedence over the name of the dimension.
     """
     axes = {one.name: one.axis for one in around.positions if one is not None and one.axis}
     return [
@@ -110,10 +110,10 @@ def _spacing(array: "zarr.Array[Any]", axes: Sequence[str], around: Beside) -> S
 def read_only_array(
     location: Location, store: Store, group: "zarr.Group", *, axes: str = ""
 ) -> Image | None:
-    """Return the image of the only array in a group of no OME-Zarr image.
+    """Return the image of the only volume in a group that holds no OME-Zarr image.
 
-    None: it has no array of three axes, or OME-Zarr is in it. Raises SourceError where it has
-    several.
+    None: it has no array of three axes, or holds OME-Zarr. Raises SourceError where it has several
+    volumes.
     """
     if not location.is_local:  # most addresses can't be listed
         return None
@@ -126,7 +126,7 @@ def read_only_array(
     found.sort(key=lambda pair: pair[0])
     if len(found) == 1:
         image = read_array(location, store, found[0][0], axes=axes)
-        note = f"array {found[0][0]}, the only one of a group without `multiscales`"
+        note = f"array {found[0][0]}: the only volume in a group without `multiscales`"
         return replace(image, notes=(note, *image.notes))
     listed = ", ".join(f"{path} {node.shape}" for path, node in found[:_LISTED])
     more = f" and {len(found) - _LISTED} more" if len(found) > _LISTED else ""
@@ -134,7 +134,7 @@ def read_only_array(
     likely = likely_image(paths)
     raise SeveralDatasetsError(
         f"{location.shown}: no multiscales: found {listed}{more}; expected the attribute "
-        f"`multiscales` of an image, or one array, as {location.shown}/{likely}",
+        f"`multiscales` of an image, or one array, such as {location.shown}/{likely}",
         [f"{location.source}/{path}" for path in paths],
         [f"{path} {node.shape}" for path, node in found],
         paths.index(likely),

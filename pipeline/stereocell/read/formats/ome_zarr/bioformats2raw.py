@@ -1,8 +1,8 @@
-"""The OME-XML of a converted file, which bioformats2raw keeps beside its OME-Zarr images.
+"""Read the OME-XML that bioformats2raw keeps beside the OME-Zarr images of a converted file.
 
-`OME/METADATA.ome.xml` describes the images as OME-TIFF does: sizes of voxels, positions of planes,
-and further axes (`ModuloAlongZ`). The OME-Zarr metadata have only the sizes, so the OME-XML is
-compared with them and read by the code of OME-TIFF.
+`OME/METADATA.ome.xml` describes the images as OME-TIFF does: voxel sizes, positions of planes, and
+further axes (`ModuloAlongZ`). The OME-Zarr metadata only have the sizes. So the OME-XML is compared
+with them and read by the code for OME-TIFF.
 """
 
 import os
@@ -32,10 +32,10 @@ _REMEDY = "--spacing-um z,y,x replaces it"
 class Converted:
     """An image in the OME-XML of the file that was converted.
 
-    spacing_um  (z, y, x), um; None each: not stated
+    spacing_um  (z, y, x), um; None for each one not stated
     shape       voxels (z, y, x)
-    path        of the OME-XML
-    root        of the OME-XML, with this image alone
+    path        path of the OME-XML
+    root        root of the OME-XML, reduced to this image
     """
 
     spacing_um: PartialTriple
@@ -45,12 +45,15 @@ class Converted:
 
     @property
     def name(self) -> str:
-        """The path of the OME-XML below the container, for notes."""
+        """The path of the OME-XML inside the container, for notes."""
         return os.path.join("OME", os.path.basename(self.path))
 
 
 def converted_of(location: Location) -> Converted | None:
-    """Return the OME-XML's image beside an image of bioformats2raw on this machine."""
+    """Return the description of an image in the OME-XML beside it; None: there is none.
+
+    Only images on this machine have one.
+    """
     image = Path(location.source)
     container = image.parent
     path = container / _XML
@@ -69,7 +72,7 @@ def converted_of(location: Location) -> Converted | None:
 
 
 def _index_of(container: Path, name: str) -> int:
-    """Return the place of an image among the series of its container. Raises ValueError."""
+    """Return the index of an image in the series of its container. Raises ValueError."""
     for file in ("zarr.json", ".zattrs"):
         path = container / "OME" / file
         if path.is_file() and path.stat().st_size <= _MAX_BYTES:
@@ -119,12 +122,12 @@ def _with_spacing_of_xml(
     depth, notes = settle_depth(converted.root, stated)
     if depth is None or y is None or x is None:
         return tuple(grids), ()
-    note = f"voxel spacing: the image states none with a unit of length: {converted.name} is used"
+    note = f"voxel spacing: the image states no length with a unit: {converted.name} is used"
     return (Grid(grids[0].shape, (depth, y, x)), *grids[1:]), (note, *notes)
 
 
 def _deeper(grid: Grid, ratio: float) -> Grid:
-    """Return a grid whose voxels are some times as deep."""
+    """Return a grid whose spacing along z is multiplied by a ratio."""
     if grid.spacing_um is None or ratio == 1.0:
         return grid
     z, y, x = grid.spacing_um

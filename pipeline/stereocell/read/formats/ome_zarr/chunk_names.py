@@ -1,11 +1,11 @@
-"""The names of a Zarr array's chunks, where the files are not named as the metadata state.
+"""Find a Zarr array's chunks if their files are named differently than the metadata state.
 
-A copy through another program or an edited `.zarray` leaves chunks `0.0.0` behind metadata that
-state `0/0/0`, or the reverse. Zarr then reads each chunk as absent, and the volume as empty. Both
-separators of both encodings are looked for, and a chunk without a file of the stated name is read
-from a file of the other name. On this machine the folder, or the zip file, is listed when it is
-opened. At an address the other names are tried when a chunk is absent, which costs no request
-before.
+A copy through another program or an edited `.zarray` leaves chunks `0.0.0` with metadata that state
+`0/0/0`, or the reverse. Zarr would then read each chunk as absent, and the volume as empty. So both
+separators of both encodings are searched, and a chunk without a file of the stated name is read
+from a file with another name. On this machine the folder or the zip file is listed when it is
+opened. At an address the other names are tried only when a chunk is absent, so a sound source costs
+no further request.
 
 References: Zarr 3 specification, section on chunk key encodings; Zarr 2, `dimension_separator`
 """
@@ -33,16 +33,16 @@ _ENCODINGS: tuple[ChunkKeyEncoding, ...] = (
     DefaultChunkKeyEncoding("."),
 )
 _KEY = re.compile(r"c?[./]?(\d+(?:[./]\d+)*)")  # name of a chunk below its array
-_MOST_LISTED = 100_000  # most entries of an array's folder that are looked at
+_MOST_LISTED = 100_000  # entries of an array's folder that are looked at
 
 
 @dataclass(frozen=True, slots=True)
 class OtherNames:
-    """The names that the files of an array have, beside those that its metadata state.
+    """Names of an array's files that differ from those that its metadata state.
 
     array   path of the array below the source; empty: the source itself
-    stated  the name of the first chunk by the metadata
-    found   the encoding by which files are named
+    stated  name of the first chunk according to the metadata
+    found   encoding by which the files are named
     """
 
     array: str
@@ -50,7 +50,7 @@ class OtherNames:
     found: ChunkKeyEncoding
 
     def key_of(self, key: str) -> str | None:
-        """Return the name that the chunk of a stated name has; None: no chunk has this name."""
+        """Return the file's name for the stated name of a chunk; None: it is not a chunk's name."""
         prefix = f"{self.array}/" if self.array else ""
         match = _KEY.fullmatch(key.removeprefix(prefix)) if key.startswith(prefix) else None
         if match is None:
@@ -63,13 +63,13 @@ class OtherNames:
         first = self.found.encode_chunk_key((0,) * dimensions)
         level = f" of level {self.array!r:.60}" if self.array else ""
         return (
-            f"chunks{level}: the metadata name them as {self.stated}, the files are named as "
-            f"{first}: the files are read"
+            f"chunks{level}: the metadata name them like {self.stated}, but the files are named "
+            f"like {first}: the files are read"
         )
 
 
 def possible_names(array: "zarr.Array[Any]") -> tuple[OtherNames, ...]:
-    """Return the names that chunks may have beside those that the metadata state."""
+    """Return the names that chunks may have other than the stated ones."""
     count = len(array.shape)
     if count < 2:
         return ()
@@ -81,11 +81,11 @@ def possible_names(array: "zarr.Array[Any]") -> tuple[OtherNames, ...]:
 def names_on_disk(
     location: Location, array: "zarr.Array[Any]", members: Set[str] | None
 ) -> OtherNames | None:
-    """Return the names by which chunks lie that the metadata name otherwise; None: there are none.
+    """Return the other names under which chunks are stored; None: there are none.
 
-    The array is on this machine, in a folder that can be listed, or in a zip file.
+    The array is on this machine, in a folder that can be listed or in a zip file.
 
-    members  of the zip file; None: it is a folder
+    members  names in the zip file; None: it is a folder
     """
     count = len(array.shape)
     forms = _listed(location, array) if members is None else _among(members, array)
@@ -93,12 +93,12 @@ def names_on_disk(
 
 
 def _form(encoding: ChunkKeyEncoding, dimensions: int) -> str:
-    """Return the name that identifies an encoding."""
+    """Return the name of the first chunk, which identifies an encoding."""
     return encoding.encode_chunk_key((0,) * dimensions)
 
 
 def _among(members: Set[str], array: "zarr.Array[Any]") -> set[str]:
-    """Return the forms of the names of an array's chunks among the members of a zip file."""
+    """Return the first chunk's name for each encoding found among the members of a zip file."""
     prefix, count = f"{array.path}/" if array.path else "", len(array.shape)
     below = (name.removeprefix(prefix) for name in members if name.startswith(prefix))
     found = filter(None, map(_KEY.fullmatch, islice(below, _MOST_LISTED)))
@@ -112,7 +112,7 @@ def _among(members: Set[str], array: "zarr.Array[Any]") -> set[str]:
 
 
 def _listed(location: Location, array: "zarr.Array[Any]") -> set[str]:
-    """Return the forms of the names in an array's folder on this machine."""
+    """Return the first chunk's name for each encoding found in an array's folder."""
     folder, count = f"{location.source}/{array.path}".rstrip("/"), len(array.shape)
     dotted = re.compile(rf"(c\.)?\d+(\.\d+){{{count - 1}}}")
     forms: set[str] = set()

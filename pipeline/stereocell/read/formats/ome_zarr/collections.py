@@ -1,7 +1,7 @@
-"""OME-Zarr groups that hold images: plates, wells, containers of several series, label images.
+"""Describe OME-Zarr groups that hold images: plates, wells, containers of series, label images.
 
-Such a group is no image by itself. What it holds is told in one line, with the path that opens a
-part of it; a container of one image is opened.
+Such a group is not an image itself. One line describes its content, with the path that opens a part
+of it. A container with a single image is opened.
 
 References: OME-Zarr 0.5, https://ngff.openmicroscopy.org/0.5/ (plate, well, labels,
 bioformats2raw.layout)
@@ -20,27 +20,27 @@ from stereocell.read.formats.ome_zarr.store import GuardedStore, open_store, zar
 from stereocell.storage.location import Location, is_own, require_own_key
 
 CONTAINER = "bioformats2raw.layout"
-_SHOWN = 8  # parts that a line lists; the others are counted
-_LOOKED_AT = 4  # label images of which type and number of objects are read
-_MAX_SERIES = 1000  # images of a container without a list of them
+_SHOWN = 8  # parts that a line lists; the others are only counted
+_LOOKED_AT = 4  # label images whose type and number of objects are read
+_MAX_SERIES = 1000  # images that are looked for in a container without a list of them
 _NAME = 60  # characters of a path or name in a line
 _GROUP_FILES = ("zarr.json", ".zgroup", ".zarray")
 
 
 @dataclass(frozen=True, slots=True)
 class ZarrTree:
-    """The groups below an opened one; each is read once it is asked for."""
+    """The groups below an opened one. A group is read when it is needed."""
 
     location: Location
     store: GuardedStore
     zarr_format: Any
 
     def attributes(self, path: str) -> Mapping[str, Any]:
-        """Return the OME attributes of a group; none where it is missing or can't be read."""
+        """Return the OME attributes of a group; empty: the group is missing or can't be read."""
         return self.find(path) or {}
 
     def find(self, path: str) -> Mapping[str, Any] | None:
-        """Return the OME attributes of a group; None: it is none, or can't be read."""
+        """Return the OME attributes of a group; None: the group is missing or can't be read."""
         try:
             with zarr_boundary(self.location.shown, "a group"):
                 group = zarr.open_group(
@@ -51,7 +51,7 @@ class ZarrTree:
             return None
 
     def dtype(self, path: str) -> str:
-        """Return the type of an array's numbers; empty where it can't be read."""
+        """Return the type of an array's numbers; empty: the array can't be read."""
         try:
             with zarr_boundary(self.location.shown, "an array"):
                 array = zarr.open_array(
@@ -63,15 +63,15 @@ class ZarrTree:
 
 
 def ome_of(attributes: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the attributes of OME-Zarr: nested in `ome` since 0.5."""
+    """Return the attributes of OME-Zarr, which are nested in `ome` since version 0.5."""
     ome = attributes.get("ome", attributes)
     return ome if isinstance(ome, Mapping) else {}
 
 
 def series_of(ome: Mapping[str, Any], tree: ZarrTree) -> list[str]:
-    """Return the paths of the images in a container; none where the group is no container.
+    """Return the paths of the images in a container; empty: the group is not a container.
 
-    The group OME lists them; else they are numbered from 0.
+    The group OME lists them; without a list they are numbered from 0.
     """
     if CONTAINER not in ome:
         return []
@@ -92,7 +92,7 @@ def part_of(location: Location, path: str) -> Location:
         require_own_key(path, named)
     elif not is_own(part.source, [location.folder]):
         raise SourceError(
-            f"{named}: leads out of the group, expected a group in it (links followed)"
+            f"{named}: leads out of the group, expected a group inside it (links are followed)"
         )
     return part
 
@@ -103,7 +103,7 @@ def is_collection(ome: Mapping[str, Any]) -> bool:
 
 
 def image_of_level(location: Location) -> str:
-    """Return the shown path of the OME-Zarr image of which an array is a level; empty: of none."""
+    """Return the shown path of the OME-Zarr image that has an array as a level; empty: none."""
     source, _, name = location.source.rstrip("/").rpartition("/")
     image = replace(location, source=source)
     try:
@@ -126,15 +126,15 @@ def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree
             return "found a plate without wells"
         fields = _paths(tree.attributes(wells[0]).get("well"), "images")
         return (
-            f"found a plate of {_counted(wells, 'well')}; open an image of a well by its path, as "
-            f"{shown}/{_cut(wells[0])}/{_cut(fields[0]) if fields else '0'}"
+            f"found a plate of {_counted(wells, 'well')}; open an image of a well by its path, "
+            f"such as {shown}/{_cut(wells[0])}/{_cut(fields[0]) if fields else '0'}"
         )
     if "well" in ome:
         fields = _paths(ome["well"], "images")
         if not fields:
             return "found a well without images"
         return (
-            f"found a well of {_counted(fields, 'image')}; open one by its path, as "
+            f"found a well of {_counted(fields, 'image')}; open one by its path, such as "
             f"{shown}/{_cut(fields[0])}"
         )
     if CONTAINER in ome:
@@ -142,19 +142,19 @@ def describe_group(ome: Mapping[str, Any], series: Sequence[str], tree: ZarrTree
             return f"found a container of series ({CONTAINER}) without an image"
         return (
             f"found {_counted(series, 'image')} in one container ({CONTAINER}); open one by its "
-            f"path, as {shown}/{_cut(series[0])}"
+            f"path, such as {shown}/{_cut(series[0])}"
         )
     if "labels" in ome:
         names = [str(name) for name in ome["labels"]] if isinstance(ome["labels"], list) else []
         return f"found a list of labels, {_counted(names, 'label image')}"
     groups = _groups_below(tree)
     if groups:
-        return f"found {_counted(groups, 'group')}; open an image by its path, as {shown}/PATH"
+        return f"found {_counted(groups, 'group')}; open an image by its path: {shown}/PATH"
     return "not found"
 
 
 def notes_on_labels(tree: ZarrTree) -> tuple[str, ...]:
-    """Return a sentence, or none, about the label images beside an image."""
+    """Return a sentence on the label images of an image, if it has any."""
     listed = tree.attributes("labels").get("labels")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     if not names:
@@ -163,13 +163,11 @@ def notes_on_labels(tree: ZarrTree) -> tuple[str, ...]:
     described += [_cut(name) for name in names[_LOOKED_AT:_SHOWN]]
     if len(names) > _SHOWN:
         described.append(f"{len(names) - _SHOWN} more")
-    return (
-        f"label images of it: {', '.join(described)} (--labels NAME builds the objects of one)",
-    )
+    return (f"its label images: {', '.join(described)} (--labels NAME builds the objects of one)",)
 
 
 def labels_evidence(ome: Mapping[str, Any], location: Location) -> str:
-    """Return what in the metadata says that voxels number objects; empty: nothing does."""
+    """Return the metadata that say that voxels number objects; empty: none do."""
     if "image-label" in ome:
         return "`image-label` in its attributes"
     parts = location.parts
@@ -195,7 +193,7 @@ def _label_image(tree: ZarrTree, name: str) -> str:
 
 
 def _paths(table: Any, key: str) -> list[str]:
-    """Return the `path` of each entry of a list in a table; none where it is no such list."""
+    """Return the `path` of each entry of a list in a table; empty: there is no such list."""
     entries = table.get(key) if isinstance(table, Mapping) else None
     if not isinstance(entries, list):
         return []
@@ -209,13 +207,13 @@ def _counted(names: Sequence[str], noun: str) -> str:
 
 
 def _cut(name: str) -> str:
-    """Return a name as it may be printed: no control characters, not too long."""
+    """Return a name that can be printed: without control characters, and shortened."""
     clean = "".join(c if c.isprintable() else " " for c in name)
     return clean if len(clean) <= _NAME else f"{clean[:_NAME]}..."
 
 
 def _groups_below(tree: ZarrTree) -> list[str]:
-    """Return the names of the groups in a folder, sorted; of an address none."""
+    """Return the sorted names of the groups in a folder; empty at an address."""
     if not tree.location.is_local or not Path(tree.location.source).is_dir():
         return []
     folder = Path(tree.location.source)
@@ -224,6 +222,6 @@ def _groups_below(tree: ZarrTree) -> list[str]:
 
 
 def _is_group(location: Location) -> bool:
-    """Whether the image to which a folder `labels` belongs is a Zarr group of any name."""
+    """Return whether the folder that contains `labels` is a Zarr group of any name."""
     image = Path(location.source).parent.parent
     return location.is_local and any((image / file).is_file() for file in _GROUP_FILES)

@@ -1,8 +1,8 @@
-"""The positions of a Zarr array's voxels, which xarray writes into arrays beside it.
+"""Read the positions of a Zarr array's voxels, which xarray writes into arrays beside it.
 
 An array names its dimensions, and a one-dimensional array of the same name holds the positions
-along one of them. It lies in the group of the array, or in a group around that, as a tree of xarray
-has it. Its `units` are the unit of the positions, and `axis` names the axis, as CF has it.
+along each of them. It lies in the group of the array or, in a tree of xarray, in a group around
+that. Its `units` are the unit of the positions, and CF's `axis` names the axis.
 
 References: https://docs.xarray.dev/en/stable/internals/zarr-encoding-spec.html
 """
@@ -41,9 +41,9 @@ class Positions:
     """The positions along one dimension.
 
     values  one for each voxel
-    unit    of the values; empty: not stated
-    axis    `t`, `z`, `y` or `x`, by CF's attribute; empty: not stated
-    sense   up or down, by CF's attribute `positive`; empty: not stated
+    unit    unit of the values; empty: not stated
+    axis    `t`, `z`, `y` or `x`, from CF's attribute; empty: not stated
+    sense   `up` or `down`, from CF's attribute `positive`; empty: not stated
     """
 
     name: str
@@ -55,11 +55,12 @@ class Positions:
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """All that lies beside an array.
+    """The positions and attributes that lie beside an array.
 
-    positions   for each dimension; None: there are none
-    attributes  of each group around the array with its name for notes, the innermost first
-    files       the files and folders that were read
+    positions   positions along each dimension; None: there are none
+    attributes  attributes of each group around the array, with the group's name for notes; the
+                innermost group is first
+    files       files and folders that were read
     """
 
     positions: tuple[Positions | None, ...]
@@ -68,7 +69,7 @@ class Beside:
 
 
 def named_dimensions(array: "zarr.Array[Any]") -> dict[str, tuple[str, ...]]:
-    """Return the names of an array's dimensions, by each field that states them."""
+    """Return the names of an array's dimensions, for each field that states them."""
     fields = {name: array.attrs.get(name) for name in NAME_LISTS}
     stated = getattr(array.metadata, "dimension_names", None)
     fields["dimension_names"] = stated or fields["dimension_names"]
@@ -77,7 +78,7 @@ def named_dimensions(array: "zarr.Array[Any]") -> dict[str, tuple[str, ...]]:
 
 
 def beside(location: Location, store: Store, path: str, array: "zarr.Array[Any]") -> Beside:
-    """Return what lies beside the array at a path of a store, relative to the source."""
+    """Return the positions and attributes beside the array at a path, relative to the source."""
     dimensions = next(iter(named_dimensions(array).values()), ())
     groups = list(_groups(location, store, path))
     found = [
@@ -94,10 +95,10 @@ def beside(location: Location, store: Store, path: str, array: "zarr.Array[Any]"
 def notes_beside_scale(
     positions: Sequence[Positions | None], axes: Sequence[str], spacing_um: Triple | None
 ) -> tuple[str, ...]:
-    """Return notes on positions that disagree with the scale of an image, which is taken.
+    """Return notes on positions that disagree with an image's scale; the scale is used.
 
-    axes        of the array, slowest first
-    spacing_um  (z, y, x), by the scale; None: not stated
+    axes        names of the array's axes, slowest first
+    spacing_um  (z, y, x), from the scale; None: not stated
     """
     notes: list[str] = []
     for axis, one in zip(axes, positions, strict=False):
@@ -106,7 +107,7 @@ def notes_beside_scale(
             continue
         if steps.mean < 0:
             notes.append(
-                f"positions of {one.name} beside the image descend, and its scale rises: the "
+                f"positions of {one.name} beside the image descend, while its scale rises: the "
                 "voxels are read as stored, so the volume may be mirrored"
             )
         if not steps.is_even:
@@ -147,7 +148,7 @@ class _Group:
 def _groups(location: Location, store: Store, path: str) -> Iterator[_Group]:
     """Yield the groups around an array, the innermost first.
 
-    Where the source is the array itself, this is the group in which it lies.
+    If the source is the array itself, only the group in which it lies is yielded.
     """
     inner = path.strip("/")
     if not inner:

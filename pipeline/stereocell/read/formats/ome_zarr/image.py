@@ -1,7 +1,8 @@
-"""OME-Zarr 0.1 to 0.6 (Zarr v2 and v3), in a folder, a zip file or at an address, by zarr-python.
+"""Read OME-Zarr 0.1 to 0.6 (Zarr v2 and v3) from a folder, a zip file or an address.
 
-bioio's reader, which stands on zarr-python, is not used. Only its JSON metadata would be left in
-use, and its import took 1.5 s of each process, four times as long as zarr's:
+zarr-python reads the arrays. bioio's reader, which builds on it, is not used, because only its
+reading of the JSON metadata would be useful, and importing it took 1.5 s in each process, four
+times as long as zarr:
 - `physical_pixel_sizes` leaves out the units, and takes the first coordinate transformation for a
   scale without checking; this module composes all transformations.
 - `xarray_dask_data` builds a graph over all chunks of the dataset for every window; this module
@@ -61,21 +62,21 @@ from stereocell.read.value_scale import ignored_note
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_MAX_LEVELS = 64  # most levels of the pyramid
-_MOST_NAMED = 4  # most images of a group that a note names
+_MAX_LEVELS = 64  # levels of a pyramid; an image with more is refused
+_MOST_NAMED = 4  # images of a group that a note names
 
 
 def read_image(location: Location, *, axes: str = "", series: int = 0) -> Image:
     """Return a multiscale image of a group, or a bare array (bare_zarr.py).
 
-    The group may be a container of series, if it holds one image.
+    The group may be a container of series that holds one image.
 
     axes    the user's `--axes`, for a bare array
-    series  of the group's images, and of those along a further axis of the OME-XML beside one, as
-            `list_series` counts; 0: the first
+    series  number of the image as `list_series` counts: the group's images, and the parts along a
+            further axis that the OME-XML beside an image describes; 0: the first
 
-    Raises SourceError where there is no image, or where there are several groups of images;
-    UsageError where `axes` doesn't fit or there is no such series.
+    Raises SourceError where there is no image or several groups of images, UsageError where `axes`
+    doesn't fit or there is no such series.
     """
     image, root = _read(location, axes)
     if image.images == 1:
@@ -99,7 +100,10 @@ def read_image(location: Location, *, axes: str = "", series: int = 0) -> Image:
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each image of a group, and along a further axis. Raises SourceError."""
+    """Return a line for each image of a group and each part along a further axis.
+
+    Raises SourceError.
+    """
     entries = _entries(location, "", *_read(location, ""))
     return lines([one.candidate for one in entries])
 
@@ -108,8 +112,8 @@ def list_series(location: Location) -> tuple[str, ...]:
 class _Entry:
     """One line of the list: an image of the group, or a part of it along a further axis.
 
-    image  its index among the multiscales
-    part   from 1
+    image  index of the image among the multiscales
+    part   number of the part, from 1
     """
 
     image: int
@@ -120,7 +124,7 @@ class _Entry:
 def _entries(
     location: Location, axes: str, image: Image, root: ElementTree.Element | None
 ) -> list[_Entry]:
-    """Return the list of a group's images, of which the first one is read already."""
+    """Return the list of a group's images. `image` and `root` are the first one's, already read."""
     found = [_Entry(0, n, one) for n, one in enumerate(listed(image, root), 1)]
     for index in range(1, image.images):
         try:
@@ -134,10 +138,10 @@ def _entries(
 def _read(
     location: Location, axes: str, *, index: int = 0, is_part: bool = False
 ) -> tuple[Image, ElementTree.Element | None]:
-    """Return an image as it is stored, and the OME-XML beside it, if it describes the image.
+    """Return an image as stored, and the OME-XML beside it if it describes the image.
 
-    index    of the image among the multiscales
-    is_part  it is the one image of a container, and no container itself
+    index    index of the image among the multiscales
+    is_part  whether the group is the only image of a container, so it is not a container itself
     """
     where = location.shown
     with zarr_boundary(where, "the group of one OME-Zarr image, or a Zarr array"):
@@ -147,8 +151,8 @@ def _read(
     if isinstance(node, zarr.Array):
         if not axes and (whole := image_of_level(location)):
             raise SourceError(
-                f"{where}: found a level of an OME-Zarr image, expected the image, as {whole} "
-                "(--level picks the level), or its axes by --axes"
+                f"{where}: found a level of an OME-Zarr image, expected the image: {whole} "
+                "(--level picks the level); or give --axes to read only this array"
             )
         return bare_zarr.read_array(location, store, "", axes=axes), None
     metadata = node.metadata
@@ -186,20 +190,20 @@ def _image(
     axes: str,
     converted: Converted | None,
 ) -> Image:
-    """Return a multiscale image of a group's OME attributes. Raises SourceError."""
+    """Return a multiscale image from a group's OME attributes. Raises SourceError."""
     location, where = tree.location, tree.location.shown
     multiscale = _parsed(tree, ome)
     if not 0 < len(multiscale.paths) <= _MAX_LEVELS:
         raise SourceError(
             f"{where}: multiscales[0].datasets: found {len(multiscale.paths) or 'none'}, expected "
-            f"a level, and at most {_MAX_LEVELS}"
+            f"1 to {_MAX_LEVELS} levels"
         )
     levels, notes = _levels(location, store, multiscale, axes, tree.zarr_format)
     missing = [axis for axis in "zyx" if axis not in levels[0].axes]
     if missing:
         raise SourceError(
-            f"{where}: one plane (2D): a volume needs at least 2 planes: no axis {missing[0]} "
-            f"among {', '.join(levels[0].axes)}"
+            f"{where}: one plane (2D): a volume needs at least 2 planes: found no axis "
+            f"{missing[0]} among {', '.join(levels[0].axes)}"
         )
     grids, more = _grids(multiscale, levels, converted)
     files = () if converted is None else (converted.path,)
@@ -231,18 +235,21 @@ def _image(
 
 
 def _parsed(tree: ZarrTree, ome: Mapping[str, Any]) -> Multiscale:
-    """Return the metadata of the only image. Raises SourceError, of other versions with a way."""
+    """Return the metadata of the only image.
+
+    Raises SourceError; for an unknown version, the message shows how to read the voxels.
+    """
     where = tree.location.shown
     version, titled = ngff.version_of(ome), where
-    expected = "axes, datasets and scales as OME-Zarr 0.1 to 0.6"
+    expected = "axes, datasets and scales of OME-Zarr 0.1 to 0.6"
     if not ngff.is_known(version):
         with zarr_boundary(where, "a group whose arrays can be listed"):
             group = zarr.open_group(tree.store, mode="r", zarr_format=tree.zarr_format)
             path = next((name for name, node in group.members() if isinstance(node, zarr.Array)), 0)
-        titled = f"{where}: OME-Zarr {version:.20}, a version that is not known"
+        titled = f"{where}: OME-Zarr {version:.20}, an unknown version"
         expected += (
             f"; {where.rstrip('/')}/{path} --axes zyx --spacing-um z,y,x reads the voxels of an "
-            "array as they are stored"
+            "array as stored"
         )
     with one_line(f"{titled}: multiscales[0]", expected):
         parsed = ngff.parse(where, ome)
@@ -255,10 +262,10 @@ def _levels(
 ) -> tuple[tuple[VoxelArray, ...], tuple[str, ...]]:
     """Return the levels with the axes of the image, and notes.
 
-    axes  the user's `--axes`, taken where the metadata leave the axes open
+    axes  the user's `--axes`, used where the metadata leave the axes open
 
-    Raises SourceError where a level has another number of axes, or where the axes contradict each
-    other; UsageError where the metadata settle the axes.
+    Raises SourceError where a level has another number of axes or the axes contradict each other,
+    and UsageError where the metadata already state the axes.
     """
     where, dimensions = location.shown, len(image.names)
     arrays = [open_array(location, store, path, zarr_format=zarr_format) for path in image.paths]
@@ -267,14 +274,14 @@ def _levels(
     if axes and (is_same or not is_open):
         raise UsageError(
             f"{where}: --axes {axes}: the image names its axes, {', '.join(image.names)}; "
-            "expected none"
+            "expected no --axes"
         )
-    way = "" if image.names_axes else f", as {image.title} has them (else give --axes)"
+    source = "`axes`" if image.names_axes else f"axes of {image.title} (or give --axes)"
     for path, array in zip(image.paths, arrays, strict=True):
         if array.ndim != dimensions and (image.names_axes or not axes):
             raise SourceError(
                 f"{where}: level {path!r:.80}: found {array.ndim} dimensions, "
-                f"expected {dimensions} as `axes`{way}"
+                f"expected {dimensions}, the number of {source}"
             )
     names, notes = settled_axes(where, arrays[0], image.names, axes)
     for array in arrays[1:]:
@@ -300,7 +307,10 @@ def _grids(
 def _position_notes(
     tree: ZarrTree, store: Store, path: str, level: VoxelArray, grid: Grid
 ) -> tuple[str, ...]:
-    """Return notes on positions beside the finest level on this machine that disagree with it."""
+    """Return notes on positions beside the finest level that disagree with its grid.
+
+    Only positions on this machine are read.
+    """
     stored: Any = level.array
     while not isinstance(stored, zarr.Array):
         stored = stored.stored
@@ -320,7 +330,7 @@ def _grid(
     scale: Sequence[float] | None,
     shift: Sequence[float] | None,
 ) -> Grid:
-    # A scale without a unit is no length: writers that lack the spacing state 1.0.
+    # Without a unit, a scale is not a length: writers state 1.0 if they don't know the spacing.
     spacing = _spatial(image.names, image.units, scale)
     grid = grid_of(level.shape, spacing)
     if shift is None or grid.spacing_um is None:

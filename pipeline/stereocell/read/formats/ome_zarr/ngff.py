@@ -1,13 +1,13 @@
-"""The metadata of an OME-Zarr image, of versions 0.1 to 0.6: axes, levels and their places.
+"""Read the metadata of an OME-Zarr image, versions 0.1 to 0.6: axes, levels and their places.
 
 - 0.1 and 0.2 name no axes: they are t, c, z, y, x. They state no spacing.
 - 0.3 lists the names of axes, without types and units. It states no spacing.
-- 0.4 and 0.5 have axes with units; a level's transformations come before those of the image.
+- 0.4 and 0.5 have axes with units; a level's transformations apply before those of the image.
 - 0.6 (RFC-5) names coordinate systems. A level's transformation leads to the image's own system,
-  and those of the image lead from there to others.
+  and the image's transformations lead from there to others.
 
-Transformations that keep the grid's axes are read: scale, translation, identity, sequences of them,
-and affine matrices without rotation and shear.
+Only transformations that keep the grid's axes are read: scale, translation, identity, sequences of
+them, and affine matrices without rotation and shear.
 
 References: https://ngff.openmicroscopy.org, RFC-4 (orientation), RFC-5 (coordinate systems)
 """
@@ -25,15 +25,15 @@ from stereocell.read.statements import omission
 
 Placement = tuple[list[float] | None, list[float] | None]  # scale and translation of a level
 
-_FIXED = ("t", "c", "z", "y", "x")  # axes of 0.1 and 0.2
+_FIXED = ("t", "c", "z", "y", "x")  # axes of versions 0.1 and 0.2
 _WITHOUT_AXES = ("0.1", "0.2", "")
 _WITHOUT_SPACING = ("0.1", "0.2", "0.3")
 KNOWN = ("0.1", "0.2", "0.3", "0.4", "0.5", "0.6")
-_DEEPEST = 20  # most sequences within each other
+_DEEPEST = 20  # sequences nested within each other
 
 
 def version_of(ome: Mapping[str, Any]) -> str:
-    """Return the version that a group's attributes state; empty: they state none.
+    """Return the version that a group's attributes state; empty: none.
 
     >>> version_of({"version": "0.5", "multiscales": [{}]}), version_of({})
     ('0.5', '')
@@ -45,23 +45,23 @@ def version_of(ome: Mapping[str, Any]) -> str:
 
 
 def is_known(version: str) -> bool:
-    """Return whether the metadata of a version are known; drafts of one, as `0.6.dev1`, too."""
+    """Return whether a version is known, including its drafts such as `0.6.dev1`."""
     return not version or any(re.match(rf"{re.escape(one)}(?![0-9])", version) for one in KNOWN)
 
 
 class NotAlongAxesError(ValueError):
-    """A transformation turns or shears the grid, or is of an unknown kind; the text names it."""
+    """A transformation rotates or shears the grid, or has an unknown kind; the text names it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Multiscale:
     """The metadata of one image.
 
-    version       as stated; empty: not stated
-    names         of the axes, lower case
-    units         of the axes in um; None: no unit of length
-    orientations  of the axes, as `left-to-right`; empty: not stated
-    paths         of the levels, finest first
+    version       stated version; empty: not stated
+    names         names of the axes, in lower case
+    units         units of the axes, um; None: not a unit of length
+    orientations  orientations of the axes, such as `left-to-right`; empty: not stated
+    paths         paths of the levels, finest first
     placements    scale and translation of each level, in the axes' units; None: not stated
     notes         sentences for the user
     """
@@ -76,7 +76,7 @@ class Multiscale:
 
     @property
     def names_axes(self) -> bool:
-        """Whether the metadata name the axes: 0.1 and 0.2 don't."""
+        """Whether the metadata name the axes. Versions 0.1 and 0.2 don't."""
         return self.names != _FIXED or self.version not in _WITHOUT_AXES
 
     @property
@@ -91,10 +91,10 @@ class Multiscale:
 
 
 def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
-    """Return the first image of a group's attributes.
+    """Return the metadata of the first image in a group's attributes.
 
-    Raises SourceError where transformations turn the grid, and ValueError, KeyError or TypeError
-    where the metadata are of no version.
+    Raises SourceError where transformations rotate the grid, and ValueError, KeyError or TypeError
+    where the metadata don't follow any version.
     """
     multiscale = ome["multiscales"][0]
     version = version_of(ome)
@@ -103,7 +103,7 @@ def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
     axes, notes, system = _axes(multiscale, version)
     names = tuple(str(axis["name"]).lower() for axis in axes)
     if len(set(names)) != len(names):
-        raise ValueError(f"axes {', '.join(names)} name one twice")
+        raise ValueError(f"axes {', '.join(names)}: two have the same name")
     try:
         placements = tuple(_placement(multiscale, one, len(names), system) for one in datasets)
     except NotAlongAxesError as error:
@@ -111,7 +111,7 @@ def parse(where: str, ome: Mapping[str, Any]) -> Multiscale:
         raise SourceError(
             f"{where}: OME-Zarr {version}: coordinateTransformations: found {error}, expected "
             f"scales and translations; {where.rstrip('/')}/{paths[0] if paths else 0} --axes "
-            f"{letters} --spacing-um z,y,x reads the voxels as they are stored"
+            f"{letters} --spacing-um z,y,x reads the voxels as stored"
         ) from None
     return Multiscale(
         version,
@@ -128,7 +128,7 @@ def _newer(version: str) -> tuple[str, ...]:
     if is_known(version):
         return ()
     return (
-        f"OME-Zarr {version:.20}: this version is not known, and read as {KNOWN[-1]} is: compare "
+        f"OME-Zarr {version:.20}: this version is unknown and is read like {KNOWN[-1]}: compare "
         "axes and spacing with the program that wrote them",
     )
 
@@ -138,31 +138,31 @@ def _axes(
 ) -> tuple[Sequence[Mapping[str, Any]], tuple[str, ...], str | None]:
     """Return the axes, notes on them, and the name of the coordinate system that has them.
 
-    The name is None before 0.6.
+    The name is None before version 0.6.
     """
     if "coordinateSystems" in multiscale and "axes" not in multiscale:
         return _axes_of_system(multiscale)
     if "axes" not in multiscale and version in _WITHOUT_AXES:
         note = (
-            f"OME-Zarr {version or 'without a version'} names no axes: {', '.join(_FIXED)} are "
-            "read, as its specification has them"
+            f"OME-Zarr {version or 'without a version'} names no axes: they are read as "
+            f"{', '.join(_FIXED)}, by its specification"
         )
         return [{"name": name} for name in _FIXED], (note,), None
     axes = multiscale["axes"]
     if all(isinstance(axis, str) for axis in axes):
         return [{"name": axis} for axis in axes], (), None
     if not all(isinstance(axis, Mapping) for axis in axes):
-        raise ValueError("axes are not of OME-Zarr 0.3 to 0.6")
+        raise ValueError("axes don't have the form of OME-Zarr 0.3 to 0.6")
     return axes, (), None
 
 
 def _axes_of_system(
     multiscale: Mapping[str, Any],
 ) -> tuple[Sequence[Mapping[str, Any]], tuple[str, ...], str]:
-    """Return the axes of the coordinate system that is read, notes, and its name.
+    """Return the axes of the coordinate system that is read, notes, and the system's name.
 
-    It is the one to which the levels lead, or where that has no units of length, another one that
-    has, to which a transformation of the image leads from there.
+    It is the system to which the levels lead. If that has no units of length, it is another one
+    that has units and to which a transformation of the image leads from the first.
     """
     systems = {str(one["name"]): one["axes"] for one in multiscale["coordinateSystems"]}
     own = multiscale["datasets"][0].get("coordinateTransformations") or [{}]
@@ -206,7 +206,7 @@ def _way_to(
 
 
 def _system_of(step: Mapping[str, Any], end: str) -> str:
-    """Return the coordinate system at an end of a transformation; drafts differ in the form."""
+    """Return the coordinate system at an end of a transformation; drafts differ in its form."""
     found = step.get(end, "")
     return str(found.get("name", "") if isinstance(found, Mapping) else found)
 
@@ -223,8 +223,8 @@ def _placement(
 ) -> Placement:
     """Return scale and translation of a level.
 
-    The level's own transformations come first, then those of the whole image; with coordinate
-    systems the latter lead to other systems. Raises ValueError where one is invalid.
+    The level's own transformations apply first, then those of the whole image. With coordinate
+    systems, the latter lead to other systems. Raises ValueError where one is invalid.
     """
     steps = list(dataset.get("coordinateTransformations", []))
     if system is None:
@@ -247,7 +247,7 @@ def _flat(
 ) -> Iterator[tuple[str, list[float]]]:
     """Yield each scale and translation in the order in which they apply."""
     if depth > _DEEPEST:
-        raise NotAlongAxesError("sequences within sequences")
+        raise NotAlongAxesError("sequences that are nested too deeply")
     for step in steps:
         kind = str(step["type"])
         if kind == "sequence":
@@ -277,7 +277,7 @@ def _of_matrix(kind: str, rows: Any, dimensions: int) -> Iterator[tuple[str, lis
     matrix = matrix.reshape(dimensions, columns)
     scale = np.diag(matrix[:, :dimensions])
     if (matrix[:, :dimensions] != np.diag(scale)).any():
-        raise NotAlongAxesError(f"{kind!r} that turns or shears the grid")
+        raise NotAlongAxesError(f"{kind!r} that rotates or shears the grid")
     yield "scale", scale.tolist()
     if kind == "affine":
         yield "translation", matrix[:, dimensions].tolist()
@@ -286,15 +286,16 @@ def _of_matrix(kind: str, rows: Any, dimensions: int) -> Iterator[tuple[str, lis
 def _repeated(
     multiscale: Mapping[str, Any], placements: Sequence[Placement], system: str | None
 ) -> tuple[str, ...]:
-    """Return a note where the image's scale repeats that of its finest level."""
+    """Return a note if the image's scale repeats that of its finest level."""
     if system is not None or not placements or placements[0][0] is None:
         return ()
     own = _scale_in(multiscale["datasets"][0])
     if own is None or own != _scale_in(multiscale) or set(own) == {1.0}:
         return ()
     return (
-        "voxel spacing: the image and its finest level state the same scale: they are multiplied, "
-        "as OME-Zarr has it; if one repeats the other, --spacing-um z,y,x replaces the product",
+        "voxel spacing: the image and its finest level state the same scale: the two are "
+        "multiplied, by the specification of OME-Zarr; if one just repeats the other, "
+        "--spacing-um z,y,x replaces the product",
     )
 
 

@@ -1,4 +1,4 @@
-"""The sides of an OME-Zarr image in a body, by the anatomical orientation of its axes (RFC-4).
+"""Find the sides of an OME-Zarr image in a body from its axes' anatomical orientation (RFC-4).
 
 An axis states the direction in which its index grows, such as `left-to-right`. Three axes that
 state three different directions place the image in the patient's world, as DICOM does.
@@ -19,7 +19,7 @@ from stereocell.read.spacing import Grid
 from stereocell.read.turn import turned_array, turned_grid
 
 _UM_PER_MM = 1000.0
-# axis of LPS (left, posterior, superior) along which each side lies, and its sign
+# side -> the axis of LPS (left, posterior, superior) on which it lies, and the sign there
 _SIDES = {
     "left": (0, 1), "right": (0, -1),
     "posterior": (1, 1), "anterior": (1, -1),
@@ -44,9 +44,9 @@ class Sided:
 def with_sides(
     arrays: tuple[VoxelArray, ...], grids: tuple[Grid, ...], orientations: Sequence[str]
 ) -> Sided:
-    """Return the levels turned onto canonical axes, where their orientations say how.
+    """Return the levels on canonical axes, if their orientations are known.
 
-    orientations  of z, y and x, as `left-to-right`; empty: not stated
+    orientations  orientations of z, y and x, such as `left-to-right`; empty: not stated
     """
     if not any(orientations):
         return Sided(arrays, grids)
@@ -55,7 +55,7 @@ def with_sides(
     if len(axes) < len(orientations):
         stated = ", ".join(text or "none" for text in orientations)
         note = (
-            f"orientation of z, y, x: found {stated:.200}, expected three different directions of "
+            f"orientation of z, y, x: found {stated:.200}, expected three different directions in "
             "a body: it is not used, so the sides are unknown"
         )
         return Sided(arrays, grids, notes=(note,))

@@ -1,8 +1,8 @@
-"""Values that an OME-Zarr image states beside its own metadata, compared with these.
+"""Compare an OME-Zarr image's own metadata with values that are stated beside them.
 
 The arrays name their dimensions as well: `dimension_names` of Zarr v3, `_ARRAY_DIMENSIONS` of
-xarray in v2. A permutation of the axes mirrors the specimen, so the user decides. The OME-XML of a
-converted file is compared in bioformats2raw.py.
+xarray in v2. Reading axes in the wrong order mirrors the specimen, so the user decides between
+contradictory orders. The OME-XML of a converted file is compared in bioformats2raw.py.
 """
 
 import re
@@ -20,7 +20,7 @@ _VERSION = re.compile(r"0\.\d")
 
 
 def dimension_names(array: Any) -> tuple[str, ...]:
-    """Return the names of an array's dimensions, as letters; empty: not stated, or no axes."""
+    """Return the axes that an array's dimensions are named after; empty: not stated, or others."""
     named = getattr(array.metadata, "dimension_names", None)
     named = named or array.attrs.get("_ARRAY_DIMENSIONS", ())
     is_list = isinstance(named, list | tuple)
@@ -29,10 +29,10 @@ def dimension_names(array: Any) -> tuple[str, ...]:
 
 
 def version_notes(ome: Mapping[str, Any], zarr_format: int) -> tuple[str, ...]:
-    """Return a note where the version of the metadata is stated twice, or is not that of the files.
+    """Return a note if two fields state different versions, or the files have another version.
 
-    ome          the group's attributes, with one image
-    zarr_format  2 or 3, of the files: OME-Zarr up to 0.4 is of Zarr v2, later ones are of v3
+    ome          attributes of the group, with one image
+    zarr_format  2 or 3, of the files: OME-Zarr up to 0.4 uses Zarr v2, later versions v3
     """
     places = [("the image", ome["multiscales"][0]), ("the group", ome)]
     stated = [
@@ -48,8 +48,8 @@ def version_notes(ome: Mapping[str, Any], zarr_format: int) -> tuple[str, ...]:
     if zarr_format == of_files or not _VERSION.match(version):
         return settled.notes
     note = (
-        f"version of OME-Zarr: {version:.20} is stated, which is stored as Zarr v{of_files}, but "
-        f"the files are Zarr v{zarr_format}: they are read as they are stored"
+        f"version of OME-Zarr: {version:.20} is stated, which uses Zarr v{of_files}, but the "
+        f"files are Zarr v{zarr_format}: they are read as stored"
     )
     return (*settled.notes, note)
 
@@ -59,7 +59,7 @@ def settled_axes(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the axes of an image, and notes.
 
-    axes   of the image's metadata
+    axes   axes in the image's metadata
     given  the user's `--axes`, which decides between them and the names of the dimensions
 
     Raises SourceError where the names are in another order and the user didn't decide.

@@ -15,21 +15,21 @@ from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
 _ABSENT = np.uint64(2**64 - 1)  # offset and length of a chunk that is not stored
-_ENTRY = 16  # bytes of offset and length
-_CHECKSUM = 4  # bytes of CRC-32C behind the index
-_MOST_SHARDS = 2000  # most shards whose index is read
+_ENTRY = 16  # bytes of a chunk's offset and length
+_CHECKSUM = 4  # bytes of CRC-32C after the index
+_MOST_SHARDS = 2000  # shards whose index is read at most
 
 
 def absent_in_shards(
     stored: Any, touched: Sequence[Sequence[int]], is_present: Any
 ) -> tuple[int, int, bool] | None:
-    """Return how many chunks are absent, of how many, and whether a shard that is there lacks one.
+    """Return the numbers of absent and of all chunks, and whether a stored shard lacks a chunk.
 
-    stored      a sharded Zarr array, at a store that checks its reads
-    touched     the chunks along each axis that are read
-    is_present  returns whether the file of a shard is there, for its place
+    stored      a sharded Zarr array, in a store that checks its reads
+    touched     chunks along each axis that are read
+    is_present  returns whether the file of a shard at an index is stored
 
-    None: the index is of another form, or there are too many shards.
+    None: the index has another form, or there are too many shards.
     """
     if (codec := _codec_of(stored)) is None:
         return None
@@ -67,7 +67,7 @@ def _codec_of(stored: Any) -> ShardingCodec | None:
 
 
 def _grouped(chunks: Sequence[int], per: int) -> dict[int, list[int]]:
-    """Return the places of chunks inside their shards along one axis, by shard."""
+    """Return the indices of chunks inside their shards along one axis, by shard."""
     found: dict[int, list[int]] = {}
     for chunk in chunks:
         found.setdefault(chunk // per, []).append(chunk % per)
@@ -77,7 +77,7 @@ def _grouped(chunks: Sequence[int], per: int) -> dict[int, list[int]]:
 def _index_of(
     stored: Any, shard: tuple[int, ...], codec: ShardingCodec, per: Sequence[int]
 ) -> NDArray[np.uint64] | None:
-    """Return the offsets of a shard's chunks, uint64 (`per`); None: it can't be read."""
+    """Return the offsets of a shard's chunks, uint64 of shape `per`; None: they can't be read."""
     size = _ENTRY * int(np.prod(per))
     stored_size = size + _CHECKSUM * (len(codec.index_codecs) > 1)
     at_end = str(getattr(codec.index_location, "value", codec.index_location)) == "end"

@@ -1,9 +1,9 @@
-"""The store that Zarr reads through: it checks paths, file lengths and sizes after decoding.
+"""The store through which Zarr reads. It checks paths, file lengths and decoded sizes.
 
-A chunk's size is known from the array's metadata, but the decoders ignore it: gzip and zstd unpack
-until the stream ends or memory runs out, and Blosc trusts the length in the chunk's header and
-reads past the end of the buffer, so that a truncated file would be read as noise. For a shard that
-is read whole only the file's size is known here, not the decoded size of its inner chunks.
+The array's metadata give the size of a chunk, but the decoders ignore it. gzip and zstd unpack
+until the stream ends or memory runs out. Blosc trusts the length in the chunk's header and reads
+past the end of the buffer, so a truncated file would be read as noise. For a shard that is read
+whole, only the size of the file is known here, not the decoded size of its inner chunks.
 """
 
 import bz2
@@ -40,10 +40,10 @@ from stereocell.storage.library_errors import (
 from stereocell.storage.location import Location, require_own, require_own_key
 
 _METADATA = ("zarr.json", ".zarray", ".zattrs", ".zgroup", ".zmetadata")
-_METADATA_BYTES = 64 << 20  # largest size of a metadata file in bytes
-_ROOM = 1 << 20  # bytes beyond a chunk's decoded size: poor compression, checksums, an index
-_MOST_MISSES = 8  # absent chunks at an address for which other names are tried in vain
-_BLOSC_HEADER = struct.Struct("<4B3I")  # last three, bytes: decoded, of a block, encoded
+_METADATA_BYTES = 64 << 20  # bytes; largest metadata file
+_ROOM = 1 << 20  # bytes beyond a chunk's decoded size, for poor compression, checksums and an index
+_MOST_MISSES = 8  # absent chunks at an address after which other names are no longer tried
+_BLOSC_HEADER = struct.Struct("<4B3I")  # last three, in bytes: decoded, of a block, encoded
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,9 @@ class Chunks:
 
     codecs  names of the bytes-to-bytes codecs, in the order of encoding
     size    bytes of a decoded chunk; None: only metadata are read
-    array   path of the array's metadata file: once it is gone, a missing chunk isn't empty
-    others  names of chunks that the metadata name otherwise: those that were found on this
-            machine, or those that are tried at an address
+    array   path of the array's metadata file; if that is gone, a missing chunk doesn't mean empty
+    others  other names of chunks than the stated ones: on this machine the names that were found,
+            at an address the names that are tried
     """
 
     codecs: tuple[str, ...] = ()
@@ -66,10 +66,10 @@ class Chunks:
 class GuardedStore(WrapperStore[Store]):
     """Refuses files outside the group, truncated chunks and chunks that decode to too many bytes.
 
-    location  of the group
-    chunks    of the array that is read; None: only metadata are read
+    location  place of the group
+    chunks    chunks of the array that is read; None: only metadata are read
 
-    Reads raise OSError for these, SourceError for a path outside the group.
+    Raises OSError for truncated or oversized chunks, SourceError for a path outside the group.
     """
 
     def __init__(self, store: Store, location: Location, chunks: Chunks | None = None) -> None:
@@ -93,19 +93,19 @@ class GuardedStore(WrapperStore[Store]):
 
     @property
     def members(self) -> Set[str] | None:
-        """The names of all files in a zip file; None: the source is no zip file."""
+        """The names of all files in a zip file; None: the source is not a zip file."""
         return self._store.sizes.keys() if isinstance(self._store, ZippedStore) else None
 
     @property
     def other_names(self) -> OtherNames | None:
-        """The names of chunks that the array's metadata name otherwise; None: there are none."""
+        """The names of chunks that differ from the stated ones; None: there are none."""
         others = self._chunks.others
         return others[0] if self._location.is_local and others else None
 
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Return the bytes at a key, or at the other name of its chunk; None: there are none."""
+        """Return the bytes at a key, or at another name of its chunk; None: no such file."""
         value = await self._checked(key, prototype, byte_range)
         tried = self._tried
         for names in self._tried if value is None else ():
@@ -128,7 +128,7 @@ class GuardedStore(WrapperStore[Store]):
         self._require_own(key, most)
         value = await self._store.get(key, prototype, byte_range)
         if value is None and array and not await self._store.exists(array):
-            raise OSError(f"{array} is gone since it was opened")
+            raise OSError(f"{array} was removed after it was opened")
         if value is not None and is_metadata and byte_range is None:
             record_json(value.to_bytes(), key)
         elif value is not None and byte_range is None and size is not None:
@@ -148,7 +148,7 @@ class GuardedStore(WrapperStore[Store]):
         prototype: BufferPrototype,
         key_ranges: Iterable[tuple[str, ByteRequest | None]],
     ) -> list[Buffer | None]:
-        """Return the bytes of each key and range, checked as by `get`."""
+        """Return the bytes of each key and range, checked as in `get`."""
         return [await self.get(key, prototype, byte_range) for key, byte_range in key_ranges]
 
     def _require_own(self, key: str, most: int) -> None:
@@ -161,7 +161,7 @@ class GuardedStore(WrapperStore[Store]):
         if isinstance(self._store, ZippedStore):
             size = self._store.sizes.get(key, 0)
         if size > most:
-            raise OSError(f"{key}: {size} bytes, over the {most} that it may have")
+            raise OSError(f"{key}: found {size} bytes, more than {most}")
 
     def _most(self, times: int) -> int:
         return times * (self._chunks.size or 0) + _ROOM
@@ -183,12 +183,14 @@ class GuardedStore(WrapperStore[Store]):
                 raise DamagedError(f"chunk {key}: {damage_words(error)}") from error
             raise
         if size > most:
-            raise OSError(f"chunk {key} unpacks to over {most} bytes, more than its array says")
+            raise OSError(
+                f"chunk {key} unpacks to over {most} bytes, more than its array's metadata state"
+            )
 
 
 def _of_zstd(data: bytes, most: int) -> int:
     size: int = zstandard.get_frame_parameters(data).content_size
-    if 0 <= size < 1 << 62:  # else the size is not stated
+    if 0 <= size < 1 << 62:  # any other value means that the size is not stated
         return size
     total = 0
     reader = zstandard.ZstdDecompressor().stream_reader(data)
@@ -236,7 +238,7 @@ _UNPACKED: dict[str, Callable[[bytes, int], int]] = {
 
 
 def codec_name(codec: Any) -> str:
-    """Return the name of a codec of Zarr v3 or of numcodecs, as `gzip`."""
+    """Return the name of a codec of Zarr v3 or of numcodecs, such as `gzip`."""
     name = type(codec).__name__.lower().removesuffix("codec").strip("_")
     return str(name)
 
@@ -259,15 +261,15 @@ def zarr_boundary(where: str, expected: str) -> Iterator[None]:
 
 
 def open_store(location: Location) -> Store:
-    """Return the store of a group or an array; its reads are to go through a GuardedStore."""
+    """Return the store of a group or an array; read it only through a GuardedStore."""
     if is_zipped(location):
         return open_zipped(location)
     if location.is_local:
         return LocalStore(location.source, read_only=True)
     if location.shown.endswith((".ozx", ".zip")):
         raise SourceError(
-            f"{location.shown}: a zip file at an address, expected a path on this machine: copy it "
-            "here first, or unpack it there"
+            f"{location.shown}: found a zip file at an address, expected a path on this machine: "
+            "copy it here first, or unpack it there"
         )
     with one_line(location.shown, "an address that fsspec opens"):
         return FsspecStore.from_url(
@@ -276,7 +278,7 @@ def open_store(location: Location) -> Store:
 
 
 def notes_on_names(arrays: Iterable["zarr.Array[Any]"]) -> tuple[str, ...]:
-    """Return a note for each array whose chunks are not named as its metadata state."""
+    """Return a note for each array whose chunks are named differently than its metadata state."""
     found = ((array, getattr(array.store, "other_names", None)) for array in arrays)
     return tuple(names.note(array.ndim) for array, names in found if names is not None)
 
@@ -284,7 +286,7 @@ def notes_on_names(arrays: Iterable["zarr.Array[Any]"]) -> tuple[str, ...]:
 def files_of(location: Location, arrays: Sequence[str]) -> tuple[str, ...]:
     """Return all that is read of a group: the folders of its arrays, and its own metadata.
 
-    An address of `http` can't list a folder, so it has the arrays' metadata in their place.
+    A folder can't be listed over `http`, so the metadata files of the arrays stand in for it.
     """
     if is_zipped(location):
         return (location.path,)
@@ -305,20 +307,20 @@ def open_array(
     title: str = "level",
     item_bytes: int | None = None,
 ) -> "zarr.Array[Any]":
-    """Return the array at a path of a store, whose chunks are checked. Raises SourceError.
+    """Return the array at a path of a store, with checks on its chunks. Raises SourceError.
 
-    title       what it is, for messages
-    item_bytes  of a value in a chunk, where the array's type does not say it: of texts
+    title       name of the array's kind, for messages
+    item_bytes  bytes of a value in a chunk, for texts, whose type doesn't state a length
     """
     where = f"{location.shown}: {title} {path!r:.80}" if path else location.shown
     with zarr_boundary(where, "a Zarr array"):
         guard = GuardedStore(store, location)
         array = zarr.open_array(guard, path=path, mode="r", zarr_format=zarr_format)
-        # The codecs of a sharded array pack its inner chunks, not the shard as a whole.
+        # The codecs of a sharded array compress its inner chunks, not the shard as a whole.
         codecs = () if array.shards else tuple(codec_name(codec) for codec in array.compressors)
         size = math.prod(array.shards or array.chunks) * (item_bytes or array.dtype.itemsize)
         named = "zarr.json" if array.metadata.zarr_format == 3 else ".zarray"
-        # not `path`, which may end in a slash
+        # `path` may end in a slash, so the array's own path is used.
         names = possible_names(array)
         if location.is_local:
             found = names_on_disk(location, array, guard.members)

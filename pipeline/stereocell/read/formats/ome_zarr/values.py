@@ -1,7 +1,7 @@
-"""How the numbers of a Zarr array become values, by the attributes of CF and of xarray.
+"""Convert the numbers of a Zarr array to values, by the attributes of CF and of xarray.
 
-xarray keeps `_FillValue` in the metadata's `fill_value` (Zarr v2), or as base64 among the
-attributes (v3). In other arrays `fill_value` is that of chunks that are not stored, and no more.
+xarray stores `_FillValue` as the metadata's `fill_value` (Zarr v2), or as base64 in the attributes
+(v3). In other arrays `fill_value` only stands for chunks that are not stored.
 """
 
 import base64
@@ -21,9 +21,9 @@ def with_values(
 ) -> tuple[VoxelArray, tuple[str, ...]]:
     """Return an array of values, and notes.
 
-    attributes  of the finest level, which hold for all; None: the array's own
+    attributes  attributes of the finest level, which hold for all levels; None: the array's own
 
-    Raises SourceError where a stated factor is no finite number.
+    Raises SourceError where a stated factor is not a finite number.
     """
     stored: Any = level.array
     own = attributes if attributes is not None else value_attributes(stored)
@@ -32,7 +32,7 @@ def with_values(
 
 
 def value_attributes(array: Any) -> dict[str, Any]:
-    """Return the attributes of an array that tell how its values are stored."""
+    """Return the attributes of an array that state how its values are stored."""
     stated = dict(array.attrs)
     found = {name: stated.get(name) for name in ATTRIBUTES}
     if isinstance(text := found[_FILL], str):
@@ -44,7 +44,7 @@ def value_attributes(array: Any) -> dict[str, Any]:
 
 
 def _decoded(text: str) -> float | None:
-    """Return a fill value that xarray wrote as base64; None: it is another text."""
+    """Return a fill value that xarray wrote as base64; None: the text is not one."""
     try:
         (value,) = struct.unpack("<d", base64.b64decode(text, validate=True))
     except (binascii.Error, struct.error, ValueError):

@@ -1,4 +1,4 @@
-"""OME-Zarr in a zip file (`.ozx` of RFC-9, `.zarr.zip`), read without unpacking.
+"""Read OME-Zarr in a zip file (`.ozx` of RFC-9, `.zarr.zip`) without unpacking it.
 
 The group lies at the root of the archive, or in its only folder.
 
@@ -28,7 +28,7 @@ def is_zipped(location: Location) -> bool:
 class ZippedStore(WrapperStore[ZipStore]):
     """The members of a zip file below one folder.
 
-    sizes  bytes of each member once it is unpacked, by its name below the folder
+    sizes  unpacked size of each member in bytes, by its name below the folder
     """
 
     def __init__(self, store: ZipStore, root: str, sizes: dict[str, int]) -> None:
@@ -41,7 +41,7 @@ class ZippedStore(WrapperStore[ZipStore]):
     async def get(
         self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Return the bytes of a member; None: there is none."""
+        """Return the bytes of a member; None: there is no such member."""
         if key not in self.sizes:
             return None
         return await self._store.get(self._root + key, prototype, byte_range)
@@ -72,14 +72,14 @@ class ZippedStore(WrapperStore[ZipStore]):
 def open_zipped(location: Location) -> ZippedStore:
     """Return the store of a zip file, or of a group in it. Raises SourceError."""
     where = location.shown
-    with one_line(where, "a zip file of OME-Zarr that is whole"):
+    with one_line(where, "a complete zip file of OME-Zarr"):
         with zipfile.ZipFile(location.path) as archive:
             members = {info.filename: info for info in archive.infolist() if not info.is_dir()}
         root = zarr_root_in(members)
         if root is None:
             raise SourceError(
-                f"{where}: found a zip archive without a Zarr group, expected OME-Zarr: "
-                "unzip it, and name the file or folder in it"
+                f"{where}: found a zip archive without a Zarr group, expected OME-Zarr: unzip it, "
+                "and name the file or folder in it"
             )
         inner = location.source[len(location.path) :].strip("/")
         root += f"{inner}/" if inner else ""
@@ -89,6 +89,6 @@ def open_zipped(location: Location) -> ZippedStore:
             if name.startswith(root)
         }
         if any(info.flag_bits & 1 for info in members.values()):
-            raise SourceError(f"{where}: found members with a password, expected none")
+            raise SourceError(f"{where}: found password-protected members, expected none")
         store: Any = ZipStore(location.path, mode="r")
         return ZippedStore(store, root, sizes)

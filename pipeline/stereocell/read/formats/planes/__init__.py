@@ -1,4 +1,4 @@
-"""Folders of planes, one image file each."""
+"""Folders of planes, with one image file per plane."""
 
 import os
 
@@ -8,7 +8,7 @@ from stereocell.read.image import Image
 from stereocell.read.known_formats import identify, known_formats
 from stereocell.storage.location import Location, first_bytes
 
-_MAX_OTHERS = 200  # most files without an image's name that are looked into for DICOM
+_MAX_OTHERS = 200  # files without an image's ending that are checked for DICOM
 
 
 def _open(location: Location, *, series: int = 0, pattern: str = "") -> Image:

@@ -1,4 +1,4 @@
-"""Compare the files of a folder: one volume has one voxel size and one kind of pixels."""
+"""Compare the files of a folder: a volume has one voxel size and one kind of pixels."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,15 +12,15 @@ from stereocell.read.statements import Statement, Subject, settle
 from stereocell.read.value_scale import dtype_of_values
 
 _REMEDY = "--spacing-um z,y,x replaces it"
-_TOLERANCE = 1e-3
+_TOLERANCE = 1e-3  # relative difference up to which two sizes agree
 
 
 def settle_sizes(
     stated: Mapping[str, PartialTriple],
 ) -> tuple[PartialTriple, tuple[str, ...]]:
-    """Return the voxel size (z, y, x), um, of files that are to be one volume, and notes.
+    """Return the voxel size (z, y, x), um, of the files of one volume, and notes.
 
-    stated  the size that each file states, by its name; the first one is taken where they differ
+    stated  the size that each file states, by its name; the first one is used if they differ
     """
     found: list[float | None] = []
     notes: list[str] = []
@@ -37,7 +37,7 @@ def settle_sizes(
 
 
 def _distinct(sizes: Mapping[str, float | None]) -> list[Statement]:
-    """Return a statement for each size, with the first file that states it."""
+    """Return a statement for each distinct size, with the first file that states it."""
     found: list[Statement] = []
     for file, size in sizes.items():
         known = [float(one.value) for one in found if isinstance(one.value, float | int)]
@@ -49,10 +49,10 @@ def _distinct(sizes: Mapping[str, float | None]) -> list[Statement]:
 def settle_depth_of_planes(
     heads: Sequence[Head], stated_um: float | None
 ) -> tuple[float | None, tuple[str, ...]]:
-    """Return the distance between planes, um, by the places that all of them state, and notes.
+    """Return the distance between planes, um, from positions that all planes state, and notes.
 
-    heads      in the order of the planes
-    stated_um  the distance that the files state; None: none does
+    heads      heads in the order of the planes
+    stated_um  the distance that the files state; None: no file does
     """
     places = {n: head.z_um for n, head in enumerate(heads) if head.z_um is not None}
     if len(places) < len(heads):
@@ -64,7 +64,7 @@ def settle_depth_of_planes(
 
 
 def drift_notes_of_planes(heads: Sequence[Head], spacing_um: PartialTriple) -> tuple[str, ...]:
-    """Return notes where planes of one stack were taken at different places along y or x."""
+    """Return notes if planes of one stack were taken at different positions along y or x."""
     notes: list[str] = []
     for place, axis in enumerate("yx"):
         found = {n: head.yx_um[place] for n, head in enumerate(heads)}
@@ -76,22 +76,23 @@ def drift_notes_of_planes(heads: Sequence[Head], spacing_um: PartialTriple) -> t
 
 
 def require_one_kind(where: str, heads: Mapping[str, Head]) -> None:
-    """Raise SourceError where some files state that 0 is white and others that it is black."""
+    """Raise SourceError where 0 is white in some files and black in others."""
     white = [file for file, head in heads.items() if head.is_inverse]
     if white and len(white) < len(heads):
         raise SourceError(
-            f"{where}: PhotometricInterpretation: found {len(white)} of {len(heads)} planes whose "
-            f"0 is white, as {white[0]!r:.100}, expected the same in all: invert those"
+            f"{where}: PhotometricInterpretation: found 0 for white in {len(white)} of "
+            f"{len(heads)} planes, such as {white[0]!r:.100}, expected the same in all: invert "
+            "those"
         )
 
 
 def dtype_of_planes(heads: Sequence[Head]) -> np.dtype[np.generic]:
-    """Return the dtype that holds the values of all planes."""
+    """Return a dtype that holds the values of all planes."""
     return np.result_type(*{dtype_of_values(head.dtype, head.values) for head in heads})
 
 
 def notes_of_planes(heads: Sequence[Head]) -> list[str]:
-    """Return the notes on planes, each once, with the number of planes if it is not all."""
+    """Return the notes on planes without repeats, with the number of planes if not all have one."""
     notes = dict.fromkeys(note for head in heads for note in head.notes)
     counts = {note: sum(note in head.notes for head in heads) for note in notes}
     total = len(heads)

@@ -1,4 +1,4 @@
-"""Voxels of a folder of files as lazy arrays: one plane, or one file's window, at a time."""
+"""Voxels of a folder of files as lazy arrays: one plane, or a window of one file, at a time."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from stereocell.model.tiling import Box
 from stereocell.read.image import Image
 
-_OPEN_FILES = 8  # stacks kept open at a time
+_OPEN_FILES = 8  # stacks that are kept open at a time
 _Index = tuple[int, int]  # time, channel
 
 
 class PlaneArray:
-    """Files of one plane each, (t, c, z, y, x); samples of colour pixels are the channels.
+    """Files of one plane each, (t, c, z, y, x). Samples of colour pixels are the channels.
 
-    shape    in voxels
+    shape    (t, c, z, y, x) in voxels
     load     returns the pixels (rows, columns, samples) of the file at (t, c, z)
     samples  True: c counts the samples of each file
     """
@@ -48,10 +48,10 @@ class PlaneArray:
 class StackArray:
     """Files that are each a stack, (t, c, z, y, x).
 
-    shape  in voxels
-    dtype  holds the values of all files
-    open_  returns the image of the file at (t, c); of several channels inside it (`inner`), c
-           counts these
+    shape  (t, c, z, y, x) in voxels
+    dtype  dtype that holds the values of all files
+    open_  returns the image of the file at (t, c)
+    inner  True: a file holds several channels, and c counts these
     """
 
     def __init__(

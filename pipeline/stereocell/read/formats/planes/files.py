@@ -24,21 +24,22 @@ from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
 
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
-_TAIL = 1024  # bytes in which a PNG ends; some programs add a few of their own
-_PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; 3: a palette
-_EXIF_ORIENTATION = 274  # of TIFF and EXIF alike
+# bytes at the end of a PNG that are searched for its last chunk; programs may append some
+_TAIL = 1024
+_PNG_SAMPLES = {0: 1, 2: 3, 4: 2, 6: 4}  # by the colour type; type 3, a palette, is refused
+_EXIF_ORIENTATION = 274  # tag of TIFF and EXIF
 _SAMPLES = {"L": 1, "RGB": 3}  # by pillow's mode
 
 
 def read_head(path: str, named: str) -> Head:
-    """Return what a file says of itself; no pixels are decoded. Raises SourceError."""
-    with collected_log("tifffile"), one_line(named, "an image that is whole"):
+    """Return what a file states; no pixels are decoded. Raises SourceError."""
+    with collected_log("tifffile"), one_line(named, "a complete image"):
         return _FORMATS[_kind(path)].head(path, named)
 
 
 def read_plane(path: str, named: str) -> NDArray[Any]:
     """Return the pixels, (rows, columns, samples), in the file's dtype. Raises SourceError."""
-    with collected_log("tifffile"), one_line(named, "an image that is whole"):
+    with collected_log("tifffile"), one_line(named, "a complete image"):
         found = _FORMATS[_kind(path)].plane(path, named)
     return found[..., None] if found.ndim == 2 else found
 
@@ -73,7 +74,7 @@ def _png_head(path: str, named: str) -> Head:
 
 
 def _require_end(path: str, named: str) -> None:
-    """Raise SourceError for a PNG without the chunk that ends one."""
+    """Raise SourceError for a PNG without its last chunk."""
     size = os.path.getsize(path)
     with open(path, "rb") as file:
         file.seek(max(0, size - _TAIL))
@@ -85,7 +86,7 @@ def _require_end(path: str, named: str) -> None:
 
 
 def _png_plane(path: str, named: str) -> NDArray[Any]:
-    # not by pillow, which cuts 16-bit RGB to 8 bits
+    # pillow would cut 16-bit RGB to 8 bits.
     with open(path, "rb") as file:
         return np.asarray(imagecodecs.png_decode(file.read()))
 
@@ -101,7 +102,7 @@ def _bmp_head(path: str, named: str) -> Head:
 
 
 def _pillow_head(path: str, named: str) -> Head:
-    """Return what a file says of itself that pillow decodes; a palette of greys is grey to it."""
+    """Return what a file states that pillow decodes; pillow reads a palette of greys as grey."""
     try:
         with Pillow.open(path) as image:
             turn, notes = turn_by(image.getexif().get(_EXIF_ORIENTATION, 1))
@@ -146,5 +147,5 @@ _ENDINGS = {"tiff": TIFF, "png": PNG, "jpeg": JPEG, "bmp": BMP}
 
 
 def join(folder: str, path: str) -> str:
-    """Return the place on the disk of a file that is named relative to a folder, with `/`."""
+    """Return the path on the disk of a file that is named relative to a folder, with `/`."""
     return os.path.join(folder, *path.split("/"))

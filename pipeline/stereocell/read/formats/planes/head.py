@@ -1,4 +1,4 @@
-"""The head of one file of a folder of planes: what is known before its pixels are decoded."""
+"""The head of one file in a folder of planes: what is known before its pixels are decoded."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,15 +14,15 @@ class Head:
     """The metadata of a file.
 
     shape       rows, columns, samples (colour and alpha; 1: grey)
-    pages       more than one: the file is a stack, or no plane
+    pages       number of pages; more than one: the file is a stack, not a plane
     spacing_um  (z, y, x), um, as far as it is stated
-    z_um        where the plane lies along z, um; None: not stated
-    z_field     the name of the field that states z_um
-    has_z_unit  whether z_um is in a stated unit of length; else um are assumed
-    yx_um       where the plane lies along y and x, um; None each: not stated
-    values      how stored numbers become values
-    is_inverse  the file states that 0 is white
-    notes       on the pixels, for the user
+    z_um        position of the plane along z, um; None: not stated
+    z_field     name of the field that states z_um
+    has_z_unit  whether z_um has a stated unit of length; otherwise um are assumed
+    yx_um       position of the plane along y and x, um; None for each one not stated
+    values      rule by which stored numbers become values
+    is_inverse  whether the file states that 0 is white
+    notes       notes on the pixels, for the user
     """
 
     shape: tuple[int, int, int]

@@ -1,8 +1,8 @@
-"""A folder of images: planes of TIFF, PNG, JPEG or BMP, or a stack of TIFF for each channel.
+"""Read a folder of images: planes of TIFF, PNG, JPEG or BMP, or a TIFF stack for each channel.
 
-The names say which plane, channel and time a file holds: names.py guesses, or
-`--pattern` tells (pattern.py). Wells, sites and series part the files into volumes of
-their own, of which one is built. Every file's head is read, its pixels when a window needs them.
+The file names state which plane, channel and time a file holds: names.py guesses it, or `--pattern`
+says it (pattern.py). Wells, sites and series divide the files into separate volumes, of which one
+is built. The head of every file is read at once, its pixels when a window needs them.
 """
 
 import re
@@ -33,10 +33,10 @@ from stereocell.storage.location import Location
 def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Image:
     """Return one volume of the folder; 0 is the largest, others count from 1 as `list_series` does.
 
-    pattern  how the names are built, as `img_c{c}_z{z}.tif`; empty: guessed
+    pattern  how the names are built, such as `img_c{c}_z{z}.tif`; empty: guessed
 
-    Raises SourceError where the files make no volume, UsageError where the folder lacks the
-    series, or the pattern fits no file.
+    Raises SourceError where the files don't form a volume, UsageError where the folder lacks the
+    series or the pattern fits no file.
     """
     where = location.shown
     listed = in_natural_order(list_images(location))
@@ -45,7 +45,7 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
         return whole
     places, notes = _places(location, listed, pattern)
     if held := others_in(location.source, "planes", "tiff"):
-        notes.append(f"the folder holds {held} too, which are not read: name one to build it")
+        notes.append(f"the folder also holds {held}, which are not read: name one to build it")
     groups = groups_of(places)
     if series > len(groups):
         raise UsageError(
@@ -56,10 +56,10 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     chosen = groups[number - 1]
     if len(chosen) == 1 and len(listed) > 1 and not (series or pattern):
         raise SourceError(
-            f"{where}: found {len(listed)} images whose names make no volume, as "
-            f"{listed[0]!r:.100} and {listed[-1]!r:.100}; expected planes or channels that numbers "
-            "or words in their names tell; name one of the files, choose by --series (`--series "
-            "list` shows them), or tell the names by --pattern"
+            f"{where}: found {len(listed)} images whose names don't show a volume, such as "
+            f"{listed[0]!r:.100} and {listed[-1]!r:.100}; expected names with numbers or words "
+            "for planes or channels; name one of the files, choose by --series (`--series list` "
+            "shows them), or describe the names by --pattern"
         )
     if len(groups) > 1:
         why = "asked for" if series else "the largest"
@@ -75,31 +75,31 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     if first.pages == 1:
         raise SourceError(
             f"{where}: a volume needs at least 2 planes: found images of one plane, and no number "
-            f"in their names that counts planes, as {chosen[0].path!r:.100}; expected such "
+            f"in their names that counts planes, such as {chosen[0].path!r:.100}; expected such "
             f"numbers, or --pattern with {{z}}{or_one_of(location.source, 'planes', 'tiff')}"
         )
     if len(volume.planes) > 1:
         raise SourceError(
-            f"{where}: found {first.pages} planes in {chosen[0].path!r:.100}, whose name has a "
-            "number of a plane too, expected either"
+            f"{where}: found {first.pages} planes in {chosen[0].path!r:.100}, whose name also has "
+            "the number of a plane, expected only one of the two"
         )
     return image_of_stacks(files, notes)
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each group of files, as `--series` counts them. Raises SourceError."""
+    """Return a line for each group of files, numbered as for `--series`. Raises SourceError."""
     groups = groups_of(_places(location, in_natural_order(list_images(location)), "")[0])
     return tuple(
-        f"{i:3d}  {group[0].group or 'all files'}: {counted(len(group), 'file')}, as "
+        f"{i:3d}  {group[0].group or 'all files'}: {counted(len(group), 'file')}, such as "
         f"{group[0].path!r:.100}"
         for i, group in enumerate(groups, start=1)
     )
 
 
 def _set_in(location: Location, found: list[str]) -> Image | None:
-    """Return the image of a folder that holds one TIFF stack, or a set of OME-TIFF; else None.
+    """Return the image of a folder with one TIFF stack or an OME-TIFF set; None: another folder.
 
-    The files of a set are one image by their OME-XML, whatever their names say.
+    The OME-XML combines the files of a set to one image, regardless of their names.
     """
     paths = [path for path in found if path.lower().endswith(TIFF)]
     if not paths or len({path.rpartition("/")[0] for path in paths}) > 1:
@@ -114,7 +114,7 @@ def _set_in(location: Location, found: list[str]) -> Image | None:
     elif read_head(first.source, f"{location.shown}/{paths[0]}").pages == 1:
         return None
     image = read_tiff(first)
-    return replace(image, notes=(f"the folder is read by its file {paths[0]}", *image.notes))
+    return replace(image, notes=(f"the folder is read through {paths[0]}", *image.notes))
 
 
 def _places(
@@ -125,18 +125,18 @@ def _places(
         own = found if "/" in pattern else [path for path in found if "/" not in path]
         places = read_by_pattern(own, pattern)
         left = len(found) - len(places)
-        return places, [f"{left} files whose names the pattern doesn't fit left out"] * (left > 0)
+        return places, [f"{left} files whose names don't fit the pattern left out"] * (left > 0)
     paths, notes = of_one_kind(found)
     first = read_head(join(location.source, paths[0]), f"{location.shown}/{paths[0]}")
     places = guess(paths, first.pages > 1)
     if 2 * len(places) < len(paths):
         raise SourceError(
             f"{location.shown}: found {len(paths)} images, of which {len(places)} are named "
-            f"alike, as {places[0].path!r:.100}, expected one way of naming; name one of the "
-            "files, or tell the names by --pattern"
+            f"alike, such as {places[0].path!r:.100}, expected one way of naming; name one of the "
+            "files, or describe the names by --pattern"
         )
     if len(places) < len(paths):
         others = len(paths) - len(places)
-        are = "files that are" if others > 1 else "file that is"
-        notes.append(f"{others} {are} named otherwise left out")
+        are = "files with other names" if others > 1 else "file with another name"
+        notes.append(f"{others} {are} left out")
     return places, notes

@@ -1,7 +1,8 @@
-"""The images in a folder: which of them are planes, and which are left out."""
+"""List the images in a folder: those that are planes, and those that are left out."""
 
 import os
 
+from stereocell.model.counted import counted
 from stereocell.read.formats.planes.endings import BMP, JPEG, PNG, TIFF
 from stereocell.read.formats.planes.files import join
 from stereocell.storage.location import Location, require_own
@@ -25,33 +26,33 @@ def list_images(location: Location) -> list[str]:
 
 
 def of_one_kind(found: list[str]) -> tuple[list[str], list[str]]:
-    """Return the files that the guess is about, and notes on the others.
+    """Return the files on which the guess is based, and notes on the others.
 
-    Images in the folder itself go before those below it, the commonest kind before others,
-    planes before thumbnails and before MetaXpress' projections (`ZStep_0`).
+    Images in the folder itself take precedence over those in folders below, the commonest kind over
+    others, and planes over thumbnails and over MetaXpress's projections (`ZStep_0`).
     """
     notes = []
     top = [path for path in found if "/" not in path]
     if any("zstep_" in path.lower().rpartition("/")[0] for path in found):
-        top = []  # MetaXpress puts projections into the folder, planes below it
+        top = []  # MetaXpress stores projections in the folder and planes below it
     paths = top or found
     if top and len(top) < len(found):
-        notes.append(f"{len(found) - len(top)} images in folders below left out")
+        notes.append(f"{counted(len(found) - len(top), 'image')} in folders below left out")
     by_kind = {
         kind: [path for path in paths if path.lower().endswith(suffixes)]
         for kind, suffixes in _KINDS.items()
     }
-    kind = max(by_kind, key=lambda one: len(by_kind[one]))  # of equally many the first
+    kind = max(by_kind, key=lambda one: len(by_kind[one]))  # the first of equally common ones
     if len(by_kind[kind]) < len(paths):
         notes.append(
             f"images of several kinds: {len(by_kind[kind])} {kind} are read, "
-            f"{len(paths) - len(by_kind[kind])} others left out"
+            f"{counted(len(paths) - len(by_kind[kind]), 'other')} left out"
         )
     paths = by_kind[kind]
-    for is_other, noun in ((_is_thumb, "thumbnails"), (_is_projection, "projections")):
+    for is_other, noun in ((_is_thumb, "thumbnail"), (_is_projection, "projection")):
         kept = [path for path in paths if not is_other(path)]
         if kept and len(kept) < len(paths):
-            notes.append(f"{len(paths) - len(kept)} {noun} left out")
+            notes.append(f"{counted(len(paths) - len(kept), noun)} left out")
             paths = kept
     return paths, notes
 

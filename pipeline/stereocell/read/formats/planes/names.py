@@ -1,9 +1,9 @@
-"""Guess from the names of files which channel, time and plane each one holds.
+"""Guess which channel, time and plane each file holds from the names of all files.
 
-Names are cut at separators into columns, and a column whose values differ in their numbers alone
-into its numbers. A number's meaning is told by the letters before it (`z012`, `ch01`, `w2`, `t5`,
-`s3`). The last number that no letters tell is the plane; a column of words is the channel. What is
-left (wells, sites, series) parts the files into groups, each a volume of its own.
+Names are split at separators into columns. A column whose values differ only in their numbers is
+split into its numbers. The letters before a number give its meaning (`z012`, `ch01`, `w2`, `t5`,
+`s3`). The last number without such letters is the plane; a column of words is the channel. Other
+columns (wells, sites, series) divide the files into groups, each a separate volume.
 """
 
 import re
@@ -20,11 +20,11 @@ _GROUPS = {
     *("s", "site", "p", "pos", "position", "xy", "f", "field", "fov", "series", "m", "tile"),
     *("well", "row", "col", "r", "scene", "stage", "v", "view", "region"),
 }
-COUNTERS = _Z | _C | _T | _GROUPS  # letters before a number that say what it counts
+COUNTERS = _Z | _C | _T | _GROUPS  # letters before a number that state what it counts
 _SEPARATORS = (re.compile(r"[/_\-\s.]+"), re.compile(r"[/_\s]+"))
 _WELL = re.compile(r"[A-P][0-9]{2}")
 _GUID = re.compile(r"[0-9A-Fa-f]{8}(-[0-9A-Fa-f]{4}){3}-[0-9A-Fa-f]{12}")
-_MAX_CHANNELS = 40  # values of a number that no letters tell: more are no channels
+_MAX_CHANNELS = 40  # values of a number without letters; with more, it doesn't count channels
 _SUFFIX = re.compile(r"(\.ome)?\.[A-Za-z0-9]+$")
 
 
@@ -32,10 +32,10 @@ _SUFFIX = re.compile(r"(\.ome)?\.[A-Za-z0-9]+$")
 class _Field:
     """A part of the names that differs from file to file.
 
-    label   the letters before it, in small letters
-    values  of each file
-    spans   of each file: start and stop in its path
-    is_number  digits alone
+    label      letters before it, in lower case
+    values     value in each file name
+    spans      start and stop of the value in each path
+    is_number  whether it consists of digits only
     """
 
     label: str
@@ -49,13 +49,14 @@ class _Field:
 
 
 def guess(paths: Sequence[str], are_stacks: bool) -> tuple[Place, ...]:
-    """Return the places of the files; fewer than there are where some are named otherwise.
+    """Return the places of the files; files whose names have another form are missing.
 
     paths       relative to the folder, in natural order
-    are_stacks  each file holds planes along z itself
+    are_stacks  whether each file itself holds planes along z
     """
     best: tuple[Place, ...] = ()
-    for separators in _SEPARATORS:  # a name with a hyphen may have more parts than another
+    # hyphens may be separators, or parts of names that then differ in their number of parts
+    for separators in _SEPARATORS:
         places = _guess(paths, are_stacks, separators)
         has_planes = are_stacks or places[0].plane is not None
         if not best or (has_planes and len(places) > len(best)):
@@ -88,7 +89,7 @@ def _guess(
 
 
 def _columns(path: str, separators: re.Pattern[str]) -> list[tuple[int, int]]:
-    """Return start and stop of each part of a name, without its suffix and a random identifier."""
+    """Return start and stop of each part of a name, without its suffix and random identifiers."""
     ends = _SUFFIX.search(path)
     stem = path[: ends.start()] if ends else path
     stem = _GUID.sub(lambda found: " " * len(found[0]), stem)
@@ -99,7 +100,7 @@ def _columns(path: str, separators: re.Pattern[str]) -> list[tuple[int, int]]:
 
 def _fields(paths: Sequence[str], columns: Sequence[list[tuple[int, int]]]) -> list[_Field]:
     found = []
-    before = ""  # the words of the column before, which may tell a number that stands alone
+    before = ""  # words in the column before, which may explain a number without letters
     for place in range(len(columns[0])):
         spans = [one[place] for one in columns]
         texts = [path[start:stop] for path, (start, stop) in zip(paths, spans, strict=True)]
@@ -139,7 +140,7 @@ def _numbers(texts: list[str], spans: list[tuple[int, int]], before: str) -> lis
 def _roles(
     fields: list[_Field], are_stacks: bool
 ) -> tuple[_Field | None, _Field | None, _Field | None]:
-    """Return the fields of plane, channel and time, each None where there is none."""
+    """Return the fields of plane, channel and time; None for each one that is missing."""
     numbers = [field for field in fields if field.is_number]
     planes = [field for field in numbers if field.label in _Z]
     times = [field for field in numbers if field.label in _T]
@@ -151,7 +152,7 @@ def _roles(
     others = [f for f in numbers if f not in taken and f.label not in _GROUPS]
     words = [f for f in fields if not f.is_number and f.label != "well "]
     if plane is None and not are_stacks:
-        # of what no letters tell the last one; a lone `ch` or `s` counts slices after all
+        # The last number without letters; a lone `ch` or `s` counts slices after all.
         rest = others or ([] if len(fields) > 1 else fields)
         plane = next((field for field in reversed(rest) if field.is_number), None)
         if plane is None and channel is not None and len(numbers) == 1 and not words:
@@ -166,11 +167,11 @@ def _roles(
 
 
 def template_of(place: Place) -> str:
-    """Return a file's path with {z} in the place of its plane's number."""
+    """Return a file's path with {z} in place of its plane's number."""
     start, stop = place.digits
     return f"{place.path[:start]}{{z}}{place.path[stop:]}" if stop else place.path
 
 
 def in_natural_order(paths: Sequence[str]) -> list[str]:
-    """Return paths sorted by the values of their numbers; equal ones by their text."""
+    """Return paths sorted by the values of their numbers, then by their text."""
     return sorted(paths, key=lambda path: (natural(path), path))

@@ -1,4 +1,4 @@
-"""A volume of files that hold one plane each."""
+"""Read a volume from files that hold one plane each."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -42,7 +42,7 @@ def image_of_planes(files: VolumeFiles, notes: list[str]) -> Image:
         if len(volume.channels) > 1:
             raise SourceError(
                 f"{where}: found {first.words} and {len(volume.channels)} channels in the names, "
-                "expected either"
+                "expected only one of the two"
             )
         channels, description = _of_samples(samples)
         notes.append(description)
@@ -68,7 +68,7 @@ def _heads(files: VolumeFiles) -> dict[Key, Head]:
         if (head.shape, head.dtype, head.pages) != (first.shape, first.dtype, 1):
             found = f"{head.pages} planes" if head.pages > 1 else head.words
             raise SourceError(
-                f"{files.shown(key)}: found {found}, expected {first.words} as in "
+                f"{files.shown(key)}: found {found}, expected {first.words}, as in "
                 f"{files.name((0, 0, 0))!r:.100}"
             )
     return heads
@@ -82,14 +82,14 @@ def _load(
     head, shown = heads[key], files.shown(key)
     pixels = read_plane(files.path(key), shown)
     if pixels.shape != head.shape or pixels.dtype != head.dtype:
-        raise SourceError(f"{shown}: found another size than at first, expected {head.words}")
+        raise SourceError(f"{shown}: found a size that has changed, expected {head.words}")
     return values_of(pixels, head.values, dtype)
 
 
 def _of_samples(samples: int) -> tuple[Channels, str]:
-    """Return names and colours of colour pixels, and a note; alpha is left out."""
+    """Return names and colours of the channels of colour pixels, and a note. Alpha is left out."""
     if samples >= 3:
         alpha = "; their alpha is left out" * (samples == 4)
-        description = f"colour pixels: built as channels {', '.join(RGB_NAMES)}{alpha}"
+        description = f"colour pixels: read as channels {', '.join(RGB_NAMES)}{alpha}"
         return (RGB_NAMES, RGB_COLORS), description
     return ((None,), (None,)), "grey pixels with alpha: the alpha is left out"

@@ -1,4 +1,4 @@
-"""A volume of files that hold a stack each: one for each channel, or for each point in time."""
+"""Read a volume from files that hold a stack each: one for each channel or each time point."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,11 +19,11 @@ from stereocell.storage.location import Location
 
 @dataclass(frozen=True, slots=True)
 class _Stack:
-    """The statements of one file on its stack.
+    """The metadata of one file's stack.
 
     stored  dtype of the numbers in the file
-    dtype   of their values
-    color   of its first channel
+    dtype   dtype of their values
+    color   colour of its first channel
     """
 
     shape: tuple[int, int, int]
@@ -39,7 +39,7 @@ class _Stack:
     def words(self) -> str:
         z, y, x = self.shape
         several = f" and {self.channels} channels" if self.channels > 1 else ""
-        times = f" at {self.times} points in time" if self.times > 1 else ""
+        times = f" at {self.times} time points" if self.times > 1 else ""
         return f"{z} x {y} x {x} voxels (z, y, x) of {self.stored.name}{several}{times}"
 
 
@@ -53,7 +53,7 @@ def image_of_stacks(files: VolumeFiles, notes: list[str]) -> Image:
         raise SourceError(
             f"{files.location.shown}: found {len(names)} channels in "
             f"{files.name((0, 0, 0))!r:.100} and {len(volume.channels)} in the names, expected "
-            "either"
+            "only one of the two"
         )
     stacks = {files.name(key): _stack(files, *key[:2]) for key in volume.files}
     _require_alike(files, stacks)
@@ -96,12 +96,12 @@ def _require_alike(files: VolumeFiles, stacks: dict[str, _Stack]) -> None:
         if found != expected or one.times > 1:
             raise SourceError(
                 f"{files.shown(key)}: found {one.words}, expected {replace(first, times=1).words} "
-                f"at one point in time, as in {name!r:.100}"
+                f"at one time point, as in {name!r:.100}"
             )
 
 
 def _notes(stacks: dict[str, _Stack]) -> list[str]:
-    """Return the notes of all files, each once, with the first file if it is not of all."""
+    """Return the notes of all files without repeats, with the first file if not all have one."""
     found: dict[str, list[str]] = {}
     for name, stack in stacks.items():
         for note in stack.notes:

@@ -1,4 +1,4 @@
-"""Read names by the user's pattern: `img_c{c}_z{z}.tif`."""
+"""Read file names by the user's pattern, such as `img_c{c}_z{z}.tif`."""
 
 import re
 from collections.abc import Sequence
@@ -12,18 +12,18 @@ _PARTS = {
     "{c}": r"(?P<c>[^/]+?)",
     "*": r"[^/]*?",
 }
-_MAX_STARS = 4  # each multiplies the time that a name takes
+_MAX_STARS = 4  # `*` in a pattern; each multiplies the time that matching a name takes
 _EXPECTED = (
-    "expected a name with {z} for the plane's number and, where there are any, {c} for the "
-    "channel, {t} for the time, * for text that doesn't count, as img_c{c}_z{z}.tif"
+    "expected a name with {z} for the plane's number and, if needed, {c} for the channel, {t} for "
+    "the time, and * for text that doesn't matter, such as img_c{c}_z{z}.tif"
 )
 
 
 def read_by_pattern(paths: Sequence[str], pattern: str) -> tuple[Place, ...]:
-    """Return the places of the files that match; the others are left out.
+    """Return the places of the files that match; other files are left out.
 
-    A pattern without `/` is of files in the folder itself. Raises UsageError where the pattern is
-    none, or where no file matches.
+    A pattern without `/` covers only files in the folder itself. Raises UsageError where the
+    pattern is invalid or no file matches.
     """
     form = _compiled(pattern)
     found = []
@@ -43,7 +43,7 @@ def read_by_pattern(paths: Sequence[str], pattern: str) -> tuple[Place, ...]:
             )
         )
     if not found:
-        example = f", as {paths[0]!r:.100}" if paths else ""
+        example = f", such as {paths[0]!r:.100}" if paths else ""
         raise UsageError(
             f"--pattern is {pattern!r}: none of {len(paths)} files matches{example}; {_EXPECTED}"
         )

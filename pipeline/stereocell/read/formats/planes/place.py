@@ -1,4 +1,4 @@
-"""The place of a file in a folder of planes: its channel, its point in time, its plane."""
+"""The place of a file in a folder of planes: its channel, time point and plane."""
 
 import re
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 class Place:
     """One file.
 
-    path     relative to the folder, with `/`
-    group    the parts of its name that tell series, positions or wells; files of a group are one
+    path     path relative to the folder, with `/`
+    group    parts of its name that identify a series, position or well; files of a group form one
              volume
-    channel  as the name has it: `ch00`, `DAPI`; empty: none
+    channel  channel as the name states it: `ch00`, `DAPI`; empty: none
     time     number in the name; 0 where it has none
     plane    number along z in the name; None: it has none (each file is a stack)
-    digits   where the plane's number stands in `path`: start, stop
+    digits   start and stop of the plane's number in `path`
     """
 
     path: str

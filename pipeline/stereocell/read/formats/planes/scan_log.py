@@ -1,6 +1,6 @@
-"""The voxel size of micro-CT slices: it stands in the log beside them, not in the images.
+"""Read the voxel size of micro-CT slices from the log beside them; the images don't state it.
 
-Bruker's (SkyScan's) NRecon writes the log as `[Section]` and `key=value` lines, and slices as BMP
+NRecon by Bruker (SkyScan) writes the log as `[Section]` and `key=value` lines, and slices as BMP
 or TIFF. Other entries, such as the operator's name, are not read.
 """
 
@@ -16,12 +16,12 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 
 _MAX_BYTES = 1 << 20
 _LINE = re.compile(r"\s*(?:\[(?P<section>[^\]]*)\]|(?P<key>[^=]+)=(?P<value>.*))\s*")
-# section and key of the pixel size -> its trust: the camera's pixels may be binned or scaled later
+# section and key of the pixel size -> its trust; pixels of the camera may be binned or scaled later
 _SIZES = {
     ("reconstruction", "pixel size (um)"): Trust.STATED,
     ("acquisition", "image pixel size (um)"): Trust.DERIVED,
 }
-_STEP = ("reconstruction", "section to section step")  # lines of the camera from slice to slice
+_STEP = ("reconstruction", "section to section step")  # lines of the camera between slices
 _SECTIONS = ("reconstruction", "sections count")
 
 
@@ -29,11 +29,11 @@ _SECTIONS = ("reconstruction", "sections count")
 class ScanLog:
     """The sizes in a log.
 
-    path        of the file
-    statements  on the size of a pixel, um
-    step        pixels from slice to slice
+    path        path of the file
+    statements  statements on the size of a pixel, um
+    step        pixels between slices
     sections    number of slices that were written; None: not stated
-    notes       fields that the log states twice
+    notes       notes on fields that the log states twice
     """
 
     path: str
@@ -44,14 +44,14 @@ class ScanLog:
 
 
 def find_log(folder: str, image: str) -> ScanLog | None:
-    """Return the log of a folder's slices; None: there is none that states a size.
+    """Return the log of a folder's slices; None: no log states a size.
 
     image  path of a slice in the folder, with `/`
     """
     below, _, name = image.rpartition("/")
     inside = join(folder, below) if below else folder
     logs = [entry for entry in os.listdir(inside) if entry.lower().endswith(".log")]
-    # a log is named as its slices are, without their numbers
+    # A log has the name of its slices, without their numbers.
     own = [log for log in logs if name.lower().startswith(log.lower().removesuffix(".log"))]
     for log in sorted(own or logs, key=len, reverse=True):
         found = _read(os.path.join(inside, log))
@@ -63,10 +63,10 @@ def find_log(folder: str, image: str) -> ScanLog | None:
 def with_log(
     stated_um: PartialTriple, log: ScanLog | None, slices: Sequence[int]
 ) -> tuple[PartialTriple, list[str]]:
-    """Return a spacing (z, y, x), um, completed by a log, and notes on the log.
+    """Return a spacing (z, y, x), um, completed from a log, and notes on the log.
 
-    stated_um  by the images themselves
-    slices     the slices' numbers, which count the camera's lines
+    stated_um  spacing that the images state
+    slices     numbers of the slices, which count lines of the camera
     """
     if log is None:
         return stated_um, []
@@ -86,9 +86,9 @@ def with_log(
     step = settle(Subject("step from slice to slice", "pixels"), steps)
     sizes = (pixel * step.number, pixel, pixel)
     z, y, x = (own if own is not None else size for own, size in zip(stated_um, sizes, strict=True))
-    told = f"the voxel size is that of the scanner's log: {pixel:g} um"
+    size_note = f"the voxel size comes from the scanner's log: {pixel:g} um"
     return (z, y, x), [
-        told,
+        size_note,
         *log.notes,
         *settled.notes,
         *step.notes,
@@ -97,10 +97,10 @@ def with_log(
 
 
 def _missing_slices(log: ScanLog, slices: int) -> list[str]:
-    """Return a note where the log counts other slices than there are images."""
+    """Return a note if the number of slices in the log differs from the number of images."""
     if log.sections is None or log.sections == slices:
         return []
-    rest = "the others may be lost" if log.sections > slices else "some may be of another scan"
+    rest = "the others may be lost" if log.sections > slices else "some may belong to another scan"
     return [f"slices: found {slices} images, and the log states {log.sections}: {rest}"]
 
 
@@ -140,7 +140,7 @@ def _read(path: str) -> ScanLog:
 
 
 def _named(key: tuple[str, str]) -> str:
-    """Return a field with its section, as the log has them."""
+    """Return a field with its section, in the form of the log."""
     return f"[{key[0].capitalize()}] {key[1]}"
 
 

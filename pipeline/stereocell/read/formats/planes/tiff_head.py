@@ -1,4 +1,4 @@
-"""The head of a TIFF file of a folder of planes."""
+"""The head of a TIFF file in a folder of planes."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -24,7 +24,7 @@ def tiff_head(path: str, named: str) -> Head:
         tiff = open_tiff(Location(path, True), stack)
         page = tiff.pages.first
         if page.dtype is None:
-            raise SourceError(f"{named}: found pixels of no known type, expected numbers")
+            raise SourceError(f"{named}: found pixels of an unknown type, expected numbers")
         stated = stated_by(tiff, page)
         turn, turn_notes = turn_of(page)
         sizes = (0, page.imagelength, page.imagewidth)
@@ -55,7 +55,7 @@ def _pages(tiff: TiffFile, named: str) -> int:
         return pages
     require_pages(named, tiff, [tiff.pages.first], 1)
     described = (tiff.imagej_metadata or {}) if tiff.is_imagej else {}
-    images = described.get("images", 1)  # of ImageJ's one directory over 4 GB
+    images = described.get("images", 1)  # ImageJ writes files over 4 GB with one directory
     return images if isinstance(images, int) else 1
 
 
@@ -66,11 +66,11 @@ def _metaseries_place(tiff: TiffFile) -> float | None:
 
 
 def _with_ome(head: Head, text: str, named: str) -> Head:
-    """Return the head with the voxel size and the place of the plane in its OME-XML."""
+    """Return the head with the voxel size and the position of the plane in its OME-XML."""
     try:
         root = ome_xml.parse(text, named)
         images = ome_xml.images_of(root, named)
-    except SourceError:  # the pixels are a plane all the same
+    except SourceError:  # without OME-XML the pixels are still a plane
         return head
     places, has_unit = positions_of(root)
     y_um, x_um = (_only(positions_of(root, axis)[0]) for axis in "YX")

@@ -1,4 +1,4 @@
-"""Files by channel, time and plane: series of one folder, and the planes that are missing."""
+"""Sort files by channel, time and plane, and find missing planes."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,13 +11,14 @@ from stereocell.model.errors import SourceError
 from stereocell.read.formats.planes.place import Place, natural
 from stereocell.read.image import MAX_CHANNELS
 
-_SHOWN = 4  # names in a message
-_SPARSE = 20  # times as many numbers as files between the first and the last: not one row
+_SHOWN = 4  # file names in a message
+# ratio of the range of numbers to the number of files; above it, the numbers are no sequence
+_SPARSE = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Volume:
-    """The files of one group, sorted: `files[time, channel, plane]`; plane 0 alone of stacks."""
+    """The files of one group, sorted: `files[time, channel, plane]`; stacks only have plane 0."""
 
     group: str
     times: tuple[int, ...]
@@ -27,7 +28,7 @@ class Volume:
 
 
 def groups_of(places: Sequence[Place]) -> list[list[Place]]:
-    """Return files by the group that their names tell, groups in natural order."""
+    """Return the files by the group that their names state, with groups in natural order."""
     groups: dict[str, list[Place]] = {}
     for place in places:
         groups.setdefault(place.group, []).append(place)
@@ -35,15 +36,15 @@ def groups_of(places: Sequence[Place]) -> list[list[Place]]:
 
 
 def volume_of(where: str, places: Sequence[Place]) -> Volume:
-    """Return a group's files by time, channel and plane. Raises SourceError for gaps and doubles.
+    """Return a group's files by time, channel and plane. Raises SourceError for gaps and repeats.
 
-    Where the planes' numbers go on from channel to channel, each channel's are counted anew.
+    If the numbers of planes continue from channel to channel, each channel is counted from 0 again.
     """
     channels = sorted({place.channel for place in places}, key=natural)
     times = sorted({place.time for place in places})
     if len(channels) > MAX_CHANNELS:
         raise SourceError(
-            f"{where}: found {len(channels)} channels by the names, expected at most {MAX_CHANNELS}"
+            f"{where}: found {len(channels)} channels in the names, expected at most {MAX_CHANNELS}"
         )
     by_stack: dict[tuple[int, int], dict[int, Place]] = {}
     for place in places:
@@ -52,7 +53,7 @@ def volume_of(where: str, places: Sequence[Place]) -> Volume:
         if other is not place:
             raise SourceError(
                 f"{where}: found two files for one plane, {other.path!r:.100} and "
-                f"{place.path!r:.100}, expected one (--pattern tells names apart)"
+                f"{place.path!r:.100}, expected one (--pattern may tell the names apart)"
             )
     numbers = sorted({number for stack in by_stack.values() for number in stack})
     own = [_every(where, sorted(stack)) for stack in by_stack.values()]
@@ -80,8 +81,8 @@ def volume_of(where: str, places: Sequence[Place]) -> Volume:
         shown = ", ".join(missing[:_SHOWN]) + (", ..." if len(missing) > _SHOWN else "")
         raise SourceError(
             f"{where}: found {len(files)} of {len(files) + len(missing)} planes ("
-            f"{len(channels)} channels, {len(planes)} planes, {len(times)} times by the names), "
-            f"missing {shown}; expected all of them, or --pattern where the names mean something "
+            f"{len(channels)} channels, {len(planes)} planes, {len(times)} times in the names), "
+            f"missing {shown}; expected all of them, or --pattern if the names mean something "
             "else"
         )
     return Volume(places[0].group, tuple(times), tuple(channels), tuple(planes), files)
@@ -97,14 +98,14 @@ def _every(where: str, numbers: Sequence[int]) -> list[int]:
     if (numbers[-1] - numbers[0]) // step > _SPARSE * len(numbers):
         raise SourceError(
             f"{where}: found {len(numbers)} planes numbered {numbers[0]} to "
-            f"{numbers[-1]!s:.20} by the names, expected numbers in a row, or --pattern where "
+            f"{numbers[-1]!s:.20} in the names, expected consecutive numbers, or --pattern if "
             "they mean something else"
         )
     return list(range(numbers[0], numbers[-1] + 1, step))
 
 
 def _missing(places: Sequence[Place], time: int, channel: str, plane: int) -> str:
-    """Return the words for a plane that is not there: the path that it would have."""
+    """Return the words for a missing plane: the path that it would have."""
     for place in places:
         if place.time == time and place.channel == channel and place.plane is not None:
             return repr(place.path_of(plane))

@@ -1,4 +1,4 @@
-"""The files of one volume of a folder: their paths, their channels, and the note on their names."""
+"""The files of one volume in a folder: their paths, channels, and a note on their names."""
 
 import re
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from stereocell.storage.location import Location
 Key = tuple[int, int, int]  # time, channel, plane
 _AXES = ("t", "c", "z", "y", "x")
 _SHOWN = 4  # names in a message
-_NUMBER = re.compile(r"[0-9]{1,9}$")  # at the end of a channel's name
+_NUMBER = re.compile(r"[0-9]{1,9}$")  # number at the end of a channel's name
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class VolumeFiles:
         return self.volume.files[key].path
 
     def path(self, key: Key) -> str:
-        """Return the place of a file on the disk."""
+        """Return the path of a file on the disk."""
         return join(self.location.source, self.name(key))
 
     def shown(self, key: Key) -> str:
@@ -40,12 +40,12 @@ class VolumeFiles:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """The places of all files on the disk."""
+        """The paths of all files on the disk."""
         return tuple(self.path(key) for key in self.volume.files)
 
     @property
     def channels(self) -> tuple[tuple[str | None, ...], tuple[Color | None, ...]]:
-        """Names and colours of the channels that the files' names tell."""
+        """Names and colours of the channels; the names come from the file names."""
         names = tuple(name or None for name in self.volume.channels)
         return names, (None,) * len(names)
 
@@ -63,7 +63,7 @@ class VolumeFiles:
 
     @property
     def _read_as(self) -> str:
-        """The note on what the names were taken for."""
+        """The note on how the names were interpreted."""
         volume, place = self.volume, self.volume.files[0, 0, 0]
         parts = []
         if len(volume.channels) > 1:
@@ -74,20 +74,20 @@ class VolumeFiles:
             parts.append(f"{len(volume.channels)} channels ({shown}{more}{skipped})")
         if len(volume.times) > 1:
             skipped = _skipped(volume.times)
-            parts.append(f"{len(volume.times)} points in time{f' ({skipped[2:]})' * bool(skipped)}")
+            parts.append(f"{len(volume.times)} time points{f' ({skipped[2:]})' * bool(skipped)}")
         if place.plane is not None:
             first, last, skipped = volume.planes[0], volume.planes[-1], _skipped(volume.planes)
             parts.append(f"{len(volume.planes)} planes ({first} to {last}{skipped})")
         description = " of ".join(parts) or "one stack"
         count = len(volume.files)
         return (
-            f"{count} file{'s' * (count != 1)}, named as {template_of(place)}, read as "
+            f"{count} file{'s' * (count != 1)}, named like {template_of(place)}, read as "
             f"{description}"
         )
 
 
 def _skipped(numbers: Sequence[int]) -> str:
-    """Return the words for the numbers between the least and the largest that no name has."""
+    """Return the words for the numbers between the smallest and the largest that no name has."""
     least, largest = min(numbers), max(numbers)
     count = largest - least + 1 - len(set(numbers))
     if not count:

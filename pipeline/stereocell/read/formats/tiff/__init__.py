@@ -8,9 +8,9 @@ from stereocell.read.image import Image
 from stereocell.storage.first_bytes import Mark
 from stereocell.storage.location import Location
 
-# DICOM may have a head of TIFF before its own mark
+# DICOM files may start like TIFF, before DICOM's own mark.
 _MARK = rb"(?!.{128}DICM)(" + b"|".join(map(re.escape, MAGIC)) + rb")"
-_COMPANION = ".companion.ome"  # the OME-XML of a set, in a file of its own
+_COMPANION = ".companion.ome"  # the OME-XML of a set, in a separate file
 
 
 def _open(location: Location, *, series: int = 0, axes: str = "") -> Image:

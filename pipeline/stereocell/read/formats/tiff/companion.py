@@ -1,4 +1,4 @@
-"""The OME-XML of a set of TIFF files that lies in a file of its own, a companion.
+"""Read the OME-XML of a set of TIFF files from a separate file, a companion.
 
 Each TIFF file of such a set names the companion, and states its own UUID and the companion's.
 
@@ -24,9 +24,9 @@ _MAX_BYTES = 64 << 20  # bytes of an OME-XML beside the TIFF files
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """OME-XML.
+    """The OME-XML of a file or a set.
 
-    path  of the companion; empty: the OME-XML is in the TIFF file itself
+    path  path of the companion; empty: the OME-XML is in the TIFF file itself
     """
 
     root: ElementTree.Element
@@ -35,12 +35,12 @@ class Described:
 
 
 def is_companion(location: Location) -> bool:
-    """Whether a source is named as a companion is."""
+    """Return whether a source is named like a companion."""
     return location.parts[-1].lower().endswith(_SUFFIX)
 
 
 def first_of_set(location: Location) -> Location:
-    """Return the first TIFF file of a set that is named by its companion. Raises SourceError."""
+    """Return the first TIFF file of a set from its companion. Raises SourceError."""
     where = location.shown
     if not location.is_local:
         raise SourceError(f"{where}: found OME-XML at an address, expected the set on this machine")
@@ -59,7 +59,7 @@ def companion_at(path: str, named: str) -> Described:
     with one_line(named, "OME-XML"):
         size = os.path.getsize(path)
         if size > _MAX_BYTES:
-            raise SourceError(f"{named}: found {size} bytes, expected OME-XML")
+            raise SourceError(f"{named}: found {size} bytes, expected at most {_MAX_BYTES}")
         with open(path, encoding="utf-8") as file:
             text = file.read().strip()
     return Described(ome_xml.parse(text, named), text, path)
@@ -68,20 +68,20 @@ def companion_at(path: str, named: str) -> Described:
 def companion_of(location: Location, root: ElementTree.Element) -> Described | None:
     """Return the companion that a TIFF file's OME-XML names; None: it names none.
 
-    Raises SourceError where it isn't there, or describes another set.
+    Raises SourceError where the companion is missing or describes another set.
     """
     name, uuid = ome_xml.metadata_file_of(root)
     if not name:
         return None
     named = f"{location.shown}: OME-XML: BinaryOnly MetadataFile {name!r:.100}"
     if not location.is_local:
-        raise SourceError(f"{named}: beside an address, expected the set on this machine")
+        raise SourceError(f"{named}: found an address, expected the set on this machine")
     path = os.path.join(location.folder, name)
     if require_own(path, [location.folder], named=named) is None:
         raise SourceError(f"{named}: not found, expected it beside the TIFF file")
     if name.lower().endswith(SUFFIXES):
         raise SourceError(
-            f"{named}: found the OME-XML of the set in another TIFF file, expected that file: "
+            f"{named}: found another TIFF file that holds the set's OME-XML, expected that file: "
             "open it in place of this one"
         )
     found = companion_at(path, named)

@@ -1,7 +1,7 @@
-"""Value scale and missing value in the tags that GDAL writes into TIFF.
+"""Read value scale and missing value from the tags that GDAL writes into TIFF.
 
 GDAL_METADATA holds XML with a factor and an offset for each sample: `SCALE * stored + OFFSET`.
-GDAL_NODATA holds the stored number that stands for no measurement.
+GDAL_NODATA holds the stored number that marks missing measurements.
 
 References: https://gdal.org/drivers/raster/gtiff.html
 """
@@ -26,7 +26,7 @@ def gdal_scale(page: TiffPage) -> ValueScale:
     if len(set(factors)) > 1:
         notes.append(
             "values: SCALE and OFFSET of GDAL_METADATA differ by sample: the voxels are read as "
-            "they are stored"
+            "stored"
         )
     slope, intercept = factors[0] if len(set(factors)) == 1 else (1.0, 0.0)
     stored = np.dtype(page.dtype)
@@ -38,14 +38,14 @@ def gdal_scale(page: TiffPage) -> ValueScale:
     missing = _missing(page.tags.valueof(_NODATA), stored)
     if missing:
         notes.append(
-            f"values: voxels of GDAL_NODATA {missing[0]:g} are no measurements: read as the "
-            "smallest measured value"
+            f"values: voxels of GDAL_NODATA {missing[0]:g} are not measurements: they are read as "
+            "the smallest measured value"
         )
     return ValueScale(slope=slope, intercept=intercept, missing=missing, notes=tuple(notes))
 
 
 def _factors(text: Any) -> list[tuple[float, float]]:
-    """Return factor and offset of each sample; empty: there are none, or no XML of GDAL."""
+    """Return factor and offset of each sample; empty: there are none, or the XML is not GDAL's."""
     if not isinstance(text, str) or "<!" in text or len(text) > _MAX_CHARACTERS:
         return []
     try:
@@ -62,7 +62,7 @@ def _factors(text: Any) -> list[tuple[float, float]]:
 
 
 def _missing(text: Any, stored: np.dtype[Any]) -> tuple[float, ...]:
-    """Return the number that stands for no measurement, if the voxels can have it."""
+    """Return the number that marks missing measurements, if the voxels can have it."""
     value = _number(text)
     if value is None:
         return ()

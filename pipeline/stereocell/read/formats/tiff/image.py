@@ -1,4 +1,4 @@
-"""TIFF: OME-TIFF, and what ImageJ, Zeiss LSM, MetaMorph, Micro-Manager, tifffile and others write.
+"""Read TIFF: OME-TIFF, and files of ImageJ, Zeiss LSM, MetaMorph, Micro-Manager, tifffile, others.
 
 ome.py reads files with OME-XML, plain.py all others; both use tifffile.
 """
@@ -32,16 +32,16 @@ from stereocell.read.series import lines
 from stereocell.storage.library_errors import collected_log, one_line
 from stereocell.storage.location import Location
 
-logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors are raised here
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # errors raise exceptions here
 _OME_NAMES = (".ome.tif", ".ome.tiff", ".ome.tf2", ".ome.tf8", ".ome.btf")
-_BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's words
+_BEYOND = re.compile(r"invalid page offset ([0-9]+)")  # tifffile's message
 
 
 def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
     """Return one image of the file.
 
-    axes    of those longer than 1, slowest first, as `zcyx`; empty: the file's own
-    series  of the images of OME-XML (ome_images.py, modulo.py); 0: the largest
+    axes    letters of the axes longer than 1, slowest first, such as `zcyx`; empty: the file's own
+    series  number among the images of OME-XML (ome_images.py, modulo.py); 0: the largest
 
     Raises SourceError where the file can't be read as an image, UsageError where it has another
     number of axes or no such image.
@@ -56,7 +56,7 @@ def read_image(location: Location, axes: str = "", series: int = 0) -> Image:
 
 
 def list_series(location: Location) -> tuple[str, ...]:
-    """Return a line for each image, also along further axes. Raises SourceError."""
+    """Return a line for each image, and for each part along further axes. Raises SourceError."""
     with ExitStack() as stack, collected_log("tifffile"):
         described = _open(location, stack)[2]
         if described is not None and ome_xml.count_images(described.root) > 1:
@@ -69,12 +69,12 @@ def list_series(location: Location) -> tuple[str, ...]:
 
 
 def _open(location: Location, stack: ExitStack) -> tuple[Location, TiffFile, Described | None]:
-    """Return the file of a source, open, with its OME-XML; None: it has none."""
+    """Return the opened file of a source with its OME-XML; None: it has none."""
     given = location.source if is_companion(location) else ""
     if given:
         location = first_of_set(location)
     tiff = open_tiff(location, stack)
-    with one_line(location.shown, "a TIFF file, whole"):
+    with one_line(location.shown, "a complete TIFF file"):
         text = tiff.pages.first.description
     if not given and not ome_xml.is_ome(text):
         return location, tiff, None
@@ -84,10 +84,7 @@ def _open(location: Location, stack: ExitStack) -> tuple[Location, TiffFile, Des
 def _read(
     location: Location, axes: str, series: int
 ) -> tuple[Image, ElementTree.Element | None, int]:
-    """Return the image as it is stored, its OME-XML, and the series of its parts.
-
-    The OME-XML is None where the file has none.
-    """
+    """Return the image as stored, its OME-XML (None: it has none), and the series of its parts."""
     stack = ExitStack()
     try:
         with collected_log("tifffile") as log:
@@ -116,8 +113,8 @@ def _read(
 def _described(location: Location, tiff: TiffFile, text: str, given: str) -> Described:
     """Return the OME-XML of a file or of its set. Raises SourceError.
 
-    text   of the file's first page
-    given  path of the file of OME-XML that the user named; empty: none
+    text   description of the file's first page
+    given  path of the companion that the user named; empty: the user named a TIFF file
     """
     if given:
         return companion_at(given, given)
@@ -129,7 +126,7 @@ def _described(location: Location, tiff: TiffFile, text: str, given: str) -> Des
 
 
 def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) -> None:
-    """Raise SourceError where tifffile left out pages behind the end of a file at an address."""
+    """Raise SourceError where tifffile left out pages beyond the end of a file at an address."""
     for message in log:
         found = _BEYOND.search(message)
         if found:
@@ -139,18 +136,18 @@ def _require_pages_read(location: Location, tiff: TiffFile, log: Sequence[str]) 
 def _with_note(location: Location, image: Image) -> Image:
     if not location.parts[-1].lower().endswith(_OME_NAMES):
         return image
-    note = "the name says OME-TIFF, but there is no OME-XML in it: read as plain TIFF"
+    note = "the name says OME-TIFF, but the file has no OME-XML: read as plain TIFF"
     return replace(image, notes=(note, *image.notes))
 
 
 def _otherwise(tiff: TiffFile) -> str:
-    """Return the words for what a file is whose OME-XML can't be read."""
+    """Return the remedy for a file whose OME-XML can't be read, with a description of its pages."""
     try:
         with one_line("", "pages"):
             found = kind_of(tiff.series[0])
     except SourceError:
         return ""
     return (
-        f" (without it the file is {found}: saved anew as TIFF by ImageJ, say, it is read "
-        "without OME-XML)"
+        f" (without it the file is {found}: save it again as TIFF, for example with ImageJ, to "
+        "read it without OME-XML)"
     )

@@ -1,8 +1,8 @@
-"""Micro-Manager's NDTiff: a set of TIFF files, and an index that names axes and places of images.
+"""Read Micro-Manager's NDTiff: TIFF files, and an index of axes and places of images.
 
 An index that was cut short lists fewer images, and tifffile returns only those. So the images in
 each file are counted and compared with the index. Files of the set that the index doesn't name are
-searched, too.
+searched too.
 
 References: https://github.com/micro-manager/NDTiffStorage
 """
@@ -29,10 +29,10 @@ _MARK_AT = 8
 def with_index(
     location: Location, tiff: TiffFile, stack: ExitStack
 ) -> tuple[TiffFile, tuple[str, ...]]:
-    """Return the file with the index beside it, which names axes and other files, if it has one.
+    """Return the file opened with the index beside it, which names axes and other files.
 
-    The second value is the names of channels in the index. Raises SourceError where the index
-    lists fewer images than the files hold.
+    Without an index, the file is returned unchanged. The second value holds the names of channels
+    in the index. Raises SourceError where the index lists fewer images than the files hold.
     """
     index = index_of(location)
     folder = os.path.dirname(index)
@@ -46,7 +46,7 @@ def with_index(
         named = f"{location.shown}: {INDEX}: {name!r:.200}"
         require_own(os.path.join(folder, name), [location.folder], named=named)
     _require_all(location, folder, Counter(row[1] for row in rows))
-    # tifffile numbers channels in the order of their first planes
+    # tifffile numbers channels in the order of their first planes.
     channels = dict.fromkeys(row[0].get("channel") for row in rows)
     names = tuple(name for name in channels if isinstance(name, str))
     return open_tiff(location, stack, is_ndtiff=None), names
@@ -60,7 +60,7 @@ def index_of(location: Location) -> str:
 def _require_all(location: Location, folder: str, listed: Mapping[str, int]) -> None:
     """Raise SourceError where the files of the set hold more images than the index lists.
 
-    listed  images in the index, by file
+    listed  number of images in the index, by file
     """
     held = {name: _images_in(location, os.path.join(folder, name)) for name in listed}
     for name in sorted(os.listdir(folder)):
@@ -73,7 +73,7 @@ def _require_all(location: Location, folder: str, listed: Mapping[str, int]) -> 
             raise SourceError(
                 f"{location.shown}: {INDEX}: found {sum(listed.values())} of {total} images "
                 f"({listed.get(name, 0)} of {count} in {name!r:.100}), expected all of them: the "
-                "index is cut short or of another set: copy it again"
+                "index is cut short or belongs to another set: copy it again"
             )
 
 
@@ -83,7 +83,7 @@ def _images_in(location: Location, path: str) -> int:
 
 
 def _is_marked(path: str) -> bool:
-    """Return whether a file has the mark of NDTiff in its first bytes."""
+    """Return whether a file has NDTiff's mark in its first bytes."""
     if not os.path.isfile(path):
         return False
     with open(path, "rb") as file:

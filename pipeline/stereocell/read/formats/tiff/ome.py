@@ -1,8 +1,8 @@
-"""OME-TIFF, by tifffile, which serves every level as a Zarr array of the file's strips or tiles.
+"""Read OME-TIFF with tifffile, which serves every level as a Zarr array of strips or tiles.
 
-bioio's reader, which stands on tifffile, is not used: it reads level 0 only (it leaves out
-sub-resolutions, in SubIFDs), reads a whole page for each window, opens the file anew for each page,
-refuses a file for a fault anywhere in its metadata, and takes 2 s to import.
+bioio's reader, which builds on tifffile, is not used. It reads only level 0 (leaving out
+sub-resolutions in SubIFDs). It reads a whole page for each window, and opens the file again for
+each page. It also refuses a file for a fault anywhere in its metadata, and takes 2 s to import.
 
 References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
 """
@@ -40,9 +40,9 @@ from stereocell.read.statements import Statement, Subject, Trust, settle
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-# Limits of the numbers in OME-XML and tags: the libraries allocate lists of such a length at once.
+# Limits of numbers in OME-XML and tags: the libraries allocate lists of such lengths at once.
 _MAX_SIDE = 10_000_000  # voxels along an axis
-_MAX_LEVELS = 64  # of the pyramid
+_MAX_LEVELS = 64  # levels of a pyramid
 _SUB_IFDS = 330  # TIFF tag SubIFDs: offsets of a page's coarser levels
 _VALUE_TYPE = Subject("type of the voxels")
 _NUMPY_NAMES = {"float": "float32", "double": "float64", "bit": "bool"}  # by OME-XML's names
@@ -61,14 +61,14 @@ def read_ome(
 ) -> Image:
     """Return the chosen image of an open file.
 
-    text    the OME-XML with the chosen image alone, of the file or of the one beside it
-    log     grows by tifffile's messages
-    axes    of those longer than 1, slowest first; empty: as the OME-XML has them
+    text    OME-XML with only the chosen image, from the file or from the one beside it
+    log     list to which tifffile's messages are added
+    axes    letters of the axes longer than 1, slowest first; empty: as in the OME-XML
 
     Raises SourceError where it can't be read as an image.
     """
     where, root = location.shown, chosen.root
-    with one_line(where, "an OME-TIFF file, whole, with its OME-XML"):
+    with one_line(where, "a complete OME-TIFF file with its OME-XML"):
         _check_claims(where, tiff, text)
         tiff.is_ome = True
         images = ome_xml.images_of(root, where)
@@ -94,7 +94,7 @@ def read_ome(
 
 
 def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[str, ...]]:
-    """Return the image with the depth of its voxels by the most trusted field, and notes."""
+    """Return the image with the depth of its voxels from the most trusted field, and notes."""
     finest = image.grids[0]
     z, y, x = finest.spacing_um or finest.partial_um
     stated = [] if z is None else [Statement(z, "PhysicalSizeZ")]
@@ -103,7 +103,7 @@ def _with_depth(image: Image, root: ElementTree.Element) -> tuple[Image, tuple[s
 
 
 def _type_notes(root: ElementTree.Element, page: TiffPage) -> tuple[str, ...]:
-    """Return a note where the OME-XML and the tags of the pages state different voxels."""
+    """Return a note if the OME-XML and the tags of the pages state different voxels."""
     pixels = ome_xml.pixels_of(root)
     name = "" if pixels is None else pixels.get("Type", "")
     if not name or page.dtype is None:
@@ -116,7 +116,7 @@ def _type_notes(root: ElementTree.Element, page: TiffPage) -> tuple[str, ...]:
 def _require_planes(
     location: Location, tiff: TiffFile, root: ElementTree.Element, levels: list[list[Any]]
 ) -> None:
-    """Raise SourceError where planes are missing, or are not those that the OME-XML names."""
+    """Raise SourceError where planes are missing, or differ from those that the OME-XML names."""
     require_files(location, root, levels[0])
     for index, level in enumerate(levels):
         require_pages(f"{location.shown}: level {index}", tiff, level, len(level))
@@ -128,7 +128,7 @@ def _require_planes(
 def _undescribed(tiff: TiffFile, others: int) -> tuple[str, ...]:
     """Return a note on pages of the files that belong to no image of the OME-XML.
 
-    others  planes of other images
+    others  number of planes of other images
     """
     pages = [page for one in tiff.series for page in one.pages if page is not None]
     described = len(pages) + others
@@ -156,7 +156,7 @@ def _check_claims(where: str, tiff: TiffFile, text: str) -> None:
         sizes[name] = max(sizes.get(name, 1), int(value))
     planes = math.prod(sizes.get(f"Size{axis}", 1) for axis in "ZCT")
     if planes > MAX_PLANES:
-        raise SourceError(f"{where}: OME-XML: {planes} planes, expected at most {MAX_PLANES}")
+        raise SourceError(f"{where}: OME-XML: found {planes} planes, expected at most {MAX_PLANES}")
     tag = tiff.pages.first.tags.get(_SUB_IFDS)
     if tag is not None and tag.count > _MAX_LEVELS:
         raise SourceError(f"{where}: SubIFDs: found {tag.count}, expected at most {_MAX_LEVELS}")

@@ -1,7 +1,7 @@
-"""The images of one OME-XML: which is read, and how `--series` counts them.
+"""Choose which image of an OME-XML is read, and how `--series` counts the images.
 
-A label or an overview may come before the volume, a pyramid may be one image for each level, and a
-set of files may hold one position each. So the largest volume of the opened file is read.
+A label or an overview may come before the volume. Each level of a pyramid may be a separate image,
+and a set of files may hold one position each. So the largest volume of the opened file is read.
 """
 
 import math
@@ -20,10 +20,10 @@ from stereocell.storage.location import Location
 class Chosen:
     """One image of an OME-XML.
 
-    root    with this image alone
-    series  of the images that lie along its further axes, from 1; 0: the first
-    notes   on the choice
-    others  planes of the other images that lie in the opened file
+    root    root with only this image
+    series  number of the part along its further axes, from 1; 0: the first
+    notes   notes on the choice
+    others  number of planes of the other images in the opened file
     """
 
     root: ElementTree.Element
@@ -44,7 +44,7 @@ class _Entry:
 
 
 def choose_image(location: Location, root: ElementTree.Element, series: int) -> Chosen:
-    """Return the image of an OME-XML that a series of `list_images` is; 0: the largest.
+    """Return the image of an OME-XML with a number in `list_images`; 0: the largest.
 
     Raises SourceError for OME-XML that can't be read, UsageError where there is no such series.
     """
@@ -68,7 +68,7 @@ def choose_image(location: Location, root: ElementTree.Element, series: int) -> 
 
 
 def list_images(location: Location, root: ElementTree.Element) -> list[Candidate]:
-    """Return what a list says of each image, and of its parts along further axes."""
+    """Return the entry in the list of series of each image and of its parts along further axes."""
     return [one.candidate for one in _entries(location, root)]
 
 
@@ -97,7 +97,7 @@ def _entries(location: Location, root: ElementTree.Element) -> list[_Entry]:
 
 
 def _is_here(location: Location, root: ElementTree.Element) -> bool:
-    """Whether planes of the first image lie in the opened file."""
+    """Return whether planes of the first image lie in the opened file."""
     own = os.path.basename(location.parts[-1])
     for _, uuid in ome_xml.tiff_data_of(root):
         if uuid is None or uuid.text == root.get("UUID") or uuid.get("FileName") == own:

@@ -1,6 +1,6 @@
-"""The planes of an OME-TIFF, compared with the files and pages that the OME-XML names for them.
+"""Compare the planes of an OME-TIFF with the files and pages that the OME-XML names for them.
 
-tifffile takes the last of two entries for a plane, and leaves out a file that it can't open.
+tifffile uses the last of two entries for a plane, and leaves out a file that it can't open.
 """
 
 import os
@@ -18,16 +18,16 @@ from stereocell.storage.location import Location
 def require_described(location: Location, root: ElementTree.Element, pages: Sequence[Any]) -> None:
     """Raise SourceError where a plane of the first image isn't the page that the OME-XML names.
 
-    The OME-XML then names two pages for a plane, or describes the planes of no page.
+    The OME-XML then names two pages for a plane, or describes no page of the planes.
 
-    pages  of the finest level; none is missing
+    pages  pages of the finest level; none is missing
     """
     order, sizes = _loops(root)
     described = 0
     for data, uuid in ome_xml.tiff_data_of(root):
         place = [int(data.get(f"First{axis}", 0)) for axis in order]
         if any(at >= size for at, size in zip(place, sizes, strict=True)):
-            continue  # as ImageJ writes them when it crops; tifffile leaves these out, too
+            continue  # ImageJ writes such entries when it crops; tifffile leaves them out too
         described += 1
         start, first = int(np.ravel_multi_index(place, sizes)), int(data.get("IFD", 0))
         count = max(int(data.get("PlaneCount", data.get("NumPlanes", 1))), 1)
@@ -51,9 +51,9 @@ def require_described(location: Location, root: ElementTree.Element, pages: Sequ
 def require_files(
     location: Location, root: ElementTree.Element, pages: Sequence[object | None]
 ) -> None:
-    """Raise SourceError where planes are missing because a file of the set is.
+    """Raise SourceError where planes are missing because a file of the set is missing.
 
-    pages  of the finest level; None: a missing one
+    pages  pages of the finest level; None: a missing page
     """
     if not location.is_local or all(page is not None for page in pages):
         return
@@ -70,20 +70,20 @@ def require_files(
 def require_alike(location: Location, pages: Sequence[Any]) -> None:
     """Raise SourceError where the files of a set hold planes of another size or number type.
 
-    pages  of the finest level; none is missing
+    pages  pages of the finest level; none is missing
     """
     first = pages[0].keyframe
     for page in {page.parent: page.keyframe for page in pages}.values():
         if (page.shape, page.dtype) != (first.shape, first.dtype):
             raise SourceError(
                 f"{location.shown}: {page.parent.filename!r:.100}: found planes of {page.shape} "
-                f"{page.dtype}, expected {first.shape} {first.dtype} as in "
-                f"{first.parent.filename!r:.100}: it is a file of another set"
+                f"{page.dtype}, expected {first.shape} {first.dtype}, as in "
+                f"{first.parent.filename!r:.100}: the file belongs to another set"
             )
 
 
 def _loops(root: ElementTree.Element) -> tuple[str, list[int]]:
-    """Return the axes over planes, slowest first, and their sizes; samples are no planes."""
+    """Return the axes over planes, slowest first, and their sizes. Samples are not planes."""
     pixels = ome_xml.pixels_of(root)
     if pixels is None:
         return "", []
@@ -101,7 +101,7 @@ def _words(page: tuple[str, int]) -> str:
 def _path_of(
     location: Location, root: ElementTree.Element, uuid: ElementTree.Element | None
 ) -> str:
-    """Return the path of the file that tifffile reads for a UUID; empty: at an address."""
+    """Return the path of the file that tifffile reads for a UUID; empty at an address."""
     if not location.is_local:
         return ""
     own = os.path.realpath(location.path)

@@ -1,9 +1,9 @@
-"""The files of an OME-TIFF set, compared with the UUIDs by which the OME-XML names them.
+"""Compare the files of an OME-TIFF set with the UUIDs in its OME-XML.
 
 The OME-XML names the file of each plane twice, by its name and by its UUID. tifffile opens files by
-their names and never compares the UUIDs, so a file of another acquisition under the right name
-would be read as a part of this one. Each file states its own UUID in its own OME-XML. A file that
-was renamed is found by its UUID. A file that states no UUID is taken by its name.
+their names and never compares the UUIDs, so a file of another acquisition with the right name would
+be read as part of this one. Each file states its own UUID in its own OME-XML. A renamed file is
+found by its UUID. A file that states no UUID is accepted by its name.
 
 References: https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/specification.html
 """
@@ -23,8 +23,8 @@ from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location, require_own
 
 _MOST_SEARCHED = 1000  # files of a folder that are opened to find one by its UUID
-_HEAD = 16_384  # characters of a description in which the first tag of OME-XML lies
-_OF_ANOTHER = "{!r:.100} states the UUID of another file of its set: taken by its name"
+_HEAD = 16_384  # characters of a description that contain the first tag of OME-XML
+_OF_ANOTHER = "{!r:.100} states the UUID of another file of its set: it is accepted by its name"
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _OWN_UUID = re.compile(r"""<(?:[\w.-]+:)?OME\b[^<>]*?\sUUID\s*=\s*["']([^"']*)""")
 
@@ -32,34 +32,35 @@ _OWN_UUID = re.compile(r"""<(?:[\w.-]+:)?OME\b[^<>]*?\sUUID\s*=\s*["']([^"']*)""
 def settle_files(
     location: Location, root: ElementTree.Element, *, is_companion: bool
 ) -> tuple[bool, tuple[str, ...]]:
-    """Correct the file names in the OME-XML of a set by the UUIDs that the files state.
+    """Correct the file names in the OME-XML of a set with the UUIDs that the files state.
 
-    root          changed in place
-    is_companion  the OME-XML lies in a file of its own
+    root          root of the OME-XML, changed in place
+    is_companion  whether the OME-XML is in a separate file
 
-    Returns whether the OME-XML was changed, and a note for each file that it names otherwise.
+    Returns whether the OME-XML was changed, and a note for each file with another name.
 
-    Only files of the first image are compared: it is the one that is read. Raises SourceError for
-    a file outside the source's folder, and for one whose UUID is that of another file. A missing
-    file is not refused here: the missing planes are counted later. At an address, tifffile opens
-    no other file.
+    Only files of the first image are compared, since only that image is read. Raises SourceError
+    for a file outside the source's folder, and for one with the UUID of another file. A missing
+    file is not refused here: the missing planes are counted later. At an address, tifffile opens no
+    other file.
     """
     if not location.is_local:
         return False, ()
     names = (uuid.get("FileName") for uuid in ome_xml.uuids_of(root) if _is_other(uuid, root))
-    for name in dict.fromkeys(names):  # of all images, since tifffile opens them all
+    # names in all images are checked, because tifffile opens all these files
+    for name in dict.fromkeys(names):
         if name is not None:
             _require_inside(location, name)
     return _Set(location, root, is_companion=is_companion).settle()
 
 
 def _is_other(uuid: ElementTree.Element, root: ElementTree.Element) -> bool:
-    """Whether a UUID is of another file than the OME-XML is in."""
+    """Return whether a UUID belongs to another file than the one with the OME-XML."""
     return uuid.text != root.get("UUID", "")
 
 
 def _require_inside(location: Location, name: str) -> bool:
-    """Whether a named file is there. Raises SourceError for one outside the source's folder."""
+    """Return whether a named file exists. Raises SourceError outside the source's folder."""
     named = f"{location.shown}: OME-XML: UUID FileName {name!r:.200}"
     path = os.path.join(os.path.dirname(os.path.realpath(location.path)), name)
     return require_own(path, [location.folder], named=named) is not None
@@ -92,14 +93,14 @@ class _Set:
         return is_changed or bool(notes), tuple(notes)
 
     def _name_empty(self) -> bool:
-        """Replace empty UUIDs, which tifffile takes for the opened file; return whether any was."""
+        """Replace empty UUIDs, which tifffile takes for the opened file. Return whether any was."""
         empty = [element for element in self._elements if not _plain(element.text)]
         for element in empty:
             element.text = element.get("FileName", "")
         return bool(empty)
 
     def _by_uuid(self) -> dict[str, list[ElementTree.Element]]:
-        """Return the elements by UUID. Raises SourceError where two files have the same one."""
+        """Return the elements by UUID. Raises SourceError where two files have the same UUID."""
         found: dict[str, list[ElementTree.Element]] = {}
         for element in self._elements:
             name = element.get("FileName", "")
@@ -113,9 +114,9 @@ class _Set:
         return found
 
     def _settle_own(self, by_uuid: dict[str, list[ElementTree.Element]]) -> list[str]:
-        """Know the opened file by its name where all files of the set state the same UUID.
+        """Identify the opened file by its name if all files of the set state the same UUID.
 
-        Returns a note if it is so.
+        Returns a note in that case.
         """
         named = {elements[0].get("FileName", ""): elements for elements in by_uuid.values()}
         by_name = named.get(os.path.basename(self._own))
@@ -132,27 +133,27 @@ class _Set:
         return [_OF_ANOTHER.format(os.path.basename(self._own))]
 
     def _settled(self, uuid: str, name: str) -> tuple[str, str]:
-        """Return the name of the file with a UUID, and a note where it differs from `name`."""
+        """Return the name of the file with a UUID, and a note if it differs from `name`."""
         if not self._is_companion and uuid == self._root_uuid:
-            return name, ""  # the opened file itself, by whatever name
+            return name, ""  # this is the opened file itself, under any name
         path = self._folder / name
         is_there = bool(name) and _require_inside(self._location, name)
         is_own = is_there and os.path.samefile(path, self._own)
         if is_own and not self._is_companion and self._root_uuid not in self._uuids:
-            return name, ""  # the OME-XML in a file describes this file
+            return name, ""  # the OME-XML inside a file describes that file
         stated = _stated_uuid(str(path)) if is_there else ""
         if is_there and stated in ("", uuid):
             return name, ""
         if other := self._by_stated_uuid.get(uuid):
             return other, f"{other!r:.90} has the UUID of {name!r:.90}: read in its place"
-        is_of_set = stated == self._root_uuid  # by a writer that gives each file the same OME-XML
+        is_of_set = stated == self._root_uuid  # a writer gave each file the same OME-XML
         if is_there and is_of_set and not filecmp.cmp(path, self._own, shallow=False):
             return name, _OF_ANOTHER.format(name)
         if is_there:
             raise SourceError(
-                f"{self._location.shown}: OME-XML: UUID FileName {name!r:.100}: found a file of "
-                f"UUID {stated!r:.60}, expected {uuid!r:.60}: it is a file of another set, or in "
-                "another file's place: copy the files of this set into a folder of their own"
+                f"{self._location.shown}: OME-XML: UUID FileName {name!r:.100}: found a file with "
+                f"UUID {stated!r:.60}, expected {uuid!r:.60}: the file belongs to another set, or "
+                "replaces another file: copy the files of this set into a folder of their own"
             )
         if not self._root_uuid and not self._is_companion and len(self._names) == 1:
             own = os.path.basename(self._own)
@@ -181,13 +182,13 @@ class _Set:
 
 
 def _plain(uuid: str | None) -> str:
-    """Return a UUID as it is compared."""
+    """Return a UUID in the form in which UUIDs are compared."""
     return (uuid or "").strip().lower().removeprefix("urn:uuid:")
 
 
 def _stated_uuid(path: str) -> str:
     """Return the UUID in a file's own OME-XML; empty: it states none, or can't be read."""
-    with suppress(SourceError), ExitStack() as stack, one_line(path, "a TIFF file, whole"):
+    with suppress(SourceError), ExitStack() as stack, one_line(path, "a complete TIFF file"):
         tiff = open_tiff(Location(path, True), stack)
         head = _COMMENT.sub("", tiff.pages.first.description[:_HEAD])
         found = _OWN_UUID.search(head)

@@ -1,8 +1,8 @@
-"""Open a TIFF file, and check that it is one and that it is whole.
+"""Open a TIFF file, and check that it is one and that it is complete.
 
-tifffile reads a file whose end is missing as one of fewer pages, or of zeros. So directories and
-strips are checked against the file's size: a file that was cut short is told, with the number of
-bytes that it needs at least.
+tifffile reads a file without its end as one with fewer pages, or with zeros. So directories and
+strips are compared with the size of the file. A file that was cut short is reported with the number
+of bytes that it needs at least.
 
 References: TIFF 6.0 section 2, https://www.awaresystems.be/imaging/tiff/bigtiff.html
 """
@@ -26,24 +26,25 @@ from stereocell.storage.location import Location
 
 MAX_PLANES = 1_000_000
 SUFFIXES = (".tif", ".tiff", ".tf2", ".tf8", ".btf")
-_REMOTE_BLOCK = 1 << 18  # bytes of a remote read; fsspec's default reads 5 MB ahead for every tile
-_DESCRIPTION = 270  # tag ImageDescription, one byte a character
-_MAX_TAGS = 4096  # of a directory; tifffile refuses more
-_EXPECTED = "a TIFF file, whole"
+# bytes of a remote read; fsspec's default would read 5 MB ahead for every tile
+_REMOTE_BLOCK = 1 << 18
+_DESCRIPTION = 270  # tag ImageDescription, one byte per character
+_MAX_TAGS = 4096  # tags of a directory; tifffile refuses more
+_EXPECTED = "a complete TIFF file"
 
 
 def open_tiff(location: Location, stack: ExitStack, **options: Any) -> TiffFile:
     """Return the open file; `stack` closes it.
 
-    options  of TiffFile; formats in which tifffile opens other files that this one names are off
-             by default: whoever has checked the names turns one on
+    options  options of TiffFile. Formats in which tifffile opens other named files are off by
+             default; a caller that has checked the names may turn them on
 
-    Raises SourceError where it is no TIFF, or where directories lie beyond its end.
+    Raises SourceError where it is not a TIFF, or where directories lie beyond its end.
     """
     where = location.shown
     options = {"is_ome": False, "is_mmstack": False, "is_ndtiff": False} | options
     with one_line(where, _EXPECTED):
-        if location.is_local:  # by path, so that the files of a set find each other
+        if location.is_local:  # opened by path, so that the files of a set find each other
             path = os.path.realpath(location.source)
             with open(path, "rb") as file:
                 _require_tiff(where, file)
@@ -63,23 +64,23 @@ def open_tiff(location: Location, stack: ExitStack, **options: Any) -> TiffFile:
 def _require_tiff(where: str, file: IO[bytes]) -> None:
     head = file.read(HEAD_BYTES)
     if not head.startswith(MAGIC):
-        raise SourceError(f"{where}: not a TIFF file: found {identify(head).words}, expected TIFF")
+        raise SourceError(f"{where}: found {identify(head).words}, expected TIFF")
 
 
 def require_directories(where: str, file: IO[bytes], size: int) -> int:
     """Return the number of directories; 0 where they can't be counted here.
 
-    Raises SourceError where their chain leads beyond the file's end.
+    Raises SourceError where their chain leads beyond the end of the file.
 
-    file  at any place, which changes
-    size  of the file in bytes
+    file  open file, whose position changes
+    size  size of the file in bytes
     """
     file.seek(0)
     head = file.read(16).ljust(16, b"\0")
     order = "<" if head[:2] == b"II" else ">"
     is_big = head[2:4] in (b"+\0", b"\0+")
     if not is_big and size >= 1 << 32:
-        return 0  # offsets of 32 bits have wrapped around: tifffile mends them
+        return 0  # 32-bit offsets have wrapped around; tifffile corrects them
     number, offset_bytes = ("Q", 8) if is_big else ("H", 4)
     link, entry = ("Q", 20) if is_big else ("I", 12)
     (offset,) = struct.unpack_from(order + link, head, 8 if is_big else 4)
@@ -108,7 +109,7 @@ def _require_description(
 ) -> None:
     """Raise SourceError where the text of the first directory ends beyond the file.
 
-    tifffile ignores such a text, and a file without its OME-XML would be read as plain TIFF.
+    tifffile ignores such a text, so a file without its OME-XML would be read as plain TIFF.
     """
     form, inline = struct.Struct(order + ("HHQQ" if is_big else "HHII")), 8 if is_big else 4
     whole = entries[: len(entries) // form.size * form.size]
@@ -118,9 +119,9 @@ def _require_description(
 
 
 def refuse_short(where: str, size: int, needed: int) -> NoReturn:
-    """Raise the SourceError of a file of `size` bytes that refers to byte `needed`."""
+    """Raise the SourceError for a file of `size` bytes that refers to byte `needed`."""
     raise SourceError(
-        f"{where}: cut short at byte {size} of {needed} or more, expected the whole file "
+        f"{where}: cut short at byte {size} of {needed} or more, expected the complete file "
         "(copy or download it again)"
     )
 
@@ -130,7 +131,7 @@ def require_pages(
 ) -> None:
     """Raise SourceError for missing planes, which tifffile would read as zeros, or a short file.
 
-    expected  the number of planes
+    expected  number of planes
     """
     present = [page for page in pages if page is not None]
     if len(present) < expected:
@@ -149,7 +150,7 @@ def require_pages(
 
 
 def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
-    """Return the paths of the files that hold some pages; empty: the source is an address."""
+    """Return the paths of the files that hold the pages; empty: the source is at an address."""
     if not location.is_local:
         return ()
     paths = {page.parent.filehandle.path for page in pages if page is not None}
@@ -157,9 +158,9 @@ def files_of(location: Location, pages: Iterable[Any]) -> tuple[str, ...]:
 
 
 def note_absent(levels: Iterable[Iterable[Any]]) -> tuple[str, ...]:
-    """Return a note for each level that has strips or tiles without bytes, which are read as 0.
+    """Return a note for each level with strips or tiles without bytes, which are read as 0.
 
-    levels  the pages of each level, the finest one first
+    levels  pages of each level, the finest first
 
     Writers leave out empty tiles (GDAL calls such a file sparse), and a lost tile looks the same.
     """
@@ -170,14 +171,14 @@ def note_absent(levels: Iterable[Iterable[Any]]) -> tuple[str, ...]:
             share = max(absent / len(counts), 1e-4)
             found.append(
                 f"{f'level {index}: ' if index else ''}{absent} of {len(counts)} strips or tiles "
-                f"({share:.2%}) are not stored: read as 0, as the format has it for empty ones "
-                "and as lost ones are"
+                f"({share:.2%}) are not stored: read as 0, which the format uses for empty ones; "
+                "they may be lost"
             )
     return tuple(found)
 
 
 def require_series(where: str, tiff: TiffFile, series: TiffPageSeries) -> None:
-    """Raise SourceError where a series lacks planes; it may lie in one block behind one page."""
+    """Raise SourceError where a series lacks planes. They may all lie in one block after a page."""
     pages = list(series.pages)
     of_one = max(series.keyframe.size, 1)
     if len(pages) == 1 and series.dataoffset is not None:

@@ -1,7 +1,7 @@
-"""The tag Orientation: where the first row and the first column of the stored pixels lie.
+"""The tag Orientation: the position of the first row and column of the stored pixels.
 
-libtiff turns the pixels so when it draws an image. OME-TIFF's readers ignore the tag, and so does
-this one for OME-TIFF, with a note.
+libtiff turns the pixels by it when it draws an image. Readers of OME-TIFF ignore the tag, and so
+does this one for OME-TIFF, with a note.
 
 References: TIFF 6.0, tag 274
 """
@@ -14,7 +14,7 @@ from tifffile import TiffPage
 from stereocell.read.turn import Turn
 
 _SWAPPED = (0, 2, 1)
-# Orientation -> turn. The rows of 5 to 8 are columns of the image.
+# Orientation -> turn. Stored rows of 5 to 8 are columns of the image.
 _TURNS = {
     2: Turn(flips=(False, False, True)),
     3: Turn(flips=(False, True, True)),
@@ -39,18 +39,18 @@ def turn_of(page: TiffPage, *, is_applied: bool = True) -> tuple[Turn, tuple[str
 
 
 def turned_pixels(pixels: NDArray[Any], turn: Turn) -> NDArray[Any]:
-    """Return the pixels (rows, columns, ...) of one plane, turned."""
+    """Return the pixels (rows, columns, ...) of one plane after a turn."""
     seen = pixels.swapaxes(0, 1) if turn.order == _SWAPPED else pixels
     _, y, x = (slice(None, None, -1 if flip else 1) for flip in turn.flips)
     return seen[y, x]
 
 
 def turn_by(value: Any, *, is_applied: bool = True) -> tuple[Turn, tuple[str, ...]]:
-    """Return the turn for a value of the tag, which EXIF has as well, and a note."""
+    """Return the turn for a value of the tag, which EXIF has too, and a note."""
     if value not in _TURNS:
         return Turn(), ()
     row, column = _SIDES[value]
-    made = "the planes are turned so" if is_applied else "not applied, as OME-TIFF has it"
+    made = "the planes are turned by it" if is_applied else "not applied, as usual for OME-TIFF"
     note = (
         f"Orientation {value}: the first row is the {row} of the image, the first column its "
         f"{column}: {made}"

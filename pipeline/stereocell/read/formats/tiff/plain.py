@@ -1,8 +1,8 @@
-"""TIFF without OME-XML: pages of one size, and what ImageJ, Zeiss, MetaMorph and others add.
+"""Read TIFF without OME-XML: pages of one size, and the metadata of ImageJ, Zeiss and others.
 
-tifffile knows these kinds and names the axes of each. Pages of which no one says what they are
-count as slices along z, and a note says so: time and channels are told by the file alone, but for
-two unknown axes, of which a short one is taken for channels.
+tifffile knows these kinds of file and names the axes of each. Pages whose meaning is not stated
+count as slices along z, and a note says so. Only the file can state time and channels, with one
+exception: of two unknown axes, a short one is read as channels.
 """
 
 from collections.abc import Sequence
@@ -40,17 +40,17 @@ from stereocell.read.value_scale import ScaledArray
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-_UNKNOWN = "qio"  # tifffile's axes of pages that are sequence, image, other
+_UNKNOWN = "qio"  # tifffile's axes for sequences, images and other pages
 _PLACES = {"r": "positions", "p": "positions", "m": "mosaic tiles", "v": "views"}
-_MAX_CHANNELS = 10  # of two unknown axes the one this short may be channels
+_MAX_CHANNELS = 10  # length up to which one of two unknown axes is read as channels
 _IMAGEJ_AXES = ("channels", "slices", "frames")
 _EXPECTED = "a TIFF of planes of one size"
 
 
 def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) -> Image:
-    """Return the largest image of an open TIFF. Raises SourceError, UsageError for the axes.
+    """Return the largest image of an open TIFF. Raises SourceError, and UsageError for the axes.
 
-    axes  of those longer than 1, slowest first; empty: what the file says, or a guess
+    axes  letters of the axes longer than 1, slowest first; empty: the file's own, or a guess
     """
     where = location.shown
     with one_line(where, _EXPECTED):
@@ -62,11 +62,11 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
             found = list(tiff.series)
     if not found:
         raise SourceError(f"{where}: found no image, expected pages")
-    series = max(found, key=lambda one: one.size)  # the first of those
+    series = max(found, key=lambda one: one.size)  # the first of equally large ones
     with one_line(where, _EXPECTED):
         for level in series.levels:
             require_series(where, tiff, level)
-            if location.is_local:  # at an address each directory would be one more request
+            if location.is_local:  # at an address each directory would need one more request
                 require_same_tags(where, tiff, level.pages)
         arrays = [array_of(series, index) for index in range(len(series.levels))]
         page = series.keyframe
@@ -76,7 +76,8 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
         if series.kind == "ndtiff":
             files += (index_of(location),)
         notes = _undescribed(tiff, found)
-    notes += [] if series.kind == "lsm" else _left_out(found, series)  # LSM: its thumbnail
+    # the other images of LSM are thumbnails
+    notes += [] if series.kind == "lsm" else _left_out(found, series)
     arrays, more = _at_first_place(arrays)
     notes += more
     if axes:
@@ -84,14 +85,14 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
     else:
         arrays, more = _with_axes(where, arrays)
         notes += more
-    arrays, names, colors, told = samples_as_channels(where, arrays, page)
-    notes += [*told, *notes_of(page), *absent]
+    arrays, names, colors, sample_notes = samples_as_channels(where, arrays, page)
+    notes += [*sample_notes, *notes_of(page), *absent]
     require_depth(where, arrays[0])
     count = len(names) or arrays[0].size("c")
     if count > MAX_CHANNELS or arrays[0].size("z") * arrays[0].size("t") > MAX_PLANES:
         raise SourceError(
             f"{where}: found {count} channels and {arrays[0].size('z')} planes at each of "
-            f"{arrays[0].size('t')} times, expected at most {MAX_CHANNELS} and {MAX_PLANES}"
+            f"{arrays[0].size('t')} time points, expected at most {MAX_CHANNELS} and {MAX_PLANES}"
         )
     arrays, more = _calibrated(arrays, stated)
     notes += more
@@ -115,14 +116,14 @@ def read_plain(location: Location, tiff: TiffFile, stack: ExitStack, axes: str) 
 
 
 def _calibrated(arrays: list[VoxelArray], stated: Stated) -> tuple[list[VoxelArray], list[str]]:
-    """Return arrays of the values that the file's scale defines, and notes."""
+    """Return arrays with the values that the file's scale defines, and notes."""
     if not stated.values.is_plain:
         arrays = [VoxelArray(ScaledArray(one.array, stated.values), one.axes) for one in arrays]
     return arrays, list(stated.notes)
 
 
 def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
-    """Whether a program wrote a stack plane by plane, each as an array by itself, by tifffile."""
+    """Return whether a program wrote a stack with tifffile plane by plane, each as one array."""
     first = found[0] if found else None
     return (
         first is not None
@@ -136,7 +137,7 @@ def _are_planes(found: Sequence[TiffPageSeries]) -> bool:
 
 
 def _left_out(found: Sequence[TiffPageSeries], chosen: TiffPageSeries) -> list[str]:
-    """Return a note on the images that are not built; it names one that is as large, if any is."""
+    """Return a note on the images that are not built; it names one of the same size, if any."""
     others = [one for one in found if one is not chosen]
     if not others:
         return []
@@ -147,14 +148,14 @@ def _left_out(found: Sequence[TiffPageSeries], chosen: TiffPageSeries) -> list[s
     pages = sum(len(one.pages) for one in others)
     return [
         f"{count} ({pages} of {pages + len(chosen.pages)} pages): the first of the largest is "
-        f"built, {kind_of(chosen)}, and not {kind_of(alike[0])}"
+        f"built, {kind_of(chosen)}, not {kind_of(alike[0])}"
     ]
 
 
 def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
-    """Return a note on pages that no image has: the file's description counts fewer planes."""
+    """Return a note on pages that belong to no image, if the file's description counts fewer."""
     largest = max(found, key=lambda one: one.size)
-    if largest.kind == "ndtiff":  # compared with its index already
+    if largest.kind == "ndtiff":  # already compared with its index
         return []
     levels, total = [level for one in found for level in one.levels], len(tiff.pages)
     if largest.kind == "lsm":  # every second page is a thumbnail
@@ -172,7 +173,7 @@ def _undescribed(tiff: TiffFile, found: Sequence[TiffPageSeries]) -> list[str]:
 def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
     """Raise SourceError where planes are missing that ImageJ's description counts.
 
-    The description states the number of planes, and most often the axes too: they have to agree.
+    The description states the number of planes, and usually the axes too, which must agree with it.
     """
     meta = tiff.imagej_metadata if tiff.is_imagej else None
     if not meta:
@@ -190,7 +191,7 @@ def _require_imagej_whole(where: str, tiff: TiffFile) -> None:
         stated = " x ".join(f"{meta[key]} {key}" for key in _IMAGEJ_AXES if key in meta)
         raise SourceError(
             f"{where}: ImageJ's description: found images={images!s:.20} and {stated}, expected "
-            "the same number of planes (copy or download the file again, or save it anew in ImageJ)"
+            "the same number of planes (copy or download the file again, or save it in ImageJ)"
         )
     if planes > len(tiff.pages) and page.is_final and page.dataoffsets:
         end = page.dataoffsets[0] + planes * page.nbytes
@@ -216,32 +217,32 @@ def _first_along(level: VoxelArray, axis: str) -> VoxelArray:
 
 
 def _with_axes(where: str, arrays: list[VoxelArray]) -> tuple[list[VoxelArray], list[str]]:
-    """Return the arrays with z, and channels, in the place of unknown axes, and a note."""
+    """Return the arrays with unknown axes named z or c, and a note."""
     axes = arrays[0].axes
     known = [axis for axis in axes if axis not in _UNKNOWN]
     unknown = [place for place, axis in enumerate(axes) if axis in _UNKNOWN]
     if not unknown and len(set(known)) == len(known):
         return arrays, []
     lengths = [int(arrays[0].array.shape[place]) for place in unknown]
-    meant = _meant(axes, lengths) if len(set(known)) == len(known) else None
-    if meant is None:
+    guessed = _guess_axes(axes, lengths) if len(set(known)) == len(known) else None
+    if guessed is None:
         shape = ", ".join(str(n) for n in arrays[0].array.shape)
         raise SourceError(
             f"{where}: axes: found {''.join(axes).upper()} of {shape}, expected pages whose axes "
-            "are named: by the file (ImageJ, OME-TIFF), or by --axes, as zcyx"
+            "are named by the file (ImageJ, OME-TIFF), or by --axes, such as zcyx"
         )
-    names = dict(zip(unknown, meant, strict=True))
+    names = dict(zip(unknown, guessed, strict=True))
     renamed = tuple(names.get(place, axis) for place, axis in enumerate(axes))
-    nouns = {"z": "slices along z", "c": "channels", "t": "points in time"}
-    told = " of ".join(
-        f"{length} {nouns[axis]}" for length, axis in zip(lengths, meant, strict=True)
+    nouns = {"z": "slices along z", "c": "channels", "t": "time points"}
+    meaning = " of ".join(
+        f"{length} {nouns[axis]}" for length, axis in zip(lengths, guessed, strict=True)
     )
-    note = f"the file doesn't say what its pages are: read as {told}"
+    note = f"the file doesn't state what its pages are: read as {meaning}"
     return [VoxelArray(level.array, renamed) for level in arrays], [note]
 
 
-def _meant(axes: Sequence[str], lengths: list[int]) -> str | None:
-    """Return the axes that the unknown ones are taken for, one letter each; None: no guess."""
+def _guess_axes(axes: Sequence[str], lengths: list[int]) -> str | None:
+    """Return the axes that the unknown ones are read as, one letter each; None: no guess."""
     if len(lengths) == 1:
         return next((axis for axis in "zct" if axis not in axes), None)
     if len(lengths) > 2 or "z" in axes or "c" in axes:
@@ -253,6 +254,6 @@ def _meant(axes: Sequence[str], lengths: list[int]) -> str | None:
 
 
 def kind_of(series: TiffPageSeries) -> str:
-    """Return what a series is, for messages: `imagej, ZYX of 5 x 64 x 64, uint16`."""
+    """Return a description of a series for messages: `imagej, ZYX of 5 x 64 x 64, uint16`."""
     shape = " x ".join(str(n) for n in series.shape)
     return f"{series.kind}, {series.axes} of {shape}, {series.dtype}"

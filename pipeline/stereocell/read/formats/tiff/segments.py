@@ -1,9 +1,9 @@
-"""Check that the strips and tiles of pages can be those of one file.
+"""Check that the strips and tiles of pages can belong to one file.
 
-tifffile reads the bytes at each stated offset, wherever that is. So a damaged offset or size reads
-a part of another plane, or rows of a directory, as voxels. Two segments of a sound file lie apart,
-or are the same bytes where a writer stores equal ones once. The size of a segment that is not
-compressed follows from its samples; the last strip may be stated as large as the others.
+tifffile reads the bytes at each stated offset, wherever that is. So a damaged offset or size would
+read a part of another plane, or rows of a directory, as voxels. Two segments of a sound file don't
+overlap, unless a writer stores equal segments once. The size of an uncompressed segment follows
+from its samples; the last strip may be stated as large as the others.
 
 References: TIFF 6.0 sections 3 and 15
 """
@@ -18,17 +18,17 @@ from tifffile import TiffPage
 
 from stereocell.model.errors import SourceError
 
-_UNCOMPRESSED = 1  # of the tag Compression
-_ENTRY_BYTES, _BIG_ENTRY_BYTES = 12, 20  # of a directory's entry, in TIFF and in BigTIFF
+_UNCOMPRESSED = 1  # value of the tag Compression
+_ENTRY_BYTES, _BIG_ENTRY_BYTES = 12, 20  # bytes of a directory's entry, in TIFF and in BigTIFF
 _AGAIN = "copy or download it again"
 
 
 def require_segments(where: str, tiff: Any, pages: Iterable[Any]) -> None:
-    """Raise SourceError where segments overlap, or do not have the size of their samples.
+    """Raise SourceError where segments overlap, or don't have the size of their samples.
 
-    tiff   the TiffFile that `where` names; pages of other files are named after it
-    pages  TiffPage or TiffFrame of tifffile. Those of LSM and STK are not looked at: tifffile
-           replaces their offsets and sizes
+    tiff   the TiffFile that `where` names; pages of other files are named after those files
+    pages  TiffPage or TiffFrame of tifffile. LSM and STK are not checked, since tifffile replaces
+           their offsets and sizes
     """
     of_files: defaultdict[Any, list[Any]] = defaultdict(list)
     for page in pages:
@@ -53,7 +53,7 @@ def _require_size(where: str, page: Any) -> None:
         tag = "TileByteCounts" if key.is_tiled else "StripByteCounts"
         raise SourceError(
             f"{where}: {tag}[{index}]: found {counts[index]}, expected {needed[index]} bytes, "
-            f"since Compression states none ({_AGAIN})"
+            f"since Compression states no compression ({_AGAIN})"
         )
 
 
@@ -64,7 +64,7 @@ def _sizes(key: Any, count: int) -> NDArray[np.int64]:
     row = -(-width * samples * key.bitspersample // 8)
     if key.is_tiled:
         return np.full(count, key.tiledepth * key.tilelength * row, np.int64)
-    strips = -(-key.imagelength // key.rowsperstrip)  # of a plane
+    strips = -(-key.imagelength // key.rowsperstrip)  # strips of a plane
     first_row = np.arange(count) % strips * key.rowsperstrip
     return np.minimum(key.rowsperstrip, key.imagelength - first_row) * row
 
@@ -78,18 +78,18 @@ def _places(page: Any) -> NDArray[np.int64]:
         pairs = zip(page.dataoffsets, page.databytecounts, strict=False)
         segments = [(start, start + count) for start, count in pairs if count]
     entry = _BIG_ENTRY_BYTES if page.parent.is_bigtiff else _ENTRY_BYTES
-    if page.offset:  # a page that tifffile makes up has no directory; a frame keeps no tags
+    if page.offset:  # pages that tifffile makes up have no directory, and frames keep no tags
         count = len(page.tags) if isinstance(page, TiffPage) else 1
         segments.append((page.offset, page.offset + entry * count))
     return np.array(segments, np.int64).reshape(-1, 2)
 
 
 def _require_apart(where: str, places: NDArray[np.int64]) -> None:
-    places = np.unique(places, axis=0)  # sorted, and shared segments once
+    places = np.unique(places, axis=0)  # sorted, with shared segments only once
     reach = np.maximum.accumulate(places[:, 1])
-    if (met := np.flatnonzero(places[1:, 0] < reach[:-1])).size:
-        first = int(places[met[0] + 1, 0])
+    if (overlaps := np.flatnonzero(places[1:, 0] < reach[:-1])).size:
+        first = int(places[overlaps[0] + 1, 0])
         raise SourceError(
             f"{where}: StripOffsets or TileOffsets: found two planes or directories that share the "
-            f"bytes from {first} on, expected ones that lie apart ({_AGAIN})"
+            f"bytes from {first} on, expected none that overlap ({_AGAIN})"
         )

@@ -1,8 +1,8 @@
-"""Metadata of a plain TIFF, by the program that wrote it: spacings, names and colours of channels.
+"""Read metadata of a plain TIFF: spacings, and names and colours of channels, by its writer.
 
-Resolutions in dots per inch are printers' and not read: only an inch that ImageJ names counts.
-Texts that a user typed (labels of slices, image names, descriptions) are not read either, but for
-channels' names.
+Resolutions in dots per inch are meant for printers and not read: an inch counts only if ImageJ
+names it. Texts that a user typed (labels of slices, image names, descriptions) are not read either,
+except for names of channels.
 """
 
 import json
@@ -26,27 +26,28 @@ from stereocell.read.value_scale import ValueScale
 
 _CENTIMETRE = 3  # TIFF tag ResolutionUnit
 _ESCAPED = re.compile(r"\\u([0-9A-Fa-f]{4})")
-_MAX_NAME = 60  # characters; longer texts are no names of channels
+_MAX_NAME = 60  # characters; longer texts are not names of channels
 # fields of ImageJ's description that are read
 _IMAGEJ_FIELDS = {
     "spacing", "unit", "xunit", "yunit", "zunit", "images", "channels", "slices", "frames",
     "c0", "c1", "cf", "vunit",
 }  # fmt: skip
 _PIXEL = Subject("voxel spacing", "um", 0.01, "--spacing-um z,y,x replaces it")
-_STRAIGHT, _NO_FUNCTION = 0, 20  # kinds of ImageJ's functions, as `cf` has them
+_STRAIGHT, _NO_FUNCTION = 0, 20  # values of `cf`, the kind of ImageJ's function
 _INCH_UM = 25_400.0
-_SCREEN_DPI = (72, 96, 100, 150, 200, 300, 600, 1200)  # of screens and printers
+_SCREEN_DPI = (72, 96, 100, 150, 200, 300, 600, 1200)  # dots per inch of screens and printers
 _NOTHING: PartialTriple = (None, None, None)
 
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What a file says of its voxels; None: not stated.
+    """The metadata of a file's voxels; None: not stated.
 
     spacing_um  (z, y, x), um
-    names       of channels, maybe fewer than there are; `colors` the same, linear RGB
-    hint        where a missing spacing may come from
-    values      how stored numbers become values
+    names       names of channels, maybe of the first ones only
+    colors      colours of the same channels, linear RGB, 0..1
+    hint        where a missing spacing may be found
+    values      rule by which stored numbers become values
     notes       sentences for the user
     """
 
@@ -61,7 +62,7 @@ class Stated:
 def stated_by(tiff: TiffFile, page: TiffPage) -> Stated:
     """Return the metadata of an open file; a garbled entry counts as not stated.
 
-    page  the first one of the image, whose tags count
+    page  first page of the image, whose tags count
     """
     for flag, read in _READERS.items():
         if getattr(tiff, flag):
@@ -85,9 +86,9 @@ def stated_by(tiff: TiffFile, page: TiffPage) -> Stated:
 def tag_notes(
     page: TiffPage, pixel_um: tuple[float | None, float | None], place: str
 ) -> tuple[str, ...]:
-    """Compare the pixel (y, x) that metadata state with the tags, where they are per centimetre.
+    """Compare the stated pixel size (y, x) with the tags, if those are per centimetre.
 
-    place  of `pixel_um`, for notes
+    place  place where `pixel_um` is stated, for notes
 
     A resolution of screens and printers is stated for any image, and is not compared.
     """
@@ -110,7 +111,7 @@ def _imagej(tiff: TiffFile, page: TiffPage) -> Stated:
     y, x = (_over(per[axis], _resolution(page, axis)) for axis in "yx")
     z = _times(per["z"], meta.get("spacing"))
     step_notes: tuple[str, ...] = ()
-    if z is not None and z < 0:  # the sign is that of the stage's way; ImageJ leaves it out, too
+    if z is not None and z < 0:  # the sign is the direction of the stage; ImageJ ignores it too
         z = -z
         step_notes = (
             f"voxel spacing along z: ImageJ states {-z:.5g} um: the planes are read in the order "
@@ -125,7 +126,7 @@ def _imagej(tiff: TiffFile, page: TiffPage) -> Stated:
 
 
 def _repeat_notes(tiff: TiffFile) -> tuple[str, ...]:
-    """Return a note for each field of ImageJ's description with lines that disagree."""
+    """Return a note for each field of ImageJ's description whose lines disagree."""
     pairs = (line.partition("=") for line in tiff.pages.first.description.splitlines())
     known = [(key.strip(), text.strip()) for key, _, text in pairs if key.strip() in _IMAGEJ_FIELDS]
     return settle_repeats(known, "ImageJ's description")[1]
@@ -133,7 +134,7 @@ def _repeat_notes(tiff: TiffFile) -> tuple[str, ...]:
 
 def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str, ...]]:
     """Return the scale of ImageJ's values, and notes. `cf` is the kind of function."""
-    # ImageJ takes factors without a function for a straight line
+    # ImageJ reads factors without a function as a straight line.
     kind = meta.get("cf", _STRAIGHT if {"c0", "c1"} <= meta.keys() else None)
     if kind is None or kind == _NO_FUNCTION:
         return ValueScale(), ()
@@ -142,8 +143,8 @@ def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str,
     unit = _name(meta.get("vunit", "")) or "values"
     if kind != _STRAIGHT or intercept is None or not slope:
         note = (
-            f"values: ImageJ's calibration ({unit}) is no straight line: the voxels are read as "
-            "they are stored"
+            f"values: ImageJ's calibration ({unit}) is not a straight line: the voxels are read as "
+            "stored"
         )
         return ValueScale(), (note,)
     if (intercept, slope) == (0.0, 1.0):
@@ -156,9 +157,9 @@ def _imagej_calibration(meta: Mapping[str, Any]) -> tuple[ValueScale, tuple[str,
 
 
 def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
-    """Return the labels that all planes of a channel share: those are names of channels.
+    """Return the labels that all planes of a channel share, which are names of channels.
 
-    Other labels tell slices, often by a file's name.
+    Other labels describe slices, often by a file's name.
     """
     labels, channels = meta.get("Labels"), meta.get("channels", 1)
     if not isinstance(labels, list) or not isinstance(channels, int) or channels < 2:
@@ -174,22 +175,22 @@ def _imagej_names(meta: Mapping[str, Any]) -> tuple[str | None, ...]:
 
 
 def _label_notes(meta: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a note where Bio-Formats' labels name channels or times that the header lacks."""
+    """Return a note if Bio-Formats' labels name channels or times that the header lacks."""
     labels = meta.get("Labels")
     if not isinstance(labels, list) or not labels:
         return ()
-    told = []
-    for letter, key, noun in (("c", "channels", "channels"), ("t", "frames", "points in time")):
+    named = []
+    for letter, key, noun in (("c", "channels", "channels"), ("t", "frames", "time points")):
         found = [re.match(rf"(?:.*\s)?{letter}:(\d+)/(\d+)\b", str(text)) for text in labels]
         if not all(found):
             continue
         numbers = {int(one[1]) for one in found if one is not None}
         if len(numbers) > 1 and meta.get(key, 1) == 1:
-            told.append(f"{len(numbers)} {noun}")
-    if not told:
+            named.append(f"{len(numbers)} {noun}")
+    if not named:
         return ()
     return (
-        f"the labels of the slices name {' and '.join(told)}, which the header of ImageJ counts "
+        f"the labels of the slices name {' and '.join(named)}, which the header of ImageJ counts "
         "as slices: they are read as slices (Image > Hyperstacks > Stack to Hyperstack in ImageJ "
         "corrects the file)",
     )
@@ -206,7 +207,7 @@ def _lut_color(lut: Any) -> Color | None:
 
 def _lsm(tiff: TiffFile, page: TiffPage) -> Stated:
     meta = _mapping(tiff.lsm_metadata)
-    z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # metres
+    z, y, x = (_times(1e6, meta.get(f"VoxelSize{axis}")) for axis in "ZYX")  # from metres
     channels = _mapping(meta.get("ChannelColors"))
     names = tuple(_name(name) for name in channels.get("ColorNames") or ())
     colors = tuple(_rgb(color) for color in channels.get("Colors") or ())
@@ -219,7 +220,7 @@ def _stk(tiff: TiffFile, page: TiffPage) -> Stated:
     y, x = (_times(per, meta.get(f"{axis}Calibration")) for axis in "YX")
     steps = np.abs(np.atleast_1d(np.asarray(meta.get("ZDistance", ()), np.float64)))
     steps = steps[np.isfinite(steps) & (steps > 0)]
-    z = float(np.median(steps)) if steps.size else None  # um, whatever the calibration's unit
+    z = float(np.median(steps)) if steps.size else None  # um, regardless of the calibration's unit
     return Stated((z, y, x))
 
 
@@ -246,20 +247,21 @@ def _scanimage(tiff: TiffFile, page: TiffPage) -> Stated:
 
 
 def _shaped(tiff: TiffFile, page: TiffPage) -> Stated:
-    """tifffile's own JSON; a caller of `imwrite` may have put ImageJ's words into it."""
-    try:  # each image of a file has its own
+    """Read tifffile's own JSON; a caller of `imwrite` may have added ImageJ's fields."""
+    try:  # each image of a file has its own description
         meta = _mapping(json.loads(page.description))
     except (ValueError, RecursionError):
         meta = {}
     per = _um(meta.get("unit"))
     z = _times(per, meta.get("spacing"))
-    if _resolution_unit(page) == _CENTIMETRE:  # the tag states the unit of the resolution itself
+    # the tag then states the unit of the resolution itself
+    if _resolution_unit(page) == _CENTIMETRE:
         return Stated((z, None, None))
     y, x = (_over(per, _resolution(page, axis)) for axis in "yx")
     return Stated((z, y, x))
 
 
-# by tifffile's flags; the first that fits
+# by tifffile's flags; the first one that is set counts
 _READERS: dict[str, Callable[[TiffFile, TiffPage], Stated]] = {
     "is_lsm": _lsm,
     "is_stk": _stk,
@@ -272,7 +274,7 @@ _READERS: dict[str, Callable[[TiffFile, TiffPage], Stated]] = {
 
 
 def _by_tags(page: TiffPage) -> PartialTriple:
-    """Return y and x where the tags state them per centimetre."""
+    """Return y and x if the tags state them per centimetre."""
     per = um_per("cm") if _resolution_unit(page) == _CENTIMETRE else None
     y, x = (_over(per, _resolution(page, axis)) for axis in "yx")
     return None, y, x
@@ -291,11 +293,12 @@ def _resolution(page: TiffPage, axis: str) -> float | None:
 
 
 def _um(unit: Any) -> float | None:
-    """Return a unit's um; ImageJ writes the micro sign of `um` as an escape of ASCII."""
+    """Return a unit in um. ImageJ writes the micro sign of `um` as an ASCII escape."""
     if not isinstance(unit, str):
         return None
     text = _ESCAPED.sub(lambda found: chr(int(found[1], 16)), unit)
-    return um_per(text.replace("\u00c2", "").strip())  # the first byte of UTF-8's micro sign
+    # U+00C2 is the first byte of UTF-8's micro sign
+    return um_per(text.replace("\u00c2", "").strip())
 
 
 def _times(per: float | None, value: Any) -> float | None:

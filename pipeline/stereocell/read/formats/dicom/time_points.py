@@ -1,9 +1,9 @@
-"""Find the points in time of a stack: several pictures of the same slices, in the order of time.
+"""Find the time points of a stack: several images of the same slices, in the order of time.
 
-The points are told apart by the attribute that gives each place one frame per value, or else by one
-that puts the frames of each place in an order. Without such an attribute the frames at a place are
-counted by their instance numbers. A point that lacks slices,
-as the last one does of an acquisition that was stopped, is incomplete: it is set apart.
+Time points are separated by the attribute that gives each place one frame per value, or else by one
+that orders the frames of each place. Without such an attribute the frames at a place are counted by
+their instance numbers. A time point that lacks slices, such as the last one of an acquisition that
+was stopped, is incomplete and becomes a separate stack.
 """
 
 from collections import defaultdict
@@ -23,7 +23,7 @@ Place = Sequence[Frame]  # frames at one place, by instance number
 BY_REPETITION = "RepetitionTime"
 BY_POSITION = "TemporalPositionIdentifier"
 BY_IMAGE_INDEX = "ImageIndex"
-# attributes that number points in time: field of FrameKind, name in the standard
+# attributes that number time points: field of FrameKind, name in the standard
 _NUMBERED = (
     ("temporal", BY_POSITION),
     ("cardiac", "NominalPercentageOfCardiacPhase"),
@@ -34,20 +34,22 @@ _NUMBERED = (
     ("repetition_time", BY_REPETITION),
 )
 BY_NUMBER = "InstanceNumber"
-_LEAST_OF_RUN = 0.5  # least share of the slices in a run of instance numbers that is a point
+# smallest share of the slices in a run of instance numbers that counts as a time point
+_LEAST_OF_RUN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Points in time of frames that are sorted by place.
+    """Time points of frames that are sorted by place.
 
-    whole       for each point one frame per place
-    incomplete  frames of points that lack some places
-    attribute   the one that tells the points apart
-    whole_places, incomplete_places  of these points among all, in the order of time, from 0
-    values      of the attribute for all points, in that order; empty: it has none for each point
-    duplicates  number of frames that are neither
-    differ      duplicates have other pixels than the frames that are taken
+    whole       one frame per place, for each complete time point
+    incomplete  frames of time points that lack some places
+    attribute   name of the attribute that separates the time points
+    whole_places, incomplete_places  indices of these time points among all, in the order of time
+    values      values of the attribute for all time points, in that order; empty: it has no single
+                value for each
+    duplicates  number of frames that belong to no time point
+    differ      whether duplicates have other pixels than the frames that are used
     """
 
     whole: tuple[tuple[Frame, ...], ...]
@@ -63,9 +65,9 @@ class Points:
 def find_points(
     places: Sequence[Place], normal: NDArray[np.float64], near_mm: float, are_equal: AreEqual
 ) -> Points:
-    """Return the points in time.
+    """Return the time points.
 
-    places     rising along the normal
+    places     frames by place, rising along the normal
     are_equal  compares the pixels of two frames; it is called only for frames at one place
     """
     first = tuple(place[0] for place in places)
@@ -81,7 +83,7 @@ def find_points(
 
 
 def _numbered(places: Sequence[Place]) -> Points | None:
-    """Return the points by the first attribute that gives each place one frame per value."""
+    """Return the time points by the first attribute that gives each place one frame per value."""
     for field, name in _NUMBERED:
         classes: dict[float, list[tuple[int, Frame]]] = defaultdict(list)
         for index, place in enumerate(places):
@@ -90,16 +92,17 @@ def _numbered(places: Sequence[Place]) -> Points | None:
         if None in classes or len(classes) < 2:
             continue
         values = sorted(classes)
-        points = _sorted_out([classes[value] for value in values], len(places), name)
+        points = _divided([classes[value] for value in values], len(places), name)
         if points is not None:
             return replace(points, values=tuple(values))
     return None
 
 
 def _ranked(places: Sequence[Place]) -> Points | None:
-    """Return the points by the first attribute that puts the frames of each place in an order.
+    """Return the time points by the first attribute that orders the frames of each place.
 
-    Values of one point may differ from slice to slice, as trigger times do with the heart rate.
+    Values at one time point may differ from slice to slice, as trigger times do with the heart
+    rate.
     """
     if len({len(place) for place in places}) > 1:
         return None
@@ -113,17 +116,17 @@ def _ranked(places: Sequence[Place]) -> Points | None:
 
 
 def _by_runs(places: Sequence[Place], normal: NDArray[np.float64], near_mm: float) -> Points | None:
-    """Return the points by instance numbers that run through the slices again and again."""
+    """Return the time points by instance numbers that run through the slices repeatedly."""
     index_of = {id(frame): index for index, place in enumerate(places) for frame in place}
     runs = find_runs([frame for place in places for frame in place], normal, near_mm)
     if len(runs) < 2 or min(map(len, runs)) < _LEAST_OF_RUN * len(places):
         return None
     numbered = [[(index_of[id(frame)], frame) for frame in run] for run in runs]
-    return _sorted_out(numbered, len(places), BY_NUMBER)
+    return _divided(numbered, len(places), BY_NUMBER)
 
 
 def _by_rank(places: Sequence[Place]) -> Points | None:
-    """Return the points by the order of instance numbers at each place."""
+    """Return the time points by the order of instance numbers at each place."""
     counts = {len(place) for place in places}
     fewest, most = min(counts), max(counts)
     if fewest < 2:
@@ -132,13 +135,13 @@ def _by_rank(places: Sequence[Place]) -> Points | None:
         [(index, place[rank]) for index, place in enumerate(places) if len(place) > rank]
         for rank in range(most)
     ]
-    return _sorted_out(ranks, len(places), BY_NUMBER)
+    return _divided(ranks, len(places), BY_NUMBER)
 
 
-def _sorted_out(
+def _divided(
     points: Sequence[Sequence[tuple[int, Any]]], places: int, attribute: str
 ) -> Points | None:
-    """Return whole and incomplete points; None where a point has two frames at a place."""
+    """Return complete and incomplete time points; None: a time point has two frames at a place."""
     if any(len({index for index, _ in point}) < len(point) for point in points):
         return None
     in_order = [tuple(frame for _, frame in sorted(p, key=lambda pair: pair[0])) for p in points]

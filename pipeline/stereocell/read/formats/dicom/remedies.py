@@ -1,4 +1,4 @@
-"""Ways out of refusals: what a DICOM file without a usable plane is, and what to name instead.
+"""Remedies in refusals: what a DICOM file without a usable plane is, and what to name instead.
 
 References: DICOM PS3.4 B.5 (Standard SOP Classes).
 """
@@ -12,13 +12,13 @@ from pydicom.uid import UID
 from stereocell.read.formats.dicom.frame_kind import FrameKind
 
 _IMAGES = "name the folder of the images"
-# patterns of names of SOP classes -> cause and way out, the first that matches
+# patterns of names of SOP classes -> cause and remedy; the first match counts
 _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), text)
     for pattern, text in (
         (
             r"RT Structure Set",
-            f"an RT structure set holds contours and no voxels: {_IMAGES} that they were drawn on, "
+            f"an RT structure set holds contours but no voxels: {_IMAGES} that they were drawn on, "
             "or export the contours as a segmentation (SEG) or a label map",
         ),
         (
@@ -37,10 +37,10 @@ _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
             "from",
         ),
         (r"Encapsulated", f"an encapsulated document holds no image: {_IMAGES}"),
-        (r"Waveform|ECG", f"a waveform is no image: {_IMAGES}"),
+        (r"Waveform|ECG", f"a waveform is not an image: {_IMAGES}"),
         (
             r"Presentation State",
-            f"a presentation state tells how to show other images: {_IMAGES} that it belongs to",
+            f"a presentation state states how to show other images: {_IMAGES} that it belongs to",
         ),
         (
             r"Registration|Fiducials|Real World Value Mapping|Raw Data|Measurements|Tractography",
@@ -49,7 +49,7 @@ _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"Media Storage Directory", "a DICOMDIR lists other files: name the folder of the images"),
         (
             r"Secondary Capture",
-            "a secondary capture, such as a dose sheet or a screen save, is a picture of a screen: "
+            "a secondary capture, such as a dose sheet or a screen save, is an image of a screen: "
             "name the folder of the slices",
         ),
         (
@@ -64,22 +64,23 @@ _CLASSES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         ),
         (
             r"Whole Slide|VL |Photography",
-            "photographs and slides of microscopes are no volume: export planes as TIFF",
+            "photographs and slides of microscopes are not a volume: export planes as TIFF",
         ),
     )
 )
 _ROLES = {
-    "dose or protocol sheet": "a dose or protocol sheet is a picture of a text: name the folder of "
+    "dose or protocol sheet": "a dose or protocol sheet is an image of text: name the folder of "
     "the slices",
-    "screen save": "a screen save is a picture of a screen: name the folder of the slices",
-    "localizer": "a localizer (scout) without a place is no volume: name the folder of the slices",
-    "rendering": "a rendering is a picture of a volume: name the folder of the slices",
+    "screen save": "a screen save is an image of a screen: name the folder of the slices",
+    "localizer": "a localizer (scout) without a place is not a volume: name the folder of the "
+    "slices",
+    "rendering": "a rendering is only a view of a volume: name the folder of the slices",
 }
-# beginnings of reasons -> way out
+# start of a reason -> remedy
 _REASONS = (
     (
-        "of colours",
-        "export the images as grey values, not as colours",
+        "in colour",
+        "export the images in grey values, not in colour",
     ),
     (
         "without a PixelSpacing",
@@ -92,7 +93,7 @@ _REASONS = (
         "planes of TIFF or PNG with --spacing-um z,y,x",
     ),
     (
-        "of several frames without a place",
+        "with several frames but no place",
         "export single slices or an enhanced image, which states the place of each frame",
     ),
     (
@@ -101,7 +102,7 @@ _REASONS = (
     ),
     ("deflated", "export the images uncompressed (Explicit VR Little Endian)"),
     (
-        "of a modality table",
+        "with a modality table",
         "export the images with RescaleSlope and RescaleIntercept",
     ),
     ("cut short", "copy the files again"),
@@ -109,13 +110,13 @@ _REASONS = (
 
 
 def class_name(header: Any) -> str:
-    """Return the name of a file's SOP class in the standard's words; empty: it is private."""
+    """Return the name of a file's SOP class in the standard's words; empty: a private class."""
     kind = UID(str(header.get("SOPClassUID", "")))
     return kind.name if kind.name != kind else ""  # the name of a private UID is the UID
 
 
-def way_out(header: Any, kind: FrameKind, reason: str) -> str:
-    """Return what a file that is left out is, and what helps; empty: nothing is known.
+def remedy_for(header: Any, kind: FrameKind, reason: str) -> str:
+    """Return what a file that is left out is, and a remedy; empty: not known.
 
     reason  why it is left out
     """
@@ -125,13 +126,13 @@ def way_out(header: Any, kind: FrameKind, reason: str) -> str:
         return _ROLES[kind.role]
     by_class = next((text for pattern, text in _CLASSES if pattern.search(name)), "")
     has_no_place = reason.startswith(
-        ("without pixels", "without a place", "of colours", "of sever")
+        ("without pixels", "without a place", "in colour", "with several frames")
     )
     if by_class and has_no_place:
         return by_class
     return next((text for start, text in _REASONS if reason.startswith(start)), "")
 
 
-def in_words(ways: Sequence[str], most: int = 3) -> str:
-    """Return different ways out as the end of a message."""
-    return "".join(f"; {way}" for way in list(dict.fromkeys(filter(None, ways)))[:most])
+def in_words(remedies: Sequence[str], most: int = 3) -> str:
+    """Return the different remedies as the end of a message."""
+    return "".join(f"; {one}" for one in list(dict.fromkeys(filter(None, remedies)))[:most])
