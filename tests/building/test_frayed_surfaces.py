@@ -48,7 +48,7 @@ def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
     folder = OutFolder(out)
     plan, survey = folder.plan(), read_survey(folder)
     step = plan.with_grid(survey["sponge"].grid_um).step
-    assert "of the planes along z, y, x one in {}, {}, {} carries it".format(*step) in said
+    assert "one plane in {}, {}, {} along z, y, x carries its surface".format(*step) in said
     assert survey["sponge"].most_faces > MAX_FACES
     assert step[1] > step[0] >= 1  # as far apart along all axes as can be
     assert survey["ball"].grid_um == 0

@@ -259,13 +259,13 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
     build(source, out, *flags)
     told = said(capsys)
-    words = "2 objects, 1 of them larger than a tile and half around it, and cut (5)"
+    words = "2 objects, 1 of them cut at tile borders, because they reach farther than half a tile"
     assert f"plan: organs: {words}" in told
     assert f"units: organs: {words}" in told
     # of more voxels it tells which will be, without reading any
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
-    assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
+    assert "beyond their own, out of 40 x 80 x 80 um (z, y, x), will be cut" in said(capsys)
     folder = out / "bundle/channels/organs"
     content = objects_of(out, "organs")
     assert content["count"] == 2
@@ -353,8 +353,8 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert "--labels nuclei" in told
     assert "--labels nuclei=PATH" in told
     told = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
-    assert "a channel has that name" in told
-    assert "expected another one, as DNA_objects=PATH" in told
+    assert "a channel has this name already" in told
+    assert "expected another name, such as DNA_objects=PATH" in told
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
     told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
     assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
@@ -370,11 +370,9 @@ def test_what_can_not_be_built_is_told_in_one_line(
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
     for flag in ("--table", "--table-key", "--columns", "--color-by"):
-        assert f"{flag} is 'a': of no objects, expected --labels" in refusal(
-            capsys, *plan, flag, "a"
-        )
+        assert f"{flag} is 'a', expected --labels with it" in refusal(capsys, *plan, flag, "a")
     told = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
-    assert "--columns is 'a,b': of no table, expected --table with it" in told
+    assert "--columns is 'a,b', expected --table with it" in told
     told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
     assert "none.csv: can't be read" in told
     assert not (tmp_path / "out").exists()
@@ -389,7 +387,7 @@ def test_of_two_label_maps_the_first_one_has_the_table(
     flags = ("--channels", "DNA", "--labels", "cells", "--table", table)
     for more, is_told in ((), False), (("--labels", f"again={again}"), True):
         assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
-        assert ("the table is joined to cells alone, the first" in said(capsys)) is is_told
+        assert ("the table is joined only to the first label map, cells" in said(capsys)) is is_told
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"

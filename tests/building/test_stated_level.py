@@ -277,7 +277,7 @@ def test_a_level_above_no_background_is_said_to_count_from_0(
     flags = ["--channels", "even", "--config", str(tmp_path / "s.toml"), flag]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
-    told = "units: even: there is no background to subtract: its level counts from 0"
+    told = "units: even: found no background to subtract: its level counts from 0"
     assert told in capsys.readouterr().err
 
 
@@ -335,15 +335,15 @@ def test_a_surface_that_is_none_is_one_clear_line(
     [
         (
             ["--surfaces", "even=inner", "--iso-value", "even=700"],
-            "even: built where --surfaces says, not at the iso-value 700",
+            "even: --surfaces chooses the level, so iso-value 700 is ignored",
         ),
         (
             ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],
-            "even 800: built where --surfaces says, not by adaptive",
+            "even 800: --surfaces chooses the level, so adaptive is ignored",
         ),
         (
             ["--iso-value", "3=700", "--iso-scope", "tile"],
-            "even: its level is given, so the same in all tiles: --iso-scope tile is for levels",
+            "even: the settings state its level, so all tiles have the same one, and --iso-scope",
         ),
     ],
 )
@@ -376,7 +376,7 @@ def test_a_window_of_ct_is_refused_where_nothing_is_a_ct(
     flags = ["-o", str(tmp_path / "out"), "--window", "even=brain"]
     assert main(["plan", str(source), *flags]) == 2
     error = capsys.readouterr().err
-    assert "--window even=brain: a window in Hounsfield units, of CT, and nothing says" in error
+    assert "--window even=brain: this window is in Hounsfield units, and the input is not" in error
     assert error.count("\n") == 1
 
 

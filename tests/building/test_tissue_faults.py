@@ -149,7 +149,7 @@ def remains(out: Path) -> list[Path]:
 def faults(out: Path) -> list[str]:
     """Return the lines that fail, but for results that are whole and of an earlier plan."""
     failed = [line for line in check_module.check(out) if not line.ok]
-    stale = (": made of another ", ": begun and not finished: ")
+    stale = (": made of another ", ": began and did not finish: ")
     return [
         f"{line.name}: {line.detail}"
         for line in failed

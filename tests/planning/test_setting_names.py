@@ -1,4 +1,4 @@
-"""Errors name a setting as its reader does: flags at a prompt, sections and keys in Python."""
+"""Errors name settings by flags on the command line, and by section and key in Python."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ WRONG = [
     (["--iso-scope", "slide"], "--iso-scope is 'slide', expected one of channel, tile"),
     (["--iso-criterion", "x"], "--iso-criterion is 'x', expected one of ladder"),
     (["--as", "labels"], "--as is 'labels', expected intensity"),
-    (["--spacing-um", "0,1,1"], "--spacing-um: found 0,1,1, expected z,y,x in um"),
+    (["--spacing-um", "0,1,1"], "--spacing-um is 0,1,1, expected z,y,x in um"),
     (["--axes", "zz"], "--axes is 'zz', expected z, y and x"),
     (["--time=-1"], "--time is -1, expected 0 or more"),
     (["--wrap", "film"], "--wrap is 'film', expected one of voxels"),
@@ -31,7 +31,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("flags", "told"), WRONG)
-def test_a_flag_is_called_as_it_was_typed(
+def test_an_error_names_a_flag_as_it_was_typed(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
 ) -> None:
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 2
@@ -40,7 +40,7 @@ def test_a_flag_is_called_as_it_was_typed(
     assert "\n" not in line
 
 
-def test_a_setting_of_a_file_is_called_as_the_file_does(
+def test_an_error_names_a_setting_as_the_file_does(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "my.toml").write_text('[isovalue]\nscope = "slide"\n')
@@ -59,7 +59,7 @@ def test_a_setting_of_a_file_is_called_as_the_file_does(
         ({"surfaces": {"F": "outermost"}}, "surfaces.F: found 'outermost', expected outer"),
     ],
 )
-def test_python_reads_settings(
+def test_an_error_in_python_names_the_setting(
     source: Path, tmp_path: Path, settings: dict[str, dict[str, object]], told: str
 ) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
@@ -67,14 +67,14 @@ def test_python_reads_settings(
     assert str(caught.value).startswith(told)
 
 
-def test_who_opens_a_volume_reads_arguments(source: Path) -> None:
+def test_an_error_of_open_volume_names_its_argument(source: Path) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
         stereocell.open_volume(source, series=2)
     assert f"{source}: series: found 2, expected" in str(caught.value)
     assert "--" not in str(caught.value)
 
 
-def test_every_flag_has_its_way_back() -> None:
+def test_each_flag_can_be_replaced_by_its_setting_and_back() -> None:
     names = [flag.name for flag, _, _ in flagged_settings()]
     assert len(names) == len(set(names))
     for flag, place, _ in flagged_settings():
