@@ -101,7 +101,7 @@ def test_work_for_a_command_that_has_ended_leaves_nothing(tmp_path: Path) -> Non
         with working_for(claim):
             write_bytes(out / "in_time", b"x")
         (out / "in_time").unlink()
-    refused = r"out: the command that asked for this has ended"
+    refused = r"out: the command that sent this task has ended"
     with working_for(claim), pytest.raises(OutputError, match=refused):
         write_bytes(out / "late", b"x")
     assert not out.exists()
@@ -123,7 +123,7 @@ def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) ->
             temporary.write_bytes(b"new")
             (tmp_path / LOCK).write_bytes(b"another's")
 
-    with pytest.raises(OutputError, match="the command that asked for this has ended"):
+    with pytest.raises(OutputError, match="the command that sent this task has ended"):
         write()
     assert (tmp_path / "a").read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == [LOCK, "a"]

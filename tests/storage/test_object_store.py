@@ -395,7 +395,7 @@ def test_a_lock_that_was_not_renewed_is_taken_over(
         monkeypatch.setattr("stereocell.storage.object_lock.STALE_S", -1e6)
         with alone_at(fs, path, "there", "units"):
             assert json.loads(fs.cat_file(path))["command"] == "units"
-            with pytest.raises(OutputError, match=r"there: was taken over by .*: start it again"):
+            with pytest.raises(OutputError, match=r"there: .* has taken over, .*: start it again"):
                 _wait_for(require)
             assert json.loads(fs.cat_file(path))["command"] == "units"  # and stays so
         assert not fs.exists(path)

@@ -68,7 +68,7 @@ def test_each_fault_of_a_sealed_record_has_one_line_for_both_kinds(
     )
     file.write_text(json.dumps(KEY) if name.endswith("json") else SETTINGS)
     line = fault()
-    assert line.startswith(": has no hash of its content, expected ")
+    assert line.startswith(": found no hash of its content, expected ")
     assert line.endswith(": it is of an earlier version, or was written or changed by hand")
     file.unlink()
     file.mkdir()
