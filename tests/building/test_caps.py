@@ -151,10 +151,10 @@ def test_report_and_check_say_that_surfaces_are_open_on_purpose(
     assert [line.split(":")[0] for line in remark.lines] == list(NAMES)
     assert all("--no-caps" in line for line in remark.lines)
     assert not [one for one in find_remarks(gather(OutFolder(capped))) if "open at" in one.title]
-    for out, told in ((bare, 1), (capped, 0)):
+    for out, expected in ((bare, 1), (capped, 0)):
         capsys.readouterr()
         assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
-        assert capsys.readouterr().out.count("open at the block's faces on purpose") == told
+        assert capsys.readouterr().out.count("open at the block's faces on purpose") == expected
 
 
 def test_open_surfaces_are_exported_but_not_as_solids(
@@ -164,6 +164,6 @@ def test_open_surfaces_are_exported_but_not_as_solids(
     assert main(["export", str(capped), str(tmp_path / "solid.3mf")]) == 0
     capsys.readouterr()
     assert main(["export", str(bare), str(tmp_path / "open.3mf")]) == 1
-    told = capsys.readouterr().err.splitlines()[-1]
-    assert "its surface is open at the block's faces, as --no-caps built it" in told
+    output = capsys.readouterr().err.splitlines()[-1]
+    assert "its surface is open at the block's faces, as --no-caps built it" in output
     assert not (tmp_path / "open.3mf").exists()

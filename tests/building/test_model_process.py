@@ -52,7 +52,7 @@ def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "message"),
     [
         (["x" * 101, "b"], "found 'xxxxxxxx"),
         (["x" * 5000, "b"], "found 'xxxxxxxx"),
@@ -61,10 +61,10 @@ def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -
     ],
 )
 def test_class_names_that_no_channel_can_have_are_refused(
-    tmp_path: Path, names: object, told: str
+    tmp_path: Path, names: object, message: str
 ) -> None:
     line = refusal(write_model(tmp_path / "m.onnx", names=names), ModelBounds())
-    assert told in line
+    assert message in line
     assert len(line) < 500
 
 

@@ -36,9 +36,9 @@ def test_the_report_and_the_deep_check_describe_objects(
     assert f"cells: {count} objects</h3>" in page
     said(capsys)
     assert run("check", out, "--deep", "--workers", 0) == 0
-    told = said(capsys)
-    assert f"ok   cells against source: {count} objects" in told
-    assert "ok   bundle against stage: 8 surfaces" in told
+    output = said(capsys)
+    assert f"ok   cells against source: {count} objects" in output
+    assert "ok   bundle against stage: 8 surfaces" in output
 
     # a label that was not counted in one tile and level, and a surface that is too small
     layer = Sdf.Layer.FindOrOpen(str(out / "stage/tiles/r0_c0/tile.usdc"))
@@ -68,9 +68,9 @@ def test_levels_whose_simplification_stops_early_are_reported(
     monkeypatch.setattr(building, "simplify_walls", simplify_walls)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
     wanted = "l: simplifying lod3 stopped early in r0_c0, because triangles would have crossed"
-    told = said(capsys)
-    assert wanted in told
-    assert "lod2 has" not in told
+    output = said(capsys)
+    assert wanted in output
+    assert "lod2 has" not in output
     assert run("report", tmp_path / "out") == 0
     assert wanted in (tmp_path / "out/report/index.html").read_text("utf-8")
 
@@ -102,9 +102,9 @@ def test_the_deep_check_measures_the_image_again(
     build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    told = said(capsys)  # on the last object of each tile
-    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in told
-    assert told.count("voxels'") == 1
+    output = said(capsys)  # on the last object of each tile
+    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in output
+    assert output.count("voxels'") == 1
 
 
 @pytest.mark.slow
@@ -162,11 +162,11 @@ def test_the_deep_check_measures_the_interfaces_again(
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)
     said(capsys)
     assert run("check", tmp_path / "out", "--deep", "--workers", 0) == (fault != "none")
-    told = said(capsys)
+    output = said(capsys)
     odd = {
         column
         for column in ("neighbours", "contact")
-        if f"column {column} is not that of the surface of" in told
+        if f"column {column} is not that of the surface of" in output
     }
     assert (
         odd

@@ -100,9 +100,9 @@ def test_the_table_is_joined_by_label_and_rows_that_do_not_fit_are_reported(
 ) -> None:
     (out / "phases.json").unlink()
     assert run("stage", out, "--workers", 0) == 0
-    told = said(capsys)
-    assert "2 rows without an object: CellID 8888, 9999" in told
-    assert "1 object without a row: 1" in told
+    output = said(capsys)
+    assert "2 rows without an object: CellID 8888, 9999" in output
+    assert "1 object without a row: 1" in output
     tissue = make_tissue(SHAPE, 3)
     kinds = objects_of(out)
     entry = next(one for one in kinds["columns"] if one["id"] == "cell_type")
@@ -260,10 +260,10 @@ def test_a_large_object_is_cut_at_tile_borders_and_stays_one_object(
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
     build(source, out, *flags)
-    told = said(capsys)
+    output = said(capsys)
     words = "2 objects, 1 of them cut at tile borders, because they reach farther than half a tile"
-    assert f"plan: organs: {words}" in told
-    assert f"units: organs: {words}" in told
+    assert f"plan: organs: {words}" in output
+    assert f"units: organs: {words}" in output
     # for a label map with more voxels the plan states the limit without reading it
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
@@ -329,8 +329,8 @@ def test_small_objects_are_counted_and_large_ones_end_at_the_region(
     flags = ("--labels", ".", "--spacing-um", "1,1,1", "--region", "0:12,0:40,0:20")
     assert run("plan", source, "-o", out, *flags) == 0
     assert run("units", out, "--workers", 0) == 0
-    told = said(capsys)
-    assert "l: 2 objects; 1 of too few voxels are left out" in told
+    output = said(capsys)
+    assert "l: 2 objects; 1 with too few voxels are left out" in output
     plan = OutFolder(out).plan()
     located = Passes(OutFolder(out), plan, Engine(0)).objects(plan.labels[0])
     assert located.extents.labels.tolist() == [6, 2**62]
@@ -341,9 +341,9 @@ def test_small_objects_are_counted_and_large_ones_end_at_the_region(
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     assert run(*arguments) in (1, 2)
-    told = capsys.readouterr().err.strip().splitlines()
-    assert len(told) == 1
-    return told[0]
+    output = capsys.readouterr().err.strip().splitlines()
+    assert len(output) == 1
+    return output[0]
 
 
 def test_label_maps_and_flags_that_do_not_fit_are_refused_in_one_line(
@@ -353,21 +353,21 @@ def test_label_maps_and_flags_that_do_not_fit_are_refused_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan = ("plan", sample, "-o", tmp_path / "out", "--channels", "DNA")
-    told = refusal(capsys, *plan, "--labels", "nuclei")
-    assert "--labels nuclei" in told
-    assert "--labels nuclei=PATH" in told
-    told = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
-    assert "a channel has this name already" in told
-    assert "expected another name, such as DNA_objects=PATH" in told
+    output = refusal(capsys, *plan, "--labels", "nuclei")
+    assert "--labels nuclei" in output
+    assert "--labels nuclei=PATH" in output
+    output = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
+    assert "a channel has this name already" in output
+    assert "expected another name, such as DNA_objects=PATH" in output
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
-    told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
-    assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
+    output = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
+    assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in output
     negative = np.zeros((6, 8, 300), np.int16)
     negative[..., -1] = -7  # far from its middle
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
-    told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
-    assert "found -7, expected 0 or more in labels" in told
+    output = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
+    assert "found -7, expected 0 or more in labels" in output
     assert not (tmp_path / "n").exists()
     monkeypatch.setattr(
         label_numbers, "_COUNTED_AT_ONCE", 100
@@ -377,10 +377,10 @@ def test_label_maps_and_flags_that_do_not_fit_are_refused_in_one_line(
     assert "found -7, expected 0 or more in labels" in capsys.readouterr().err
     for flag in ("--table", "--table-key", "--columns", "--color-by"):
         assert f"{flag} is 'a', expected --labels with it" in refusal(capsys, *plan, flag, "a")
-    told = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
-    assert "--columns is 'a,b', expected --table with it" in told
-    told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
-    assert "none.csv: can't be read" in told
+    output = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
+    assert "--columns is 'a,b', expected --table with it" in output
+    output = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
+    assert "none.csv: can't be read" in output
     assert not (tmp_path / "out").exists()
 
 
@@ -391,17 +391,19 @@ def test_the_table_belongs_to_the_first_of_two_label_maps(
     again, table = sample / "labels/cells", tmp_path / "t.csv"
     table.write_text("label,score\n2,0.5\n")
     flags = ("--channels", "DNA", "--labels", "cells", "--table", table)
-    for more, is_told in ((), False), (("--labels", f"again={again}"), True):
+    for more, is_reported in ((), False), (("--labels", f"again={again}"), True):
         assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
-        assert ("the table is joined only to the first label map, cells" in said(capsys)) is is_told
+        assert (
+            "the table is joined only to the first label map, cells" in said(capsys)
+        ) is is_reported
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"
     assert objects_of(out, "again")["default"] != "score"
     said(capsys)
-    told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
-    assert "--color-by is 'scores', expected one of volume, area, " in told
-    assert told.endswith(", score")
+    output = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
+    assert "--color-by is 'scores', expected one of volume, area, " in output
+    assert output.endswith(", score")
 
 
 @pytest.mark.slow
@@ -562,8 +564,8 @@ def test_objects_that_are_too_thin_are_reported_and_left_out(
     source, out = tmp_path / "noise.tif", tmp_path / "out"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     build(source, out, "--labels", "cells=.", "--spacing-um", "1,1,1")
-    told = said(capsys)
-    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in told
+    output = said(capsys)
+    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in output
     assert run("report", out) == 0
     assert run("check", out, "--deep", "--workers", 0) == 0
     if is_alone:

@@ -71,8 +71,8 @@ def out(source: Path) -> Path:
     settings = source.parent / "settings.toml"
     settings.write_text(SETTINGS)
     out = source.parent / "out"
-    told = ("--config", str(settings))
-    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
+    flags = ("--config", str(settings))
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=flags) == 0
     return out
 
 
@@ -237,8 +237,8 @@ def test_the_surface_of_a_mask_lies_half_way_and_a_ball_keeps_its_size(
     out = tmp_path / "out"
     assert main(["plan", str(path), "-o", str(out), "--grid", "2x1", "--iso-scope", scope]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    told = f"a mask of {values[0]} and {values[1]}, whose surface lies half-way"
-    assert told in capsys.readouterr().err
+    note = f"a mask of {values[0]} and {values[1]}, whose surface lies half-way"
+    assert note in capsys.readouterr().err
     (channel,) = OutFolder(out).survey().values()
     assert {tile["value"] for tile in channel["iso"].values()} == {sum(values) / 2}
     assert channel["appearance"]["surface"] == "clear"
@@ -261,9 +261,11 @@ def test_a_mask_of_single_voxels_has_no_surface_and_a_note_says_why(
     phantoms.write_ome_tiff(path, mask, spacing=SPACING)
     out = tmp_path / "out"
     assert main(["build", str(path), "-o", str(out), "--workers", "0"]) == 0
-    told = capsys.readouterr().err
-    assert "half-way; 0% of it is left by a median of 3 x 3 voxels and a Gaussian of 1 um" in told
-    assert "no surface: all voxels lie below the level 127.5" in told
+    output = capsys.readouterr().err
+    assert (
+        "half-way; 0% of it is left after a median of 3 x 3 voxels and a Gaussian of 1 um" in output
+    )
+    assert "no surface: all voxels lie below the level 127.5" in output
     (channel,) = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))["channels"]
     assert channel["surface"] == "none"
 
@@ -277,8 +279,8 @@ def test_a_note_says_that_a_level_without_background_counts_from_0(
     flags = ["--channels", "even", "--config", str(tmp_path / "s.toml"), flag]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
-    told = "units: even: found no background to subtract: its level counts from 0"
-    assert told in capsys.readouterr().err
+    note = "units: even: found no background to subtract: its level counts from 0"
+    assert note in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -331,7 +333,7 @@ def test_an_unknown_surface_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "note"),
     [
         (
             ["--surfaces", "even=inner", "--iso-value", "even=700"],
@@ -348,11 +350,11 @@ def test_an_unknown_surface_is_refused_in_one_line(
     ],
 )
 def test_a_note_names_a_setting_that_another_one_overrules(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], note: str
 ) -> None:
     flags = ["-o", str(tmp_path / "out"), "--channels", "even", *flags]
     assert main(["plan", str(source), *flags]) == 0
-    assert f"plan: {told}" in capsys.readouterr().err
+    assert f"plan: {note}" in capsys.readouterr().err
 
 
 @pytest.mark.slow

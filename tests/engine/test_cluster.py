@@ -104,8 +104,8 @@ def test_a_cluster_reads_from_and_writes_to_an_object_store(
     print(f"object store: {store.kind}")
     fs = store.files()
     fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
-    told = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
-    assert main(["build", "s3://bucket/f.ome.zarr", *told]) == 0
+    flags = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
+    assert main(["build", "s3://bucket/f.ome.zarr", *flags]) == 0
     keys = [name.removeprefix("bucket/out/") for name in fs.find("bucket/out")]
     assert {
         key: hashlib.sha256(fs.cat_file(f"bucket/out/{key}")).hexdigest()
@@ -168,20 +168,20 @@ def wait_for(file: Path) -> None:
 
 
 def write_when(task: tuple[Path, Path, Path]) -> None:
-    begun, told, file = task
+    begun, released, file = task
     begun.touch()
-    wait_for(told)
+    wait_for(released)
     try:
         write_bytes(file, b"late")
     finally:
-        told.with_suffix(".over").touch()
+        released.with_suffix(".over").touch()
 
 
 @pytest.mark.slow
 def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
     cluster: Joined, tmp_path: Path
 ) -> None:
-    out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
+    out, begun, released = tmp_path / "out", tmp_path / "begun", tmp_path / "released"
 
     def interrupt() -> None:
         wait_for(begun)
@@ -192,16 +192,16 @@ def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
             engine = Engine(0, cluster[0], out / LOCK)
             threading.Thread(target=interrupt).start()
             try:
-                engine.run("late", write_when, [("a", (begun, told, out / "tile" / "a"))])
+                engine.run("late", write_when, [("a", (begun, released, out / "tile" / "a"))])
             finally:
                 engine.close()
 
     with ctrl_c.heeded(), pytest.raises(KeyboardInterrupt):
         build()
     assert not out.exists()
-    told.touch()
-    wait_for(told.with_suffix(".over"))
-    assert told.with_suffix(".over").exists()
+    released.touch()
+    wait_for(released.with_suffix(".over"))
+    assert released.with_suffix(".over").exists()
     assert not out.exists()
 
 

@@ -27,10 +27,12 @@ def test_a_label_map_ends_the_plan_with_a_line_that_names_both_flags(
     out = tmp_path / "out"
     for command in (["plan"], ["build", "--workers", "0"]):
         assert main([command[0], str(labels), "-o", str(out), *command[1:]]) == 2
-        told = capsys.readouterr().err.strip()
-        assert told.count("\n") == 0
-        assert f"{labels}: channel 'Channel0' looks like a label map of 192 objects: found" in told
-        assert "--as intensity" in told
+        output = capsys.readouterr().err.strip()
+        assert output.count("\n") == 0
+        assert (
+            f"{labels}: channel 'Channel0' looks like a label map of 192 objects: found" in output
+        )
+        assert "--as intensity" in output
         assert not out.exists() or not list(out.iterdir())
 
 
@@ -42,9 +44,9 @@ def test_a_label_map_whose_objects_are_built_is_not_built_as_an_image(
     assert main([*words, "--channels", "0"]) == 2
     assert "looks like a label map of 192 objects" in capsys.readouterr().err
     assert main(words) == 0
-    told = capsys.readouterr().err
-    assert "level 0 (the finest, because only label maps are built)" in told
-    assert "looks like" not in told
+    output = capsys.readouterr().err
+    assert "level 0 (the finest, because only label maps are built)" in output
+    assert "looks like" not in output
 
 
 def test_an_image_that_is_taken_for_labels_is_reported(
@@ -112,8 +114,8 @@ def test_wide_integers_that_number_objects_end_the_plan(
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
     assert "--as intensity" in capsys.readouterr().err
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
-    told = " ".join("".join(capsys.readouterr()).split())
-    assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told
+    output = " ".join("".join(capsys.readouterr()).split())
+    assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in output
 
 
 @pytest.mark.slow

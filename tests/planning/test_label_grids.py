@@ -75,17 +75,17 @@ def test_labels_on_the_image_s_own_grid_cause_no_note(image: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("part", "told"),
+    ("part", "message"),
     [
         (np.s_[:, :, :20], "cover 20 of 28 columns (x), 0 to 19, of the image; their file states"),
         (np.s_[1:, :19, :], "cover 5 of 6 planes (z), 0 to 4, and 19 of 20 rows (y), 0 to 18,"),
     ],
 )
 def test_a_note_says_that_labels_of_a_crop_cover_a_part_of_the_image(
-    image: Path, tmp_path: Path, part: Any, told: str
+    image: Path, tmp_path: Path, part: Any, message: str
 ) -> None:
     (note,) = lay(image, calibrated(tmp_path / "l.tif", NUMBERS[part])).notes
-    assert note.startswith(f"labels 'cells': {told}")
+    assert note.startswith(f"labels 'cells': {message}")
     assert "they start at the image's first voxel" in note
 
 

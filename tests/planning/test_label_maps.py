@@ -116,7 +116,7 @@ def test_rotated_skewed_and_distant_labels_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "message"),
     [
         (("i.ome.tif", "l.nii"), "axes by a patient's sides, and the image has its file's own"),
         (("i.nii", "l.tif"), "its file's own axes, and the image has axes by a patient's sides"),
@@ -126,7 +126,7 @@ def test_rotated_skewed_and_distant_labels_are_refused(
     ],
 )
 def test_the_orientation_of_labels_is_never_guessed(
-    tmp_path: Path, names: tuple[str, str], told: str
+    tmp_path: Path, names: tuple[str, str], message: str
 ) -> None:
     """Readers turn a volume to the patient's sides only if the file states them."""
     voxels = numbered(
@@ -140,8 +140,8 @@ def test_the_orientation_of_labels_is_never_guessed(
     nifti_files.write(tmp_path / "guess.nii", np.diag([1.0, 1, 1, 1]), voxels, "neither")
     image, labels = (tmp_path / name for name in names)
     pair = (image, read.open(image))
-    if told:
-        assert told in refusal(pair, labels)
+    if message:
+        assert message in refusal(pair, labels)
     else:
         assert len(labels_on(pair, labels)) == 3
 

@@ -42,14 +42,14 @@ def test_a_background_that_is_not_0_is_reported_and_left_out_on_request(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], background: int, dtype: Any
 ) -> None:
     voxels = numbered(background=background, first=2, dtype=dtype)
-    told = planned(tmp_path, voxels, capsys)
-    assert "4 objects" in told
+    printed = planned(tmp_path, voxels, capsys)
+    assert "4 objects" in printed
     share = f"{(voxels == background).mean():.1%}"
-    assert f"object {background}, the largest, has {share} of the voxels and touches" in told
-    assert f"--background {background} leaves it out" in told
-    told = planned(tmp_path, voxels, capsys, "--background", background)
-    assert "3 objects" in told
-    assert "background;" not in told
+    assert f"object {background}, the largest, has {share} of the voxels and touches" in printed
+    assert f"--background {background} leaves it out" in printed
+    printed = planned(tmp_path, voxels, capsys, "--background", background)
+    assert "3 objects" in printed
+    assert "background;" not in printed
     assert json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]["background"]
 
 
@@ -62,14 +62,14 @@ def test_a_background_below_0_is_left_out_on_request(
     assert plan["labels"][0]["background"] == -2
 
 
-@pytest.mark.parametrize(("covered", "is_told"), [(1, True), (8, False)])
+@pytest.mark.parametrize(("covered", "is_reported"), [(1, True), (8, False)])
 def test_a_background_that_misses_a_side_is_reported_if_it_has_most_voxels(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_told: bool
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_reported: bool
 ) -> None:
     voxels = numbered(background=65535)
     voxels[:covered] = 9  # an object covers the first planes
-    told = planned(tmp_path, voxels, capsys)
-    assert ("touches 5 of six sides: it is probably the background" in told) is is_told
+    printed = planned(tmp_path, voxels, capsys)
+    assert ("touches 5 of six sides: it is probably the background" in printed) is is_reported
 
 
 def test_a_background_of_0_is_not_mentioned(
@@ -96,9 +96,9 @@ def test_a_build_without_the_background_has_only_the_objects(
 def test_labels_that_a_float_rounds_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], dtype: Any, exact: int
 ) -> None:
-    told = planned(tmp_path, numbered(background=0, first=exact, dtype=dtype), capsys)
-    assert "2 objects" in told  # exact + 1 is rounded to exact
-    assert f"rounds whole numbers beyond {exact:,}" in told
+    printed = planned(tmp_path, numbered(background=0, first=exact, dtype=dtype), capsys)
+    assert "2 objects" in printed  # exact + 1 is rounded to exact
+    assert f"rounds whole numbers beyond {exact:,}" in printed
     assert "rounds" not in planned(tmp_path, numbered(background=0, first=9, dtype=dtype), capsys)
 
 

@@ -107,8 +107,8 @@ def test_a_haze_around_far_brighter_structures_is_unsure_and_their_level_is_repo
     inner = channel.ladder[1].value
     assert inner == pytest.approx(10_000, rel=0.3)
     assert f"{inner:.5g} (" in channel.near_levels
-    told = capsys.readouterr().err
-    assert told.count(f"{inner:.5g} (") >= 2  # printed by plan and by units
+    output = capsys.readouterr().err
+    assert output.count(f"{inner:.5g} (") >= 2  # printed by plan and by units
 
 
 def test_a_tile_is_never_more_confident_of_a_level_than_its_channel(tmp_path: Path) -> None:

@@ -92,9 +92,9 @@ def test_the_plan_states_a_single_clear_level_and_the_voxel_size(
     out = _planned(tmp_path, _cells((32, 64, 64), core=0))
     (note,) = _level_notes(out)
     assert re.fullmatch(r"Channel0: clear level [0-9.]+ \([0-9.]+% of the voxels\)", note)
-    told = " ".join(capsys.readouterr().err.split())
-    assert f"plan: {note}" in told
-    assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in told
+    printed = " ".join(capsys.readouterr().err.split())
+    assert f"plan: {note}" in printed
+    assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in printed
 
 
 def test_large_voxel_sizes_are_printed_in_millimetres() -> None:

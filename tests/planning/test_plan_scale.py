@@ -39,9 +39,9 @@ def test_the_plan_of_16940_units_takes_few_calls_for_each_unit(tmp_path: Path) -
     """Calls are counted and not seconds, which depend on other work of the machine."""
     source = write_empty(tmp_path / "whole.ome.zarr", 70)
     size = ",".join(map(str, TILE))
-    told = ["--preset", "cycif", "--level", "0", "--tile-size", size]
+    flags = ["--preset", "cycif", "--level", "0", "--tile-size", size]
     with cProfile.Profile() as counted:
-        assert main(["plan", str(source), "-o", str(tmp_path / "out"), *told]) == 0
+        assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     plan = OutFolder(tmp_path / "out").plan()
     assert (len(plan.tiles), len(plan.channels)) == (242, 70)
     calls = pstats.Stats(counted).total_calls

@@ -101,8 +101,8 @@ def test_a_note_doubts_a_preset_of_ct_for_other_values_and_prints_the_flags_that
 ) -> None:
     source = _nifti(tmp_path / "a.nii", voxels)
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]) == 0
-    told = capsys.readouterr().err.replace("\n", " ")
-    assert words in told if words else "Hounsfield" not in told
+    output = capsys.readouterr().err.replace("\n", " ")
+    assert words in output if words else "Hounsfield" not in output
     again = [str(source), "-o", str(tmp_path / "b"), "--preset", preset, "--iso-value", "0=80"]
     assert main(["plan", *again]) == 0
     assert "is meant for Hounsfield units" not in capsys.readouterr().err
@@ -289,8 +289,10 @@ def test_the_plan_states_that_voxels_are_those_of_a_microscope(
     source = tmp_path / "a.ome.tif"
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().err
-    assert told.count("plan: no preset: voxels of 0.5 um, as of a microscope: lengths follow") == 1
+    output = capsys.readouterr().err
+    assert (
+        output.count("plan: no preset: voxels of 0.5 um, as of a microscope: lengths follow") == 1
+    )
 
 
 def test_the_plan_states_the_preset_with_its_reason_and_flags_override_it(

@@ -30,13 +30,13 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("flags", "told"), WRONG)
+@pytest.mark.parametrize(("flags", "message"), WRONG)
 def test_an_error_names_a_flag_as_it_was_typed(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], message: str
 ) -> None:
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 2
     line = capsys.readouterr().err.strip()
-    assert line.startswith(f"stereocell: {told}")
+    assert line.startswith(f"stereocell: {message}")
     assert "\n" not in line
 
 
@@ -50,7 +50,7 @@ def test_an_error_names_a_setting_as_the_file_does(
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "message"),
     [
         ({"plan": {"level": 7}}, "plan.level is 7, expected 0 to 0"),
         ({"plan": {"grid": "2by1"}}, "plan.grid is '2by1', expected columns x rows"),
@@ -60,11 +60,11 @@ def test_an_error_names_a_setting_as_the_file_does(
     ],
 )
 def test_an_error_in_python_names_the_setting(
-    source: Path, tmp_path: Path, settings: dict[str, dict[str, object]], told: str
+    source: Path, tmp_path: Path, settings: dict[str, dict[str, object]], message: str
 ) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
         stereocell.build(source, tmp_path / "out", settings=settings)
-    assert str(caught.value).startswith(told)
+    assert str(caught.value).startswith(message)
 
 
 def test_an_error_of_open_volume_names_its_argument(source: Path) -> None:

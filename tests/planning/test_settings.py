@@ -236,14 +236,14 @@ def test_voxel_values_in_settings_and_inputs_have_the_same_bound() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "expected"),
     [
         ({"plan": {"grid": "\udcff"}}, "here: plan.grid is '\\xff', expected text in UTF-8"),
         ({"plan": {"channels": ["a", "\udce9"]}}, "here: plan.channels is '\\xe9', expected text"),
         ({"iso_values": {"\ud800": 1.0}}, "here: iso_values.\\ud800 is '\\ud800', expected text"),
     ],
 )
-def test_texts_that_are_not_utf8_are_reported(values: dict[str, object], told: str) -> None:
+def test_texts_that_are_not_utf8_are_reported(values: dict[str, object], expected: str) -> None:
     with pytest.raises(UsageError) as raised:
         settings_module.apply(Settings(), values, "here")
-    assert str(raised.value).startswith(told)
+    assert str(raised.value).startswith(expected)

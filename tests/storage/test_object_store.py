@@ -159,10 +159,10 @@ def test_the_objects_of_a_build_equal_the_files_of_a_local_one(
     assert not [key for key in found if "/." in f"/{key}"]
     # there is nothing to do, and nothing is done
     assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
-    told = capsys.readouterr()
-    assert "stage    s3://bucket/there/stage/stage.usda\n" in told.out
+    output = capsys.readouterr()
+    assert "stage    s3://bucket/there/stage/stage.usda\n" in output.out
     for phase in ("plan", "units", "stage", "bundle", "report"):
-        assert f"{phase}: up to date" in told.err
+        assert f"{phase}: up to date" in output.err
     assert marks(store, "bucket/there") == marked
 
 
@@ -358,8 +358,8 @@ def test_each_thread_of_a_worker_reports_its_own_uploads(store: ObjectStore) -> 
         ThreadPoolExecutor(2) as threads,
     ):
         work, _ = object_store_tasks.carried(_put_slowly)
-        told = list(threads.map(work, [root / "a", root / "b"]))
-    assert told == [(None, {"a": 1}), (None, {"b": 1})]
+        output = list(threads.map(work, [root / "a", root / "b"]))
+    assert output == [(None, {"a": 1}), (None, {"b": 1})]
 
 
 def test_work_for_a_command_that_has_ended_uploads_nothing(store: ObjectStore) -> None:

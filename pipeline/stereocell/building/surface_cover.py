@@ -17,8 +17,8 @@ from stereocell.steps.find_window import FindWindow
 from stereocell.steps.gather_evidence import GatherEvidence
 from stereocell.steps.unit_files import cover_of, load_record
 
-# Remedies for a surface that leaves out much. In a CT of a trunk with voxels of 3 mm, at 300 HU,
-# the first reduced the part left out from 59 % to 17 %, both together to 5 %.
+# Remedies for a surface that leaves out much. They were tried on a CT of a trunk with voxels of
+# 3 mm, at 300 HU. The first reduced the part left out from 59 % to 17 %, both together to 5 %.
 REMEDY = (
     "in a file for --config, under [surface], max_shift = 0.02 keeps thin structures, and "
     "min_diagonal_um = 0 with max_fragment_um = 0 keeps small ones"

@@ -41,8 +41,8 @@ from stereocell.transfer.joint_histogram import (
 from stereocell.transfer.options import WindowOptions
 
 SURVEY_VOXELS = 16_000_000  # about the most voxels from which a channel's window is found
-# Most voxels that are counted for the histogram. More voxels make a peak more certain: in a head of
-# 384 x 384 x 274 voxels the second-highest peak rises 6.5 deviations above chance with all voxels,
+# Most voxels that are counted for the histogram. More voxels make a peak more certain. In a head of
+# 384 x 384 x 274 voxels the second-highest peak rose 6.5 deviations above chance with all voxels,
 # and 3.7 with every third plane.
 COUNTED_VOXELS = 64_000_000
 COUNTED_PLANES = 16  # planes that are read at once

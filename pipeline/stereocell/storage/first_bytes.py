@@ -1,9 +1,10 @@
 """Describe a file by its first bytes, for messages about files of an unexpected kind.
 
 This module knows containers, and formats that StereoCell does not read. Callers add the marks of
-formats that it reads. Two modules of `storage` need it: contents.py names a foreign file that a
-command would replace or that was given in place of a build, and library_errors.py names a file that
-a library can't read.
+formats that it reads.
+
+Two modules of `storage` need it. contents.py names a foreign file that a command would replace, or
+that was given in place of a build. library_errors.py names a file that a library can't read.
 """
 
 import re

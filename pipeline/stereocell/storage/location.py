@@ -187,10 +187,10 @@ def require_own(
 ) -> os.stat_result | None:
     """Return the state of a file that a source refers to; None: it does not exist.
 
-    Sources come from strangers, and results are published. So every file that a source refers to,
-    by a path in its metadata or by a link, must be a regular file in one of the folders or below,
-    after following links. Otherwise an error is raised and the file is not opened, because a pipe
-    would block.
+    Sources come from strangers, and results are published. A source may refer to a file by a path
+    in its metadata or by a link. With links followed, it must be a regular file in one of the
+    folders or below. Otherwise an error is raised and the file is not opened, because a pipe would
+    block.
 
     named   words for the reference, for the message
     raised  class of the error

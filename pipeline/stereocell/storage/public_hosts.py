@@ -1,9 +1,9 @@
 """Refuse addresses in private networks if a server's answer leads to them.
 
 Users may name any host, even one in their own network. But a redirect or a link in a server's
-answer could point at a machine that only this one can reach, such as a router, or the metadata
-service of a cloud. Such an address is refused. The message shows it, so that users who trust it can
-name it themselves.
+answer could point at a machine that only this one can reach. Examples are a router, and the
+metadata service of a cloud. Such an address is refused. The message shows it, so that users who
+trust it can name it themselves.
 
 A process that reads for a stranger only connects to public hosts (`connect_to_public_alone`). There
 each connection is checked by its IP address, because a name may lead to another address each time
