@@ -54,8 +54,8 @@ def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        (["x" * 101, "b"], "found 'xxxxxxxx"),
-        (["x" * 5000, "b"], "found 'xxxxxxxx"),
+        (["x" * 101, "b"], "name of a class is 'xxxxxxxx"),
+        (["x" * 5000, "b"], "name of a class is 'xxxxxxxx"),
         (["a\nb", "c"], "name of a class is 'a\\nb', expected at most 100 printable characters"),
         ("[" * 100_000, "metadata 'stereocell_classes' is '[[["),
     ],

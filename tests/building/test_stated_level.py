@@ -337,7 +337,7 @@ def test_an_unknown_surface_is_refused_in_one_line(
     [
         (
             ["--surfaces", "even=inner", "--iso-value", "even=700"],
-            "even: --surfaces chooses the level, so iso-value 700 is ignored",
+            "even: --surfaces chooses the level, so iso-value 700",
         ),
         (
             ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],

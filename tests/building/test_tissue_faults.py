@@ -399,7 +399,7 @@ def test_a_class_named_like_a_channel_is_refused_and_earlier_classes_stay(
     model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["", CHANNEL])
     capfd.readouterr()
     assert tissue(out, "--model", str(model)) == 1
-    assert f"has a channel '{CHANNEL}' of its own" in only_line(capfd)
+    assert f"a channel is named '{CHANNEL}', like a class" in only_line(capfd)
     assert digests(out) == before
     assert (
         json.loads((out / "tissue" / "tissue.json").read_text("utf-8"))["settings"]["classes"] == 2

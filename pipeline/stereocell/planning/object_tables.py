@@ -68,14 +68,14 @@ def make_table(
         place, [(rows[tile], one) for tile, one in facts.items()], _measured(plan)
     )
     remarks: list[str] = []
-    noted = _noted(notes, names)
+    from_file = _columns_of_file(notes, names)
     # columns of a file with colours are not coloured by default: its own colours are better
-    behind = {column.name for column in noted if notes.colors} - {NAMES}
-    columns += noted
+    not_default = {column.name for column in from_file if notes.colors} - {NAMES}
+    columns += from_file
     if table is not None:
         joined, remarks = _joined(table, names)
         columns += joined
-        behind -= {column.name for column in joined}
+        not_default -= {column.name for column in joined}
     columns, renamed = _unique(columns)
     corners = np.stack([zyx_to_xyz(low), zyx_to_xyz(high)])
     return (
@@ -90,7 +90,7 @@ def make_table(
             _default(
                 columns,
                 plan.settings.objects.color_by,
-                behind,
+                not_default,
                 is_first=labels.id == plan.labels[0].id,
             ),
             *_interfaces(facts, rows, names),
@@ -147,7 +147,7 @@ def _notes_on_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
     ]
 
 
-def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
+def _columns_of_file(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
     """Return the columns that the label map's own file holds."""
     found = []
     listed_labels = labels.tolist()
@@ -189,11 +189,11 @@ def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], lis
     has_row = sorted_labels[at] == labels if len(order) else np.zeros(len(labels), bool)
     row = order[at] if len(order) else np.zeros(len(labels), np.int64)
     remarks = []
-    strangers = np.setdiff1d(table.labels, labels)
-    if len(strangers):
+    unmatched = np.setdiff1d(table.labels, labels)
+    if len(unmatched):
         remarks.append(
-            f"{table.shown}: {counted(len(strangers), 'row')} without an object: {table.key} "
-            f"{listed(strangers.tolist())}"
+            f"{table.shown}: {counted(len(unmatched), 'row')} without an object: {table.key} "
+            f"{listed(unmatched.tolist())}"
         )
     if not has_row.all():
         lacking = labels[~has_row]
@@ -244,20 +244,22 @@ def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
     return list(found.values()), remarks
 
 
-def _default(columns: Sequence[Column], wanted: str, behind: set[str], *, is_first: bool) -> str:
+def _default(
+    columns: Sequence[Column], wanted: str, not_default: set[str], *, is_first: bool
+) -> str:
     """Return the ID of the column that colours objects at first; empty: none.
 
     It is the wanted column, or else the first column of categories.
 
-    behind    names of columns that colour only if wanted
-    is_first  whether this is the first label map, which must have the wanted column
+    not_default  names of columns that colour only if wanted
+    is_first     whether this is the first label map, which must have the wanted column
     """
     for column in columns:
         if wanted and wanted in (column.name, column.id):
             return column.id
     if wanted and is_first:
         raise _no_column(wanted, [column.name for column in columns])
-    categories = [one.id for one in columns if one.categories and one.name not in behind]
+    categories = [one.id for one in columns if one.categories and one.name not in not_default]
     return categories[0] if categories else ""
 
 
