@@ -215,7 +215,7 @@ def test_build_of_another_input_into_a_used_out_is_refused(
         (["--level", "4"], 2, "--level is 4, expected 0 to 0"),
         (["--channels", "F bodi"], 2, "did you mean 'F body'"),
         (["--spacing-um", "1,2"], 2, "--spacing-um is '1,2', expected three numbers"),
-        (["--spacing-um=-1,1,1"], 2, "found -1,1,1, expected z,y,x in um, each above 0"),
+        (["--spacing-um=-1,1,1"], 2, "is -1,1,1, expected z,y,x in um, each above 0"),
         (["--spacing-um", "0,1,1"], 2, "is 0,1,1"),
         (["--iso-value", "CD31"], 2, "expected CHANNEL=VALUE"),
         (["--preset", "nobody"], 2, "expected one of ct, ct-bone, cycif"),

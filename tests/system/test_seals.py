@@ -109,7 +109,7 @@ def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     assert main([command[0], str(out), *command[1:]]) == 1
     line = error_line(capfd)
     assert "plan.json: found no hash of its content" in line
-    assert "of an earlier version" in line
+    assert "an earlier version wrote it" in line
     (out / "plan.json").unlink()  # the remedy
     assert main(["plan", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]) == 0
     assert (out / "plan.json").read_bytes() == (built / "plan.json").read_bytes()
@@ -126,7 +126,7 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
         lines = (out / name).read_bytes().splitlines(keepends=True)
         (out / name).write_bytes(b"".join(lines[:-1]))
     (out / "units" / "plan.key").write_text("0123abcd")
-    assert "is of an earlier version" in _faults(out)
+    assert "an earlier version wrote it" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main([*build, "--workers", "0"]) == 1
     assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in error_line(capfd)
