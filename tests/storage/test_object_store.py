@@ -370,7 +370,7 @@ def test_work_for_a_command_that_has_ended_uploads_nothing(store: ObjectStore) -
     for lock in (None, b"another's"):
         if lock is not None:
             fs.pipe_file("bucket/late/.lock", lock)
-        with pytest.raises(OutputError, match=r"bucket/late: the command that asked .* has ended"):
+        with pytest.raises(OutputError, match=r"bucket/late: the command that sent .* has ended"):
             pickle.loads(carried)(root / "a")
         assert "bucket/late/a" not in fs.find("bucket/late")
     workspace.forget(root)
@@ -427,7 +427,7 @@ def test_showing_a_build_fetches_only_its_bundle(
         (
             ["units", "https://me:secret@x.org/out?sig=secret"],
             2,
-            "OUT is https://x.org/out: expected a folder or an s3:// address",
+            "OUT is https://x.org/out, expected a folder or an s3:// address",
         ),
         (["iso", "x.nii", "-o", "s3://a:b@c/x", "--channel", "0", "--tile", "r"], 2, "s3://c/x"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
