@@ -1,4 +1,4 @@
-"""From a noisy volume to surfaces, held against analytic truth."""
+"""Surfaces of a noisy volume are compared with the analytic truth."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ from stereocell.steps.unit_files import load_lods
 from support import phantoms
 from support.meshes import enclosed_volume, open_edges
 
-VOXEL_UM = 0.14  # the finer spacing: the stricter reading of "a voxel"
+VOXEL_UM = 0.14  # um; the finer of the two spacings, which is the stricter bound
 
 
 def _units(source: Path, out: Path, channel: str, **plan: object) -> tuple[OutFolder, list[Mesh]]:
@@ -58,14 +58,14 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
     positions = np.concatenate([mesh.positions for mesh in meshes]).astype(np.float64)
     zyx = np.stack([positions[:, 2], -positions[:, 1], positions[:, 0]], axis=1)
     extent = (np.array(truth["shape"]) - 1) * truth["spacing_um"]
-    margin = 2 * np.array(truth["spacing_um"])  # not the caps at the block's ends
+    margin = 2 * np.array(truth["spacing_um"])  # leaves out the caps at the ends of the block
     free = ((zyx > margin) & (zyx < extent - margin)).all(axis=1)
     distances = np.abs(_distance_to_ellipsoids(zyx[free], truth["nuclei"]))
     nearest = distances.min(axis=0)
     assert nearest.mean() < 0.5 * VOXEL_UM
     assert np.percentile(nearest, 99) < 2 * VOXEL_UM
 
-    # and none is missing: each nucleus inside the block has surface all round
+    # no nucleus is missing: each one inside the block has surface on all sides
     inside = [
         i
         for i, n in enumerate(truth["nuclei"])
@@ -76,7 +76,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
     for i in inside:
         assert (distances[i] < 2 * VOXEL_UM).sum() > 100
 
-    # the background is uneven: each tile's iso-value against the boundaries of its own nuclei
+    # the background is uneven, so each tile's iso-value is compared with its own nuclei
     plan = out_folder.plan()
     for tile in plan.tiles:
         first, last = plan.position_um(tile.box.start), plan.position_um(tile.box.stop)
@@ -99,7 +99,7 @@ def test_nuclei_are_cut_at_their_analytic_boundary(tmp_path: Path) -> None:
 def test_blurred_ball_keeps_its_volume_from_file_to_mesh(
     tmp_path: Path, radius: float, sigma: float, noise: float
 ) -> None:
-    """Within 2 %; within 6 % at a radius of 5 x 11 x 11 voxels: see the test of the iso-value."""
+    """The error is at most 2 %, and 6 % at a radius of 5 x 11 x 11 voxels."""
     spacing, side = (0.28, 0.14, 0.14), 2 * (radius + 2.6)
     z, y, x = (round(side / step) for step in spacing)
     ball = phantoms.blurred_ball((z, y, x), spacing, (side / 2,) * 3, radius, sigma)

@@ -1,4 +1,4 @@
-"""Surfaces where the block ends: flat caps in a fixed order, or open on purpose."""
+"""Surfaces at the ends of the block have flat caps in a fixed order, or are open on request."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ LOW, HIGH = np.array([0.0, -19.5, 0.0]), np.array([35.5, 0.0, 15.0])
 NAMES = ("red", "green", "blue")
 LEVELS = [f"{name}=500" for name in NAMES]
 FLAGS = [text for level in LEVELS for text in ("--iso-value", level)]
-# the places of caps are those of half a voxel in eight parts
+# caps lie at eighths of half a voxel
 HAIR = 0.5 / 8
 
 
@@ -69,14 +69,14 @@ def _levels(out: Path, channel: str) -> list[list[Mesh]]:
 
 
 def _flat_area(mesh: Mesh, axis: int, place: np.float32) -> float:
-    """Return the area of a mesh in a plane, bit by bit."""
+    """Return the area of a mesh that lies exactly in a plane."""
     corners = mesh.positions[mesh.triangles]
     a, b, c = corners[(corners[:, :, axis] == place).all(axis=1)].astype(float).transpose(1, 0, 2)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 def _ends(meshes: list[Mesh]) -> NDArray[np.float32]:
-    """Return the least and the largest place of meshes along each axis, (2, 3)."""
+    """Return the least and largest position of meshes along each axis, (2, 3)."""
     every = np.concatenate([mesh.positions for mesh in meshes])
     return np.array([every.min(axis=0), every.max(axis=0)])
 
@@ -97,15 +97,15 @@ def test_caps_are_flat_and_lie_in_the_channels_order_at_each_level(capped: Path)
                 for side in range(2)
             ]
             finest = finest or areas
-            # rims get coarser, at the last level by four voxels: bodies end there in points
+            # rims get coarser, by four voxels at the last level, where objects end in points
             if meshes is not levels[-1]:
                 assert np.divide(areas, finest).min() > 0.5
         assert finest is not None
         assert min(finest) > 50
 
 
-def test_nothing_of_a_channel_lies_past_its_own_caps_where_another_one_ends(capped: Path) -> None:
-    """The order holds beside the flat parts too, since no vertex of a level leaves its cap."""
+def test_no_surface_passes_its_own_caps_beside_those_of_another_channel(capped: Path) -> None:
+    """The order also holds beside the flat parts, because no vertex leaves its cap."""
     for level in range(len(_levels(capped, NAMES[0]))):
         ends = np.array([_ends(_levels(capped, name)[level]) for name in NAMES])
         assert (np.diff(ends[:, 0], axis=0) > 0).all()
@@ -130,7 +130,7 @@ def test_cap_normals_face_out_of_the_block(capped: Path) -> None:
                     np.testing.assert_array_equal(mesh.normals[on_cap, axis], way)
 
 
-def test_without_caps_rims_lie_on_the_block_s_faces_alone(bare: Path) -> None:
+def test_without_caps_all_rims_lie_on_the_block_s_faces(bare: Path) -> None:
     for name in NAMES:
         for meshes in _levels(bare, name):
             places, triangles = weld([(mesh.positions, mesh.triangles) for mesh in meshes])
@@ -151,10 +151,10 @@ def test_report_and_check_say_that_surfaces_are_open_on_purpose(
     assert [line.split(":")[0] for line in remark.lines] == list(NAMES)
     assert all("--no-caps" in line for line in remark.lines)
     assert not [one for one in find_remarks(gather(OutFolder(capped))) if "open at" in one.title]
-    for out, told in ((bare, 1), (capped, 0)):
+    for out, expected in ((bare, 1), (capped, 0)):
         capsys.readouterr()
         assert main(["check", str(out), "--deep", "--workers", "0"]) == 0
-        assert capsys.readouterr().out.count("open at the block's faces on purpose") == told
+        assert capsys.readouterr().out.count("open at the block's faces on purpose") == expected
 
 
 def test_open_surfaces_are_exported_but_not_as_solids(
@@ -164,6 +164,6 @@ def test_open_surfaces_are_exported_but_not_as_solids(
     assert main(["export", str(capped), str(tmp_path / "solid.3mf")]) == 0
     capsys.readouterr()
     assert main(["export", str(bare), str(tmp_path / "open.3mf")]) == 1
-    told = capsys.readouterr().err.splitlines()[-1]
-    assert "its surface is open at the block's faces, as --no-caps built it" in told
+    output = capsys.readouterr().err.splitlines()[-1]
+    assert "its surface is open at the block's faces, as --no-caps built it" in output
     assert not (tmp_path / "open.3mf").exists()

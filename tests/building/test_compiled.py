@@ -1,4 +1,4 @@
-"""No build compiles what set-up has compiled: kernels are given arrays of the same types."""
+"""Builds compile no kernel again: they call kernels with the types that set-up compiled."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ import pytest
 from support import phantoms
 from support.touching_cells import touching_cells
 
-# in a process of its own: elsewhere tests call kernels with types of their own
+# in a process of its own, because other tests call kernels with other types
 BUILDS = """
 import gc
 import sys

@@ -1,4 +1,4 @@
-"""A channel whose surface would wrap the specimen is a volume alone beside others."""
+"""A channel whose surface would wrap the specimen is drawn as a volume only beside others."""
 
 import re
 from pathlib import Path
@@ -54,7 +54,7 @@ def _triangles(source: Path, out: Path, *flags: str) -> dict[str, int]:
     }
 
 
-def test_the_channel_that_covers_the_others_is_a_volume(
+def test_a_channel_that_covers_the_others_is_drawn_as_a_volume(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, out = (
@@ -79,7 +79,7 @@ def test_the_channel_that_covers_the_others_is_a_volume(
     assert any(text.startswith("haze: drawn as a volume") for text in remarks)
 
 
-def test_its_surface_is_built_where_it_is_asked_for(tmp_path: Path) -> None:
+def test_the_surface_of_a_covering_channel_is_built_on_request(tmp_path: Path) -> None:
     source = _source(tmp_path / "two.ome.zarr", haze=_slab(), cells=_ball(6.0))
     asked = _triangles(source, tmp_path / "asked", "--surfaces", "haze=outer")
     stated = _triangles(source, tmp_path / "stated", "--iso-value", "haze=550")
@@ -92,6 +92,6 @@ def test_channels_that_all_cover_keep_their_surfaces(tmp_path: Path) -> None:
     assert min(_triangles(source, tmp_path / "out").values()) > 100
 
 
-def test_a_lone_channel_keeps_its_surface(tmp_path: Path) -> None:
+def test_a_single_channel_keeps_its_surface(tmp_path: Path) -> None:
     source = _source(tmp_path / "one.ome.zarr", haze=_slab())
     assert min(_triangles(source, tmp_path / "out").values()) > 100

@@ -1,4 +1,4 @@
-"""What a unit costs is bounded by its voxels: of a surface like noise's fewer planes carry it."""
+"""The work of a unit is bounded by its voxels: fewer planes carry a noisy surface."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ MAX_FACES = 6000
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build a sponge, which frays as noise does, and a ball that lies in both tiles."""
+    """Build a sponge, whose surface is like noise's, and a ball that lies in both tiles."""
     folder = tmp_path_factory.mktemp("frayed")
     noise = np.random.default_rng(3).normal(0, 1, SHAPE)
     sponge = 1000 + 4000 * ndimage.gaussian_filter(noise, (0.5, 1, 1))
@@ -40,7 +40,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
+def test_fewer_planes_carry_the_surface_of_a_sponge_and_a_note_says_so(
     out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["units", str(out), "--workers", "0"]) == 0
@@ -48,9 +48,9 @@ def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
     folder = OutFolder(out)
     plan, survey = folder.plan(), read_survey(folder)
     step = plan.with_grid(survey["sponge"].grid_um).step
-    assert "of the planes along z, y, x one in {}, {}, {} carries it".format(*step) in said
+    assert "one plane in {}, {}, {} along z, y, x carries its surface".format(*step) in said
     assert survey["sponge"].most_faces > MAX_FACES
-    assert step[1] > step[0] >= 1  # as far apart along all axes as can be
+    assert step[1] > step[0] >= 1  # nearly the same distance along all axes
     assert survey["ball"].grid_um == 0
     assert "ball: up to" not in said
     assert f"{MAX_FACES:,} (surface.max_faces)" in survey["sponge"].thinning(plan)
@@ -58,7 +58,7 @@ def test_of_a_sponge_fewer_planes_carry_the_surface_and_it_is_said(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("channel", ["sponge", "ball"])
-def test_its_tiles_make_one_sound_surface_of_no_more_triangles_than_that(
+def test_tiles_of_a_sponge_make_one_valid_surface_with_few_enough_triangles(
     out: Path, channel: str
 ) -> None:
     assert main(["units", str(out), "--workers", "0"]) == 0
@@ -70,6 +70,6 @@ def test_its_tiles_make_one_sound_surface_of_no_more_triangles_than_that(
         meshes.append(load_lods(unit)[0].mesh)
     assert len(meshes) == 2
     for mesh in meshes:
-        # a vertex lies on each voxel edge that is crossed, and has two triangles
+        # each crossed voxel edge has a vertex, and each vertex two triangles
         assert len(mesh.triangles) <= 2 * MAX_FACES
     assert not find_defects(welded(meshes)).total

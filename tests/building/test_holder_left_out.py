@@ -21,7 +21,7 @@ AIR, FLESH, BONE, TABLE = -1000, 40, 700, 900
 
 
 def _parts() -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return where body, bone and table of a chest are."""
+    """Return masks of body, bone and table of a chest."""
     middle = [(n - 1) / 2 for n in SHAPE]
     _, y, x = ((g - m) * SPACING_MM for g, m in zip(np.indices(SHAPE), middle, strict=True))
     body = ((y + 12) / 50) ** 2 + (x / 72) ** 2 < 1
@@ -73,7 +73,7 @@ def test_a_table_is_left_out_of_the_volume_and_a_deep_check_agrees(
     eight_bit_kept, measured_kept = _voxels(with_table)
     assert _shares(measured_kept, TABLE) > 0.03
     assert _shares(measured, TABLE) < 0.0005
-    # all else is as measured
+    # all other voxels are as measured
     same = measured == measured_kept
     assert np.mean(same) > 0.9
     assert (measured[~same] <= AIR).all()

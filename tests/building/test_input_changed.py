@@ -1,4 +1,4 @@
-"""An input that changes while tasks read it is reported in one line; no result of it is kept."""
+"""An input that changes while tasks read it is reported in one line, and no result is kept."""
 
 import os
 import shutil
@@ -40,7 +40,7 @@ UM = ["--spacing-um", "0.5,0.2,0.2"]
 
 @pytest.fixture(autouse=True)
 def fresh() -> None:
-    """Forget the inputs of earlier tests, as a process of its own would not know them."""
+    """Forget the inputs of earlier tests, like a new process."""
     input_files.forget()
 
 
@@ -239,7 +239,7 @@ def test_last_results_of_a_killed_command_are_made_again_if_the_input_was_writte
     def die() -> None:
         raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch:  # a killed process cleans nothing up
+    with monkeypatch.context() as patch:  # a killed process does not clean up
         after_the_first_unit(patch, die)
         patch.setattr(run_on_input, "_require_still", lambda *_, **__: None)
         assert main(["units", str(out), *INLINE]) != 0
@@ -351,7 +351,7 @@ def test_a_model_or_its_image_that_changes_while_it_is_read_is_reported(
     assert not (out / "tissue").exists()
 
 
-def test_a_store_that_permits_no_listing_is_compared_by_its_fingerprint_alone(
+def test_a_store_that_permits_no_listing_is_compared_only_by_its_fingerprint(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def refuse(*_: object) -> object:

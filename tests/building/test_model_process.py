@@ -52,23 +52,23 @@ def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "message"),
     [
-        (["x" * 101, "b"], "found 'xxxxxxxx"),
-        (["x" * 5000, "b"], "found 'xxxxxxxx"),
-        (["a\nb", "c"], "found 'a\\nb', expected printable characters"),
+        (["x" * 101, "b"], "name of a class is 'xxxxxxxx"),
+        (["x" * 5000, "b"], "name of a class is 'xxxxxxxx"),
+        (["a\nb", "c"], "name of a class is 'a\\nb', expected at most 100 printable characters"),
         ("[" * 100_000, "metadata 'stereocell_classes' is '[[["),
     ],
 )
-def test_names_that_no_channel_can_have_are_refused(
-    tmp_path: Path, names: object, told: str
+def test_class_names_that_no_channel_can_have_are_refused(
+    tmp_path: Path, names: object, message: str
 ) -> None:
     line = refusal(write_model(tmp_path / "m.onnx", names=names), ModelBounds())
-    assert told in line
+    assert message in line
     assert len(line) < 500
 
 
-def test_a_file_that_is_no_network_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_network_is_refused_by_name(tmp_path: Path) -> None:
     (tmp_path / "m.onnx").write_bytes(b"GIF89a")
     line = refusal(tmp_path / "m.onnx", ModelBounds())
     assert line.endswith("found another kind of file, expected an ONNX model")
@@ -82,7 +82,7 @@ def test_a_bound_that_is_not_a_positive_number_is_refused(value: float) -> None:
         ModelBounds(memory_gb=value)
 
 
-def test_the_flags_have_the_defaults_of_the_bounds() -> None:
+def test_the_flags_have_the_same_defaults_as_the_bounds() -> None:
     parser = ArgumentParser()
     declare_tissue(parser)
     flags = parser.parse_args(["OUT"])

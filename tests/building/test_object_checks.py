@@ -1,4 +1,4 @@
-"""Faults of built label maps that the report and the deep check name."""
+"""Faults of built label maps that the report and the deep check find."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ SHAPE = (24, 48, 96)
 
 
 @pytest.mark.slow
-def test_the_report_and_the_deep_check_tell_of_objects(
+def test_the_report_and_the_deep_check_describe_objects(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     labels = make_tissue(SHAPE, 3).labels
@@ -36,11 +36,11 @@ def test_the_report_and_the_deep_check_tell_of_objects(
     assert f"cells: {count} objects</h3>" in page
     said(capsys)
     assert run("check", out, "--deep", "--workers", 0) == 0
-    told = said(capsys)
-    assert f"ok   cells against source: {count} objects" in told
-    assert "ok   bundle against stage: 8 surfaces" in told
+    output = said(capsys)
+    assert f"ok   cells against source: {count} objects" in output
+    assert "ok   bundle against stage: 8 surfaces" in output
 
-    # a value that nobody counted, in one tile and level, and a surface that is too small
+    # a label that was not counted in one tile and level, and a surface that is too small
     layer = Sdf.Layer.FindOrOpen(str(out / "stage/tiles/r0_c0/tile.usdc"))
     stage = Usd.Stage.Open(layer)
     stage.GetDefaultPrim().GetVariantSet("lod").SetVariantSelection("lod0")
@@ -56,7 +56,7 @@ def test_the_report_and_the_deep_check_tell_of_objects(
 
 
 @pytest.mark.slow
-def test_levels_that_stop_early_are_told_of(
+def test_levels_whose_simplification_stops_early_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_ome_tiff(tmp_path / "l.ome.tif", boxes((3, 4, 20), shape=(16, 24, 24)))
@@ -67,23 +67,23 @@ def test_levels_that_stop_early_are_told_of(
 
     monkeypatch.setattr(building, "simplify_walls", simplify_walls)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
-    wanted = "l: lod3 has more triangles or other volumes than are asked for in r0_c0: triangles"
-    told = said(capsys)
-    assert wanted in told
-    assert "lod2 has" not in told
+    wanted = "l: simplifying lod3 stopped early in r0_c0, because triangles would have crossed"
+    output = said(capsys)
+    assert wanted in output
+    assert "lod2 has" not in output
     assert run("report", tmp_path / "out") == 0
     assert wanted in (tmp_path / "out/report/index.html").read_text("utf-8")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("measure_of", sweep(["mean", "p95"], kept=["p95"]))
-def test_the_deep_check_measures_the_image_anew(
+def test_the_deep_check_measures_the_image_again(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     measure_of: str,
 ) -> None:
-    """A unit that counted wrong: the stage has what it said, the voxels have not."""
+    """The unit measured wrongly, and the stage has its values instead of the voxels' true ones."""
     labels = boxes((3, 4, 20), (5, 24, 36), (8, 40, 56), shape=(16, 24, 60))
     image = np.random.default_rng(3).poisson(300, labels.shape).astype(np.uint16)
     tifffile.imwrite(tmp_path / "l.tif", labels, photometric="minisblack")
@@ -102,13 +102,13 @@ def test_the_deep_check_measures_the_image_anew(
     build(tmp_path / "i.ome.tif", tmp_path / "wrong", *flags)
     said(capsys)
     assert run("check", tmp_path / "wrong", "--deep", "--workers", 0) == 1
-    told = said(capsys)  # of the last object of each tile
-    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in told
-    assert told.count("voxels'") == 1
+    output = said(capsys)  # on the last object of each tile
+    assert f"cells: column {measure_of}_DNA is not the voxels' {measure_of} of 3, 8" in output
+    assert output.count("voxels'") == 1
 
 
 @pytest.mark.slow
-def test_the_deep_check_measures_the_surfaces_anew(
+def test_the_deep_check_measures_the_surfaces_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_ome_tiff(tmp_path / "l.ome.tif", boxes((3, 4, 20), shape=(16, 24, 24)))
@@ -134,14 +134,14 @@ def test_the_deep_check_measures_the_surfaces_anew(
     ),
 )
 @pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
-def test_the_deep_check_finds_shared_walls_anew(
+def test_the_deep_check_measures_the_interfaces_again(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     grid: str,
     fault: str,
 ) -> None:
-    """Two boxes that touch, in one tile or at the plane between two, and one by itself."""
+    """Two boxes touch, in one tile or at the plane between two tiles, and one box is apart."""
     labels = boxes((3, 22, 36), (5, 36, 50), (8, 54, 66), shape=(16, 24, 72))
     write_ome_tiff(tmp_path / "l.ome.tif", labels)
     right = objects_maker.build_objects
@@ -162,11 +162,11 @@ def test_the_deep_check_finds_shared_walls_anew(
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".", "--grid", grid)
     said(capsys)
     assert run("check", tmp_path / "out", "--deep", "--workers", 0) == (fault != "none")
-    told = said(capsys)
+    output = said(capsys)
     odd = {
         column
         for column in ("neighbours", "contact")
-        if f"column {column} is not that of the surface of" in told
+        if f"column {column} is not that of the surface of" in output
     }
     assert (
         odd

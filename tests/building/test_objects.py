@@ -1,4 +1,4 @@
-"""Builds of label maps from end to end: which tile has which object, the table, edits, resuming."""
+"""Builds of label maps from end to end: tiles of objects, the table, edits, resuming."""
 
 import json
 from itertools import pairwise
@@ -57,7 +57,7 @@ def out(sample: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_each_cell_is_there_once_with_its_voxels_volume(out: Path) -> None:
+def test_each_cell_is_built_once_with_the_volume_of_its_voxels(out: Path) -> None:
     tissue = make_tissue(SHAPE, 3)
     labels, counts = np.unique(tissue.labels[tissue.labels > 0], return_counts=True)
     labels, counts = labels[counts >= 27], counts[counts >= 27]
@@ -95,14 +95,14 @@ def test_the_image_is_measured_over_each_cell(out: Path, sample: Path) -> None:
         assert p95s[row] == pytest.approx(np.percentile(own, 95), rel=1e-5)
 
 
-def test_the_table_is_joined_by_number_and_tells_what_does_not_fit(
+def test_the_table_is_joined_by_label_and_rows_that_do_not_fit_are_reported(
     out: Path, sample: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (out / "phases.json").unlink()
     assert run("stage", out, "--workers", 0) == 0
-    told = said(capsys)
-    assert "2 rows without an object: CellID 8888, 9999" in told
-    assert "1 object without a row: 1" in told
+    output = said(capsys)
+    assert "2 rows without an object: CellID 8888, 9999" in output
+    assert "1 object without a row: 1" in output
     tissue = make_tissue(SHAPE, 3)
     kinds = objects_of(out)
     entry = next(one for one in kinds["columns"] if one["id"] == "cell_type")
@@ -139,7 +139,7 @@ def test_classes_of_other_names_reach_the_bundle(out: Path, tmp_path: Path) -> N
     assert len(column["colors"]) == len(names)
 
 
-def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
+def test_each_level_of_detail_in_a_file_names_its_cells(out: Path) -> None:
     content = objects_of(out)
     boxes = np.fromfile(out / "bundle" / content["boxes"]["path"], "<f4").reshape(-1, 6)
     manifest = json.loads((out / "bundle/manifest.json").read_text("utf-8"))
@@ -159,7 +159,7 @@ def test_every_level_of_a_file_names_its_cells(out: Path) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_done_twice_and_a_table_changes_the_stage_alone(
+def test_no_work_is_repeated_and_a_table_changes_only_the_stage(
     out: Path, sample: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for phase in PHASES[1:]:
@@ -188,7 +188,7 @@ def test_nothing_is_done_twice_and_a_table_changes_the_stage_alone(
 
 @pytest.mark.slow
 def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
-    """A value and a colour, as an artist's layer overrides them."""
+    """An artist's layer overrides a value and a colour."""
     stage = Usd.Stage.Open(str(out / "stage/stage.usda"))
     path = "/Specimen/Tiles/r0_c0/cells/cells_r0_c0"
     layer = Sdf.Layer.CreateNew(str(out / "stage/edit.usda"))
@@ -232,7 +232,9 @@ def test_edits_of_the_stage_reach_the_bundle(out: Path) -> None:
 
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("workers", [1, 2])
-def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int) -> None:
+def test_any_number_of_workers_gives_the_same_bytes(
+    out: Path, tmp_path: Path, workers: int
+) -> None:
     labels = make_tissue(SHAPE, 3).labels.astype(np.uint16)
     source = tmp_path / "mask.ome.tif"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
@@ -248,7 +250,7 @@ def test_the_same_bytes_with_any_workers(out: Path, tmp_path: Path, workers: int
 
 
 @pytest.mark.slow
-def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
+def test_a_large_object_is_cut_at_tile_borders_and_stays_one_object(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     z, y, _x = np.mgrid[:20, :40, :120]
@@ -258,19 +260,19 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     flags = ("--labels", "organs=.", "--spacing-um", "1,1,1", "--tile-size", "20,40,40")
     build(source, out, *flags)
-    told = said(capsys)
-    words = "2 objects, 1 of them larger than a tile and half around it, and cut (5)"
-    assert f"plan: organs: {words}" in told
-    assert f"units: organs: {words}" in told
-    # of more voxels it tells which will be, without reading any
+    output = said(capsys)
+    words = "2 objects, 1 of them cut at tile borders, because they reach farther than half a tile"
+    assert f"plan: organs: {words}" in output
+    assert f"units: organs: {words}" in output
+    # for a label map with more voxels the plan states the limit without reading it
     monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 1000)
     assert run("plan", source, "-o", tmp_path / "other", *flags) == 0
-    assert "organs: objects larger than a tile and half around it, 40 x 80 x 80 um" in said(capsys)
+    assert "beyond their own, out of 40 x 80 x 80 um (z, y, x), will be cut" in said(capsys)
     folder = out / "bundle/channels/organs"
     content = objects_of(out, "organs")
     assert content["count"] == 2
     row = labels_of(out, "organs").tolist().index(5)
-    assert row == 1  # what is in several tiles comes last
+    assert row == 1  # cut objects come last
     held = [
         [*range(tile["first"], tile["first"] + tile["count"]), *tile.get("more", [])]
         for tile in content["tiles"].values()
@@ -280,8 +282,10 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
     assert volume == (labels == 5).sum()
     area = column_of(out, "area_um2", "organs")[row]
     radius = np.sqrt(volume / 120 / np.pi)
-    assert area == pytest.approx(2 * np.pi * radius * (radius + 120), rel=0.05)  # no caps inside
-    # the pieces meet: what one ends with, the next begins with
+    assert area == pytest.approx(
+        2 * np.pi * radius * (radius + 120), rel=0.05
+    )  # there are no caps inside
+    # the pieces meet: one ends with the plane with which the next begins
     ends = []
     for tile in ("r0_c0", "r0_c1", "r0_c2"):
         mesh = read_glb(folder / tile / "lod0.glb")
@@ -295,7 +299,7 @@ def test_a_large_object_is_cut_at_the_tiles_and_stays_one(
 
 
 @pytest.mark.slow
-def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
+def test_a_cut_object_has_the_percentile_of_all_its_voxels(tmp_path: Path) -> None:
     labels = boxes((7, 2, 88), shape=(16, 24, 90))
     rng = np.random.default_rng(3)
     image = (1000 * rng.gamma(2.0, 1 + np.arange(90) / 20, labels.shape)).astype(np.uint16)
@@ -306,12 +310,12 @@ def test_an_object_in_pieces_has_the_percentile_of_all_its_voxels(tmp_path: Path
     own = image[labels == 7]
     assert len({len(tile.get("more", [])) for tile in objects_of(out)["tiles"].values()}) == 1
     assert column_of(out, "mean_DNA") == pytest.approx([own.mean()], rel=1e-5)
-    # within a thousandth of the voxels
+    # rank is right within a thousandth of the voxels
     low, high = np.percentile(own, [94.9, 95.1])
     assert low <= column_of(out, "p95_DNA")[0] <= high
 
 
-def test_small_objects_are_counted_and_others_end_with_the_region(
+def test_small_objects_are_counted_and_large_ones_end_at_the_region(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     labels = np.zeros((12, 40, 40), np.int64)
@@ -325,8 +329,8 @@ def test_small_objects_are_counted_and_others_end_with_the_region(
     flags = ("--labels", ".", "--spacing-um", "1,1,1", "--region", "0:12,0:40,0:20")
     assert run("plan", source, "-o", out, *flags) == 0
     assert run("units", out, "--workers", 0) == 0
-    told = said(capsys)
-    assert "l: 2 objects; 1 of too few voxels are left out" in told
+    output = said(capsys)
+    assert "l: 2 objects; 1 with too few voxels are left out" in output
     plan = OutFolder(out).plan()
     located = Passes(OutFolder(out), plan, Engine(0)).objects(plan.labels[0])
     assert located.extents.labels.tolist() == [6, 2**62]
@@ -337,72 +341,74 @@ def test_small_objects_are_counted_and_others_end_with_the_region(
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     assert run(*arguments) in (1, 2)
-    told = capsys.readouterr().err.strip().splitlines()
-    assert len(told) == 1
-    return told[0]
+    output = capsys.readouterr().err.strip().splitlines()
+    assert len(output) == 1
+    return output[0]
 
 
-def test_what_can_not_be_built_is_told_in_one_line(
+def test_label_maps_and_flags_that_do_not_fit_are_refused_in_one_line(
     sample: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan = ("plan", sample, "-o", tmp_path / "out", "--channels", "DNA")
-    told = refusal(capsys, *plan, "--labels", "nuclei")
-    assert "--labels nuclei" in told
-    assert "--labels nuclei=PATH" in told
-    told = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
-    assert "a channel has that name" in told
-    assert "expected another one, as DNA_objects=PATH" in told
+    output = refusal(capsys, *plan, "--labels", "nuclei")
+    assert "--labels nuclei" in output
+    assert "--labels nuclei=PATH" in output
+    output = refusal(capsys, *plan, "--labels", "DNA=" + str(sample / "labels/cells"))
+    assert "a channel has this name already" in output
+    assert "expected another name, such as DNA_objects=PATH" in output
     tifffile.imwrite(tmp_path / "m.tif", np.ones((6, 5, 7), np.uint8), metadata={"axes": "ZYX"})
-    told = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
-    assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in told
+    output = refusal(capsys, *plan, "--labels", f"m={tmp_path / 'm.tif'}")
+    assert "states no voxel size: found 6 x 5 x 7 voxels (z, y, x), expected the image's" in output
     negative = np.zeros((6, 8, 300), np.int16)
     negative[..., -1] = -7  # far from its middle
     tifffile.imwrite(tmp_path / "n.tif", negative, metadata={"axes": "ZYX"})
     flags = ("--labels", ".", "--spacing-um", "1,1,1")
-    told = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
-    assert "found -7, expected labels of 0 or more" in told
+    output = refusal(capsys, "plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags)
+    assert "found -7, expected labels of 0 or more" in output
     assert not (tmp_path / "n").exists()
-    monkeypatch.setattr(label_numbers, "_COUNTED_AT_ONCE", 100)  # a map that is too large to look
+    monkeypatch.setattr(
+        label_numbers, "_COUNTED_AT_ONCE", 100
+    )  # makes the label map count as too large to be counted
     assert run("plan", tmp_path / "n.tif", "-o", tmp_path / "n", *flags) == 0
     assert run("units", tmp_path / "n", "--workers", 0) == 1
     assert "found -7, expected labels of 0 or more" in capsys.readouterr().err
     for flag in ("--table", "--table-key", "--columns", "--color-by"):
-        assert f"{flag} is 'a': of no objects, expected --labels" in refusal(
-            capsys, *plan, flag, "a"
-        )
-    told = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
-    assert "--columns is 'a,b': of no table, expected --table with it" in told
-    told = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
-    assert "none.csv: can't be read" in told
+        assert f"{flag} is 'a', expected --labels with it" in refusal(capsys, *plan, flag, "a")
+    output = refusal(capsys, *plan, "--labels", "cells", "--columns", "a,b")
+    assert "--columns is 'a,b', expected --table with it" in output
+    output = refusal(capsys, *plan, "--labels", "cells", "--table", tmp_path / "none.csv")
+    assert "none.csv: can't be read" in output
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
-def test_of_two_label_maps_the_first_one_has_the_table(
+def test_the_table_belongs_to_the_first_of_two_label_maps(
     sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     again, table = sample / "labels/cells", tmp_path / "t.csv"
     table.write_text("label,score\n2,0.5\n")
     flags = ("--channels", "DNA", "--labels", "cells", "--table", table)
-    for more, is_told in ((), False), (("--labels", f"again={again}"), True):
+    for more, is_reported in ((), False), (("--labels", f"again={again}"), True):
         assert run("plan", sample, "-o", tmp_path / "out", *flags, *more) == 0
-        assert ("the table is joined to cells alone, the first" in said(capsys)) is is_told
+        assert (
+            "the table is joined only to the first label map, cells" in said(capsys)
+        ) is is_reported
     out, flags = tmp_path / "small", (*flags, *more, "--color-by", "score", "--grid", "2x1")
     build(sample, out, *flags)
     assert objects_of(out)["default"] == "score"
     assert objects_of(out, "again")["default"] != "score"
     said(capsys)
-    told = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
-    assert "--color-by is 'scores', expected one of volume, area, " in told
-    assert told.endswith(", score")
+    output = refusal(capsys, "plan", sample, "-o", tmp_path / "o", *flags, "--color-by", "scores")
+    assert "--color-by is 'scores', expected one of volume, area, " in output
+    assert output.endswith(", score")
 
 
 @pytest.mark.slow
-def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: Path) -> None:
-    """Labels at half the image's resolution, in a file of their own with a place of their own."""
+def test_tiles_fit_labels_of_another_spacing_and_place(sample: Path, tmp_path: Path) -> None:
+    """The labels have half the image's resolution, and their file states another place."""
     tissue = make_tissue(SHAPE, 3)
     coarse = tissue.labels[::2, ::2, ::2]
     place = tmp_path / "coarse.ome.zarr"
@@ -444,7 +450,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
     voxels = np.asarray(zarr.open_group(sample, mode="r")["0"][3])[::2, ::2, ::2]
     for label, mean in zip(found, column_of(out, "mean_CD3"), strict=True):
         assert mean == pytest.approx(voxels[coarse == label].mean(), rel=1e-5)
-    # the file's own colour of one object; the others have hues, not those of a column of its words
+    # one object has the file's own colour; all others have hues and not colours of categories
     assert any(column["id"] == "side" for column in objects_of(out)["columns"])
     for tile, rows in objects_of(out)["tiles"].items():
         mesh = read_glb(out / f"bundle/channels/cells/{tile}/lod1.glb")
@@ -456,7 +462,7 @@ def test_places_of_tiles_and_labels_of_another_spacing(sample: Path, tmp_path: P
 @pytest.mark.slow
 @pytest.mark.parametrize("omit_empty", sweep([False, True], kept=[True]))
 def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> None:
-    """Two organs by DICOM's own numbers, the first planes of them left out or not."""
+    """Two organs with DICOM's own numbers; their first planes are left out or not."""
     voxels = np.zeros((12, 16, 14, 2), np.uint8)
     voxels[4:10, 2:7, 3:11, 0] = 1
     voxels[5:10, 9:14, 3:8, 1] = 1
@@ -479,8 +485,8 @@ def test_a_segmentation_lies_on_its_images(tmp_path: Path, omit_empty: bool) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("grid", sweep(["1x1", "2x1"], kept=["2x1"]))
-def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: str) -> None:
-    """Of three boxes in a row, the last in two tiles: 10 x 16 voxels of .5 x .2 um, 10 x 8."""
+def test_the_area_of_each_interface_is_known_for_both_objects(tmp_path: Path, grid: str) -> None:
+    """Three boxes in a row touch in 10 x 16 and 10 x 8 voxels of .5 x .2 um; the last is cut."""
     labels = np.zeros((16, 24, 80), np.uint16)
     labels[3:13, 4:20, 4:20], labels[3:13, 4:20, 20:28], labels[3:13, 8:16, 28:76] = 3, 5, 8
     write_ome_tiff(tmp_path / "cells.ome.tif", labels)
@@ -503,9 +509,7 @@ def test_the_area_of_each_wall_is_known_from_both_sides(tmp_path: Path, grid: st
 
 
 @pytest.mark.slow
-def test_numbers_of_objects_are_read_as_they_are(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_labels_are_read_without_a_cast(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     labels = np.zeros((12, 16, 16), np.uint32)
     labels[3:9, 4:12, 4:12] = 2**31 + 1
     write_ome_tiff(tmp_path / "cells.ome.tif", labels)
@@ -516,7 +520,7 @@ def test_numbers_of_objects_are_read_as_they_are(
 
 @pytest.mark.slow
 def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
-    """Of two boxes the first lies in the dark, the second in what is stained."""
+    """The first of two boxes lies in the dark, the second in stained tissue."""
     labels = np.zeros((20, 24, 48), np.uint16)
     labels[4:16, 4:20, 4:20], labels[4:16, 4:20, 28:44] = 5, 9
     z, y, x = np.indices(labels.shape) - np.array([9.5, 11.5, 35.5]).reshape(3, 1, 1, 1)
@@ -548,10 +552,10 @@ def test_a_stain_is_painted_on_the_objects(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_alone", [False, True])
-def test_what_is_too_thin_is_named_and_left_out(
+def test_objects_that_are_too_thin_are_reported_and_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], is_alone: bool
 ) -> None:
-    """Beside a cell, and as all that there is: noise, an empty label map after all."""
+    """The label map is noise beside a cell, or only noise, so that no object is left."""
     labels = np.zeros((16, 40, 40), np.uint16)
     rng = np.random.default_rng(1)
     labels[:, :, 20:] = rng.integers(0, 2, (16, 40, 20)) * 700
@@ -560,8 +564,8 @@ def test_what_is_too_thin_is_named_and_left_out(
     source, out = tmp_path / "noise.tif", tmp_path / "out"
     tifffile.imwrite(source, labels, metadata={"axes": "ZYX"})
     build(source, out, "--labels", "cells=.", "--spacing-um", "1,1,1")
-    told = said(capsys)
-    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in told
+    output = said(capsys)
+    assert "cells: 1 object left out, too thin to be built, or full of holes: 700" in output
     assert run("report", out) == 0
     assert run("check", out, "--deep", "--workers", 0) == 0
     if is_alone:
@@ -571,10 +575,10 @@ def test_what_is_too_thin_is_named_and_left_out(
 
 
 @pytest.mark.slow
-def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much(
+def test_columns_named_like_primvars_are_renamed_and_paths_are_not_recorded(
     sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Columns called as a mesh's own values are, in a folder that names a patient."""
+    """The table has columns named like values of a mesh, and its folder names a patient."""
     folder = tmp_path / "Doe, Jane's"
     folder.mkdir()
     masks, table, out = folder / "masks.tif", folder / "jane.csv", tmp_path / "out"
@@ -587,14 +591,14 @@ def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much
     assert ids[-4:] == ["normals_2", "st_2", "points_2", "type"]
     values = dict(zip(labels_of(out).tolist(), column_of(out, "st_2"), strict=True))
     assert (values[2], values[3]) == (2, 5)
-    assert np.isnan(column_of(out, "type")).all()  # nobody has any
+    assert np.isnan(column_of(out, "type")).all()  # no object has a value
     assert run("check", out, "--deep", "--workers", 0) == 0
     for part in ("stage", "bundle"):
         for file in (out / part).rglob("*"):
             held = file.read_bytes() if file.is_file() else b""
             assert b"jane" not in held.lower(), file
 
-    # and what is finished needs the masks no more
+    # finished results do not need the masks any more
     masks.unlink()
     said(capsys)
     for phase in PHASES[1:]:
@@ -603,7 +607,7 @@ def test_names_of_columns_that_mean_something_else_and_places_that_tell_too_much
 
 
 @pytest.mark.slow
-def test_more_objects_than_a_file_can_name_need_more_tiles(
+def test_more_objects_than_a_file_can_number_need_more_tiles(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     edges = (120, 120, 132)  # 40 x 40 x 44 cubes of 27 voxels

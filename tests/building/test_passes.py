@@ -1,4 +1,4 @@
-"""The two rounds over the units, from file to unit: iso-values, places in the world, distances."""
+"""The passes over the voxels, from file to unit: iso-values, world positions, distances."""
 
 import weakref
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ def _units(source: Path, out: Path, *flags: str) -> OutFolder:
 
 
 def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
-    """Return what was built of each unit, by `<tile>/<channel>`."""
+    """Return the record of each unit, by `<tile>/<channel>`."""
     built = {}
     for unit, key in out_folder.index().items():
         built[unit] = load_lods(out_folder.unit_dir(unit, key))
@@ -44,10 +44,10 @@ def _lods(out_folder: OutFolder) -> dict[str, tuple[Lod, ...]]:
 
 
 @pytest.mark.slow
-def test_command_holds_the_evidence_of_one_channel_at_a_time(
+def test_the_command_holds_the_evidence_of_one_channel_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It takes .4 MB a unit, and a dataset has thousands of them."""
+    """The evidence takes .4 MB for each unit, and a dataset has thousands of units."""
     shape = (16, 32, 32)
     field = phantoms.blurred_ball(shape, SPACING, (7.5, 15.5, 15.5), 6.0, 1.0)
     counts = phantoms.as_counts(np.tile(field, (1, 2, 2)), 100, 1100, noise=5.0)
@@ -68,10 +68,10 @@ def test_command_holds_the_evidence_of_one_channel_at_a_time(
 
 
 @pytest.mark.slow
-def test_each_tile_s_body_is_cut_at_its_own_brightness_where_asked(
+def test_each_tile_has_its_own_level_on_request(
     tmp_path: Path,
 ) -> None:
-    """One value for both would make the dim ball a quarter too small, or the bright one swell."""
+    """One value for both would make the dim ball a quarter too small, or the bright one large."""
     radius, shape = 8.0, (32, 32, 64)
     dim = phantoms.blurred_ball(shape, SPACING, (15.5, 15.5, 15.5), radius, 1.0)
     bright = phantoms.blurred_ball(shape, SPACING, (15.5, 15.5, 47.5), radius, 1.0)
@@ -96,8 +96,8 @@ def _mixed_family() -> NDArray[np.uint16]:
 
 
 @pytest.mark.slow
-def test_few_bright_bodies_do_not_hide_the_many_dim_ones(tmp_path: Path) -> None:
-    """The mean gradient climbs into the brightest bodies: why it isn't the default."""
+def test_a_few_bright_balls_do_not_hide_many_dim_ones(tmp_path: Path) -> None:
+    """The mean gradient finds the brightest balls only, so it is not the default."""
     source = phantoms.write_ome_tiff(tmp_path / "mix.ome.tif", _mixed_family(), spacing=SPACING)
     (tmp_path / "mean.toml").write_text('[isovalue]\ncriterion = "pekar-mean"\n')
     found = []
@@ -107,8 +107,8 @@ def test_few_bright_bodies_do_not_hide_the_many_dim_ones(tmp_path: Path) -> None
         iso = channel["iso"]["r0_c0"]
         found.append(iso["value"] + iso["background"])
     default, mean = found
-    assert default == pytest.approx(250, rel=0.2)  # half-way up the dim ones
-    assert mean > 400  # above all of them
+    assert default == pytest.approx(250, rel=0.2)  # half-way between background and dim balls
+    assert mean > 400  # above all dim balls
 
 
 # --- places
@@ -119,7 +119,7 @@ ORIGIN = (100.0, 200.0, 300.0)
 
 
 def _pyramid(path: Path, skip: int, translations: tuple[dict[str, float] | None, ...]) -> Path:
-    """Write a ball at two levels, the coarse one of means over 2 x 2 x 2 voxels from `skip` on."""
+    """Write a ball at two levels, the coarse one of means of 2 x 2 x 2 voxels from `skip` on."""
     ball = phantoms.blurred_ball((48, 48, 48), SPACING, CENTER, RADIUS, 1.2)
     fine = phantoms.as_counts(ball, 100, 1100)
     whole = fine[skip : 48 - skip, skip : 48 - skip, skip : 48 - skip]
@@ -130,7 +130,7 @@ def _pyramid(path: Path, skip: int, translations: tuple[dict[str, float] | None,
 
 
 def _center_of(mesh: Mesh) -> NDArray[np.float64]:
-    """Return the centre of mass (x, y, z) of what a closed mesh encloses."""
+    """Return the centre of mass (x, y, z) of the solid that a closed mesh encloses."""
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     sixths = (a * np.cross(b, c)).sum(axis=1)  # tetrahedra from the origin
     center: NDArray[np.float64] = sixths @ ((a + b + c) / 4) / sixths.sum()
@@ -154,10 +154,10 @@ COARSE_PART = ([*COARSE, "--region", "2:18,3:19,1:17"], (2, 3, 1, 18, 19, 17))
         kept=[(*FINE_PART, False), (COARSE, None, False), (*COARSE_PART, True)],
     ),
 )
-def test_a_body_lies_at_its_place_at_any_level_and_in_any_region(
+def test_a_ball_has_the_right_position_at_any_level_and_in_any_region(
     tmp_path: Path, flags: list[str], region: tuple[int, ...] | None, stated: bool
 ) -> None:
-    # voxel 0 of level 1 is the mean of level 0's first two, or, as the file states, begins later
+    # voxel 0 of level 1 is the mean of level 0's first two, or begins later if the file states so
     skip = 4 if stated else 0
     level = int(flags[1])
     first = dict(zip("zyx", ORIGIN, strict=True))
@@ -169,7 +169,7 @@ def test_a_body_lies_at_its_place_at_any_level_and_in_any_region(
     spacing = 2.0**level
     np.testing.assert_allclose(_center_of(lods[0].mesh), zyx_to_xyz(CENTER), atol=0.05 * spacing)
 
-    # the voxels as well: the stage says where the volume's first and last lattice points are
+    # the stage also states the positions of the volume's first and last lattice points
     assert main(["stage", str(out_folder.out), "--workers", "0"]) == 0
     n = (48 - 2 * skip) // 2 if level else 48
     box = np.reshape(region if region is not None else (0, 0, 0, n, n, n), (2, 3))
@@ -187,7 +187,7 @@ def test_a_body_lies_at_its_place_at_any_level_and_in_any_region(
 
 
 def _points_on(mesh: Mesh, count: int) -> pv.PolyData:
-    """Return random points, evenly over the mesh's area."""
+    """Return random points that are evenly distributed over the mesh's area."""
     rng = np.random.default_rng(0)
     a, b, c = (mesh.positions[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -202,10 +202,10 @@ def _surface(mesh: Mesh) -> pv.PolyData:
 
 
 @pytest.mark.slow
-def test_all_but_a_hundredth_of_the_surface_lies_within_the_recorded_distance(
+def test_99_percent_of_the_surface_lie_within_the_recorded_distance(
     tmp_path: Path,
 ) -> None:
-    """Held against random points, both ways, and VTK's implicit distance."""
+    """The distance is compared at random points of both surfaces with VTK's implicit distance."""
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", phantoms.f_phantom(2), spacing=SPACING)
     (lods,) = _lods(_units(source, tmp_path / "out")).values()
     assert len(lods) == 4
@@ -219,7 +219,7 @@ def test_all_but_a_hundredth_of_the_surface_lies_within_the_recorded_distance(
             )
             for here, there in ((finest, coarse.mesh), (coarse.mesh, finest))
         ]
-        # the record is against the surface before any simplification: lod0 is that near to it
+        # the record compares with the surface before simplification, and lod0 is close to that
         slack = lods[0].distance_um
         assert max(np.percentile(way, 98) for way in ways) <= coarse.distance_um + slack
         assert max(way.max() for way in ways) >= coarse.distance_um - slack

@@ -1,4 +1,4 @@
-"""What holds for every input of a kind: plans, names, bricks, KTX2 and OpenVDB files.
+"""Properties that hold for all inputs of a kind: plans, names, bricks, KTX2 and OpenVDB files.
 
 Deterministic (derandomize), so that a failure in CI is one here. What is held by the modules' own
 tests (tilings, legality of identifiers, min-max bricks, trees) is not repeated.
@@ -47,7 +47,9 @@ PLAN_SCHEMA = Draft202012Validator(json.loads(schema_path("plan.schema.json").re
 lengths = st.integers(2, 90)
 shapes = st.tuples(st.integers(2, 40), lengths, lengths)
 spacings = st.tuples(*[st.floats(0.05, 5.0)] * 3)
-names = st.text(min_size=1, max_size=40).filter(str.isprintable)  # as readers give them
+names = st.text(min_size=1, max_size=40).filter(
+    str.isprintable
+)  # like the names that readers return
 volumes = npst.arrays(
     np.uint8,
     npst.array_shapes(min_dims=3, max_dims=3, min_side=1, max_side=21),
@@ -56,7 +58,7 @@ volumes = npst.arrays(
 
 
 def cuts() -> st.SearchStrategy[dict[str, object]]:
-    """Return how a region may be cut: by tiles, by a grid, as the defaults do."""
+    """Return settings that cut a region by tile size, by a grid, or by the defaults."""
     return st.one_of(
         st.just({}),
         st.builds(lambda z, y, x: {"tile_size": [z, y, x]}, lengths, lengths, lengths),
@@ -66,7 +68,7 @@ def cuts() -> st.SearchStrategy[dict[str, object]]:
 
 @st.composite
 def regions(draw: st.DrawFn, shape: tuple[int, int, int]) -> str:
-    """Return a region of at least two voxels each way inside a shape, or none."""
+    """Return a region inside a shape, at least two voxels along each axis, or no region."""
     if draw(st.booleans()):
         return ""
     ends = []
@@ -100,7 +102,7 @@ def plans(draw: st.DrawFn) -> Plan:
             settings=wanted,
             formats=["ome-zarr"],
         )
-    except (UsageError, SourceError) as error:  # told, in one line, before anything is written
+    except (UsageError, SourceError) as error:  # refused in one line before anything is written
         assert "\n" not in str(error)  # noqa: PT017
         assume(False)
         raise
@@ -122,7 +124,7 @@ def test_a_plan_covers_its_region_once_and_its_windows_lie_inside(plan: Plan) ->
             assert all(a <= b for a, b in zip(own.stop, wide.stop, strict=True))
             assert all(a >= b for a, b in zip(wide.start, inner.start, strict=True))
             assert all(a <= b for a, b in zip(wide.stop, inner.stop, strict=True))
-        # all the halo is there, but for where the data end
+        # the whole halo is there, except where the data end
         for low, high, own, end, reach, first, last in zip(
             window.start, window.stop, tile.box.start, tile.lattice(plan.region).stop,
             plan.halo, plan.region.start, plan.region.stop, strict=True,
@@ -136,7 +138,7 @@ def test_a_plan_covers_its_region_once_and_its_windows_lie_inside(plan: Plan) ->
 @pytest.mark.slow
 @MANY
 @given(plans())
-def test_a_plan_survives_its_file(plan: Plan) -> None:
+def test_a_plan_read_from_its_file_is_the_same(plan: Plan) -> None:
     content = seal(json.loads(json.dumps(to_json(plan))))
     assert list(PLAN_SCHEMA.iter_errors(content)) == []
     assert from_json(content) == plan
@@ -149,13 +151,13 @@ def test_a_plan_survives_its_file(plan: Plan) -> None:
 @given(st.lists(st.text(min_size=1, max_size=300), min_size=2, max_size=12, unique=True))
 def test_identifiers_are_unique_and_stable_and_fit_a_file_name(texts: list[str]) -> None:
     identifiers = [to_identifier(text) for text in texts]
-    # also where a file system doesn't tell upper from lower case: then they are told apart by it
+    # identifiers of names that differ only in case differ, too
     assert len(set(identifiers)) == len(texts)
     for text, identifier in zip(texts, identifiers, strict=True):
         assert to_identifier(text) == identifier
         assert len(f"{identifier}_r999_c999_z999_volume.usdc".encode()) <= 255
         shown = from_identifier(identifier)
-        # what is shown of a name cut short is how it begins
+        # a shortened name is shown by its beginning
         assert shown == text or text.startswith(shown.removesuffix("\u2026"))
         if shown == text:
             assert to_identifier(shown) == identifier
@@ -163,7 +165,7 @@ def test_identifiers_are_unique_and_stable_and_fit_a_file_name(texts: list[str])
 
 @FEW
 @given(volumes, st.integers(-1, 254))
-def test_bricks_of_any_volume_are_packed_and_unpacked(
+def test_bricks_of_any_volume_are_the_same_after_packing_and_unpacking(
     volume: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], threshold: int
 ) -> None:
     bvh = build(volume, threshold)
@@ -183,7 +185,7 @@ def test_bricks_of_any_volume_are_packed_and_unpacked(
 
 @FEW
 @given(volumes)
-def test_any_volume_comes_back_from_ktx2(
+def test_any_volume_is_the_same_after_writing_and_reading_ktx2(
     volume: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
 ) -> None:
     levels = mip_levels(volume)
@@ -194,7 +196,7 @@ def test_any_volume_comes_back_from_ktx2(
     assert (header["levels"], header["format"], header["scheme"]) == (len(levels), 9, 2)
     assert struct.unpack_from("<I", descriptor)[0] == len(descriptor)
     assert b"KTXwriter\0" in key_values
-    # levels fill the file's end without a gap, the smallest first, and unpack to what went in
+    # levels fill the end of the file without a gap, smallest first, and unpack to the input
     end = len(texture.data)
     for level, (offset, length, plain) in zip(levels, index, strict=True):
         assert offset + length == end
@@ -210,7 +212,7 @@ def test_any_volume_comes_back_from_ktx2(
         st.tuples(st.integers(1, 24), st.integers(1, 24), st.sampled_from([1, 2, 4])),
     )
 )
-def test_any_table_comes_back_from_ktx2(
+def test_any_table_is_the_same_after_writing_and_reading_ktx2(
     image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
 ) -> None:
     np.testing.assert_array_equal(decode_finest(encode_2d(image).data)[0], image)
@@ -218,7 +220,7 @@ def test_any_table_comes_back_from_ktx2(
 
 @FEW
 @given(volumes, st.integers(0, 10_000), st.integers(0, 255))
-def test_a_spoilt_ktx2_is_refused_or_of_the_same_size(
+def test_a_damaged_ktx2_is_refused_or_has_the_same_size(
     volume: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], at: int, value: int
 ) -> None:
     data = bytearray(encode_3d([volume]).data)
@@ -233,7 +235,7 @@ def test_a_spoilt_ktx2_is_refused_or_of_the_same_size(
 
 @FEW
 @given(volumes, spacings, st.tuples(*[st.floats(-1e4, 1e4)] * 3))
-def test_any_volume_comes_back_from_openvdb(
+def test_any_volume_is_the_same_after_writing_and_reading_openvdb(
     tmp_path: Path,
     volume: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
     spacing: tuple[float, float, float],
@@ -242,7 +244,7 @@ def test_any_volume_comes_back_from_openvdb(
     path = tmp_path / "a.vdb"
     write_vdb(path, volume, first_um=first, spacing_um=spacing)
     check_vdb(path)
-    vdb = read_vdb(path)  # the tests' own reader, by OpenVDB's tables
+    vdb = read_vdb(path)  # the tests' own reader, written after OpenVDB's tables
     assert len(vdb.voxels) == np.count_nonzero(volume)
     (grid,) = read_vdb_head(path)
     assert grid.spacing is not None

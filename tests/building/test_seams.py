@@ -1,4 +1,4 @@
-"""Tiles against their neighbours: what two units make of the plane, and the voxels, they share.
+"""Neighbouring tiles agree on the plane and the voxels that they share.
 
 The scene (`phantoms.seam_scene`) has on every face between two tiles what could make them disagree:
 a change of brightness, to which each tile's own level follows, and fragments, gaps and cavities of
@@ -65,7 +65,7 @@ class Seam:
     plane: int
 
     def rim(self, lod: Lod, plan: Plan) -> dict[bytes, NDArray[np.float32]]:
-        """Return the normals of the vertices on the common plane by their float32 position."""
+        """Return the normals of the vertices on the common plane, by float32 position."""
         column, sign = ((2, 1), (1, -1), (0, 1))[self.axis]
         at = np.float32(sign * self.plane * plan.spacing_um[self.axis])
         on_plane = lod.mesh.positions[:, column] == at
@@ -113,7 +113,7 @@ def _build(folder: Path, scene: NDArray[np.uint16], settings: str) -> Built:
 
 
 def _a_quarter_up(levels: ChannelLevels, level: Level, tile: TileEvidence) -> float:
-    """A tile's level by itself, however far from the channel's."""
+    """Return a tile's own level, however much it differs from the channel's."""
     counts = np.cumsum(tile.plain.counts + tile.padding.counts)
     places = np.searchsorted(counts, [0.5 * counts[-1], 0.99 * counts[-1]])
     low, high = levels.histogram.centres[places]
@@ -131,7 +131,7 @@ def _seams(plan: Plan) -> list[Seam]:
 
 
 def _chessboard(built: Built, even: int, odd: int) -> Mesh:
-    """Return one mesh of all tiles, in turn at one level and at the other."""
+    """Return one mesh of all tiles, alternately at one level and at the other."""
     meshes = [
         built.lods[tile.id][(even, odd)[sum(start // TILE for start in tile.box.start) % 2]].mesh
         for tile in built.plan.tiles
@@ -145,21 +145,21 @@ def _assert_same_rims(built: Built, level: int) -> None:
     for seam in _seams(built.plan):
         ours, theirs = (built.lods[tile.id] for tile in (seam.first, seam.second))
         rim = seam.rim(ours[level], built.plan)
-        # a face is crossed by bodies of 18 voxels and more: from end to end of each, at least
+        # each face is crossed by structures of at least 18 voxels
         places = np.array([np.frombuffer(place, np.float32) for place in rim])
         assert len(rim) > 20, seam
         assert np.sort(np.ptp(places, axis=0))[1] > 16, seam
         assert set(rim) == set(seam.rim(theirs[level], built.plan)), seam
-        # and at any other level: viewers show neighbours at different ones
+        # at all other levels, too, because viewers show neighbours at different ones
         assert set(rim) == set(seam.rim(theirs[0], built.plan)), seam
 
 
 @pytest.mark.slow
-def test_scene_could_tell_neighbours_apart(built: Built) -> None:
-    """Else the tests below would show nothing."""
+def test_the_scene_would_reveal_disagreeing_neighbours(built: Built) -> None:
+    """Otherwise the tests below would show nothing."""
     seams = _seams(built.plan)
     assert len(seams) == 12
-    # a unit doesn't see all of its neighbour: what it needs of it comes from the halo
+    # a unit does not read all of its neighbour, only the halo
     assert max(built.plan.halo) + 1 < TILE
     for seam in seams:
         dim, bright = sorted(built.iso_values[tile.id] for tile in (seam.first, seam.second))
@@ -176,8 +176,8 @@ def test_neighbours_have_the_same_vertices_on_their_common_plane(built: Built, l
 
 
 @pytest.mark.parametrize(("even", "odd"), list(product(range(LODS), repeat=2)))
-def test_tiles_make_one_sound_surface_at_any_two_levels(built: Built, even: int, odd: int) -> None:
-    """As on a chessboard: each face between two tiles lies between the two levels.
+def test_tiles_make_one_valid_surface_at_any_two_levels(built: Built, even: int, odd: int) -> None:
+    """Tiles alternate between two levels like the squares of a chessboard.
 
     Nothing is left open, and nothing crosses or doubles: no crack, and no wall in the planes.
     """
@@ -186,7 +186,7 @@ def test_tiles_make_one_sound_surface_at_any_two_levels(built: Built, even: int,
 
 
 @pytest.mark.slow
-def test_tiles_make_one_sound_surface_on_thinned_planes(
+def test_tiles_make_one_valid_surface_on_thinned_planes(
     tmp_path: Path, scene: NDArray[np.uint16]
 ) -> None:
     """Every third plane carries the surface; three divides no tile."""
@@ -211,21 +211,23 @@ def test_neighbours_have_the_same_normals_on_their_common_plane(built: Built, le
             np.testing.assert_allclose(normal, theirs[position], atol=1e-5)
 
 
-def test_nothing_is_left_of_fragments_gaps_and_cavities(built: Built) -> None:
+def test_no_fragments_gaps_and_cavities_are_left(built: Built) -> None:
     """On a common plane, each face shows one outline: that of its ball or of its slabs."""
     for seam in _seams(built.plan):
         rim = seam.rim(built.lods[seam.first.id][0], built.plan)
         zyx = np.array([np.frombuffer(p, np.float32)[[2, 1, 0]] for p in rim]) * [1, -1, 1]
         across = np.delete(zyx, seam.axis, axis=1)
-        across = np.minimum(across, 2 * TILE - 1 - across)  # as in the first quadrant
+        across = np.minimum(across, 2 * TILE - 1 - across)  # mirrored into the first quadrant
         at_bodies = across[(across < TILE - 8).all(axis=1)]  # without the ball in the middle
         ways = np.arctan2(*(at_bodies - 13).T) / (2 * np.pi) + 0.5
-        assert len(np.unique((8 * ways).astype(int) % 8)) == 8  # all the way round
+        assert len(np.unique((8 * ways).astype(int) % 8)) == 8  # the outline covers all directions
         assert np.abs(at_bodies - 13).max() < 13  # no fragment
-        assert np.abs(at_bodies - 13).max(axis=1).min() > 6  # no cavity; no gap: a whole outline
+        assert (
+            np.abs(at_bodies - 13).max(axis=1).min() > 6
+        )  # no cavity and no gap, because the outline is complete
 
 
-def test_apron_is_the_neighbours_own_voxels(built: Built, scene: NDArray[np.uint16]) -> None:
+def test_the_apron_holds_the_neighbours_own_voxels(built: Built, scene: NDArray[np.uint16]) -> None:
     plan = built.plan
     own = np.zeros(scene.shape, np.uint8)
     for tile in plan.tiles:
@@ -239,7 +241,7 @@ def test_apron_is_the_neighbours_own_voxels(built: Built, scene: NDArray[np.uint
         lattice = tile.lattice(plan.region)
         part = tuple(slice(a, b + 2) for a, b in zip(lattice.start, lattice.stop, strict=True))
         np.testing.assert_array_equal(built.volumes[tile.id], padded[part])
-    # the apron is a plane of its own, not one of the tile's once more
+    # the apron is another plane and not a copy of the tile's own
     for seam in _seams(plan):
         ours = np.moveaxis(built.volumes[seam.first.id], seam.axis, 0)
         theirs = np.moveaxis(built.volumes[seam.second.id], seam.axis, 0)
@@ -248,7 +250,7 @@ def test_apron_is_the_neighbours_own_voxels(built: Built, scene: NDArray[np.uint
 
 
 def test_lattice_points_on_the_iso_value_make_no_degenerate_triangle() -> None:
-    """Whole numbers as distances: every second crossing falls on a lattice point."""
+    """Distances are whole numbers, so every second crossing falls on a lattice point."""
     region = Box((0, 0, 0), (13, 13, 25))
     z, y, x = np.indices(region.shape)
     distance = np.clip(5 - abs(z - 6) - abs(y - 6) - abs(x - 12), -2, 2).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The level as a build states it: one a channel, and enough to find the surface again."""
+"""The level that a build states: one for each channel, enough to find the surface again."""
 
 import json
 import shutil
@@ -36,7 +36,7 @@ max_cavity_um = 0.0
 
 
 def _voxels() -> NDArray[np.uint16]:
-    """Return balls on a rising ground, noise alone, one value, balls on an even one, dim ones."""
+    """Return five channels: balls on a rising background, noise, one value, even and dim balls."""
     rng = np.random.default_rng(0)
     field = np.zeros(SHAPE, np.float32)
     for y in (16.0, 46.0):
@@ -71,13 +71,13 @@ def out(source: Path) -> Path:
     settings = source.parent / "settings.toml"
     settings.write_text(SETTINGS)
     out = source.parent / "out"
-    told = ("--config", str(settings))
-    assert make_assets(source, out, "2x1", "--workers", "0", plan=told) == 0
+    flags = ("--config", str(settings))
+    assert make_assets(source, out, "2x1", "--workers", "0", plan=flags) == 0
     return out
 
 
 def _stated(out: Path, channel: str) -> dict[str, Any]:
-    """Return the file that the stage names, found as another program would."""
+    """Return the file that the stage names, found in the way of another program."""
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     prim = stage.GetPrimAtPath(f"/Specimen/Channels/{channel}")
     name = prim.GetAttribute("stereocell:levelFile").Get()
@@ -89,7 +89,7 @@ def _stated(out: Path, channel: str) -> dict[str, Any]:
 def _bounded(
     field: NDArray[np.float64], voxels: NDArray[np.uint16], denoising: dict[str, Any]
 ) -> NDArray[np.float64]:
-    """Return the field, moved from the voxels without hot voxels by no more than the file says."""
+    """Return the smoothed field, limited to the largest shift that the file states."""
     others = np.ones(denoising["hot_voxel_box"], bool)
     in_plane = [n > 1 for n in denoising["median_voxels"]]
     straight = [1 if is_in else slice(None) for is_in in in_plane]
@@ -101,7 +101,7 @@ def _bounded(
 
 
 def _again(voxels: NDArray[np.uint16], stated: dict[str, Any]) -> NDArray[np.float64]:
-    """Return the denoised voxels above the level, by scipy alone, from what the file says."""
+    """Return the denoised voxels above the level, computed by scipy from the file's values."""
     denoising = stated["denoising"]
     field = ndimage.median_filter(voxels, denoising["median_voxels"], mode="nearest")
     sigma = denoising["gaussian_sigma_um"] / np.array(SPACING)
@@ -140,20 +140,20 @@ def test_scikit_image_finds_the_surface_where_the_stage_says(out: Path, channel:
     ).astype(np.float64)
     ours = np.stack([ours[:, 2], -ours[:, 1], ours[:, 0]], axis=1) / SPACING
     ours = ours[((ours > 1) & (ours < np.array(SHAPE) - 2)).all(axis=1)]
-    # the field at our vertices, over its slope: how far they lie from the level, in voxels
+    # the field at StereoCell's vertices over its slope: their distance from the level, in voxels
     slopes = np.gradient(above)
     value, *slope = (ndimage.map_coordinates(one, ours.T, order=1) for one in (above, *slopes))
     away = np.abs(value) / np.linalg.norm(slope, axis=0)
     assert len(ours) > 500
     assert np.percentile(away, 95) < 0.1
-    # and all of theirs has some of ours nearby: nothing is missing
+    # each vertex of scikit-image has one of StereoCell's nearby, so nothing is missing
     from scipy.spatial import cKDTree
 
     assert cKDTree(ours).query(theirs)[0].max() < 3
 
 
 @pytest.mark.slow
-def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> None:
+def test_stage_manifest_and_report_state_the_same_for_each_channel(out: Path) -> None:
     stage = Usd.Stage.Open(str(out / "stage" / "stage.usda"))
     manifest = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))
     remarks = {r.title: r.lines for r in find_remarks(gather(OutFolder(out)))}
@@ -166,7 +166,7 @@ def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> No
         assert prim.GetAttribute("stereocell:surfaceVerdict").Get() == channel["surface"]
         assert (channel["tileset"] is None) == (not has_surface)
         assert (channel["level"] is None) == (not has_surface)
-        assert channel["volumes"]  # what there is can be seen all the same
+        assert channel["volumes"]  # the channel is visible as a volume
         reason = prim.GetAttribute("stereocell:surfaceReason").Get() or ""
         assert channel["surface_reason"] == reason
         assert reason.startswith(BEGINNINGS[confidence])
@@ -180,7 +180,7 @@ def test_stage_manifest_and_report_say_the_same_of_each_channel(out: Path) -> No
     assert 100 < uneven["level"]["iso"] < 200
 
 
-def test_all_tiles_have_the_channel_s_level_and_say_what_they_hold(out: Path) -> None:
+def test_all_tiles_state_the_channel_s_level_unless_it_has_no_surface(out: Path) -> None:
     for name, channel in OutFolder(out).survey().items():
         values = {tile["value"] for tile in channel["iso"].values()}
         assert len(values) == 1, name
@@ -188,7 +188,7 @@ def test_all_tiles_have_the_channel_s_level_and_say_what_they_hold(out: Path) ->
 
 
 @pytest.mark.slow
-def test_a_value_above_the_background_is_that_of_the_build(
+def test_giving_the_found_value_above_the_background_gives_the_same_surfaces(
     source: Path, out: Path, tmp_path: Path
 ) -> None:
     iso = _stated(out, "uneven")["iso"]
@@ -199,7 +199,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
     found = OutFolder(tmp_path / "out").index()
     ours = {unit: key for unit, key in OutFolder(out).index().items() if unit.endswith("/uneven")}
-    assert found == ours  # the same keys: the very same surfaces
+    assert found == ours  # the same keys mean the same surfaces
 
 
 @pytest.mark.slow
@@ -207,7 +207,7 @@ def test_a_value_above_the_background_is_that_of_the_build(
 @pytest.mark.parametrize(
     ("given", "side"), sweep([("5000", "below"), ("-3", "above")], kept=[("5000", "below")])
 )
-def test_a_given_level_that_parts_nothing_has_no_surface_and_says_why(
+def test_a_given_level_with_all_voxels_on_one_side_has_no_surface_and_a_reason(
     source: Path, tmp_path: Path, given: str, side: str
 ) -> None:
     flags = ["--grid", "2x1", "--channels", "even", f"--iso-value=even={given}"]
@@ -223,7 +223,7 @@ def test_a_given_level_that_parts_nothing_has_no_surface_and_says_why(
 @pytest.mark.slow
 @pytest.mark.parametrize("values", [(0, 1), (0, 255), (3, 900)])
 @pytest.mark.parametrize("scope", ["channel", "tile"])
-def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
+def test_the_surface_of_a_mask_lies_half_way_and_a_ball_keeps_its_size(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], values: tuple[int, int], scope: str
 ) -> None:
     away = np.linalg.norm(
@@ -237,8 +237,8 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
     out = tmp_path / "out"
     assert main(["plan", str(path), "-o", str(out), "--grid", "2x1", "--iso-scope", scope]) == 0
     assert main(["units", str(out), "--workers", "0"]) == 0
-    told = f"a mask of {values[0]} and {values[1]}, whose surface lies half-way"
-    assert told in capsys.readouterr().err
+    note = f"a mask of {values[0]} and {values[1]}, whose surface lies half-way"
+    assert note in capsys.readouterr().err
     (channel,) = OutFolder(out).survey().values()
     assert {tile["value"] for tile in channel["iso"].values()} == {sum(values) / 2}
     assert channel["appearance"]["surface"] == "clear"
@@ -252,7 +252,7 @@ def test_a_mask_has_its_surface_half_way_and_a_ball_its_size(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
-def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
+def test_a_mask_of_single_voxels_has_no_surface_and_a_note_says_why(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mask = np.zeros(SHAPE, np.uint8)
@@ -261,29 +261,31 @@ def test_a_mask_of_single_voxels_has_no_surface_and_says_what_took_them(
     phantoms.write_ome_tiff(path, mask, spacing=SPACING)
     out = tmp_path / "out"
     assert main(["build", str(path), "-o", str(out), "--workers", "0"]) == 0
-    told = capsys.readouterr().err
-    assert "half-way; 0% of it is left by a median of 3 x 3 voxels and a Gaussian of 1 um" in told
-    assert "no surface: all voxels lie below the level 127.5" in told
+    output = capsys.readouterr().err
+    assert (
+        "half-way; 0% of it is left after a median of 3 x 3 voxels and a Gaussian of 1 um" in output
+    )
+    assert "no surface: all voxels lie below the level 127.5" in output
     (channel,) = json.loads((out / "bundle" / "manifest.json").read_text("utf-8"))["channels"]
     assert channel["surface"] == "none"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flag", ["--iso-value=even=500+b", "--surfaces=even=500+b"])
-def test_a_level_above_no_background_is_said_to_count_from_0(
+def test_a_note_says_that_a_level_without_background_counts_from_0(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flag: str
 ) -> None:
     (tmp_path / "s.toml").write_text(f"{SETTINGS}background_um = 0.0\n")
     flags = ["--channels", "even", "--config", str(tmp_path / "s.toml"), flag]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0"]) == 0
-    told = "units: even: there is no background to subtract: its level counts from 0"
-    assert told in capsys.readouterr().err
+    note = "units: even: found no background to subtract: its level counts from 0"
+    assert note in capsys.readouterr().err
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
-def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
+def test_each_requested_surface_is_a_channel_of_its_own(source: Path, tmp_path: Path) -> None:
     flags = ["-o", str(tmp_path / "out"), "--workers", "0", "--channels", "even"]
     surfaces = ["--surfaces", "even=outer,800"]
     assert main(["build", str(source), *flags, *surfaces]) == 0
@@ -293,14 +295,14 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
     assert outer["level"]["iso"] < inner["level"]["iso"] == 800
     assert outer["triangles"][0] > 0 < inner["triangles"][0]
     assert outer["color"] != inner["color"]
-    # the voxels are shown once: the second is a surface within the first one's volume
+    # the voxels are shown once; the second channel is only a surface in the first one's volume
     shown = [
         json.loads((tmp_path / "out" / "bundle" / channel["volumes"]["path"]).read_text("utf-8"))
         for channel in (outer, inner)
     ]
     assert [len(one["volumes"]) for one in shown] == [1, 0]
     assert main(["check", str(tmp_path / "out"), "--deep", "--workers", "0"]) == 0
-    # and they are read and counted once for both
+    # the voxels are read and counted once for both
     windows = list((tmp_path / "out" / "units").glob("window-*.json"))
     assert len(windows) <= 2
 
@@ -315,7 +317,7 @@ def test_each_surface_asked_for_is_a_channel_of_its_own(source: Path, tmp_path: 
         ("even=", "--surfaces is 'even=', expected CHANNEL=SURFACE,..."),
     ],
 )
-def test_a_surface_that_is_none_is_one_clear_line(
+def test_an_unknown_surface_is_refused_in_one_line(
     source: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -331,32 +333,32 @@ def test_a_surface_that_is_none_is_one_clear_line(
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "note"),
     [
         (
             ["--surfaces", "even=inner", "--iso-value", "even=700"],
-            "even: built where --surfaces says, not at the iso-value 700",
+            "even: --surfaces chooses the level, so iso-value 700",
         ),
         (
             ["--surfaces", "3=outer,800", "--iso-criterion", "adaptive"],
-            "even 800: built where --surfaces says, not by adaptive",
+            "even 800: --surfaces chooses the level, so adaptive is ignored",
         ),
         (
             ["--iso-value", "3=700", "--iso-scope", "tile"],
-            "even: its level is given, so the same in all tiles: --iso-scope tile is for levels",
+            "even: the settings state its level, so all tiles have the same one, and --iso-scope",
         ),
     ],
 )
-def test_a_setting_that_another_overrules_is_told_to_go_unused(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+def test_a_note_names_a_setting_that_another_one_overrules(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], note: str
 ) -> None:
     flags = ["-o", str(tmp_path / "out"), "--channels", "even", *flags]
     assert main(["plan", str(source), *flags]) == 0
-    assert f"plan: {told}" in capsys.readouterr().err
+    assert f"plan: {note}" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_surfaces_are_rungs_of_the_ladder_whatever_the_criterion(
+def test_surfaces_by_name_are_found_levels_whatever_the_criterion_is(
     source: Path, tmp_path: Path
 ) -> None:
     flags = ["--channels", "even", "--surfaces", "even=outer", "--workers", "0"]
@@ -370,13 +372,13 @@ def test_surfaces_are_rungs_of_the_ladder_whatever_the_criterion(
     assert levels[0] == levels[1] == levels[2]
 
 
-def test_a_window_of_ct_is_refused_where_nothing_is_a_ct(
+def test_a_named_window_of_ct_is_refused_for_other_volumes(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     flags = ["-o", str(tmp_path / "out"), "--window", "even=brain"]
     assert main(["plan", str(source), *flags]) == 2
     error = capsys.readouterr().err
-    assert "--window even=brain: a window in Hounsfield units, of CT, and nothing says" in error
+    assert "--window even=brain: this window is in Hounsfield units, and the input is not" in error
     assert error.count("\n") == 1
 
 
@@ -390,7 +392,7 @@ def test_a_window_given_twice_is_refused(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
-def test_tiles_of_their_own_level_state_it_as_a_field(source: Path, tmp_path: Path) -> None:
+def test_tiles_with_their_own_levels_state_them_as_a_field(source: Path, tmp_path: Path) -> None:
     copy = tmp_path / "it's a copy.ome.zarr"
     shutil.copytree(source, copy)
     flags = ["-o", str(tmp_path / "out"), "--channels", "even", "--grid", "3x1", "--workers", "0"]

@@ -10,11 +10,11 @@ from support import phantoms
 from support.stored_out import emptied, objects_in
 
 SHAPE = (16, 24, 48)
-OF_THE_RUN = ("phases.json", "seconds.json")  # hold seconds
+OF_THE_RUN = ("phases.json", "seconds.json")  # files that hold seconds
 
 
 def _source(folder: Path) -> tuple[str, ...]:
-    """Write an image and a label map; return the command's arguments."""
+    """Write an image and a label map, and return the command's arguments."""
     field = phantoms.blurred_ball(SHAPE, (1, 1, 1), (8, 12, 24), 6.0, 1.0)
     image, labels = folder / "i.ome.tif", folder / "l.ome.tif"
     phantoms.write_ome_tiff(image, phantoms.as_counts(field, 100, 1100, noise=5.0), "ZYX")
@@ -23,14 +23,14 @@ def _source(folder: Path) -> tuple[str, ...]:
 
 
 def _build(out: str, *source: str) -> None:
-    """Run each phase as a command of its own, which knows nothing of the files before it."""
+    """Run each phase as a command of its own, without the files of the previous one."""
     assert main(["plan", *source, "-o", out]) == 0
     for phase in ("units", "stage", "bundle"):
         assert main([phase, out, "--workers", "0"]) == 0
 
 
 @pytest.mark.slow
-def test_a_stored_build_has_the_bytes_of_a_local_one_though_no_file_stays_here(
+def test_a_build_on_object_storage_has_the_bytes_of_a_local_one_and_leaves_no_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source, local = _source(tmp_path), tmp_path / "out"

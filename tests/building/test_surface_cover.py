@@ -1,4 +1,4 @@
-"""How a surface covers the source's voxels above its level, beside what filters removed of them."""
+"""The share of the source's voxels that a surface encloses, and the share that filters remove."""
 
 import re
 from pathlib import Path
@@ -44,7 +44,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return phantoms.write_ome_zarr(place, [_voxels()], scales=scales)
 
 
-def test_shares_are_those_of_both_counts() -> None:
+def test_both_shares_follow_from_the_counts() -> None:
     cover = Cover(200, 150, 160) + Cover(0, 0, 0)
     assert cover.missing == pytest.approx(0.25)
     assert cover.added == pytest.approx(10 / 160)
@@ -56,7 +56,7 @@ def test_shares_are_those_of_both_counts() -> None:
 
 
 @pytest.mark.parametrize("step", [(1, 1, 1), (2, 2, 2), (1, 3, 2)])
-def test_all_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, int]) -> None:
+def test_the_voxels_on_the_tile_s_own_points_are_counted(step: tuple[int, int, int]) -> None:
     """SciPy interpolates the solid between the planes that carry it."""
     rng = np.random.default_rng(0)
     voxels = rng.integers(0, 1000, (20, 24, 28)).astype(np.uint16)
@@ -77,7 +77,7 @@ def test_all_voxels_are_counted_on_the_tile_s_own_points(step: tuple[int, int, i
     assert found == Cover(int(above.sum()), int((above & solid).sum()), int(solid.sum()))
 
 
-def test_a_plate_between_two_planes_of_the_surface_counts_as_lost() -> None:
+def test_a_plate_between_two_planes_of_the_surface_counts_as_left_out() -> None:
     voxels = np.zeros((9, 9, 10), np.uint16)
     voxels[3, 2:7, 2:7] = 1000
     voxels[2:7, 2:7, 9] = 1000  # beyond the last plane
@@ -91,7 +91,7 @@ def test_a_plate_between_two_planes_of_the_surface_counts_as_lost() -> None:
 
 
 @pytest.mark.slow
-def test_a_surface_that_loses_sheets_says_so_everywhere(
+def test_plan_report_and_check_state_that_a_surface_leaves_out_sheets(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, unbounded = tmp_path / "out", tmp_path / "unbounded.toml"
@@ -108,7 +108,9 @@ def test_a_surface_that_loses_sheets_says_so_everywhere(
     assert cover is not None
     assert cover.source == above.sum()
     sheets = above[:, :, 40:].sum()
-    assert cover.missing == pytest.approx(sheets / above.sum(), abs=0.03)  # and the ball's skin
+    assert cover.missing == pytest.approx(
+        sheets / above.sum(), abs=0.03
+    )  # the rest is the ball's skin
     assert f"its surface leaves out {cover.missing:.0%} of the source's voxels" in units
     assert REMEDY in " ".join(units.split())
     assert cover.words in deep
@@ -149,9 +151,11 @@ def test_the_built_surface_of_a_thin_dome_is_whole(tmp_path: Path, slice_axis: i
     cover = cover_of(load_record(unit))
     assert cover is not None
     assert cover.source == (voxels > level).sum()
-    assert cover.missing < 0.06  # voxels at ends of lines, and specks that are fragments
+    assert (
+        cover.missing < 0.06
+    )  # the rest is voxels at ends of lines, and specks that are fragments
     mesh = load_lods(unit)[0].mesh
-    # marching cubes of the voxels as they are: no ring by itself that is not there
+    # compared with marching cubes of the unfiltered voxels, there is no extra ring
     theirs = marching_cubes(np.pad(voxels, 1, constant_values=int(GROUND)), level)
     assert _pieces(mesh.positions, mesh.triangles) <= _pieces(*theirs[:2])
 
@@ -160,7 +164,7 @@ def _pieces(positions: NDArray[np.float32], triangles: NDArray[np.integer]) -> i
     return len(trimesh.Trimesh(positions, triangles).split(only_watertight=False))
 
 
-def test_voxels_that_noise_lifts_are_counted_as_they_are_drawn() -> None:
+def test_the_number_of_voxels_that_noise_lifts_is_estimated_well() -> None:
     rng = np.random.default_rng(0)
     denoised = rng.normal(200, 4, 400_000)
     level, noise = 221.0, 22.0
@@ -178,11 +182,14 @@ def test_voxels_that_noise_lifts_are_counted_as_they_are_drawn() -> None:
     [
         (Lifted(0.0, 0.0), Cover(200, 100, 110)),
         (Lifted(60.0, 4.0), Cover(136, 100, 110)),
-        (Lifted(60.0, 30.0), Cover(130, 100, 110)),  # as many as lie below the level in the solid
-        (Lifted(500.0, 30.0), Cover(100, 100, 110)),  # no more than there are
+        (
+            Lifted(60.0, 30.0),
+            Cover(130, 100, 110),
+        ),  # bounded by the voxels below the level in the solid
+        (Lifted(500.0, 30.0), Cover(100, 100, 110)),  # bounded by the voxels that are left out
     ],
 )
-def test_voxels_that_noise_lifts_are_not_left_out(lifted: Lifted, expected: Cover) -> None:
+def test_voxels_that_noise_lifts_do_not_count_as_left_out(lifted: Lifted, expected: Cover) -> None:
     found = SurfaceCover.of(Cover(200, 100, 110), lifted)
     assert found.cover == expected
     assert found.lifted == 200 - expected.source
@@ -190,7 +197,7 @@ def test_voxels_that_noise_lifts_are_not_left_out(lifted: Lifted, expected: Cove
     assert (f"noise alone lifts about {found.lifted} others" in found.words) == bool(found.lifted)
 
 
-def test_the_remedy_is_named_where_it_keeps_more_structure_than_noise() -> None:
+def test_the_remedy_is_advised_if_it_keeps_more_structure_than_noise() -> None:
     loss = Cover(200, 100, 110)
     assert SurfaceCover.of(loss, Lifted(20.0, 0.0)).remedy == REMEDY
     assert SurfaceCover.of(loss, Lifted(40.0, 0.0)).remedy == NO_REMEDY
@@ -199,7 +206,7 @@ def test_the_remedy_is_named_where_it_keeps_more_structure_than_noise() -> None:
 def _cover_after(
     tmp_path: Path, voxels: NDArray[np.uint16], level: float, surface: str = ""
 ) -> tuple[Cover, NDArray[np.bool_]]:
-    """Build the units of a volume; return how the solid covers it, and where it is above level."""
+    """Build the units of a volume, and return their cover and the voxels above the level."""
     (tmp_path / "own.toml").write_text(f"[surface]\n{surface}\n")
     scales = [{"z": 1.0, "y": 1.0, "x": 1.0}]
     source = phantoms.write_ome_zarr(tmp_path / "one.ome.zarr", [voxels], scales=scales)
@@ -213,10 +220,10 @@ def _cover_after(
     return cover, voxels > level
 
 
-def test_noise_above_a_low_level_is_nothing_that_a_surface_leaves_out(
+def test_noise_above_a_low_level_does_not_count_as_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The level lies one deviation of the noise above the ground, as that of dim nuclei does."""
+    """The level lies one deviation of the noise above the background, like that of dim nuclei."""
     ball = phantoms.blurred_ball((32, 64, 64), (1.0, 1.0, 1.0), (15.5, 31.5, 31.5), 10.0, 1.5)
     noisy = 200 + 60 * ball + np.random.default_rng(0).normal(0, 22, ball.shape)
     cover, _ = _cover_after(tmp_path, noisy.round().astype(np.uint16), 222)

@@ -1,4 +1,4 @@
-"""Plates and shells of one and two voxels in a CT whose preset asks for coarser planes."""
+"""Plates and shells of one and two voxels in a CT whose preset has coarser planes."""
 
 from pathlib import Path
 
@@ -58,7 +58,7 @@ def _built(folder: Path, voxels: NDArray[np.float64], *flags: str) -> OutFolder:
 
 
 def _surface(folder: OutFolder) -> tuple[trimesh.Trimesh, Cover]:
-    """Return the surface of all tiles as one, and how it covers the source."""
+    """Return the surface of all tiles as one mesh, and its cover of the source."""
     meshes, total = [], Cover(0, 0, 0)
     for name, key in folder.index().items():
         unit = folder.unit_dir(name, key)
@@ -88,7 +88,7 @@ def test_plates_of_one_voxel_stay_on_any_plane(
 ) -> None:
     surface, cover = _surface(_built(tmp_path, _plates(first)))
     assert len(surface.split(only_watertight=True)) == 4
-    assert cover.missing < 0.07  # voxels at the plates' edges
+    assert cover.missing < 0.07  # the rest is voxels at the plates' edges
     said = " ".join(capsys.readouterr().err.split())
     assert "too thin for planes 1400 um apart (surface.grid_um)" in said
     assert "all planes carry its surface" in said
@@ -96,7 +96,7 @@ def test_plates_of_one_voxel_stay_on_any_plane(
 
 @pytest.mark.parametrize("preset", ["ct", "ct-bone"])
 def test_thin_bone_in_noisy_coarse_voxels_passes_the_filters_of_ct_presets(preset: str) -> None:
-    """Lines of a voxel of 200 to 900 HU above tissue, as ribs are in voxels of 3 mm."""
+    """Lines one voxel wide, 200 to 900 HU above tissue, look like ribs in voxels of 3 mm."""
     rng = np.random.default_rng(0)
     voxels = np.full((24, 96, 96), TISSUE)
     for column in range(6, 92, 5):

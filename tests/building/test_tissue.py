@@ -1,4 +1,4 @@
-"""`stereocell tissue OUT`: classes become channels, and nothing else is built anew."""
+"""`stereocell tissue OUT`: classes become channels, and nothing else is built again."""
 
 import json
 import shutil
@@ -42,7 +42,7 @@ max_texture = 64
 
 @pytest.fixture(scope="module", autouse=True)
 def learned_once() -> Iterator[None]:
-    """What is learned of the same voxels is the same, and takes seconds: tissue/test_classify.py"""
+    """Learn each set of voxels only once: results are the same (tissue/test_classify.py)."""
     found: dict[tuple[bytes, str], Any] = {}
     learn = learn_tissue_step.learn_tissue
 
@@ -59,7 +59,7 @@ def learned_once() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A plan of the head from DICOM, nothing built."""
+    """A plan of the head from DICOM, without a build."""
     folder = tmp_path_factory.mktemp("tissue")
     write_dicom(folder / "head", make_head(shape=SHAPE, bias=0.3, seed=4), seed=4)
     out = folder / "out"
@@ -69,7 +69,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def add(out: Path, *flags: str) -> OutFolder:
-    """Add the classes to the plan; nothing is built."""
+    """Add the classes to the plan without building."""
     from stereocell.building.tissue import TissueRequest, add_tissue, parse_classes
 
     values = dict(zip(flags[::2], flags[1::2], strict=True))
@@ -94,15 +94,15 @@ def test_each_class_is_a_channel_of_eight_bits_that_sum_to_one(planned: Path) ->
     assert voxels.shape[1:] == plan.region.shape
     total = voxels.astype(int).sum(axis=0)
     brain = total > 0
-    assert np.abs(total[brain] - 255).max() <= 2  # each is rounded by itself
+    assert np.abs(total[brain] - 255).max() <= 2  # each class is rounded separately
     assert 0.1 < brain.mean() < 0.6
 
 
-def test_the_record_fits_its_schema_and_names_nobody(planned: Path) -> None:
+def test_the_record_fits_its_schema_and_names_no_patient(planned: Path) -> None:
     add(planned, "--classes", "3")
     record = read_json(planned / "tissue" / "tissue.json", "tissue.schema.json", "")
     assert [one["name"] for one in record["classes"]] == HEAD
-    # made of the phantom's levels: fluid is darker than grey, grey than white matter
+    # the phantom has dark fluid, brighter grey matter and the brightest white matter
     csf, grey, white = (one["intensity"] for one in record["classes"])
     assert csf < grey < white
     for file in (planned / "tissue").rglob("*"):
@@ -114,7 +114,9 @@ def test_the_record_fits_its_schema_and_names_nobody(planned: Path) -> None:
     assert set(provenance["added_channels"]) == set(HEAD)
 
 
-def test_the_plan_with_classes_survives_its_file_and_passes_its_schema(planned: Path) -> None:
+def test_a_plan_with_classes_read_from_its_file_is_the_same_and_passes_its_schema(
+    planned: Path,
+) -> None:
     plan = add(planned, "--classes", "3").plan()
     content = json.loads(json.dumps(to_json(plan)))
     schema = json.loads(find_asset("schemas/plan.schema.json").read_text("utf-8"))
@@ -134,7 +136,7 @@ def test_a_copy_reads_its_own_classes_wherever_it_lies(planned: Path, tmp_path: 
 
 
 @pytest.mark.exhaustive
-def test_classes_take_the_place_of_earlier_ones(planned: Path, tmp_path: Path) -> None:
+def test_classes_replace_earlier_ones(planned: Path, tmp_path: Path) -> None:
     add(planned, "--classes", "3")
     assert [c.name for c in add(planned, "--classes", "2").plan().channels] == [
         "MR", "tissue 1", "tissue 2",
@@ -147,7 +149,7 @@ def test_classes_take_the_place_of_earlier_ones(planned: Path, tmp_path: Path) -
     assert voxels.shape[0] == 2
 
 
-def test_the_same_again_learns_nothing_anew(
+def test_the_same_command_again_learns_nothing(
     planned: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     add(planned, "--classes", "3")
@@ -156,7 +158,7 @@ def test_the_same_again_learns_nothing_anew(
     assert "up to date" in capsys.readouterr().err
 
 
-def test_the_same_plan_has_the_same_classes_whatever_was_planned_before(tmp_path: Path) -> None:
+def test_classes_do_not_depend_on_earlier_plans(tmp_path: Path) -> None:
     body = phantoms.f_phantom(1)
     source = phantoms.write_ome_tiff(
         tmp_path / "f.ome.tif", np.stack([body, body[:, ::-1]]), "CZYX", names=["first", "second"]
@@ -175,7 +177,9 @@ def test_the_same_plan_has_the_same_classes_whatever_was_planned_before(tmp_path
     assert found["detour"] == found["straight"]
 
 
-def test_wrong_use_is_said_in_a_line(planned: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_use_is_refused_in_one_line(
+    planned: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for flags, message in (
         (["--classes", "many"], "--classes is 'many', expected 2 to 6, or auto"),
         (["--channel", "CD8"], "--channel is 'CD8', expected one of MR"),
@@ -188,12 +192,14 @@ def test_wrong_use_is_said_in_a_line(planned: Path, capsys: pytest.CaptureFixtur
         assert error.count("\n") == 1
 
 
-def test_a_build_gains_the_classes_and_keeps_what_was_built(planned: Path, tmp_path: Path) -> None:
+def test_a_build_gains_the_classes_and_keeps_its_other_results(
+    planned: Path, tmp_path: Path
+) -> None:
     (tmp_path / "quick.toml").write_text(QUICK)
     out, source = tmp_path / "out", planned.parent / "head"
     given = ["--preset", "mri", "--config", str(tmp_path / "quick.toml"), "--workers", "0"]
     assert main(["plan", str(source), "-o", str(out), *given[:-2]]) == 0
-    for phase in ("units", "stage", "bundle"):  # the report is drawn by the command, below
+    for phase in ("units", "stage", "bundle"):  # the command below draws the report
         assert main([phase, str(out), "--workers", "0"]) == 0
 
     def built() -> dict[str, int]:

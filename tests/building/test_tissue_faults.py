@@ -1,4 +1,4 @@
-"""`stereocell tissue OUT` killed, on a full disk, over damaged files: one line, and it goes on."""
+"""`stereocell tissue OUT` is killed, on a full disk, or finds damaged files, and goes on later."""
 
 import hashlib
 import json
@@ -69,13 +69,15 @@ OTHER_CLASSES = [
 @pytest.fixture(scope="module", autouse=True)
 def learning_at_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(phases, "viewer_dist", lambda: None)  # as in the processes that are killed
+        patch.setattr(
+            phases, "viewer_dist", lambda: None
+        )  # as in the processes that the tests kill
         patch.setattr(learn_tissue_step, "learn_tissue", learn)
         yield
 
 
 def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleNamespace:
-    """Give classes at once: by brightness, in soft steps. Learning has tests of its own."""
+    """Return classes by brightness, without learning, which has tests of its own."""
     count = int(options.classes)
     place = voxels / voxels.max() * (count - 1)
     shares = np.stack([np.clip(1 - np.abs(place - k), 0, 1) for k in range(count)])
@@ -86,7 +88,7 @@ def learn(voxels: NDArray[Any], _: object, *, options: TissueOptions) -> SimpleN
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The report takes longest and is written last."""
+    """Skip the report, which takes longest and is written last."""
     monkeypatch.setattr(report, "run_report", lambda out: None)
 
 
@@ -115,7 +117,7 @@ def undisturbed(built: Path) -> Path:
 
 
 def copy(out: Path, to: Path, source: Path | None = None) -> Path:
-    """Copy a build, and say so in its plan."""
+    """Copy a build, and adapt its plan."""
     shutil.copytree(out, to)
     text = (to / "plan.json").read_text("utf-8").replace(f'"{out}', f'"{to}')
     if source is not None:
@@ -133,7 +135,7 @@ def tissue(out: Path, *flags: str) -> int:
 
 
 def digests(out: Path) -> dict[str, str]:
-    """Return a digest of every file, wherever OUT lies; without seconds and addresses."""
+    """Return a digest of each file, without seconds and paths, so that OUT may lie anywhere."""
     found = {}
     for file in sorted(out.rglob("*")):
         if file.is_file() and file.name not in ("phases.json", "seconds.json", "plan.key"):
@@ -147,9 +149,9 @@ def remains(out: Path) -> list[Path]:
 
 
 def faults(out: Path) -> list[str]:
-    """Return the lines that fail, but for results that are whole and of an earlier plan."""
+    """Return the failed lines of the check, except for intact results of an earlier plan."""
     failed = [line for line in check_module.check(out) if not line.ok]
-    stale = (": made of another ", ": begun and not finished: ")
+    stale = (": made of another ", ": began and did not finish: ")
     return [
         f"{line.name}: {line.detail}"
         for line in failed
@@ -158,7 +160,7 @@ def faults(out: Path) -> list[str]:
 
 
 def only_line(capfd: pytest.CaptureFixture[str]) -> str:
-    """Return the one line of an error; lines of progress don't count."""
+    """Return the only line of an error, without lines of progress."""
     printed = capfd.readouterr().err.splitlines()
     assert not [line for line in printed if "Traceback" in line]
     (line,) = [line for line in printed if line.startswith("stereocell: ")]
@@ -166,7 +168,7 @@ def only_line(capfd: pytest.CaptureFixture[str]) -> str:
 
 
 def run_until(out: str, flags: list[str], event: str, place: str) -> None:
-    """Run the command in this process, and die where it first renames to, writes, removes it."""
+    """Run the command in this process, which dies when it first changes a path in this way."""
 
     def hook(name: str, arguments: tuple[Any, ...]) -> None:
         if name == event:
@@ -196,7 +198,7 @@ def fork_and_run() -> None:
 
 @pytest.fixture(scope="module")
 def kill() -> Iterator[Kill]:
-    """Run the command in a process that is killed at a moment; it must come to that."""
+    """Run the command in a process that is killed at a moment, which must be reached."""
     paths = os.pathsep.join(filter(None, [str(TESTS), os.environ.get("PYTHONPATH")]))
     with subprocess.Popen(
         [sys.executable, __file__],
@@ -215,7 +217,7 @@ def kill() -> Iterator[Kill]:
         yield run
 
 
-def test_killed_anywhere_it_goes_on_to_the_same_bytes(
+def test_a_command_killed_at_any_moment_goes_on_to_the_same_bytes(
     built: Path, undisturbed: Path, tmp_path: Path, kill: Kill
 ) -> None:
     out = copy(built, tmp_path / "out")
@@ -225,7 +227,7 @@ def test_killed_anywhere_it_goes_on_to_the_same_bytes(
         kill(out, ["--classes", "2"], moment)
         assert digests(out / "bundle") == before
         assert {file: file.stat().st_mtime_ns for file in done} == done
-        if moment[1] in ("/tissue", "/units/done.json"):  # the stage is not begun
+        if moment[1] in ("/tissue", "/units/done.json"):  # the stage has not begun
             assert faults(out) == []
         records = (out / "units").rglob("unit.json")
         done |= {file: file.stat().st_mtime_ns for file in records if ".partial" not in str(file)}
@@ -238,7 +240,7 @@ def test_killed_anywhere_it_goes_on_to_the_same_bytes(
     assert faults(out) == []
 
 
-def test_killed_while_classes_are_replaced_it_goes_on_either_way(
+def test_a_command_killed_while_it_replaces_classes_goes_on(
     undisturbed: Path, tmp_path: Path, kill: Kill
 ) -> None:
     asked = ["--classes", "3"]
@@ -255,14 +257,14 @@ def test_killed_while_classes_are_replaced_it_goes_on_either_way(
     assert remains(first) == []
     assert digests(first / "tissue") == digests(undisturbed / "tissue")
     assert digests(first / "bundle") == digests(undisturbed / "bundle")
-    for word in ("old", "partial"):  # killed when all was done but to remove it
+    for word in ("old", "partial"):  # killed just before the old folder is removed
         shutil.copytree(first / "tissue", first / f".tissue.0123abcd.{word}")
     (first / LOCK).write_text("{}")
     assert tissue(first) == 0
     assert remains(first) == []
 
 
-def test_full_disk_is_one_line_and_what_was_there_stays(
+def test_a_full_disk_is_one_line_and_earlier_results_stay(
     built: Path, undisturbed: Path, small_disk: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def resize(kilobytes: int) -> None:
@@ -318,7 +320,7 @@ def flip(file: Path) -> None:
         kept=[(CHUNK, flip), (CHUNK, Path.unlink), ("tissue/tissue.json", cut)],
     ),
 )
-def test_damaged_file_is_named_and_made_again(
+def test_a_damaged_file_is_reported_and_made_again(
     undisturbed: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -332,7 +334,7 @@ def test_damaged_file_is_named_and_made_again(
     (fault,) = faults(out)
     assert fault.startswith(f"tissue: {out / name}")
     unit = next((out / "units").rglob("tissue_x20_1"))
-    unit.rename(tmp_path / "unit")  # so that the voxels are needed
+    unit.rename(tmp_path / "unit")  # the voxels are needed then
     for phase in (["units", "--workers", "0"], ["report"]):
         if phase[0] == "report":
             (tmp_path / "unit").rename(unit)
@@ -350,7 +352,7 @@ def test_damaged_file_is_named_and_made_again(
     assert faults(out) == []
 
 
-def test_broken_or_replaced_source_is_named_and_nothing_is_touched(
+def test_a_damaged_or_replaced_source_is_reported_and_nothing_is_changed(
     undisturbed: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "f.ome.tif"
@@ -375,7 +377,7 @@ def test_broken_or_replaced_source_is_named_and_nothing_is_touched(
         assert remains(out) == []
 
 
-def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
+def test_a_changed_dicom_source_is_reported_with_the_files_left_out(
     undisturbed: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     remarks = ("its label images: cells", "files left out: 1 cut short")
@@ -389,7 +391,7 @@ def test_what_dicom_leaves_out_is_said_of_a_source_that_changed(
     assert "cells" not in line
 
 
-def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
+def test_a_class_named_like_a_channel_is_refused_and_earlier_classes_stay(
     undisturbed: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = copy(undisturbed, tmp_path / "out")
@@ -397,7 +399,7 @@ def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
     model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["", CHANNEL])
     capfd.readouterr()
     assert tissue(out, "--model", str(model)) == 1
-    assert f"has a channel '{CHANNEL}' of its own" in only_line(capfd)
+    assert f"a channel is named '{CHANNEL}', like a class" in only_line(capfd)
     assert digests(out) == before
     assert (
         json.loads((out / "tissue" / "tissue.json").read_text("utf-8"))["settings"]["classes"] == 2
@@ -405,7 +407,7 @@ def test_a_class_named_as_a_channel_leaves_the_earlier_ones(
 
 
 @pytest.mark.parametrize("checked", ["by the command", "by the plan"])
-def test_a_class_whose_name_no_plan_may_hold_leaves_everything_as_it_was(
+def test_a_class_whose_name_no_plan_can_hold_is_refused_and_nothing_changes(
     undisturbed: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -415,7 +417,7 @@ def test_a_class_whose_name_no_plan_may_hold_leaves_everything_as_it_was(
     out = copy(undisturbed, tmp_path / "out")
     before = digests(out)
     model = write_model(tmp_path / "m.onnx", slopes=(-1.0, 1.0), names=["bone\x07", "marrow"])
-    if checked == "by the plan":  # a name that comes by another way
+    if checked == "by the plan":  # the name bypasses the model's own check
         monkeypatch.setattr(model_process, "_require_printable", lambda path, network: None)
     capfd.readouterr()
     assert tissue(out, "--model", str(model)) == 1

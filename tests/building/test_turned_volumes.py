@@ -1,4 +1,4 @@
-"""Thick slices that lie across z, y or x: the same level, surface and bricks each way."""
+"""Thick slices across z, y or x give the same level, surface and bricks."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ SHAPE, SPACING = (14, 64, 60), (4.0, 1.0, 1.0)  # (slice, row, column)
 
 
 def _voxels() -> NDArray[np.uint16]:
-    """Return a ball and a small one beside it, in noise and in light that falls off by slices."""
+    """Return a large and a small ball, in noise and in light that falls off across the slices."""
     field = phantoms.blurred_ball(SHAPE, SPACING, (28.0, 26.0, 30.0), 17.0, 1.5)
     field += phantoms.blurred_ball(SHAPE, SPACING, (28.0, 54.0, 30.0), 7.0, 1.5)
     counts = phantoms.as_counts(field, 200.0, 1200.0, noise=25.0).astype(np.float64)
@@ -29,7 +29,7 @@ def _voxels() -> NDArray[np.uint16]:
 
 
 class Built:
-    """A build's only unit."""
+    """The only unit of a build."""
 
     def __init__(self, out: Path) -> None:
         folder = OutFolder(out)
@@ -65,7 +65,7 @@ def _volume(lod: Lod) -> float:
 
 
 @pytest.mark.slow
-def test_level_noise_and_cover_are_the_same_each_way(builds: list[Built]) -> None:
+def test_level_noise_and_cover_do_not_depend_on_the_slice_axis(builds: list[Built]) -> None:
     first, *others = builds
     assert first.survey.ladder
     for other in others:
@@ -81,7 +81,9 @@ def test_level_noise_and_cover_are_the_same_each_way(builds: list[Built]) -> Non
 
 
 @pytest.mark.slow
-def test_surface_and_its_levels_of_detail_are_the_same_each_way(builds: list[Built]) -> None:
+def test_the_surface_and_its_levels_of_detail_do_not_depend_on_the_slice_axis(
+    builds: list[Built],
+) -> None:
     first, *others = builds
     for other in others:
         assert len(other.lods) == len(first.lods)

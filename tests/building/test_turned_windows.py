@@ -26,7 +26,7 @@ AXES = pytest.mark.parametrize("axis", [1, 2])
 
 
 def _cells() -> NDArray[np.uint16]:
-    """Return balls in noise, padding at one side, on a ground that rises along all axes."""
+    """Return balls in noise with padding at one side, on a background that rises along all axes."""
     rng = np.random.default_rng(5)
     field = np.zeros(SHAPE)
     for centre in rng.uniform((8, 8, 8), (72, 64, 52), (14, 3)):
@@ -60,7 +60,7 @@ def _window(folder: Path, axis: int) -> Window:
 def test_windows_and_backgrounds_turn_with_the_volume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, axis: int, most: int
 ) -> None:
-    """Also where some of the slices stand for all, and blocks for the whole."""
+    """This also holds if some slices stand for all, and blocks for the whole volume."""
     monkeypatch.setattr(window_module, "SURVEY_VOXELS", most)
     monkeypatch.setattr(window_module, "JOINT_VOXELS", most)
     first, turned = _window(tmp_path, 0), _window(tmp_path, axis)
@@ -111,7 +111,7 @@ def test_a_holder_turns_with_the_volume(axis: int) -> None:
 def test_mip_levels_turn_with_the_volume(axis: int) -> None:
     voxels = (_cells() >> 4).astype(np.uint8)
     for level, turned in zip(mip_levels(voxels), mip_levels(_turned(voxels, axis)), strict=True):
-        # sums of float32 in another order may be rounded to the next number
+        # float32 sums in another order may differ in their last bit
         difference = np.abs(turned.astype(int) - slices_back(level, axis))
         assert difference.max() <= 1
         assert np.mean(difference > 0) < 0.01
@@ -135,10 +135,10 @@ def test_a_background_of_the_same_voxels_turns_with_them(axis: int) -> None:
 
 
 @pytest.mark.parametrize("zeros", [0.0, 0.5, 0.9])
-def test_the_noise_of_bodies_is_measured_however_much_even_ground_is_around(
+def test_the_noise_of_objects_is_measured_despite_much_even_background(
     tmp_path: Path, zeros: float
 ) -> None:
-    """A masked volume has no noise in its ground, and what is left has it all the same."""
+    """A masked volume has noise only in the part that is left."""
     voxels = np.random.default_rng(1).normal(1000, 30, (12, 100, 100)).round().astype(np.uint16)
     voxels[:, :, : round(100 * zeros)] = 0
     voxels[:, 40:60, 94:] += 800

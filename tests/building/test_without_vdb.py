@@ -26,7 +26,7 @@ def built(folder: Path, *flags: str) -> Path:
     return out
 
 
-def test_volumes_stay_in_the_bundle_and_are_no_files_of_other_programs(
+def test_volumes_stay_in_the_bundle_and_the_stage_has_no_vdb_files(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     whole = built(tmp_path / "whole")

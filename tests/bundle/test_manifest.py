@@ -67,7 +67,7 @@ def test_manifest_that_was_changed_is_read_by_no_command(
     if seal == "changed":
         file.write_text(file.read_text("utf-8").replace('"modality": ""', '"modality": "CT"'))
     else:
-        words = "has no hash of its content"
+        words = "found no hash of its content"
         file.write_text(file.read_text("utf-8").replace('"sha256": "', '"sha255": "'))
     for read in (
         lambda: NotebookBundle(bundle),

@@ -266,7 +266,7 @@ def test_the_page_of_the_inbox_is_in_no_bundle(stage, tmp_path):
 
 
 def test_viewer_that_is_not_built_is_named(stage, tmp_path):
-    with pytest.raises(OutputError, match=r"dist: no index\.html, expected the built viewer"):
+    with pytest.raises(OutputError, match=r"dist: found no index\.html, expected the built viewer"):
         write_bundle(stage, tmp_path / "bundle", tmp_path / "dist", engine=Engine(0))
 
 

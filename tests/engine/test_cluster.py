@@ -1,4 +1,4 @@
-"""A cluster that others have started does the work of `--workers`, to the same bytes."""
+"""A running cluster gives the same bytes as workers of this machine."""
 
 import hashlib
 import json
@@ -38,7 +38,7 @@ PATHS = os.pathsep.join([str(ROOT), str(ROOT / "tests"), str(ROOT / "pipeline")]
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Joined]:
-    """The scheduler file of workers, which stand in another folder, and an object store."""
+    """A scheduler file of workers that run in another folder, and an object store."""
     folder = tmp_path_factory.mktemp("cluster")
     (folder / "objects").mkdir()
     with (
@@ -56,7 +56,7 @@ def volume(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def alone(volume: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What one process leaves in a folder."""
+    """Build in one process, and return the files in the folder."""
     out = tmp_path_factory.mktemp("alone") / "out"
     assert make_assets(volume, out, GRID, "--workers", "0") == 0
     found = results(out)
@@ -73,7 +73,7 @@ def results(out: Path) -> dict[str, str]:
 
 
 def is_result(key: str) -> bool:
-    """Whether it must be the same whoever built it: no times, and not where the source lies."""
+    """Return whether a file must be the same in all builds: it holds no times and no paths."""
     name = key.rpartition("/")[2]
     return key.startswith(("units/", "stage/", "bundle/")) and name not in (
         "seconds.json",
@@ -89,7 +89,9 @@ def test_a_cluster_builds_the_same_bytes_as_one_process(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.chdir(tmp_path)  # OUT is told from here; the workers stand elsewhere
+    monkeypatch.chdir(
+        tmp_path
+    )  # OUT is relative to this folder, and the workers run in another one
     assert make_assets(volume, "out", GRID, "--scheduler", cluster[0]) == 0
     assert results(tmp_path / "out") == alone
 
@@ -102,8 +104,8 @@ def test_a_cluster_reads_from_and_writes_to_an_object_store(
     print(f"object store: {store.kind}")
     fs = store.files()
     fs.put(str(volume), "bucket/f.ome.zarr", recursive=True)
-    told = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
-    assert main(["build", "s3://bucket/f.ome.zarr", *told]) == 0
+    flags = ["-o", "s3://bucket/out", "--scheduler", scheduler, "--grid", GRID]
+    assert main(["build", "s3://bucket/f.ome.zarr", *flags]) == 0
     keys = [name.removeprefix("bucket/out/") for name in fs.find("bucket/out")]
     assert {
         key: hashlib.sha256(fs.cat_file(f"bucket/out/{key}")).hexdigest()
@@ -115,7 +117,7 @@ def test_a_cluster_reads_from_and_writes_to_an_object_store(
 
 @pytest.mark.slow
 def test_a_cluster_that_does_not_see_out_is_refused(cluster: Joined, tmp_path: Path) -> None:
-    with pytest.raises(ClusterError, match=r"worker tls://.* on .*: does not see /nowhere/.lock;"):
+    with pytest.raises(ClusterError, match=r"worker tls://.* on .*: does not see /nowhere/.lock,"):
         join(cluster[0], Path("/nowhere/.lock"))
     join(cluster[0], tmp_path).close()
 
@@ -143,7 +145,7 @@ def test_workers_that_would_make_other_bytes_are_refused(
 
 
 @pytest.mark.slow
-def test_a_worker_that_came_later_is_held_to_the_same(
+def test_a_worker_that_joins_later_is_checked_in_the_same_way(
     cluster: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     engine = Engine(0, cluster[0], tmp_path)
@@ -154,32 +156,32 @@ def test_a_worker_that_came_later_is_held_to_the_same(
             engine.run("bad", str, [("a", 1), ("b", 2)])
     finally:
         engine.close()
-    with pytest.raises(ClusterError, match=r"does not see /nowhere/.lock; expected OUT in"):
+    with pytest.raises(ClusterError, match=r"does not see /nowhere/.lock, expected OUT in"):
         able(str, Path("/nowhere/.lock"))(1)
 
 
 def wait_for(file: Path) -> None:
-    """Wait for a file as long as a test has patience."""
+    """Wait for a file, up to the limit of a test."""
     end = time.monotonic() + PATIENCE_S
     while not file.exists() and time.monotonic() < end:
         time.sleep(0.05)
 
 
 def write_when(task: tuple[Path, Path, Path]) -> None:
-    begun, told, file = task
+    begun, released, file = task
     begun.touch()
-    wait_for(told)
+    wait_for(released)
     try:
         write_bytes(file, b"late")
     finally:
-        told.with_suffix(".over").touch()
+        released.with_suffix(".over").touch()
 
 
 @pytest.mark.slow
 def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
     cluster: Joined, tmp_path: Path
 ) -> None:
-    out, begun, told = tmp_path / "out", tmp_path / "begun", tmp_path / "told"
+    out, begun, released = tmp_path / "out", tmp_path / "begun", tmp_path / "released"
 
     def interrupt() -> None:
         wait_for(begun)
@@ -190,21 +192,21 @@ def test_a_cluster_writes_nothing_for_a_command_that_was_interrupted(
             engine = Engine(0, cluster[0], out / LOCK)
             threading.Thread(target=interrupt).start()
             try:
-                engine.run("late", write_when, [("a", (begun, told, out / "tile" / "a"))])
+                engine.run("late", write_when, [("a", (begun, released, out / "tile" / "a"))])
             finally:
                 engine.close()
 
     with ctrl_c.heeded(), pytest.raises(KeyboardInterrupt):
         build()
     assert not out.exists()
-    told.touch()
-    wait_for(told.with_suffix(".over"))
-    assert told.with_suffix(".over").exists()
+    released.touch()
+    wait_for(released.with_suffix(".over"))
+    assert released.with_suffix(".over").exists()
     assert not out.exists()
 
 
 @pytest.mark.slow
-def test_a_cluster_whose_workers_are_all_killed_is_not_waited_for_for_ever(
+def test_the_command_does_not_wait_forever_for_a_cluster_whose_workers_are_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stereocell.engine.cluster_tasks._LOOK_S", 0.5)
@@ -275,11 +277,11 @@ def test_a_cluster_without_tls_is_joined_with_a_warning(
         engine = Engine(0, opened.scheduler_address, tmp_path)
         assert engine.run("good", str, [("a", 1), ("b", 2)]) == ["1", "2"]
         engine.close()
-    assert "cluster: it has no certificates (TLS), so everybody" in capsys.readouterr().err
+    assert "cluster: found no certificates (TLS), so everybody" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_a_caller_s_own_computations_with_dask_stay_off_the_cluster(
+def test_a_caller_s_own_computations_with_dask_do_not_run_on_the_cluster(
     cluster: Joined, tmp_path: Path
 ) -> None:
     engine = Engine(0, cluster[0], tmp_path)
@@ -291,7 +293,7 @@ def test_a_caller_s_own_computations_with_dask_stay_off_the_cluster(
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "ftp://x"])
-def test_what_is_no_scheduler_is_said_in_a_line(
+def test_an_address_or_file_that_is_not_a_scheduler_s_is_reported_in_one_line(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stereocell.engine.cluster._ANSWER_S", 1)

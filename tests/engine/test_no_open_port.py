@@ -41,7 +41,7 @@ def code_run_by_a_stranger(host: str, port: int) -> int | None:
     try:
         with Client(f"tcp://{host}:{port}", timeout=2) as client:
             return int(client.run_on_scheduler(os.getpid))
-    except (OSError, TimeoutError):  # as Dask answers where no scheduler does
+    except (OSError, TimeoutError):  # the error of Dask if there is no scheduler
         return None
 
 
@@ -76,6 +76,8 @@ def test_the_server_of_workers_has_its_socket_in_a_folder_that_only_its_user_can
     }
     assert len(places) == 1
     for place in places:
-        assert Path(place).is_absolute()  # one that begins with @ is open to every user
+        assert Path(
+            place
+        ).is_absolute()  # an abstract socket, which begins with @, is open to all users
         folder = Path(place).parent.stat()
         assert (stat.S_IMODE(folder.st_mode), folder.st_uid) == (0o700, os.getuid())

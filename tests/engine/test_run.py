@@ -1,4 +1,4 @@
-"""The engine runs everything, in order of the tasks, whatever fails."""
+"""The engine runs all tasks and returns results in their order, even if some fail."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ def test_results_come_in_the_tasks_order_and_failures_at_the_end(workers: int) -
 
 @pytest.mark.slow
 def test_workers_have_the_environment_of_the_moment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A server that forks workers has an older one: of this process's first engine."""
+    """The server that forks workers has an older environment, from this process's first engine."""
     name = "STEREOCELL_OF_A_TEST"
     for value in ("first", "second", None):
         if value is None:
@@ -74,7 +74,7 @@ def test_workers_start_where_the_name_of_the_temporary_folder_is_too_long_for_a_
 
 
 class Gone:
-    """A client and a task of its whose workers are gone: before the task ended, or after."""
+    """A client with one task, whose workers vanish before the task ends or afterwards."""
 
     def __init__(self, ended: bool) -> None:
         self.ended = ended
@@ -84,23 +84,25 @@ class Gone:
             raise TimeoutError
 
     def result(self, timeout: float) -> None:
-        raise TimeoutError  # it lay on a worker
+        raise TimeoutError  # the result was on a worker that is gone
 
     def scheduler_info(self) -> dict[str, dict[str, str]]:
         return {"workers": {}}
 
 
 @pytest.mark.parametrize("ended", [False, True])
-def test_workers_that_are_gone_are_not_waited_for_for_ever(ended: bool) -> None:
+def test_the_command_does_not_wait_forever_for_vanished_workers(ended: bool) -> None:
     result, failure = _outcome_of(Gone(ended), Gone(ended))
     assert result is None
     assert "its workers are gone and did not come back" in str(failure)
 
 
-def test_a_log_says_how_long_the_others_take_at_the_pace_so_far(
+def test_a_log_states_how_long_the_remaining_tasks_take_at_the_pace_so_far(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now = iter([100.0, 104.0, 120.0, 190.0, 200.0])  # the start, and the end of each of four tasks
+    now = iter(
+        [100.0, 104.0, 120.0, 190.0, 200.0]
+    )  # times of the start, and of the end of each of four tasks
     monkeypatch.setattr(run.time, "monotonic", lambda: next(now))
     Engine(0).run("units", str, [(name, 0) for name in "abcd"])
     lines = capsys.readouterr().err.splitlines()

@@ -1,4 +1,4 @@
-"""The runner moves the files of a step between a storage and this machine; the step does not."""
+"""The runner moves a step's files between object storage and this machine, not the step itself."""
 
 import hashlib
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ VOXELS = bytes(range(256))
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """A file that counts by its name."""
+    """A file that counts in a key by its name."""
 
     path: Path
 
@@ -29,7 +29,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Digest(Step[str]):
-    """Reads a file as any other program does."""
+    """A step that reads a file like any other program."""
 
     VERSION: ClassVar[int] = 1
     FORM: ClassVar[Document[str]] = Document(
@@ -51,20 +51,20 @@ def _task(out: Path, *, is_stated: bool = True) -> Kept[str]:
     return Kept("voxels", Digest(File(file)), out / "digest.json", inputs)
 
 
-def test_a_step_on_object_storage_reads_and_writes_files_of_this_machine() -> None:
+def test_a_step_on_object_storage_reads_and_writes_local_files() -> None:
     with emptied() as address:
         with opened(address, command="units") as out:
             write_bytes(out / "voxels.npy", VOXELS)
             assert not (out / "voxels.npy").exists()
             assert run_missing(Engine(0), "digests", [_task(out)]) == 1
-            assert not (out / "voxels.npy").exists()  # the disk holds the work in progress alone
+            assert not (out / "voxels.npy").exists()  # the disk holds only the work in progress
         assert objects_in(address).keys() == {"voxels.npy", "digest.json"}
         with opened(address, command="units") as out:
             assert run_missing(Engine(0), "digests", [_task(out)]) == 0
             assert _task(out).read() == hashlib.sha256(VOXELS).hexdigest()
 
 
-def test_an_input_that_a_task_does_not_state_is_missing_there() -> None:
+def test_an_input_that_a_task_does_not_list_is_missing_on_the_worker() -> None:
     with emptied() as address, opened(address, command="units") as out:
         write_bytes(out / "voxels.npy", VOXELS)
         with pytest.raises(Exception, match="No such file"):

@@ -57,7 +57,7 @@ class Twice(Keyed):
 HERE, THERE = Source("/here/a.tif", "f1"), Source("/there/b.tif", "f1")
 
 
-def test_a_source_counts_by_its_fingerprint_and_not_by_its_path() -> None:
+def test_a_source_counts_in_a_key_by_its_fingerprint_and_not_by_its_path() -> None:
     assert Sum(HERE).key == Sum(THERE).key
     assert Sum(HERE).key != Sum(Source("/here/a.tif", "f2")).key
 
@@ -80,7 +80,7 @@ def test_a_step_that_holds_another_follows_its_version(monkeypatch: pytest.Monke
     assert Twice(Sum(HERE)).key != before
 
 
-def test_arrays_count_by_their_values_shape_and_type() -> None:
+def test_arrays_count_in_a_key_by_their_values_shape_and_type() -> None:
     arrays = [
         np.arange(4.0),
         np.arange(4.0)[::-1],
@@ -112,7 +112,7 @@ def test_a_path_is_refused_in_a_key(value: object) -> None:
         content_of(value)
 
 
-def test_numpy_s_numbers_count_as_python_s() -> None:
+def test_numpy_s_numbers_count_like_python_s() -> None:
     assert content_of(np.float64(2.5)) == 2.5
     assert content_of((np.int64(3), np.bool_(True))) == [3, True]
     found: Mapping[str, Any] = {"a": np.int32(3)}

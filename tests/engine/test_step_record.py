@@ -33,7 +33,7 @@ def recorded() -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def reaches() -> dict[str, set[Path]]:
-    """The files that each step and each reader reaches."""
+    """The files whose code each step and each reader reaches."""
     modules = {step.__name__: step.__module__ for step in step_record.find_steps()}
     modules |= {name: reader.module for name, reader in known_formats().items()}
     return {name: set(step_record.reach(module)[0]) for name, module in modules.items()}
@@ -199,9 +199,7 @@ def test_modules_that_are_left_out_exist() -> None:
         ("bioio_*", {"other"}),
     ],
 )
-def test_what_decodes_for_a_reader_is_a_library_of_it_alone(
-    library: str, readers: set[str]
-) -> None:
+def test_a_decoder_counts_as_a_library_of_its_reader_only(library: str, readers: set[str]) -> None:
     modules = {name: reader.module for name, reader in known_formats().items()}
     users = {name for name, module in modules.items() if library in step_record.reach(module)[1]}
     assert users == readers
@@ -210,12 +208,16 @@ def test_what_decodes_for_a_reader_is_a_library_of_it_alone(
 
 def test_libraries_that_can_change_no_byte_ask_for_no_decision(recorded: dict[str, Any]) -> None:
     assert {"numpy", "vtk", "edt", "zarr", "pylibCZIrw"} <= recorded["libraries"].keys()
-    others = {"alktx2", "pymeshlab", "xatlas"}  # of extras: fields of the steps that use them
+    others = {
+        "alktx2",
+        "pymeshlab",
+        "xatlas",
+    }  # packages of extras are fields of the steps that use them
     others |= {"aiohttp", "botocore", "psutil", "jsonschema", "distributed"}
     assert not others & recorded["libraries"].keys()
 
 
-def test_provenance_names_installed_libraries_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_provenance_names_only_installed_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     found = libraries_of("BuildUnit", "FindWindow", "ome-zarr")
     assert {"numpy", "vtk", "edt", "zarr"} <= found.keys()
     assert {"usd-core", "OpenEXR"} <= libraries_of("WriteStageTile").keys()
@@ -240,12 +242,15 @@ def test_packages_are_found_as_python_finds_them() -> None:
         assert set(found[top]) == set(names), top
 
 
-BESIDE = {"bioio", "bioio_base"}  # a user has them beside StereoCell (read/formats/other.py)
+BESIDE = {
+    "bioio",
+    "bioio_base",
+}  # packages that a user installs beside StereoCell (read/formats/other.py)
 
 
 @pytest.mark.slow
-def test_what_is_imported_is_declared() -> None:
-    """A package that comes along with another one is gone when that one does without it."""
+def test_all_imported_packages_are_declared_as_dependencies() -> None:
+    """A package that another one brings along disappears when that one stops to need it."""
     declared = {canonicalize_name(Requirement(line).name) for line in requires("stereocell") or ()}
     installed = step_record._distributions()
     for file in PACKAGE.rglob("*.py"):

@@ -36,9 +36,7 @@ def test_a_task_that_kills_its_worker_fails_alone_and_the_others_finish(engine: 
     assert engine.run("good", double, [("a", 1), ("b", 2)]) == [2, 4]
 
 
-def test_a_task_whose_worker_was_killed_runs_again_with_nothing_beside_it(
-    engine: Engine, tmp_path: Path
-) -> None:
+def test_a_task_whose_worker_was_killed_runs_again_alone(engine: Engine, tmp_path: Path) -> None:
     tasks = [(str(n), (tmp_path, n)) for n in range(6)]
     assert engine.run("once", die_beside_others, tasks) == list(range(6))
     assert (tmp_path / "died").read_text("utf-8") == "3"
@@ -81,10 +79,12 @@ def test_a_script_without_a_main_guard_is_answered_with_the_line_to_write(tmp_pa
     _, text = script.communicate(timeout=PATIENCE_S)
     assert script.returncode == 1
     assert "A script that builds needs the line `if __name__ == '__main__':`" in text
-    assert text.count("Traceback") == 1  # that of the script itself, and none of its workers
+    assert (
+        text.count("Traceback") == 1
+    )  # the traceback of the script itself, and none of its workers'
 
 
-def test_a_script_on_standard_input_has_workers(tmp_path: Path) -> None:
+def test_a_script_on_standard_input_can_use_workers(tmp_path: Path) -> None:
     run = subprocess.run(
         [sys.executable, "-"],
         input=_UNGUARDED + "print('done')",

@@ -86,7 +86,7 @@ def test_spoilt_external_tileset_is_found(bundle):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b'{"asset": {', "damaged, no JSON"),
+        (b'{"asset": {', "damaged, this is not JSON"),
         (b"[]", "no 3D Tiles tileset"),
         (b'{"geometricError": 1}', "no 3D Tiles tileset"),
     ],

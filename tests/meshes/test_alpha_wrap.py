@@ -28,7 +28,7 @@ def test_more_tiles_than_one_are_refused(
     monkeypatch.setattr("stereocell.planning.settle.find_wrapper", lambda: "1")
     flags = ["-o", str(tmp_path / "out"), "--wrap", "alpha-wrap", "--grid", "2x1"]
     assert main(["plan", _source(tmp_path), *flags]) == 2
-    assert "closes each tile by itself, and there are 2 tiles: expected one" in (
+    assert "closes each tile by itself, and the plan has 2 tiles, expected one tile" in (
         capsys.readouterr().err
     )
 
@@ -40,7 +40,7 @@ def test_missing_package_is_named_with_its_remedy(
     out = tmp_path / "out"
     assert main(["plan", _source(tmp_path), "-o", str(out), "--wrap", "alpha-wrap"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "--wrap 'alpha-wrap' takes the package no_such_wrapper" in line
+    assert "--wrap 'alpha-wrap' needs the package no_such_wrapper" in line
     assert line.endswith("pip install 'stereocell[alpha-wrap]'")
     assert not out.exists()
 

@@ -16,5 +16,5 @@ from stereocell.model.duration import in_words
         (273_000.0, "3 d 4 h"),
     ],
 )
-def test_two_units_rounded(seconds: float, words: str) -> None:
+def test_durations_are_rounded_to_two_units(seconds: float, words: str) -> None:
     assert in_words(seconds) == words

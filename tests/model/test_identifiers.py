@@ -1,4 +1,4 @@
-"""Names become identifiers and come back."""
+"""Names are converted to identifiers and back."""
 
 import re
 from pathlib import PureWindowsPath
@@ -15,12 +15,12 @@ DEVICES = {"CON", "PRN", "AUX", "NUL"} | PORTS
 
 
 @given(st.text(min_size=1, max_size=20))
-def test_any_name_comes_back(name: str) -> None:
+def test_any_name_is_recovered_from_its_identifier(name: str) -> None:
     assert from_identifier(to_identifier(name)) == name
 
 
 @given(st.text(min_size=1, max_size=300))
-def test_identifiers_are_legal_and_bounded(name: str) -> None:
+def test_identifiers_are_valid_and_of_limited_length(name: str) -> None:
     identifier = to_identifier(name)
     assert len(identifier) <= MAX_LENGTH
     assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", identifier)
@@ -36,7 +36,7 @@ def test_different_names_have_different_identifiers(a: str, b: str) -> None:
 def test_long_names_have_identifiers_of_their_own(a: str, b: str) -> None:
     long = "\u6f22" * 24
     assert (a == b) == (to_identifier(long + a) == to_identifier(long + b))
-    # a name that looks like a shortened identifier is not taken for one
+    # a name that looks like a shortened identifier is not mistaken for one
     shortened = to_identifier(long + long)
     assert to_identifier(shortened) != shortened
 
@@ -67,7 +67,7 @@ def test_a_name_cut_short_keeps_its_beginning() -> None:
         ("A" * 180, "A" * 180),
     ],
 )
-def test_known_names(name: str, identifier: str) -> None:
+def test_known_names_have_the_documented_identifiers(name: str, identifier: str) -> None:
     assert to_identifier(name) == identifier
 
 
@@ -75,16 +75,16 @@ def test_known_names(name: str, identifier: str) -> None:
     st.text(min_size=1, max_size=300)
     | st.sampled_from(["CON", "nul", "Com1", "LPT9", "aux.", "a:b", "x ", "..", "NUL\n", "prn.txt"])
 )
-def test_windows_takes_them_as_names_of_files(name: str) -> None:
+def test_windows_accepts_identifiers_as_file_names(name: str) -> None:
     identifier = to_identifier(name)
     for file in (identifier, f"{identifier}.glb"):
         path = PureWindowsPath(file)
-        assert path.parts == (file,)  # no drive, no folder
+        assert path.parts == (file,)  # Windows sees no drive and no folder in it
         assert path.stem.upper() not in DEVICES
         assert not set(file) & set('<>:"/\\|?*')
         assert file[-1] not in ". "
 
 
-def test_empty_name_is_refused() -> None:
+def test_an_empty_name_is_refused() -> None:
     with pytest.raises(ValueError, match="empty"):
         to_identifier("")

@@ -1,4 +1,4 @@
-"""The axis across which images lie, and arrays that are turned by it."""
+"""The axis across which images lie, and arrays turned so that it comes first."""
 
 import numpy as np
 import pytest
@@ -19,19 +19,19 @@ from stereocell.model.image_plane import (
         (2, (1.0, 1.0, 1.0), 2),
         (0, (5.0, 1.0, 1.0), 0),
         (1, (1.0, 5.0, 1.0), 1),
-        (0, (1.0, 5.0, 1.0), 1),  # sampled anew along other axes than the scanner's
+        (0, (1.0, 5.0, 1.0), 1),  # resampled along other axes than the scanner's
         (0, (1.0, 2.0, 1.0), 0),  # not much coarser
         (0, (1.0, 4.0, 4.0), 0),  # a coarse level of a microscope's pyramid
     ],
 )
-def test_one_axis_that_is_much_coarser_is_the_slice_axis(
+def test_an_axis_much_coarser_than_the_others_is_the_slice_axis(
     stated: int, spacing_um: tuple[float, float, float], axis: int
 ) -> None:
     assert find_slice_axis(stated, spacing_um) == axis
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_arrays_and_triples_turn_alike_and_back(axis: int) -> None:
+def test_arrays_and_triples_are_turned_in_the_same_way_and_back(axis: int) -> None:
     array = np.zeros((2, 3, 4))
     turned = slices_first(array, axis)
     assert turned.shape == first_of_three(array.shape, axis)

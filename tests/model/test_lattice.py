@@ -1,4 +1,4 @@
-"""Where a tile's samples lie: thinned, cut, alone."""
+"""The lattice of a tile: thinned, cut, or closed by itself."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ LEFT = Lattice(
 
 
 def test_a_tile_is_cut_where_another_follows_and_nowhere_else() -> None:
-    """x of the world grows with the voxels' x: the plane of x = 14 lies at 14 + 7 um."""
+    """World x grows with the voxels' x, so the plane of voxel x = 14 lies at 14 + 7 um."""
     assert list(LEFT.cuts()) == [(2, 14)]
     assert LEFT.cut_planes() == ((0, 21.0),)
     assert list(LEFT.alone().cuts()) == []
@@ -24,8 +24,8 @@ def test_grown_points_stay_in_the_region() -> None:
     assert LEFT.grown(100).own == REGION
 
 
-def test_thinned_planes_lie_where_they_lay() -> None:
-    """Every voxel that stays keeps its place in the world: index times spacing, and the origin."""
+def test_thinned_planes_keep_their_places() -> None:
+    """Each kept voxel has the same world position: origin plus index times spacing."""
     inner = Box((3, 2, 5), (9, 18, 29))
     lattice = Lattice(
         Box((3, 4, 8), (9, 16, 27)), Box((3, 6, 10), (9, 14, 24)), inner, (2, 1, 1), (0, 5, 7)

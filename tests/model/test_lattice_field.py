@@ -1,4 +1,4 @@
-"""The iso-value between tile centres."""
+"""The field of iso-values between tile centres."""
 
 import numpy as np
 
@@ -14,12 +14,12 @@ def _found() -> dict[str, float | None]:
     return {tile.id: float(rng.uniform(100, 900)) for tile in TILES}
 
 
-def test_each_centre_has_its_own_value_and_between_it_is_linear() -> None:
+def test_each_centre_has_its_own_value_and_the_field_is_linear_in_between() -> None:
     found = _found()
     field = make_iso_field(TILES, found)
     assert field is not None
     values = field.at(REGION)
-    # centres lie at 9.5 + 20 k: half-way between two voxels
+    # centres lie at 9.5 + 20 k, half-way between two voxels
     left, right = found["r0_c1"], found["r0_c2"]
     assert left is not None
     assert right is not None
@@ -30,12 +30,16 @@ def test_each_centre_has_its_own_value_and_between_it_is_linear() -> None:
     np.testing.assert_allclose(slope, (right - left) / 20, rtol=1e-2)
 
 
-def test_neighbours_agree_bit_by_bit_from_their_own_parts() -> None:
+def test_neighbours_compute_identical_values_from_their_own_parts() -> None:
     field = make_iso_field(TILES, _found())
     assert field is not None
     whole = field.at(REGION)
     for tile in TILES:
-        for halo in ((0, 0, 0), (2, 8, 8), (9, 70, 70)):  # the last: larger than its neighbours
+        for halo in (
+            (0, 0, 0),
+            (2, 8, 8),
+            (9, 70, 70),
+        ):  # the last halo is larger than the neighbouring tiles
             window = tile.box.grown(halo, REGION)
             values = np.broadcast_to(whole, REGION.shape)[window.slices]
             seen = np.broadcast_to(field.at(window), window.shape)
@@ -44,7 +48,7 @@ def test_neighbours_agree_bit_by_bit_from_their_own_parts() -> None:
             np.testing.assert_array_equal(near, values)
 
 
-def test_field_has_one_voxel_along_axes_where_one_centre_reaches_in() -> None:
+def test_the_field_has_one_voxel_along_axes_that_only_one_centre_influences() -> None:
     field = make_iso_field(TILES, _found())
     assert field is not None
     assert field.at(REGION).shape == (1, 40, 100)
@@ -65,18 +69,18 @@ def test_tiles_of_all_three_axes_are_blended_linearly() -> None:
     np.testing.assert_allclose(field.at(inner), 100 * z + 10 * y + x, rtol=1e-6)
 
 
-def test_tile_without_a_value_takes_the_others_mean() -> None:
+def test_a_tile_without_a_value_takes_the_mean_of_the_others() -> None:
     found = dict.fromkeys((tile.id for tile in TILES), 500.0) | {"r0_c0": None}
     field = make_iso_field(TILES, found)
     assert field is not None
     np.testing.assert_array_equal(field.at(REGION), 500)
 
 
-def test_channel_without_any_value_has_no_field() -> None:
+def test_a_channel_without_any_value_has_no_field() -> None:
     assert make_iso_field(TILES, {tile.id: None for tile in TILES}) is None
 
 
-def test_a_value_is_the_same_from_a_box_that_is_blended_in_parts() -> None:
+def test_a_value_is_the_same_in_a_box_that_is_computed_in_parts() -> None:
     rng = np.random.default_rng(1)
     field = LatticeField(
         ((0.0, 3.0), (5.0, 400.0), (9.5, 100.0, 300.5)), rng.normal(size=(2, 2, 3))

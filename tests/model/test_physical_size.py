@@ -16,7 +16,7 @@ from stereocell.model.physical_size import describe_size, display_scale
         (0.5, 1e6),
     ],
 )
-def test_the_display_scale_is_a_power_of_ten_that_fits_into_a_metre(
+def test_the_display_scale_is_a_power_of_ten_that_fits_the_specimen_into_a_metre(
     longest_um: float, scale: float
 ) -> None:
     assert display_scale(longest_um) == scale
@@ -31,7 +31,7 @@ def test_the_display_scale_is_a_power_of_ten_that_fits_into_a_metre(
         ((1.2e6, 3e5, 1e6), "1.2 x 0.3 x 1 m"),
     ],
 )
-def test_a_size_is_told_in_the_unit_of_its_longest_edge(
+def test_a_size_is_described_in_the_unit_of_its_longest_edge(
     edges_um: tuple[float, float, float], words: str
 ) -> None:
     assert describe_size(edges_um) == words

@@ -34,7 +34,7 @@ def test_tiles_cover_every_voxel_once_and_lattices_every_cell_once(
 
 @pytest.mark.slow
 @given(columns=st.integers(1, 9), rows=st.integers(1, 9), more=st.tuples(lengths, lengths, lengths))
-def test_grid_gives_columns_by_rows_of_even_sizes(
+def test_a_grid_gives_columns_by_rows_of_nearly_equal_tiles(
     columns: int, rows: int, more: tuple[int, int, int]
 ) -> None:
     depth, height, width = more[0], 2 * rows - 2 + more[1], 2 * columns - 2 + more[2]
@@ -49,14 +49,14 @@ def test_grid_gives_columns_by_rows_of_even_sizes(
         assert min(sizes) >= 2
 
 
-def test_ids_name_row_and_column_and_depth_where_split() -> None:
+def test_tile_ids_name_row_column_and_a_split_depth() -> None:
     region = Box((0, 0, 0), (8, 20, 50))
     assert [t.id for t in cut(region, (8, 10, 25))] == ["r0_c0", "r0_c1", "r1_c0", "r1_c1"]
     assert [t.id for t in cut(region, (4, 20, 50))] == ["r0_c0_z0", "r0_c0_z1"]
 
 
 @pytest.mark.parametrize("halo", [(0, 0, 0), (2, 3, 100)])
-def test_halo_stops_at_the_region(halo: tuple[int, int, int]) -> None:
+def test_the_halo_ends_at_the_region(halo: tuple[int, int, int]) -> None:
     region = Box((0, 0, 0), (10, 20, 30))
     window = Box((2, 5, 5), (8, 10, 10)).grown(halo, region)
     assert all(

@@ -91,7 +91,7 @@ def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
 @pytest.mark.parametrize(
     ("source", "more", "message"),
     [
-        ("", {}, "an empty name, expected a path"),  # not the build that one stands in
+        ("", {}, "found an empty name, expected a path"),  # not the build that one stands in
         ("x.tif", {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The colours of channels: stated, of a dye or a wavelength, of a modality, and never two alike."""
+"""The colours of channels: stated, of a dye, a wavelength or a modality, and all different."""
 
 from itertools import combinations
 
@@ -47,11 +47,11 @@ def _hue_deg(color: Color) -> float:
         ("TRITC", 570),
     ],
 )
-def test_a_name_holds_a_dye(name: str, nm: float) -> None:
+def test_a_dye_is_found_in_a_channel_name(name: str, nm: float) -> None:
     assert emission_of(name) == nm
 
 
-# Emission maxima that the makers publish. The colour is the one of that light.
+# Emission maxima in nm that the makers publish. The colour is that of the emitted light.
 @pytest.mark.parametrize(
     ("name", "nm"),
     [
@@ -70,18 +70,18 @@ def test_a_dye_of_a_numbered_family_has_the_colour_of_its_light(name: str, nm: f
     found = color_of_name(name)
     assert found is not None
     hue_deg = abs(_hue_deg(found) - _hue_deg(color_of_light(nm) or (0, 0, 0)))
-    assert min(hue_deg, 360 - hue_deg) <= 45  # the same band of the spectrum, or the one beside it
+    assert min(hue_deg, 360 - hue_deg) <= 45  # the same band of the spectrum, or a neighbouring one
 
 
 @pytest.mark.parametrize("name", ["BV2 cells", "CF", "JF", "CF 12", "BV4210", "scf488", "starch"])
-def test_a_name_that_resembles_a_family_of_dyes_holds_none(name: str) -> None:
+def test_a_name_that_resembles_a_family_of_dyes_names_no_dye(name: str) -> None:
     assert emission_of(name) is None
 
 
 @pytest.mark.parametrize(
     "name", ["", "Channel0", "CD31", "MART1", "Ki67", "afferent", "cyclin", "A4"]
 )
-def test_other_names_hold_none(name: str) -> None:
+def test_other_names_name_no_dye(name: str) -> None:
     assert emission_of(name) is None
     assert color_of_name(name) is None
 
@@ -93,22 +93,22 @@ def test_other_names_hold_none(name: str) -> None:
         *[(560, 45, 60), (590, 20, 40), (620, 0, 10), (670, 305, 335)],
     ],
 )
-def test_a_wavelength_has_the_colour_that_the_eye_sees(
+def test_a_wavelength_has_the_colour_that_people_see(
     nm: float, low_deg: float, high_deg: float
 ) -> None:
     color = color_of_light(nm)
     assert color is not None
     assert low_deg <= _hue_deg(color) <= high_deg
-    assert min(color) > 0.01  # no pure primary, which a screen can't shade
+    assert min(color) > 0.01  # not a pure primary, which a screen can't shade
 
 
-def test_no_wavelength_is_none_and_a_dye_stands_in_for_it() -> None:
+def test_a_dye_gives_the_colour_if_no_wavelength_is_stated() -> None:
     assert color_of_light(None) is None
     assert color_of_light("0") is None
     assert color_of_light("of the laser", "GFP") == color_of_light(510)
 
 
-def test_lab_of_a_colour_leads_back_to_it() -> None:
+def test_converting_a_colour_to_lab_and_back_returns_it() -> None:
     color = linear_color_of_lab((62.0, 20.0, -31.0))
     np.testing.assert_allclose(lab_of_linear(np.array([color]))[0], (62, 20, -31), atol=1e-3)
 
@@ -124,11 +124,11 @@ def _chosen(
     return choose_colors(wanted, modality=modality, is_alone=alone, is_bone=bone)
 
 
-def test_what_nothing_names_has_the_colours_that_all_eyes_tell_apart() -> None:
+def test_channels_that_name_no_dye_have_the_colours_of_the_palette() -> None:
     assert _chosen(["a", "b", "c"]) == list(PALETTE[:3])
 
 
-def test_scans_are_no_blue_nuclei() -> None:
+def test_scans_of_patients_are_not_blue_like_nuclei() -> None:
     assert _chosen(["MR"], modality="MR") == [MR_GREY]
     assert _chosen(["CT"], modality="CT") == [SKIN]
     assert _chosen(["CT"], modality="CT", bone=True) == [FLESH]
@@ -142,7 +142,7 @@ def test_scans_are_no_blue_nuclei() -> None:
     [
         ((0.5, 0.2, 0.2), False, True),
         ((5.0, 2.0, 2.0), False, True),
-        ((25.0, 25.0, 25.0), False, False),  # a brain of a mouse, by its own light
+        ((25.0, 25.0, 25.0), False, False),  # a mouse brain, which shows its own light
         ((0.03, 0.004, 0.004), True, False),  # electron microscopy
     ],
 )
@@ -154,8 +154,8 @@ def test_the_only_channel_of_stained_cells_has_the_colour_of_a_stain(
     (color,) = choose_colors(wanted, modality="", is_alone=True, is_stained=is_stained)
     assert color == (STAIN if is_stained else WARM_GREY)
     light, least = max(color), min(color)
-    assert ((light - least) / light > 0.5) == is_stained  # a hue that reads as one
-    # a scanner's volume, a name and a stated colour go first
+    assert ((light - least) / light > 0.5) == is_stained  # a clearly visible hue
+    # a modality, a dye's name and a stated colour take precedence
     assert choose_colors(wanted, modality="MR", is_alone=True, is_stained=True) == [MR_GREY]
     named = choose_colors([("DAPI", None)], modality="", is_alone=True, is_stained=True)
     assert named == [color_of_light(461)]
@@ -173,7 +173,7 @@ def test_the_only_channel_of_stained_cells_has_the_colour_of_a_stain(
         (["a", "b", "autofluorescence"], list(PALETTE[:3])),
     ],
 )
-def test_a_stain_beside_autofluorescence_has_the_colour_of_a_lone_one(
+def test_a_single_stain_beside_autofluorescence_has_the_colour_of_a_stain(
     names: list[str], expected: list[Color]
 ) -> None:
     wanted = [(name, None) for name in names]
@@ -181,7 +181,7 @@ def test_a_stain_beside_autofluorescence_has_the_colour_of_a_lone_one(
 
 
 @pytest.mark.parametrize(("preset", "is_bone"), [("ct", False), ("ct-bone", True)])
-def test_a_preset_of_bone_is_told_from_one_of_skin(preset: str, is_bone: bool) -> None:
+def test_a_preset_for_bone_is_distinguished_from_one_for_skin(preset: str, is_bone: bool) -> None:
     iso_values = load(preset, None, flags={}).iso_values
     assert lies_at_bone(iso_values, is_hounsfield=True) == is_bone
     assert not lies_at_bone(iso_values, is_hounsfield=False)
@@ -197,7 +197,7 @@ def test_a_preset_of_bone_is_told_from_one_of_skin(preset: str, is_bone: bool) -
         ["mCherry", "tdTomato", "Cy3", "PALETTE"],
     ],
 )
-def test_channels_of_like_dyes_can_be_told_apart(names: list[str]) -> None:
+def test_channels_of_similar_dyes_have_different_colours(names: list[str]) -> None:
     colors = _chosen(names)
     assert colors[0] == color_of_name(names[0])
     lab = rgb2lab(to_srgb8(np.array(colors, np.float32)))
@@ -213,25 +213,25 @@ def test_a_stated_colour_is_kept_unless_an_earlier_channel_has_it() -> None:
     assert _chosen(["a"], [green], modality="MR") == [green]
 
 
-def test_a_black_channel_has_another_colour() -> None:
+def test_a_stated_black_is_replaced_by_a_visible_colour() -> None:
     assert _chosen(["a", "GFP"], [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]) == [
         PALETTE[0], color_of_name("GFP"),
     ]  # fmt: skip
 
 
-def test_a_dye_keeps_its_colour_behind_channels_that_name_none() -> None:
+def test_a_dye_keeps_its_colour_after_channels_that_name_no_dye() -> None:
     names = ["CD31", "DAPI", "CD45", "AF488", "CD3"]
     colors = _chosen(names)
     assert [colors[1], colors[3]] == [color_of_light(461), color_of_light(519)]
     assert len(set(colors)) == len(names)
 
 
-def test_a_stated_colour_of_a_later_channel_comes_before_a_dye() -> None:
+def test_a_stated_colour_of_a_later_channel_takes_precedence_over_a_dye() -> None:
     green = color_of_light(519)
     colors = _chosen(["GFP", "CD31"], [None, green])
     assert colors[1] == green
     assert colors[0] != green
 
 
-def test_more_channels_than_the_palette_has_colours_are_all_coloured() -> None:
+def test_all_channels_have_colours_even_if_the_palette_has_fewer() -> None:
     assert _chosen(list("abcdefghij")) == [*PALETTE, *PALETTE[:2]]

@@ -1,4 +1,4 @@
-"""A CT whose values are no Hounsfield units, built by the flags that the plan's note advises."""
+"""A CT whose values are not Hounsfield units, built by the flags that the plan's note advises."""
 
 import json
 import shlex
@@ -18,7 +18,7 @@ from stereocell.transfer.opacity import evaluate
 from support import nifti_files
 
 SHAPE, SPACING_MM = (20, 48, 48), 3.0  # slices, rows, columns
-STAYS = "no Hounsfield units: functions of tissues, such as bone, are not offered"
+STAYS = "not Hounsfield units: transfer functions by tissue, such as bone, are not offered"
 
 
 def _hounsfield() -> NDArray[np.float64]:
@@ -49,7 +49,7 @@ def _write(folder: Path, voxels: NDArray[np.generic]) -> Path:
 
 
 def _advised_flags(said: str) -> list[str]:
-    """Return the flags that the plan advises for a CT, as a person would copy them."""
+    """Return the flags that the plan advises for a CT, as a user would copy them."""
     advice = said.partition("for a CT ")[2]
     words = shlex.split(advice.replace(";", " ").replace(", ", " "))
     last = words.index("--window") + 1
@@ -79,13 +79,13 @@ def test_the_flags_that_are_advised_open_with_a_function_at_the_skin(
     look = _built(source, tmp_path / "out", flags)
     said = capsys.readouterr().err.replace("\n", " ")
     assert STAYS in said
-    assert "so it stays" in said
+    assert "a table or head holder is kept" in said
     notes = json.loads((tmp_path / "out" / "provenance.json").read_text("utf-8"))["notes"]
     assert any(STAYS in note for note in notes)
     assert not set(look.transfer_functions) & set(TISSUES)
     assert look.function == "default"
     assert look.iso_value is not None
-    # the air is clear, and fat is seen
+    # air is transparent, and fat is visible
     low, high = look.window
     opacity = evaluate(look.transfer_functions[look.function])
     air, fat = (float(np.median(voxels[where])) for where in _air_and_fat())
@@ -101,48 +101,47 @@ def _air_and_fat() -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return hu < -900, (hu > -130) & (hu < -70)
 
 
-def test_a_ct_in_hounsfield_units_keeps_its_functions_of_tissues(
+def test_a_ct_in_hounsfield_units_keeps_its_transfer_functions_by_tissue(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = _write(tmp_path, _hounsfield().round().astype(np.int16))
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "ct"]) == 0
-    assert "no Hounsfield units" not in capsys.readouterr().err
+    assert "not Hounsfield units" not in capsys.readouterr().err
     assert OutFolder(tmp_path / "out").plan().is_hounsfield
 
 
-def test_a_window_of_a_ct_console_is_refused_for_other_values(
+def test_a_named_window_of_ct_is_refused_for_values_that_are_not_hounsfield_units(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = _write(tmp_path, _shifted())
     flags = ["--preset", "ct", "--iso-value", "0=724", "--window", "0=bone"]
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 2
-    assert "the values of this CT are none: expected LOW:HIGH" in capsys.readouterr().err
+    assert "the values of this CT are not, expected LOW:HIGH" in capsys.readouterr().err
 
 
 def _crop() -> NDArray[np.int16]:
-    """Return muscle and bone alone, in Hounsfield units."""
+    """Return muscle and bone without air or fat, in Hounsfield units."""
     return _hounsfield()[:, 10:31, 14:35].clip(40, None).round().astype(np.int16)
 
 
 @pytest.mark.parametrize("preset", ["ct", "ct-bone"])
-def test_a_crop_without_air_is_in_hounsfield_units_where_the_user_says_so(
+def test_a_crop_without_air_is_in_hounsfield_units_if_the_user_says_so(
     tmp_path: Path, preset: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     source = _write(tmp_path, _crop())
     command = ["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]
     assert main(command) == 0
-    assert (
-        f"{STAYS}, and a table or head holder is not looked for, so it stays (--as hounsfield"
-        in (capfd.readouterr().err.replace("\n", " "))
+    assert f"{STAYS}, and a table or head holder is kept (--as hounsfield" in (
+        capfd.readouterr().err.replace("\n", " ")
     )
     said = tmp_path / "said"
     assert main([*command[:3], str(said), *command[4:], "--as", "hounsfield"]) == 0
-    assert "no Hounsfield units" not in capfd.readouterr().err
+    assert "not Hounsfield units" not in capfd.readouterr().err
     plan = json.loads((said / "plan.json").read_text("utf-8"))
     assert (plan["modality"], plan["is_hounsfield"]) == ("CT", True)
 
 
-def test_hounsfield_units_that_the_user_states_choose_the_preset(
+def test_hounsfield_units_stated_by_the_user_lead_to_the_preset_for_ct(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     source = _write(tmp_path, _crop())

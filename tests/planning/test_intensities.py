@@ -1,4 +1,4 @@
-"""A label map is not built as an image, unless it is said to be one."""
+"""A label map is not built as an image unless the user says that it is one."""
 
 from pathlib import Path
 
@@ -21,20 +21,22 @@ def labels(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_label_map_ends_the_plan_by_a_line_that_names_both_ways(
+def test_a_label_map_ends_the_plan_with_a_line_that_names_both_flags(
     labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     for command in (["plan"], ["build", "--workers", "0"]):
         assert main([command[0], str(labels), "-o", str(out), *command[1:]]) == 2
-        told = capsys.readouterr().err.strip()
-        assert told.count("\n") == 0
-        assert f"{labels}: channel 'Channel0' looks like a label map of 192 objects: found" in told
-        assert "--as intensity" in told
+        output = capsys.readouterr().err.strip()
+        assert output.count("\n") == 0
+        assert (
+            f"{labels}: channel 'Channel0' looks like a label map of 192 objects: found" in output
+        )
+        assert "--as intensity" in output
         assert not out.exists() or not list(out.iterdir())
 
 
-def test_a_label_map_that_is_built_is_no_image_beside_it(
+def test_a_label_map_whose_objects_are_built_is_not_built_as_an_image(
     labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -42,12 +44,12 @@ def test_a_label_map_that_is_built_is_no_image_beside_it(
     assert main([*words, "--channels", "0"]) == 2
     assert "looks like a label map of 192 objects" in capsys.readouterr().err
     assert main(words) == 0
-    told = capsys.readouterr().err
-    assert "level 0 (the finest, as label maps are built)" in told
-    assert "looks like" not in told
+    output = capsys.readouterr().err
+    assert "level 0 (the finest, because only label maps are built)" in output
+    assert "looks like" not in output
 
 
-def test_an_image_that_is_taken_for_labels_is_told(
+def test_an_image_that_is_taken_for_labels_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "i.ome.tif"
@@ -61,10 +63,10 @@ def test_an_image_that_is_taken_for_labels_is_told(
 @pytest.mark.slow
 @pytest.mark.parametrize("objects", sweep([2, 4], kept=[2]))
 @pytest.mark.parametrize("kind", ["uint8", "float32", "float64"])
-def test_few_objects_far_from_each_other_are_seen(
+def test_few_objects_far_from_each_other_are_recognised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, objects: int
 ) -> None:
-    """Each block that is looked at holds one at most."""
+    """Each block that is read holds at most one object."""
     voxels = np.zeros((40, 400, 400), kind)
     for number, (y, x) in enumerate([(60, 60), (60, 300), (300, 60), (300, 300)][:objects], 1):
         voxels[5:30, y : y + 50, x : x + 50] = number
@@ -76,7 +78,7 @@ def test_few_objects_far_from_each_other_are_seen(
 
 
 @pytest.mark.parametrize("kind", ["uint8", "float32"])
-def test_a_mask_and_an_image_of_whole_numbers_are_none(tmp_path: Path, kind: str) -> None:
+def test_a_mask_and_an_image_of_whole_numbers_are_not_label_maps(tmp_path: Path, kind: str) -> None:
     rng = np.random.default_rng(0)
     mask = np.zeros((20, 64, 64), kind)
     mask[5:15, 10:50, 10:50] = 1
@@ -87,11 +89,11 @@ def test_a_mask_and_an_image_of_whole_numbers_are_none(tmp_path: Path, kind: str
         assert main(["plan", str(path), "-o", str(tmp_path / name)]) == 0
 
 
-def test_it_is_built_where_it_is_said_to_be_an_image(labels: Path, tmp_path: Path) -> None:
+def test_a_label_map_is_built_as_an_image_if_the_user_says_so(labels: Path, tmp_path: Path) -> None:
     assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
 
 
-def test_it_is_taken_for_nothing_else(
+def test_the_flag_as_accepts_no_other_words(
     labels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["plan", str(labels), "-o", str(tmp_path / "out"), "--as", "labels"]) == 2
@@ -104,7 +106,7 @@ def test_wide_integers_that_number_objects_end_the_plan(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, objects: int
 ) -> None:
     z, y, x = np.mgrid[:24, :64, :64] // 8
-    number = (z * 8 + y) * 8 + x + 16_777_216  # next to each other in float32's last bit
+    number = (z * 8 + y) * 8 + x + 16_777_216  # neighbouring numbers differ in float32's last bit
     voxels = np.where(number - 16_777_216 < objects, number, 0).astype(kind)
     path = tmp_path / "wide.ome.tif"
     sizes = {f"PhysicalSize{axis}": 0.5 for axis in "ZYX"}
@@ -112,13 +114,13 @@ def test_wide_integers_that_number_objects_end_the_plan(
     assert main(["plan", str(path), "-o", str(tmp_path / "out")]) == 2
     assert "--as intensity" in capsys.readouterr().err
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--as", "intensity"]) == 0
-    told = " ".join("".join(capsys.readouterr()).split())
-    assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in told
+    output = " ".join("".join(capsys.readouterr()).split())
+    assert f"voxels are {kind}: read as float32, which keeps 24 of 32 bits" in output
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("place", sweep([4, 11], kept=[11]))
-def test_a_label_map_among_many_channels_is_seen(
+def test_a_label_map_among_many_channels_is_recognised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], place: int
 ) -> None:
     rng = np.random.default_rng(0)
@@ -134,7 +136,7 @@ def test_a_label_map_among_many_channels_is_seen(
     assert main(["plan", str(path), "-o", str(tmp_path / "out"), "--channels", others]) == 0
 
 
-def test_labels_stored_as_floats_with_nan_around_are_seen(
+def test_labels_stored_as_floats_with_nan_around_are_recognised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     z, y, x = np.mgrid[:24, :64, :64] // 8
@@ -148,7 +150,7 @@ def test_labels_stored_as_floats_with_nan_around_are_seen(
 
 
 @pytest.mark.slow
-def test_objects_off_the_middle_and_in_a_region_are_seen(
+def test_objects_off_the_middle_and_in_a_region_are_recognised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     z, y, x = np.mgrid[:24, :400, :400] // 8

@@ -1,4 +1,4 @@
-"""Where label maps lie on an image when the two files state different grids."""
+"""The place of label maps on an image if the two files state different grids."""
 
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ def calibrated(path: Path, voxels: Any, *, axes: str = "ZYX") -> Path:
 def write_ngff(
     path: Path, levels: list[Any], scales: list[list[float]], place: list[float]
 ) -> Path:
-    """Write an OME-Zarr image; `place`: translation of all levels, um."""
+    """Write an OME-Zarr image whose levels are translated by `place`, um."""
     group = zarr.open_group(path, mode="w", zarr_format=2)
     for number, voxels in enumerate(levels):
         group.create_array(str(number), shape=voxels.shape, dtype=voxels.dtype)[...] = voxels
@@ -68,36 +68,34 @@ def image(tmp_path: Path) -> Path:
     return calibrated(tmp_path / "image.tif", NUMBERS)
 
 
-def test_labels_on_the_image_s_own_grid_are_laid_without_a_word(
-    image: Path, tmp_path: Path
-) -> None:
+def test_labels_on_the_image_s_own_grid_cause_no_note(image: Path, tmp_path: Path) -> None:
     found = lay(image, calibrated(tmp_path / "l.tif", NUMBERS))
     assert found.notes == ()
     assert found.labels[0].origin_um == (0, 0, 0)
 
 
 @pytest.mark.parametrize(
-    ("part", "told"),
+    ("part", "message"),
     [
         (np.s_[:, :, :20], "cover 20 of 28 columns (x), 0 to 19, of the image; their file states"),
         (np.s_[1:, :19, :], "cover 5 of 6 planes (z), 0 to 4, and 19 of 20 rows (y), 0 to 18,"),
     ],
 )
-def test_labels_of_a_crop_are_told_to_cover_a_part(
-    image: Path, tmp_path: Path, part: Any, told: str
+def test_a_note_says_that_labels_of_a_crop_cover_a_part_of_the_image(
+    image: Path, tmp_path: Path, part: Any, message: str
 ) -> None:
     (note,) = lay(image, calibrated(tmp_path / "l.tif", NUMBERS[part])).notes
-    assert note.startswith(f"labels 'cells': {told}")
-    assert "they are laid from the image's first voxel on" in note
+    assert note.startswith(f"labels 'cells': {message}")
+    assert "they start at the image's first voxel" in note
 
 
-def test_labels_that_are_larger_than_the_image_are_told(image: Path, tmp_path: Path) -> None:
+def test_a_note_says_that_labels_reach_beyond_the_image(image: Path, tmp_path: Path) -> None:
     larger = np.pad(NUMBERS, ((0, 0), (0, 1), (0, 2)))
     (note,) = lay(image, calibrated(tmp_path / "l.tif", larger)).notes
     assert "reach 0.25 um beyond the last row (y) and 0.5 um beyond the last column (x)" in note
 
 
-def test_a_crop_with_a_place_of_its_own_lies_there(tmp_path: Path) -> None:
+def test_labels_of_a_crop_lie_at_the_place_that_their_file_states(tmp_path: Path) -> None:
     whole = write_ngff(tmp_path / "i.zarr", [NUMBERS], [[0.6, 0.25, 0.25]], [0, 0, 5.0])
     crop = write_ngff(
         tmp_path / "l.zarr", [NUMBERS[:, :, 8:]], [[0.6, 0.25, 0.25]], [0.0, 0.0, 7.0]
@@ -109,7 +107,9 @@ def test_a_crop_with_a_place_of_its_own_lies_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [2, 3, 4])
-def test_labels_of_half_the_size_may_be_rounded(image: Path, tmp_path: Path, factor: int) -> None:
+def test_labels_at_half_the_resolution_may_be_a_little_longer(
+    image: Path, tmp_path: Path, factor: int
+) -> None:
     for rounded in (NUMBERS[:, ::factor, ::factor], NUMBERS[:, factor - 1 :: factor, ::factor]):
         spacing = [0.6, 0.25 * factor, 0.25 * factor]
         shift = [0, 0.125 * (factor - 1), 0.125 * (factor - 1)]
@@ -117,7 +117,7 @@ def test_labels_of_half_the_size_may_be_rounded(image: Path, tmp_path: Path, fac
         assert lay(image, coarse).notes == ()
 
 
-def test_as_many_voxels_of_another_size_are_the_image_s(tmp_path: Path) -> None:
+def test_labels_with_as_many_voxels_take_the_image_s_voxel_size(tmp_path: Path) -> None:
     whole = write_ngff(tmp_path / "i.zarr", [NUMBERS], [[0.6, 0.25, 0.25]], [0, 0, 0])
     labels = write_ngff(tmp_path / "l.zarr", [NUMBERS], [[1.0, 1.0, 1.0]], [0, 0, 0])
     found = lay(whole, labels)
@@ -127,7 +127,7 @@ def test_as_many_voxels_of_another_size_are_the_image_s(tmp_path: Path) -> None:
     assert "the labels' file states 1, 1, 1 um" in note
 
 
-def test_a_rounded_spacing_is_no_contradiction(tmp_path: Path) -> None:
+def test_a_rounded_spacing_is_not_a_contradiction(tmp_path: Path) -> None:
     whole = write_ngff(tmp_path / "i.zarr", [NUMBERS], [[0.6, 0.25, 0.25]], [0, 0, 0])
     rounded = write_ngff(tmp_path / "l.zarr", [NUMBERS], [[0.6, 0.2501, 0.2501]], [0, 0, 0])
     assert lay(whole, rounded).notes == ()
@@ -143,7 +143,7 @@ def test_labels_without_a_size_lie_on_the_level_of_their_shape(tmp_path: Path) -
         assert found.labels[0].spacing_um == tuple(scales[number])
         assert f"is assumed, as level {number} of the image has as many" in found.notes[0]
     tifffile.imwrite(tmp_path / "l.tif", NUMBERS.transpose(2, 1, 0), metadata={"axes": "ZYX"})
-    with pytest.raises(SourceError, match="its axes are in another order, save it as"):
+    with pytest.raises(SourceError, match="its axes are in another order; save it as"):
         lay(whole, tmp_path / "l.tif")
 
 
@@ -156,22 +156,22 @@ def test_labels_follow_the_image_s_point_in_time(tmp_path: Path) -> None:
     source = found.labels[0].open()
     np.testing.assert_array_equal(source.read(source.dataset.levels[0].box), NUMBERS[::-1])
     assert found.notes == ("labels 'cells': 2 time points; building --time 1",)
-    assert "one point in time, laid on --time 1 of 2" in lay(film, still, 1).notes[0]
+    assert "has one point in time, which is used for --time 1 of 2" in lay(film, still, 1).notes[0]
     assert "2 time points; building --time 0" in lay(still, moving).notes[0]
     longer = calibrated(tmp_path / "longer.tif", np.stack([NUMBERS] * 3), axes="TZYX")
     with pytest.raises(SourceError, match="found 2 points in time, expected the image's --time 2"):
         lay(longer, moving, 2)
 
 
-def test_channels_of_a_label_map_are_told(image: Path, tmp_path: Path) -> None:
+def test_a_note_names_the_channels_of_a_label_map(image: Path, tmp_path: Path) -> None:
     pair = calibrated(tmp_path / "l.tif", np.stack([NUMBERS] * 2, axis=1), axes="ZCYX")
     found = lay(image, pair)
     assert len(found.labels) == 2
     assert "2 channels, each a label map: Channel0, Channel1" in found.notes[0]
 
 
-def test_a_crop_of_a_patient_s_labels_is_told_where_it_lies(tmp_path: Path) -> None:
-    """The image is NRRD of one library, the labels NIfTI of another."""
+def test_a_note_says_which_part_a_crop_of_a_patient_s_labels_covers(tmp_path: Path) -> None:
+    """One library writes the image as NRRD, another the labels as NIfTI."""
     voxels = SimpleITK.GetImageFromArray(NUMBERS)
     voxels.SetSpacing((1.0, 1.0, 2.5))
     voxels.SetOrigin((-10.0, 5.0, 30.0))

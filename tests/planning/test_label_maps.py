@@ -1,4 +1,4 @@
-"""Where label maps lie on a patient's image: by the scanners' geometry, in any order of axes."""
+"""The place of label maps on a patient's image, by the scanners' geometry, in any axis order."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ SHAPE = (24, 30, 28)
 
 
 def numbered(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> NDArray[np.uint8]:
-    """Return 1 to 3 where the scene's bodies are, and 0 elsewhere."""
+    """Return labels 1 to 3 for the scene's objects, and 0 elsewhere."""
     labels = np.zeros(shape, np.uint8)
     at = places(affine, shape)
     for number, (centre, sigma, _) in enumerate(BODIES, start=1):
@@ -37,7 +37,7 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Dataset]:
 
 
 def labels_on(scan: tuple[Path, Dataset], path: Path) -> list[tuple[int, NDArray[np.float64]]]:
-    """Return each object's number and its centroid among the image's voxels, (z, y, x) um."""
+    """Return each object's label, and its centroid in the image, (z, y, x) in um."""
     (labels,) = find_labels(
         scan[1],
         str(scan[0]),
@@ -75,7 +75,7 @@ def test_labels_of_nifti_lie_on_a_dicom_scan(
         z, y, x = np.rint(place / np.array(image.levels[0].spacing_um)).astype(int)
         around = brightness[z - 3 : z + 4, y - 3 : y + 4, x - 3 : x + 4]
         peak = np.array(np.unravel_index(around.argmax(), around.shape)) - 3
-        assert np.abs(peak).max() <= 1  # the body's own middle
+        assert np.abs(peak).max() <= 1  # the middle of the object
 
 
 def refusal(scan: tuple[Path, Dataset], path: Path) -> str:
@@ -84,19 +84,23 @@ def refusal(scan: tuple[Path, Dataset], path: Path) -> str:
     return str(error.value)
 
 
-def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_path: Path) -> None:
+def test_rotated_skewed_and_distant_labels_are_refused(
+    scan: tuple[Path, Dataset], tmp_path: Path
+) -> None:
     affine = grid("axial", SHAPE, (2.0, 1.8, 1.8))
     turned = np.eye(4)
     turned[:3, :3] = dicom_series.turn((1, 2, 3), 20)
     path = nifti_files.write(
         tmp_path / "t.nii.gz", turned @ affine, numbered(turned @ affine, SHAPE)
     )
-    assert "lies turned to the image" in refusal(scan, path)
+    assert "is rotated to the image" in refusal(scan, path)
     skewed = affine.copy()
     skewed[:3, 0] += 0.3 * skewed[:3, 1]
     path = nifti_files.write(tmp_path / "s.nii.gz", skewed, numbered(skewed, SHAPE))
-    assert "resampled onto an orthogonal grid: found numbers of objects" in refusal(scan, path)
-    with pytest.raises(SourceError, match="which have no means"):  # by itself, too
+    assert "resampled onto an orthogonal grid: found averaged numbers of objects" in refusal(
+        scan, path
+    )
+    with pytest.raises(SourceError, match="which mean nothing"):  # even without an image
         find_labels(
             read.open(path),
             str(path),
@@ -112,7 +116,7 @@ def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "message"),
     [
         (("i.ome.tif", "l.nii"), "axes by a patient's sides, and the image has its file's own"),
         (("i.nii", "l.tif"), "its file's own axes, and the image has axes by a patient's sides"),
@@ -121,11 +125,13 @@ def test_turned_skewed_and_far_ones_are_refused(scan: tuple[Path, Dataset], tmp_
         (("guess.nii", "guess.nii"), ""),
     ],
 )
-def test_which_way_round_labels_lie_is_never_guessed(
-    tmp_path: Path, names: tuple[str, str], told: str
+def test_the_orientation_of_labels_is_never_guessed(
+    tmp_path: Path, names: tuple[str, str], message: str
 ) -> None:
-    """Readers turn what a patient's sides are known of, and nothing else, to the sides."""
-    voxels = numbered(grid("axial", (20, 20, 20)), (20, 20, 20))  # a cube: no shape tells it
+    """Readers turn a volume to the patient's sides only if the file states them."""
+    voxels = numbered(
+        grid("axial", (20, 20, 20)), (20, 20, 20)
+    )  # a cube, whose shape does not show its orientation
     spacing = {f"PhysicalSize{axis}": 1.0 for axis in "XYZ"}
     tifffile.imwrite(tmp_path / "i.ome.tif", voxels, metadata={"axes": "ZYX", **spacing})
     tifffile.imwrite(tmp_path / "l.tif", voxels, photometric="minisblack")
@@ -134,17 +140,19 @@ def test_which_way_round_labels_lie_is_never_guessed(
     nifti_files.write(tmp_path / "guess.nii", np.diag([1.0, 1, 1, 1]), voxels, "neither")
     image, labels = (tmp_path / name for name in names)
     pair = (image, read.open(image))
-    if told:
-        assert told in refusal(pair, labels)
+    if message:
+        assert message in refusal(pair, labels)
     else:
         assert len(labels_on(pair, labels)) == 3
 
 
-@pytest.mark.parametrize("name", ["CT", "ct"])  # Windows' files would be one
-def test_names_that_are_taken(scan: tuple[Path, Dataset], tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["CT", "ct"])  # the same file name on Windows
+def test_names_of_channels_are_refused_for_label_maps(
+    scan: tuple[Path, Dataset], tmp_path: Path, name: str
+) -> None:
     affine = grid("axial", SHAPE, (2.0, 1.8, 1.8))
     path = nifti_files.write(tmp_path / "o.nii.gz", affine, numbered(affine, SHAPE))
-    with pytest.raises(UsageError, match="a channel has that name"):
+    with pytest.raises(UsageError, match="a channel has this name already"):
         find_labels(
             scan[1],
             str(scan[0]),
@@ -163,11 +171,13 @@ def test_a_segmentation_of_oblique_planes_is_refused_on_an_axial_scan(
     voxels[1:5, 4:16, 4:16] = 1
     oblique = grid(shape=(6, 20, 20), spacing=(2.5, 2.0, 2.2), rotation=turn((1, 2, -0.5), 23.0))
     path = write_segmentation(tmp_path, "BINARY", voxels, affine=oblique)
-    with pytest.raises(SourceError, match="lies turned to the image, expected labels along its"):
+    with pytest.raises(
+        SourceError, match="is rotated to the image, expected labels along the image's"
+    ):
         labels_on(scan, path)
 
 
-def test_pictures_of_labels_and_names_that_would_garble_a_terminal(
+def test_colour_images_of_labels_and_names_with_control_characters_are_refused(
     scan: tuple[Path, Dataset], tmp_path: Path
 ) -> None:
     path = tmp_path / "outlines.tif"

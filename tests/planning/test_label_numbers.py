@@ -1,4 +1,4 @@
-"""Numbers of objects that mean the background, and numbers that a file's type can't tell apart."""
+"""Labels that mean the background, and labels that a file's data type can't distinguish."""
 
 import json
 from pathlib import Path
@@ -38,18 +38,18 @@ def planned(
 
 
 @pytest.mark.parametrize(("background", "dtype"), [(65535, np.uint16), (255, np.uint8), (1, "<i4")])
-def test_a_background_that_is_not_0_is_named_and_left_out_on_request(
+def test_a_background_that_is_not_0_is_reported_and_left_out_on_request(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], background: int, dtype: Any
 ) -> None:
     voxels = numbered(background=background, first=2, dtype=dtype)
-    told = planned(tmp_path, voxels, capsys)
-    assert "4 objects" in told
+    printed = planned(tmp_path, voxels, capsys)
+    assert "4 objects" in printed
     share = f"{(voxels == background).mean():.1%}"
-    assert f"object {background}, the largest, has {share} of the voxels and touches" in told
-    assert f"--background {background} leaves it out" in told
-    told = planned(tmp_path, voxels, capsys, "--background", background)
-    assert "3 objects" in told
-    assert "background;" not in told
+    assert f"object {background}, the largest, has {share} of the voxels and touches" in printed
+    assert f"--background {background} leaves it out" in printed
+    printed = planned(tmp_path, voxels, capsys, "--background", background)
+    assert "3 objects" in printed
+    assert "background;" not in printed
     assert json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]["background"]
 
 
@@ -62,14 +62,14 @@ def test_a_background_below_0_is_left_out_on_request(
     assert plan["labels"][0]["background"] == -2
 
 
-@pytest.mark.parametrize(("covered", "is_told"), [(1, True), (8, False)])
-def test_a_background_that_misses_a_side_is_named_if_it_has_most_voxels(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_told: bool
+@pytest.mark.parametrize(("covered", "is_reported"), [(1, True), (8, False)])
+def test_a_background_that_misses_a_side_is_reported_if_it_has_most_voxels(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], covered: int, is_reported: bool
 ) -> None:
     voxels = numbered(background=65535)
     voxels[:covered] = 9  # an object covers the first planes
-    told = planned(tmp_path, voxels, capsys)
-    assert ("touches 5 of six sides: it is probably the background" in told) is is_told
+    printed = planned(tmp_path, voxels, capsys)
+    assert ("touches 5 of six sides: it is probably the background" in printed) is is_reported
 
 
 def test_a_background_of_0_is_not_mentioned(
@@ -80,11 +80,11 @@ def test_a_background_of_0_is_not_mentioned(
     assert (
         "background" not in json.loads((tmp_path / "o/plan.json").read_text("utf-8"))["labels"][0]
     )
-    # a number that no voxel has, as another type's largest one
+    # a label that no voxel has, such as the largest number of another data type
     assert "3 objects" in planned(tmp_path, voxels, capsys, "--background", 70000)
 
 
-def test_a_build_without_the_background_has_the_objects_alone(
+def test_a_build_without_the_background_has_only_the_objects(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     planned(tmp_path, numbered(background=65535), capsys, "--background", 65535)
@@ -93,16 +93,16 @@ def test_a_build_without_the_background_has_the_objects_alone(
 
 
 @pytest.mark.parametrize(("dtype", "exact"), [(np.float32, 2**24), (np.float16, 2**11)])
-def test_numbers_that_a_float_rounds_are_told(
+def test_labels_that_a_float_rounds_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], dtype: Any, exact: int
 ) -> None:
-    told = planned(tmp_path, numbered(background=0, first=exact, dtype=dtype), capsys)
-    assert "2 objects" in told  # exact + 1 is rounded to exact
-    assert f"rounds whole numbers beyond {exact:,}" in told
+    printed = planned(tmp_path, numbered(background=0, first=exact, dtype=dtype), capsys)
+    assert "2 objects" in printed  # exact + 1 is rounded to exact
+    assert f"rounds whole numbers beyond {exact:,}" in printed
     assert "rounds" not in planned(tmp_path, numbered(background=0, first=9, dtype=dtype), capsys)
 
 
-def test_numbers_that_fill_their_type_are_told(
+def test_labels_that_use_up_their_data_type_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     voxels = np.zeros((8, 64, 64), np.uint8)
@@ -118,5 +118,5 @@ def test_a_background_needs_labels(tmp_path: Path, capsys: pytest.CaptureFixture
     tifffile.imwrite(tmp_path / "l.tif", numbered(background=0), metadata={"axes": "ZYX"})
     arguments = ["plan", str(tmp_path / "l.tif"), "-o", str(tmp_path / "o"), "--background", "7"]
     assert main([*arguments, "--spacing-um", "1,1,1"]) == 2
-    assert "--background is '7': of no objects, expected --labels" in capsys.readouterr().err
+    assert "--background is '7', expected --labels with it" in capsys.readouterr().err
     assert ObjectOptions().background == 0

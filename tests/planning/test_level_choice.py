@@ -1,4 +1,4 @@
-"""Which level of a channel has its surface, and when it cannot be called clear."""
+"""The choice of a channel's level, and the reasons to call it unsure."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ from corpus.real import data_folder
 from stereocell.building.out_folder import OutFolder
 from stereocell.building.survey_file import read_survey
 from stereocell.cli.__main__ import main
-from stereocell.planning.level_choice import choose_rung
+from stereocell.planning.level_choice import choose_apart
 from stereocell.planning.survey import Survey
 from support import phantoms
 
@@ -18,7 +18,7 @@ Rung = dict[str, dict[str, int]]
 
 
 def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
-    """Return a rung's sums by tile, of (voxels, largest, count); the others are specks."""
+    """Return a level's sums by tile from (voxels, largest, count). All others are specks."""
     names = ("voxels", "largest", "count", "kept")
     return {
         f"r0_c{i}": dict(zip(names, (*tile, round(kept_share * tile[2])), strict=True))
@@ -28,8 +28,8 @@ def _rung(*tiles: tuple[int, int, int], kept_share: float = 1.0) -> Rung:
 
 TISSUE = _rung((1000, 1000, 1), (900, 890, 4))
 CELLS = _rung((100, 10, 40), (90, 9, 50))
-TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest hold .42
-# this level shows the brightest cortex of a whole mouse brain at 25 um
+TOUCHING = _rung((100, 60, 40), (90, 20, 50))  # the largest components hold .42
+# A level that shows the brightest cortex of a whole mouse brain at 25 um
 BRIGHT_PARTS = _rung((249778, 89062, 159), (98724, 94128, 32), kept_share=0.05)
 SPECKS = _rung((4, 2, 2), (5, 2, 3))
 
@@ -40,21 +40,21 @@ SPECKS = _rung((4, 2, 2), (5, 2, 3))
         ([TISSUE, CELLS], 1),
         ([TISSUE, TOUCHING, CELLS], 2),
         ([TISSUE, TOUCHING], 1),
-        ([TISSUE, SPECKS], 0),  # a few specks are no cells
-        ([TISSUE, BRIGHT_PARTS], 0),  # nor are specks beside a few large pieces
+        ([TISSUE, SPECKS], 0),  # a few specks are not cells
+        ([TISSUE, BRIGHT_PARTS], 0),  # specks beside a few large pieces are not cells
         ([TISSUE, _rung((100, 99, 60), (90, 80, 50))], 0),
         ([TISSUE, _rung((0, 0, 0), (0, 0, 0))], 0),
         ([CELLS, TISSUE], 0),
     ],
 )
-def test_the_first_rung_of_many_else_that_of_many_that_touch_else_the_outer(
+def test_the_level_with_most_components_is_chosen_if_it_parts_cells(
     rungs: list[Rung], chosen: int
 ) -> None:
-    assert choose_rung(rungs) == chosen
+    assert choose_apart(rungs) == chosen
 
 
 def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
-    """Return what a build finds of one channel, by the defaults where no flags are given."""
+    """Build one channel and return its survey. Without flags the defaults are used."""
     source = phantoms.write_ome_zarr(
         tmp_path / "one.ome.zarr", [voxels], scales=[dict(zip("zyx", (5.0, 2.0, 2.0), strict=True))]
     )
@@ -66,7 +66,7 @@ def _surveyed(tmp_path: Path, voxels: np.ndarray, *flags: str) -> Survey:
 
 
 def _bodies(radius_um: float) -> np.ndarray:
-    """Return four bright balls, each within a tile of 20 x 20, on a dim, noisy ground."""
+    """Return four bright balls, each within a tile of 20 x 20, on a dim, noisy background."""
     shape, rng = (16, 80, 80), np.random.default_rng(2)
     field = np.zeros(shape)
     for y, x in ((20, 20), (60, 100), (140, 60), (100, 140)):
@@ -84,18 +84,18 @@ def test_a_level_above_the_display_window_is_unsure(tmp_path: Path) -> None:
     assert "lies above the display window, which ends at" in unsure.appearance.surface_reason
 
 
-def test_a_level_that_no_tile_is_sure_of_is_unsure(tmp_path: Path) -> None:
-    """A few bright voxels a tile: the whole has a level, and no tile has enough inside."""
+def test_a_level_is_unsure_if_no_tile_alone_is_sure_of_it(tmp_path: Path) -> None:
+    """The whole volume has a level, but no tile has enough bright voxels."""
     voxels = _bodies(7.6)
     (channel,) = _surveyed(tmp_path, voxels, "--grid", "4x4").values()
     assert all(tile.confidence is None for tile in channel.iso.values())
     assert channel.appearance.surface == "unsure"
 
 
-def test_a_haze_around_far_brighter_bodies_is_unsure_and_their_level_is_named(
+def test_a_haze_around_far_brighter_structures_is_unsure_and_their_level_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As stain in the cytoplasm around a confocal nucleus."""
+    """Stain in the cytoplasm around a nucleus looks like this in confocal images."""
     shape, spacing, rng = (16, 80, 80), (5.0, 2.0, 2.0), np.random.default_rng(4)
     cell = phantoms.blurred_ball(shape, spacing, (40.0, 80.0, 80.0), 30.0, 2.0)
     nucleus = phantoms.blurred_ball(shape, spacing, (40.0, 80.0, 80.0), 16.0, 2.0)
@@ -103,16 +103,16 @@ def test_a_haze_around_far_brighter_bodies_is_unsure_and_their_level_is_named(
     voxels = (50 + 400 * cell + 20_000 * nucleus + noise).round().clip(0).astype(np.uint16)
     (channel,) = _surveyed(tmp_path, voxels).values()
     assert channel.appearance.surface == "unsure"
-    assert "may be a haze around brighter bodies" in channel.appearance.surface_reason
+    assert "may enclose a haze around brighter structures" in channel.appearance.surface_reason
     inner = channel.ladder[1].value
     assert inner == pytest.approx(10_000, rel=0.3)
     assert f"{inner:.5g} (" in channel.near_levels
-    told = capsys.readouterr().err
-    assert told.count(f"{inner:.5g} (") >= 2  # by plan, and by units
+    output = capsys.readouterr().err
+    assert output.count(f"{inner:.5g} (") >= 2  # printed by plan and by units
 
 
-def test_a_tile_is_no_surer_of_a_level_than_its_channel(tmp_path: Path) -> None:
-    """A bright core makes a tile sure of the skin around it, which the channel is less sure of."""
+def test_a_tile_is_never_more_confident_of_a_level_than_its_channel(tmp_path: Path) -> None:
+    """A bright core makes one tile confident of the skin around it, but not the whole channel."""
     shape, spacing, rng = (24, 64, 64), (5.0, 2.0, 2.0), np.random.default_rng(0)
     middle = (60.0, 64.0, 64.0)
     skin = phantoms.blurred_ball(shape, spacing, middle, 50.0, 2.0)
@@ -124,8 +124,10 @@ def test_a_tile_is_no_surer_of_a_level_than_its_channel(tmp_path: Path) -> None:
     assert tile.confidence == pytest.approx(channel.appearance.iso_confidence)
 
 
-def test_in_voxels_wider_than_cells_light_sheet_outlines_the_tissue(tmp_path: Path) -> None:
-    """Bright bodies in tissue, as cells are at 5 um a voxel, and parts of a brain at 25 um."""
+def test_preset_lightsheet_outlines_the_tissue_if_voxels_are_wider_than_cells(
+    tmp_path: Path,
+) -> None:
+    """At 5 um a voxel, bright structures in tissue are cells, at 25 um parts of a brain."""
     shape, rng = (24, 80, 80), np.random.default_rng(3)
     tissue = phantoms.blurred_ball(shape, (1.0, 1.0, 1.0), (12.0, 40.0, 40.0), 34.0, 1.0)
     bodies = np.zeros(shape)
@@ -152,8 +154,8 @@ SHEET = None if DATA is None else next(DATA.glob("brain_cells_2ch/*.tif"), None)
 
 @pytest.mark.slow
 @pytest.mark.skipif(not SHEET, reason="needs brain_cells_2ch in STEREOCELL_DATA")
-def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> None:
-    """No one value parts cells from tissue: the bright layer is as bright as cells beside it."""
+def test_preset_lightsheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> None:
+    """No single value parts cells from tissue: the bright layer equals the cells beside it."""
     out = tmp_path / "out"
     flags = ["--preset", "lightsheet", "--channels", "0", "--region", "8:22,100:420,0:320"]
     assert main(["plan", str(SHEET), "-o", str(out), *flags]) == 0
@@ -171,7 +173,7 @@ def test_light_sheet_shows_cells_in_dim_and_in_bright_tissue(tmp_path: Path) -> 
 
 
 def _lit(least: float) -> np.ndarray:
-    """Return balls on a ground, both under light that falls along x from 1 to `least`."""
+    """Return balls on a background, both under light that falls along x from 1 to `least`."""
     shape, rng = (32, 96, 96), np.random.default_rng(6)
     field = np.zeros(shape)
     for place in rng.uniform((20, 12, 12), (140, 180, 180), (30, 3)):

@@ -1,4 +1,4 @@
-"""The plan names levels that are near one another: exactly for small volumes, else by blocks."""
+"""The plan states a channel's levels: exactly for small volumes, otherwise from blocks."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from support import phantoms
 
 
 def _cells(shape: tuple[int, int, int], core: float) -> NDArray[np.uint16]:
-    """Return cells 400 high at random places, one in 32 x 32 x 32 voxels, each with a core."""
+    """Return cells of 400 above the background, one in 32 x 32 x 32 voxels, each with a core."""
     rng, unit = np.random.default_rng(3), (1.0, 1.0, 1.0)
     field = np.zeros(shape)
     for _ in range(math.prod(shape) >> 15):
@@ -43,7 +43,7 @@ def _level_notes(out: Path) -> list[str]:
     return [note for note in OutFolder(out).plan().notes if note.startswith("Channel0")]
 
 
-def test_the_plan_names_the_near_levels_of_a_small_volume_as_a_build_finds_them(
+def test_the_plan_states_the_near_levels_of_a_small_volume_as_a_build_finds_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = _planned(tmp_path, _cells((32, 64, 64), core=1200))
@@ -62,10 +62,10 @@ def test_the_plan_names_the_near_levels_of_a_small_volume_as_a_build_finds_them(
 @pytest.mark.parametrize(
     ("flags", "expected"),
     [
-        (("--iso-value", "0=400"), ["Channel0: level 400, as it is given"]),
+        (("--iso-value", "0=400"), ["Channel0: level 400, from the settings"]),
         (
             ("--iso-value", "0=150+b"),
-            ["Channel0: level 150+b (+b: above the background), as it is given"],
+            ["Channel0: level 150+b (+b: above the background), from the settings"],
         ),
         (
             ("--preset", "em"),
@@ -74,30 +74,30 @@ def test_the_plan_names_the_near_levels_of_a_small_volume_as_a_build_finds_them(
         (
             ("--surfaces", "0=900,inner"),
             [
-                "Channel0 900: level 900, as it is given",
+                "Channel0 900: level 900, from the settings",
                 "Channel0 inner: the build finds the inner level",
             ],
         ),
     ],
 )
-def test_the_plan_states_a_level_that_needs_no_voxel(
+def test_the_plan_states_a_level_from_the_settings_without_reading_voxels(
     tmp_path: Path, flags: tuple[str, str], expected: list[str]
 ) -> None:
     assert _level_notes(_planned(tmp_path, _cells((32, 64, 64), core=1200), *flags)) == expected
 
 
-def test_the_plan_states_a_lone_clear_level_and_the_voxel_size(
+def test_the_plan_states_a_single_clear_level_and_the_voxel_size(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = _planned(tmp_path, _cells((32, 64, 64), core=0))
     (note,) = _level_notes(out)
     assert re.fullmatch(r"Channel0: clear level [0-9.]+ \([0-9.]+% of the voxels\)", note)
-    told = " ".join(capsys.readouterr().err.split())
-    assert f"plan: {note}" in told
-    assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in told
+    printed = " ".join(capsys.readouterr().err.split())
+    assert f"plan: {note}" in printed
+    assert "32 x 64 x 64 voxels (z, y, x) of 1 x 1 x 1 um, 1 tile x 1 channel" in printed
 
 
-def test_voxel_sizes_of_bodies_are_in_millimetres() -> None:
+def test_large_voxel_sizes_are_printed_in_millimetres() -> None:
     assert words_of_spacing((5000.0, 488.28125, 488.28125)) == "5 x 0.4883 x 0.4883 mm"
     assert words_of_spacing((200.0, 50.0, 50.0)) == "200 x 50 x 50 um"
 
@@ -108,14 +108,16 @@ def test_the_plan_says_that_noise_has_no_surface(tmp_path: Path) -> None:
     assert note.startswith("Channel0: no surface: neighbouring voxels have nothing to do")
 
 
-def test_the_plan_calls_a_level_unsure_that_no_tile_has_voxels_for(tmp_path: Path) -> None:
+def test_the_plan_calls_a_level_unsure_if_no_tile_has_enough_voxels_above_it(
+    tmp_path: Path,
+) -> None:
     """A cube of 9 voxels a side holds less than .2 % of the volume."""
     lone = np.random.default_rng(0).normal(200, 10, (64, 96, 96))
     lone[20:29, 40:49, 40:49] += 2000
     out = _planned(tmp_path, lone.round().astype(np.uint16))
     (note,) = _level_notes(out)
     assert note.startswith("Channel0: unsure level ")
-    assert "no tile by itself has enough voxels on both sides of it" in note
+    assert "no tile by itself has enough voxels on both sides of the level" in note
     assert main(["units", str(out), "--workers", "0"]) == 0
     (channel,) = read_survey(OutFolder(out)).values()
     assert channel.appearance.surface == "unsure"
@@ -130,7 +132,7 @@ def test_the_plan_explains_how_the_build_chooses_between_levels(tmp_path: Path) 
     assert note.endswith(" (+b: above the background)") == ("+b (" in note)
 
 
-def test_the_plan_counts_the_channels_that_it_does_not_look_at(
+def test_the_plan_counts_the_channels_whose_level_it_does_not_estimate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stereocell.planning.level_estimate.MAX_CHANNELS", 1)
@@ -140,14 +142,16 @@ def test_the_plan_counts_the_channels_that_it_does_not_look_at(
     )
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
     notes = OutFolder(tmp_path / "out").plan().notes
-    assert "the plan looks at no level of 2 other channels: the build finds these" in notes
+    assert (
+        "the plan does not estimate the levels of 2 other channels: the build finds them" in notes
+    )
     monkeypatch.setattr("stereocell.planning.level_estimate.MOST_VOXELS", 1000)
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
     notes = OutFolder(tmp_path / "out").plan().notes
-    assert "the plan looks at no level of the channels: the build finds these" in notes
+    assert "the plan does not estimate the levels of the channels: the build finds them" in notes
 
 
-def test_blocks_find_nearly_the_levels_of_all_voxels(tmp_path: Path) -> None:
+def test_blocks_give_nearly_the_same_levels_as_all_voxels(tmp_path: Path) -> None:
     plan = OutFolder(_planned(tmp_path, _cells((96, 128, 128), core=1200))).plan()
     boxes = sample_boxes(plan.region, 400_000, BLOCK)
     assert len(boxes) > 8
@@ -159,10 +163,12 @@ def test_blocks_find_nearly_the_levels_of_all_voxels(tmp_path: Path) -> None:
     assert len(whole.clear) == len(blocks.clear) > 1
     for level, estimate in zip(whole.clear, blocks.clear, strict=True):
         assert estimate.value == pytest.approx(level.value, rel=0.05)
-        assert 0.5 < estimate.share / level.share < 2  # by chance: there are 48 cells
+        assert (
+            0.5 < estimate.share / level.share < 2
+        )  # the number of cells in the blocks varies by chance; there are 48
 
 
-def test_estimated_levels_are_told_with_three_digits(tmp_path: Path) -> None:
+def test_estimated_levels_are_printed_with_three_digits(tmp_path: Path) -> None:
     out = _planned(tmp_path, _cells((96, 160, 160), core=1200))
     (note,) = _level_notes(out)
     assert "level about" in note

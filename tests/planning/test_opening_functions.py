@@ -40,20 +40,20 @@ def _uptake(rng: np.random.Generator) -> NDArray[np.float64]:
     return np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])
 
 
-# voxels, the level of their surface where a preset states none, and that of their background
+# voxels, the level of their surface if no preset states it, and the level of their background
 CASES: dict[str, tuple[Callable[[np.random.Generator], NDArray[np.float64]], float, float]] = {
     "CT": (_body_in_hounsfield_units, -300.0, -1000.0),
     "MR": (_magnitudes, 90.0, 15.0),
     "PT": (_uptake, 1500.0, 200.0),
     "": (_light, 450.0, 100.0),
 }
-MOST_BELOW_HU = 60.0  # that a CT's opacity begins below its surface
+MOST_BELOW_HU = 60.0  # HU; most that a CT's opacity may begin below its surface
 
 
 def _opened(
     preset: str, *, is_hounsfield: bool = True, unevenness: float = 1.0
 ) -> tuple[Appearance, float]:
-    """Return how a channel of a preset's kind is drawn, and the level of its background."""
+    """Return the appearance of a channel for a preset, and the level of its background."""
     settings = load(preset, None, flags={})
     make, level, background = CASES[settings.plan.modality]
     if "*" in settings.iso_values:
@@ -77,24 +77,26 @@ def _opened(
 
 
 def _foot(appearance: Appearance) -> float:
-    """Return the value from which the chosen function shows anything, in voxel values."""
+    """Return the voxel value at which the opacity of the chosen function begins."""
     opacity = evaluate(appearance.transfer_functions[appearance.function], size=4096)
     low, high = appearance.window
     return low + float(np.flatnonzero(opacity > 0)[0]) / 4095 * (high - low)
 
 
 @pytest.mark.parametrize("preset", preset_names())
-def test_a_preset_opens_with_a_function_whose_foot_lies_at_the_surface(preset: str) -> None:
+def test_the_opacity_of_a_preset_s_function_begins_at_the_surface(preset: str) -> None:
     appearance, background = _opened(preset)
     assert appearance.iso_value is not None
     lowest = (background + appearance.iso_value) / 2
     if preset.startswith("ct"):
         lowest = appearance.iso_value - MOST_BELOW_HU
-    step = (appearance.window[1] - appearance.window[0]) / 4095  # of the table that is searched
+    step = (
+        appearance.window[1] - appearance.window[0]
+    ) / 4095  # voxel values between two entries of the table
     assert lowest <= _foot(appearance) <= appearance.iso_value + step
 
 
-def test_a_surface_of_bone_opens_with_the_function_of_bone() -> None:
+def test_a_surface_of_bone_opens_with_the_transfer_function_for_bone() -> None:
     assert _opened("ct-bone")[0].function == "bone"
     assert _opened("ct")[0].function == "tissues"
     assert _opened("mri")[0].function == "grey"
@@ -110,14 +112,14 @@ def _color_at(appearance: Appearance, hu: float, step_hu: float) -> tuple[NDArra
     return cell[:3] / 255, int(cell[3])
 
 
-def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() -> None:
+def test_tissues_of_a_ct_differ_in_colour_and_their_edge_to_air_looks_like_skin() -> None:
     appearance, _ = _opened("ct")
     fat, muscle, bone = (_color_at(appearance, hu, 0.0)[0] for hu in (-100, 50, 900))
     assert min(fat[:2]) > 0.8  # yellow
     assert fat[2] < 0.7
     assert muscle[0] > 2 * max(muscle[1:])  # red
-    assert min(bone) > 0.95  # the channel's own, pale
-    # bile, liver, muscle and contrast medium part from each other on a cut
+    assert min(bone) > 0.95  # the channel's own pale colour
+    # bile, liver, muscle and contrast medium can be distinguished on a cut
     steps = [_color_at(appearance, hu, 0.0) for hu in (0, 35, 65, 120)]
     assert (np.diff([color @ (0.2126, 0.7152, 0.0722) for color, _ in steps]) > 0.04).all()
     opacities = [opacity for _, opacity in steps]
@@ -127,7 +129,7 @@ def test_tissues_of_a_ct_have_colours_of_their_own_and_an_edge_to_air_is_skin() 
     assert _color_at(appearance, -600, 900.0)[1] == 0
 
 
-def test_brighter_tissue_of_an_mr_is_lighter_and_noise_no_stronger() -> None:
+def test_brighter_tissue_of_an_mr_is_lighter_without_amplifying_noise() -> None:
     appearance, _ = _opened("mri")
     assert appearance.iso_normalized is not None
     table = evaluate2d(appearance.transfer_2d.functions["grey"])
@@ -147,11 +149,11 @@ def test_a_ct_of_thick_slices_opens_in_one_colour() -> None:
     assert "tissues" in appearance.transfer_functions
 
 
-def test_a_ct_without_hounsfield_units_has_no_colours_of_tissues() -> None:
+def test_a_ct_without_hounsfield_units_has_no_colours_by_tissue() -> None:
     assert "tissues" not in _opened("ct", is_hounsfield=False)[0].transfer_functions
 
 
-def test_a_ct_is_solid_just_inside_its_skin() -> None:
+def test_a_ct_is_opaque_just_inside_its_skin() -> None:
     appearance, _ = _opened("ct")
     opacity = evaluate(appearance.transfer_functions["default"])
     low, high = appearance.window
@@ -160,7 +162,7 @@ def test_a_ct_is_solid_just_inside_its_skin() -> None:
     assert at[-100] > 0.4
 
 
-def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
+def test_an_mr_opens_with_a_cut_unless_classes_of_a_brain_are_found() -> None:
     plain = replace(plan_of(), modality="MR")
     assert plain.opens_cut
     assert not replace(plain, modality="CT").opens_cut
@@ -171,12 +173,12 @@ def test_an_mr_opens_cut_but_where_a_brain_is_found() -> None:
     ]
     assert not replace(plain, channels=(*plain.channels, *head)).opens_cut
     assert replace(plain, channels=(*plain.channels, *head[:2])).opens_cut
-    # a channel of the input may have such a name
+    # the input's own channel may be named like a class
     assert not has_brain([replace(one, source="") for one in head])
 
 
 @pytest.mark.parametrize(("enclosed", "is_body"), [(0.01, False), (0.2, True)])
-def test_only_a_body_is_cut_open_and_vessels_are_shown_whole_and_red(
+def test_only_bodies_are_cut_open_and_vessels_are_shown_whole_and_red(
     enclosed: float, is_body: bool
 ) -> None:
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""The colours of channels whose file names none, to normal sight and to colour-blind sight."""
+"""The palette's colours differ for people with normal and with colour-blind sight."""
 
 from itertools import combinations
 
@@ -11,8 +11,8 @@ from stereocell.model.color import linear_color, to_srgb8
 from stereocell.planning.channels import PALETTE
 from stereocell.samples.microscope import STAINS
 
-# linear RGB to what is seen at severity 1: Machado et al., "A Physiologically-based Model for
-# Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009, table 1
+# From linear RGB to the perceived colour: Machado et al., "A Physiologically-based Model for
+# Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009, table 1, severity 1
 SIGHTS = {
     "normal": np.eye(3),
     "protanopia": np.array(
@@ -30,7 +30,7 @@ SIGHTS = {
         ]
     ),
 }
-# Light changes a surface's lightness, so that it tells less than a hue does
+# Light changes the lightness of a surface, so lightness counts for less than hue.
 LIGHTNESS_COUNTS = 1.6
 
 
@@ -44,20 +44,20 @@ def least_difference(colors: NDArray[np.float64], sight: NDArray[np.float64]) ->
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_channels_can_be_told_apart(sight: str) -> None:
+def test_any_two_colours_of_the_palette_differ(sight: str) -> None:
     colors = np.array(PALETTE)
     assert least_difference(colors, SIGHTS[sight]) > 10
     assert least_difference(colors[:3], SIGHTS[sight]) > 23
 
 
 @pytest.mark.parametrize("sight", SIGHTS)
-def test_stains_of_the_sample_can_be_told_apart(sight: str) -> None:
+def test_colours_of_the_sample_s_stains_differ(sight: str) -> None:
     rgb = [bytes.fromhex(stain.color) for stain in STAINS]
     colors = np.array([linear_color((code[0], code[1], code[2])) for code in rgb])
     assert least_difference(colors, SIGHTS[sight]) > 23
 
 
-def test_no_colour_is_a_pure_primary_or_lost_on_a_dark_ground() -> None:
+def test_no_colour_is_a_pure_primary_or_too_dark_for_a_dark_ground() -> None:
     rgb = to_srgb8(np.array(PALETTE, np.float32))
     assert rgb2hsv(rgb)[:, 1].max() < 0.8
     assert rgb2lab(rgb)[:, 0].min() > 40

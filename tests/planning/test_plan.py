@@ -1,4 +1,4 @@
-"""Plans: levels, regions, tiles, halo; and what doesn't fit the data."""
+"""Plans: levels, regions, tiles and halo, and settings that don't fit the data."""
 
 import dataclasses
 import json
@@ -18,7 +18,7 @@ from support.plans import CHANNELS, plan_of
 from support.sealed_files import seal
 
 
-def test_plan_survives_its_file_and_passes_its_schema() -> None:
+def test_a_plan_read_from_its_file_is_the_same_and_passes_its_schema() -> None:
     plan = plan_of({"grid": "5x2"}, iso_values={"CD3ε": 700.0})
     content = json.loads(json.dumps(to_json(plan)))
     schema = json.loads(find_asset("schemas/plan.schema.json").read_text("utf-8"))
@@ -27,7 +27,7 @@ def test_plan_survives_its_file_and_passes_its_schema() -> None:
     assert len(plan.tiles) == 10
 
 
-def test_without_a_level_the_finest_within_the_limit_is_taken_and_said() -> None:
+def test_without_a_level_the_finest_within_the_limit_is_chosen_and_reported() -> None:
     plan = plan_of({"max_voxels": 2 * 64 * 128 * 320})
     assert plan.level == 1
     assert plan.spacing_um == (0.28, 0.28, 0.28)
@@ -40,16 +40,16 @@ def test_without_a_level_the_finest_within_the_limit_is_taken_and_said() -> None
 def test_the_limit_counts_the_region_of_the_level_that_is_built() -> None:
     limit = {"max_voxels": 2 * 64 * 100 * 100}
     assert plan_of({"region": ":,0:100,:100", **limit}).level == 0
-    # an open end is the level's own: 640 columns of level 0, 320 of level 1, 160 of level 2
+    # an open end means the end of the level: 640 columns at level 0, 320 at level 1, 160 at level 2
     assert plan_of({"region": ":,0:60,:", **limit}).level == 2
     assert plan_of({"region": ":,0:30,:", **limit}).level == 1
     with pytest.raises(
         UsageError, match=r"--region :,0:200,:300 holds 7,680,000 voxels, more than"
     ):
-        plan_of({"region": ":,0:200,:300", **limit})  # no coarser level holds it
+        plan_of({"region": ":,0:200,:300", **limit})  # no coarser level can hold this region
 
 
-def test_halo_covers_what_decides_on_a_voxel() -> None:
+def test_the_halo_covers_all_voxels_that_influence_a_result() -> None:
     plan = plan_of()
     reach = plan.repair.reach_um(plan.spacing_um)
     reach += 4 * plan.settings.surface.smoothing_um  # type: ignore[operator]
@@ -62,7 +62,7 @@ def test_tiles_are_clipped_to_the_data() -> None:
     assert [tile.id for tile in plan_of().tiles] == ["r0_c0", "r0_c1"]
 
 
-def test_a_grid_is_kept_and_its_plan_repeats() -> None:
+def test_planning_again_with_the_resulting_settings_gives_the_same_plan() -> None:
     plan = plan_of({"grid": "4x3", "region": ":,0:10,0:9"})
     sizes = {tile.box.shape for tile in plan.tiles}
     assert len(plan.tiles) == 12
@@ -97,7 +97,7 @@ def test_presets_and_defaults_suit_their_data(preset: str | None, level: Level) 
 @pytest.mark.parametrize(
     ("rows", "flags", "tiles"), [(512, {}, 1), (611, {}, 2), (611, {"tile_size": [768] * 3}, 1)]
 )
-def test_a_body_is_one_tile_up_to_512_voxels_a_side_or_the_size_that_is_asked_for(
+def test_a_body_of_up_to_512_voxels_a_side_is_one_tile_unless_a_size_is_given(
     preset: str, rows: int, flags: dict[str, object], tiles: int
 ) -> None:
     settings = settings_module.to_dict(settings_module.load(preset, None, flags={}))
@@ -110,13 +110,17 @@ def test_a_body_is_one_tile_up_to_512_voxels_a_side_or_the_size_that_is_asked_fo
 @pytest.mark.parametrize(
     "surface",
     [
-        {"alpha_um": 1000.0, "min_diagonal_um": 10000.0, "max_cavity_um": 4000.0},  # as for MRI
+        {
+            "alpha_um": 1000.0,
+            "min_diagonal_um": 10000.0,
+            "max_cavity_um": 4000.0,
+        },  # lengths of the preset mri
         {"alpha_um": 200.0},
         {"smoothing_um": 100.0},
         {"alpha_um": 1e12},
     ],
 )
-def test_lengths_for_other_voxels_are_wrong_usage(surface: dict[str, object]) -> None:
+def test_lengths_for_larger_voxels_are_wrong_usage(surface: dict[str, object]) -> None:
     with pytest.raises(UsageError) as raised:
         plan_of({"grid": "5x2"}, surface=surface)
     message = str(raised.value)
@@ -167,10 +171,14 @@ def test_planes_too_far_apart_for_a_tile_are_wrong_usage(grid_um: float, message
 def test_a_grid_with_four_planes_in_a_tile_makes_a_plan() -> None:
     assert plan_of(surface={"grid_um": 16 * 0.28}).step == (16, 32, 32)
     thin = {"region": "0:3,:,:"}
-    assert plan_of(thin, surface={"grid_um": 0.28}).step == (1, 2, 2)  # all of the few there are
+    assert plan_of(thin, surface={"grid_um": 0.28}).step == (
+        1,
+        2,
+        2,
+    )  # all of the few planes along z
 
 
-def test_a_long_reach_is_fine_where_little_is_read() -> None:
+def test_long_lengths_are_accepted_if_a_unit_reads_few_voxels() -> None:
     surface: dict[str, object] = {"min_diagonal_um": 10000.0}
     assert plan_of({"region": "0:16,0:48,0:36"}, surface=surface).halo == (20, 52, 40)
     endless: dict[str, object] = {"min_diagonal_um": 1e12, "max_cavity_um": 1e12}
@@ -205,23 +213,25 @@ def test_positions_are_voxel_centres() -> None:
         ({"tile_size": [5, 5]}, "expected three numbers"),
     ],
 )
-def test_what_does_not_fit_is_wrong_usage(flags: dict[str, object], message: str) -> None:
+def test_settings_that_do_not_fit_the_data_are_wrong_usage(
+    flags: dict[str, object], message: str
+) -> None:
     with pytest.raises(UsageError) as raised:
         plan_of(flags)
     assert message in str(raised.value)
 
 
-def test_single_plane_can_not_be_built() -> None:
-    with pytest.raises(SourceError, match="expected at least 2 each way"):
+def test_a_single_plane_can_not_be_built() -> None:
+    with pytest.raises(SourceError, match="expected at least 2 along each axis"):
         plan_of({"region": "3:4,:,:"})
 
 
-def test_iso_value_for_an_unknown_channel_names_the_known() -> None:
+def test_an_iso_value_for_an_unknown_channel_lists_the_known_ones() -> None:
     with pytest.raises(StereoCellError, match="'CD4', expected one of Hoechst 33342, CD3ε"):
         plan_of(iso_values={"CD4": 3.0})
 
 
-def test_iso_values_go_by_name_or_by_index() -> None:
+def test_iso_values_are_given_by_name_or_by_index() -> None:
     assert plan_of(iso_values={"2": 3.0}).settings.iso_values == {"CD3ε": 3.0}
     plan = plan_of(iso_values={"Hoechst 33342": 1.0, "2": 3.0})
     assert plan.settings.iso_values == {"Hoechst 33342": 1.0, "CD3ε": 3.0}
@@ -231,8 +241,8 @@ def test_iso_values_go_by_name_or_by_index() -> None:
         plan_of(iso_values={"2": 3.0, "CD3ε": 4.0})
 
 
-def test_the_star_is_for_the_channels_that_no_other_key_names() -> None:
-    """As the presets of CT use it, so that a user may name the channel in any way."""
+def test_the_star_stands_for_channels_without_a_key_of_their_own() -> None:
+    """Presets for CT use the star, so that users may name the channel in any way."""
     stars = {"iso_values": {"*": -300.0}, "windows": {"*": "-1024:2000"}}
     for key in ("CD3ε", "2"):
         plan = plan_of(
@@ -256,7 +266,7 @@ def test_each_of_several_surfaces_can_be_named() -> None:
         plan_of(channels=(outer, inner, other), paint={"CT": "PET"})
 
 
-def test_an_iso_value_s_name_goes_before_its_index() -> None:
+def test_a_key_counts_as_a_name_before_it_counts_as_an_index() -> None:
     channels = (Channel(0, "488", (0, 0, 1)), Channel(1, "0", (0, 1, 0)))
     plan = plan_of(channels=channels, iso_values={"0": 5.0})
     assert plan.settings.iso_values == {"0": 5.0}

@@ -1,4 +1,4 @@
-"""plan.json: what the dataclasses say and what the schema says are the same."""
+"""plan.json: the dataclasses and the schema have the same fields."""
 
 import json
 from dataclasses import fields, replace
@@ -26,7 +26,7 @@ def test_the_schema_has_the_plan_s_fields() -> None:
     assert list(channel["properties"]) == [field.name for field in fields(Channel)]
 
 
-def test_a_plan_of_the_version_before_its_formats_were_in_it_is_read() -> None:
+def test_a_plan_of_an_earlier_version_without_formats_is_read() -> None:
     content = to_json(plan_of())
     del content["formats"]
     jsonschema.validate(seal(content), json.loads(schema_path("plan.schema.json").read_bytes()))
@@ -41,7 +41,7 @@ def test_a_plan_without_notes_on_its_source_is_read() -> None:
     assert from_json(content) == plan_of()
 
 
-def test_results_name_the_libraries_of_their_own_reader_and_of_no_other() -> None:
+def test_results_name_the_libraries_of_their_own_reader_only() -> None:
     def named(*formats: str) -> set[str]:
         return set(provenance(replace(plan_of(), formats=formats))["libraries"])
 

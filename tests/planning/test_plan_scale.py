@@ -12,11 +12,11 @@ from stereocell.cli.__main__ import main
 from support import phantoms
 
 SHAPE, TILE = (194, 5508, 10908), (194, 512, 512)
-CALLS_BY_UNIT = 200  # it takes 153, imports included
+CALLS_BY_UNIT = 200  # most calls of functions for each unit; it was 153, with imports
 
 
 def write_empty(path: Path, channels: int) -> Path:
-    """Write an OME-Zarr of SHAPE with a single chunk: all others were never stored."""
+    """Write an OME-Zarr of SHAPE that stores only one of its chunks."""
     labels = [{"label": f"stain {n}", "color": "FF0000"} for n in range(channels)]
     phantoms.write_ome_zarr(
         path, [phantoms.f_phantom()[None]], "czyx", version="0.4", channels=labels
@@ -35,13 +35,13 @@ def write_empty(path: Path, channels: int) -> Path:
 
 
 @pytest.mark.slow
-def test_the_plan_of_16940_units_takes_few_calls_by_unit(tmp_path: Path) -> None:
-    """Calls are counted, not seconds: those depend on what else the machine does."""
+def test_the_plan_of_16940_units_takes_few_calls_for_each_unit(tmp_path: Path) -> None:
+    """Calls are counted and not seconds, which depend on other work of the machine."""
     source = write_empty(tmp_path / "whole.ome.zarr", 70)
     size = ",".join(map(str, TILE))
-    told = ["--preset", "cycif", "--level", "0", "--tile-size", size]
+    flags = ["--preset", "cycif", "--level", "0", "--tile-size", size]
     with cProfile.Profile() as counted:
-        assert main(["plan", str(source), "-o", str(tmp_path / "out"), *told]) == 0
+        assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     plan = OutFolder(tmp_path / "out").plan()
     assert (len(plan.tiles), len(plan.channels)) == (242, 70)
     calls = pstats.Stats(counted).total_calls

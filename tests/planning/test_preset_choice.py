@@ -1,4 +1,4 @@
-"""Which preset a source is built by where the user names none, and what the plan says of it."""
+"""The preset that is chosen if the user names none, and the plan's notes on it."""
 
 import re
 from pathlib import Path
@@ -34,7 +34,7 @@ def _nifti(path: Path, voxels: NDArray[np.generic], spacing_mm: float = 1.0) -> 
     return path
 
 
-def test_millimetres_with_hounsfield_units_are_a_ct(tmp_path: Path) -> None:
+def test_voxels_of_millimetres_with_hounsfield_units_are_a_ct(tmp_path: Path) -> None:
     source = _nifti(tmp_path / "a b.nii.gz", _body(-1000, 40))
     chosen, reason = choose_preset(open_dataset(source))
     assert chosen == "ct"
@@ -42,7 +42,7 @@ def test_millimetres_with_hounsfield_units_are_a_ct(tmp_path: Path) -> None:
     assert "Hounsfield" in reason[0]
 
 
-def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
+def test_voxels_of_millimetres_without_hounsfield_units_are_an_mri(tmp_path: Path) -> None:
     chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
     assert chosen == "mri"
     assert "no Hounsfield units" in reason[0]
@@ -57,7 +57,7 @@ def test_millimetres_without_are_an_mri(tmp_path: Path) -> None:
     ],
     ids=["offset 1024", "offset without a sign", "8 bits"],
 )
-def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_named(
+def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_for_a_ct_are_printed(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     voxels: NDArray[np.int16],
@@ -69,10 +69,10 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_na
     chosen, (assumed, advice) = choose_preset(open_dataset(source))
     assert chosen == "mri"
     assert words in assumed + advice
-    assert "no modality is stated: MR is assumed (--preset none: the defaults)" in assumed
+    assert "no modality is stated: MR is assumed (--preset none takes the defaults)" in assumed
     assert "for a CT --preset ct --iso-value 0=" in advice
     assert ("no scaling to Hounsfield units is known" in advice) == (voxels.dtype == np.uint8)
-    assert ("plus 1024 would be those of a CT" in advice) == (voxels.dtype != np.uint8)
+    assert ("plus 1024 are typical of a CT" in advice) == (voxels.dtype != np.uint8)
     flags = advice[advice.index("--preset ct") :].partition(";")[0].split()
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 0
     assert "is assumed" not in capsys.readouterr().err
@@ -92,7 +92,7 @@ def test_a_ct_of_other_values_is_taken_for_mr_and_the_flags_that_build_it_are_na
         ("ct", _body(-1000, 40), ""),
     ],
 )
-def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
+def test_a_note_doubts_a_preset_of_ct_for_other_values_and_prints_the_flags_that_fit(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     preset: str,
@@ -101,8 +101,8 @@ def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
 ) -> None:
     source = _nifti(tmp_path / "a.nii", voxels)
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", preset]) == 0
-    told = capsys.readouterr().err.replace("\n", " ")
-    assert words in told if words else "Hounsfield" not in told
+    output = capsys.readouterr().err.replace("\n", " ")
+    assert words in output if words else "Hounsfield" not in output
     again = [str(source), "-o", str(tmp_path / "b"), "--preset", preset, "--iso-value", "0=80"]
     assert main(["plan", *again]) == 0
     assert "is meant for Hounsfield units" not in capsys.readouterr().err
@@ -119,24 +119,24 @@ def test_a_preset_of_ct_for_other_values_is_doubted_with_the_flags_that_fit(
     ],
     ids=["offset", "8 bits", "unsigned", "normalised"],
 )
-def test_a_preset_of_ct_gives_no_level_to_values_that_are_no_hounsfield_units(
+def test_levels_of_ct_presets_are_ignored_for_values_that_are_not_hounsfield_units(
     tmp_path: Path, preset: str, voxels: NDArray[np.generic]
 ) -> None:
-    """NIfTI answers as DICOM does in tests/read/formats/dicom/test_value_scales.py."""
+    """For DICOM see tests/read/formats/dicom/test_value_scales.py."""
     out = tmp_path / "out"
     source = _nifti(tmp_path / "a.nii", voxels)
     assert main(["plan", str(source), "-o", str(out), "--preset", preset]) == 0
     plan = OutFolder(out).plan()
     assert (plan.settings.iso_values, plan.settings.windows) == ({}, {})
     assert not plan.is_hounsfield
-    assert sum("the level and its window are not used" in note for note in plan.notes) == 1
+    assert sum("its level and window are ignored" in note for note in plan.notes) == 1
     own = ["--preset", preset, "--iso-value", "0=300", "--window", "0=0:900"]
     assert main(["plan", str(source), "-o", str(tmp_path / "own"), *own]) == 0
     settings = OutFolder(tmp_path / "own").plan().settings
     assert (settings.iso_values, settings.windows) == ({"NIfTI": 300}, {"NIfTI": "0:900"})
 
 
-def test_a_part_of_a_body_without_air_keeps_the_level_of_bone(tmp_path: Path) -> None:
+def test_a_part_of_a_body_without_air_keeps_the_level_for_bone(tmp_path: Path) -> None:
     source = _nifti(tmp_path / "a.nii", _body(40, 900))
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--preset", "ct-bone"]) == 0
     plan = OutFolder(tmp_path / "out").plan()
@@ -144,7 +144,7 @@ def test_a_part_of_a_body_without_air_keeps_the_level_of_bone(tmp_path: Path) ->
     assert any("is meant for Hounsfield units (--iso-value 0=VALUE" in note for note in plan.notes)
 
 
-def test_values_of_advice_are_short_and_hold_no_exponent(tmp_path: Path) -> None:
+def test_values_in_advised_flags_are_short_and_have_no_exponent(tmp_path: Path) -> None:
     for voxels in (
         (_body(-1000, 40).astype(np.int32) + 32768).astype(np.uint16),
         (_body(20, 180) / 700).astype(np.float32),
@@ -157,56 +157,56 @@ def test_values_of_advice_are_short_and_hold_no_exponent(tmp_path: Path) -> None
             assert len(number.strip("-").replace(".", "").strip("0")) <= 3
 
 
-def test_the_levels_that_are_shifted_are_those_of_the_presets() -> None:
+def test_the_shifted_levels_are_those_of_the_presets() -> None:
     for preset, level in LEVELS_HU.items():
         settings = load(preset, None, flags={})
         assert settings.iso_values["*"] == level
         assert settings.windows["*"] == f"{WINDOW_HU[0]:g}:{WINDOW_HU[1]:g}"
 
 
-def test_a_ct_that_is_stated_without_a_sign_is_doubted(tmp_path: Path) -> None:
+def test_a_note_doubts_a_stated_ct_with_unsigned_values(tmp_path: Path) -> None:
     voxels = _body(24, 1064).astype("<u2")
     head = "ObjectType = Image\nNDims = 3\nDimSize = 32 30 24\nElementType = MET_USHORT\n"
     head += "Modality = MET_MOD_CT\nElementSpacing = 1 1 1\nElementDataFile = LOCAL\n"
     (tmp_path / "a.mha").write_bytes(head.encode() + voxels.tobytes())
     chosen, reason = choose_preset(open_dataset(tmp_path / "a.mha"))
     assert chosen == "ct"
-    assert reason[0] == "preset ct: the input is CT (--preset none: the defaults)"
+    assert reason[0] == "preset ct: the input is CT (--preset none takes the defaults)"
     assert "plus 1024, and its level of -300 is meant for Hounsfield units" in reason[1]
     assert "--preset ct --iso-value 0=724 --window 0=0:3024" in reason[1]
 
 
-def test_padding_darker_than_air_hides_no_ct(tmp_path: Path) -> None:
+def test_a_ct_is_recognised_despite_padding_darker_than_air(tmp_path: Path) -> None:
     voxels = _body(-1000, 40)
-    voxels[:, :8, :8] = voxels[:, -8:, -8:] = -3024  # outside of the scanner's round field
+    voxels[:, :8, :8] = voxels[:, -8:, -8:] = -3024  # outside of the scanner's round field of view
     assert choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))[0] == "ct"
 
 
-def test_few_negative_values_make_no_ct(tmp_path: Path) -> None:
+def test_a_few_negative_values_do_not_make_a_ct(tmp_path: Path) -> None:
     voxels = _body(3700, 12_000)
-    voxels[:4, :4, :4] = -610  # as an atlas has it, resampled by splines
+    voxels[:4, :4, :4] = -610  # resampling by splines gives an atlas such values
     chosen, reason = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels)))
     assert chosen == "mri"
     assert "no Hounsfield units" in reason[0]
 
 
-def test_a_level_above_the_background_is_refused_of_ct(
+def test_a_level_above_the_background_is_refused_for_ct(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = _nifti(tmp_path / "a.nii", _body(-1000, 40))
     assert main(["plan", str(source), "-o", str(tmp_path / "o"), "--iso-value", "0=200+b"]) == 2
-    assert "above the background, which is never subtracted of CT" in capsys.readouterr().err
+    assert "above the background, which is never subtracted from CT" in capsys.readouterr().err
 
 
-def test_what_the_input_says_goes_first(tmp_path: Path) -> None:
+def test_the_input_s_modality_takes_precedence_over_the_settings(tmp_path: Path) -> None:
     dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400)))
     assert choose_preset(dataset, modality="CT")[0] == "ct"
     assert choose_preset(dataset, modality="PT")[0] == "pet"
     assert choose_preset(dataset, modality="US")[0] is None
 
 
-def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> None:
-    """As an embryo in a small scanner: the presets would drop all of it."""
+def test_a_volume_too_small_for_a_patient_has_no_preset(tmp_path: Path) -> None:
+    """The presets would remove all of an embryo in a small scanner."""
     dataset = open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400), 0.2))
     for modality in ("", "MR"):
         chosen, reason = choose_preset(dataset, modality=modality)
@@ -222,14 +222,14 @@ def test_what_is_too_small_for_a_patient_follows_the_spacing(tmp_path: Path) -> 
         ("sub-01_ses-2_trc-18FFDG_pet.nii", "pet"),
         ("SUV_scan.nii", "pet"),
         ("spect 3.nii", "pet"),
-        ("pet_ct.nii", "mri"),  # the name of a study, and not of one image
+        ("pet_ct.nii", "mri"),  # the name of a study with several images
         ("t1w_in_pet_space.nii", "mri"),
-        ("petra.nii", "mri"),  # a sequence of MR
+        ("petra.nii", "mri"),  # the name of an MR sequence
         ("carpet.nii", "mri"),
         ("scan.nii", "mri"),
     ],
 )
-def test_a_name_states_pet_where_the_file_states_no_modality(
+def test_the_source_s_name_states_pet_if_the_file_states_no_modality(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, chosen: str
 ) -> None:
     source = _nifti(tmp_path / name, _body(20, 400))
@@ -242,12 +242,12 @@ def test_a_name_states_pet_where_the_file_states_no_modality(
     assert not any("18FFDG" in note for note in plan.notes)  # names may identify a patient
 
 
-def test_what_is_assumed_to_be_mr_names_the_preset_that_shows_heat(tmp_path: Path) -> None:
+def test_the_note_on_an_assumed_mr_names_the_preset_for_pet(tmp_path: Path) -> None:
     _, notes = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", _body(20, 400))))
     assert "for a PET or SPECT --preset pet, which shows heat" in notes[-1]
 
 
-def test_hounsfield_units_are_a_ct_whatever_the_name_says(tmp_path: Path) -> None:
+def test_hounsfield_units_are_a_ct_whatever_the_source_s_name_is(tmp_path: Path) -> None:
     source = _nifti(tmp_path / "pet.nii", _body(-1000, 40))
     assert load_for(source, None, None, flags={})[0].plan.modality == "CT"
 
@@ -256,7 +256,7 @@ def test_hounsfield_units_are_a_ct_whatever_the_name_says(tmp_path: Path) -> Non
 def test_voxels_finer_than_those_of_patients_are_not_assumed_to_be_mr(
     tmp_path: Path, spacing_mm: float, chosen: str | None
 ) -> None:
-    """Micro-CT and scanners of small animals have such voxels, and a body that is seen whole."""
+    """Micro-CT and scanners for small animals have such voxels and show the whole body."""
     voxels = np.repeat(np.repeat(_body(20, 180).astype(np.uint8), 4, 1), 4, 2)
     preset, notes = choose_preset(open_dataset(_nifti(tmp_path / "a.nii", voxels, spacing_mm)))
     assert preset == chosen
@@ -264,17 +264,17 @@ def test_voxels_finer_than_those_of_patients_are_not_assumed_to_be_mr(
     assert "for a CT --preset ct --iso-value 0=" in notes[1]
 
 
-def test_micrometres_follow_the_spacing(tmp_path: Path) -> None:
+def test_voxels_of_micrometres_have_no_preset(tmp_path: Path) -> None:
     source = tmp_path / "a.ome.tif"
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
     assert choose_preset(open_dataset(source))[0] is None
 
 
 @pytest.mark.parametrize(("finest_um", "chosen"), [(0.9, None), (2.0, "lightsheet"), (25.0, None)])
-def test_cells_are_looked_for_in_voxels_of_a_few_micrometres(
+def test_voxels_of_a_few_micrometres_are_built_by_the_preset_lightsheet(
     tmp_path: Path, finest_um: float, chosen: str | None
 ) -> None:
-    """Cells have surfaces of their own in finer voxels, and wider voxels show their tissue."""
+    """Finer voxels show the surfaces of single cells, and wider voxels only tissue."""
     source = tmp_path / "a.ome.tif"
     spacing = (2.5 * finest_um, finest_um, finest_um)
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=spacing)
@@ -283,17 +283,19 @@ def test_cells_are_looked_for_in_voxels_of_a_few_micrometres(
     assert ("cells are looked for" in reason[0]) == (chosen is not None)
 
 
-def test_the_plan_of_a_microscope_s_voxels_says_so(
+def test_the_plan_states_that_voxels_are_those_of_a_microscope(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "a.ome.tif"
     phantoms.write_ome_tiff(source, _body(20, 400).astype(np.uint16), spacing=(1.0, 0.5, 0.5))
     assert main(["plan", str(source), "-o", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().err
-    assert told.count("plan: no preset: voxels of 0.5 um, as of a microscope: lengths follow") == 1
+    output = capsys.readouterr().err
+    assert (
+        output.count("plan: no preset: voxels of 0.5 um, as of a microscope: lengths follow") == 1
+    )
 
 
-def test_the_plan_says_which_and_why_and_flags_go_over_it(
+def test_the_plan_states_the_preset_with_its_reason_and_flags_override_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = _nifti(tmp_path / "it's.nii.gz", _body(-1000, 40))
@@ -309,7 +311,7 @@ def test_the_plan_says_which_and_why_and_flags_go_over_it(
 
 
 @pytest.mark.parametrize("preset", ["none", "cycif"])
-def test_one_that_is_named_is_taken_without_a_word(
+def test_a_preset_that_the_user_names_causes_no_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], preset: str
 ) -> None:
     source = _nifti(tmp_path / "a.nii", _body(-1000, 40))
@@ -318,7 +320,7 @@ def test_one_that_is_named_is_taken_without_a_word(
     assert "plan: preset" not in capsys.readouterr().err
 
 
-def test_a_source_that_cannot_be_read_is_told_once(
+def test_a_source_that_cannot_be_read_is_reported_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "a.nii"

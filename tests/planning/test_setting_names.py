@@ -1,4 +1,4 @@
-"""Errors name a setting as its reader does: flags at a prompt, sections and keys in Python."""
+"""Errors name settings by flags on the command line, and by section and key in Python."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ WRONG = [
     (["--iso-scope", "slide"], "--iso-scope is 'slide', expected one of channel, tile"),
     (["--iso-criterion", "x"], "--iso-criterion is 'x', expected one of ladder"),
     (["--as", "labels"], "--as is 'labels', expected intensity"),
-    (["--spacing-um", "0,1,1"], "--spacing-um: found 0,1,1, expected z,y,x in um"),
+    (["--spacing-um", "0,1,1"], "--spacing-um is 0,1,1, expected z,y,x in um"),
     (["--axes", "zz"], "--axes is 'zz', expected z, y and x"),
     (["--time=-1"], "--time is -1, expected 0 or more"),
     (["--wrap", "film"], "--wrap is 'film', expected one of voxels"),
@@ -30,17 +30,17 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("flags", "told"), WRONG)
-def test_a_flag_is_called_as_it_was_typed(
-    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], told: str
+@pytest.mark.parametrize(("flags", "message"), WRONG)
+def test_an_error_names_a_flag_as_it_was_typed(
+    source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flags: list[str], message: str
 ) -> None:
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), *flags]) == 2
     line = capsys.readouterr().err.strip()
-    assert line.startswith(f"stereocell: {told}")
+    assert line.startswith(f"stereocell: {message}")
     assert "\n" not in line
 
 
-def test_a_setting_of_a_file_is_called_as_the_file_does(
+def test_an_error_names_a_setting_as_the_file_does(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "my.toml").write_text('[isovalue]\nscope = "slide"\n')
@@ -50,7 +50,7 @@ def test_a_setting_of_a_file_is_called_as_the_file_does(
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "message"),
     [
         ({"plan": {"level": 7}}, "plan.level is 7, expected 0 to 0"),
         ({"plan": {"grid": "2by1"}}, "plan.grid is '2by1', expected columns x rows"),
@@ -59,22 +59,22 @@ def test_a_setting_of_a_file_is_called_as_the_file_does(
         ({"surfaces": {"F": "outermost"}}, "surfaces.F: found 'outermost', expected outer"),
     ],
 )
-def test_python_reads_settings(
-    source: Path, tmp_path: Path, settings: dict[str, dict[str, object]], told: str
+def test_an_error_in_python_names_the_setting(
+    source: Path, tmp_path: Path, settings: dict[str, dict[str, object]], message: str
 ) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
         stereocell.build(source, tmp_path / "out", settings=settings)
-    assert str(caught.value).startswith(told)
+    assert str(caught.value).startswith(message)
 
 
-def test_who_opens_a_volume_reads_arguments(source: Path) -> None:
+def test_an_error_of_open_volume_names_its_argument(source: Path) -> None:
     with pytest.raises(stereocell.StereoCellError) as caught:
         stereocell.open_volume(source, series=2)
     assert f"{source}: series: found 2, expected" in str(caught.value)
     assert "--" not in str(caught.value)
 
 
-def test_every_flag_has_its_way_back() -> None:
+def test_each_flag_can_be_replaced_by_its_setting_and_back() -> None:
     names = [flag.name for flag, _, _ in flagged_settings()]
     assert len(names) == len(set(names))
     for flag, place, _ in flagged_settings():

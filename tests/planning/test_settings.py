@@ -1,4 +1,4 @@
-"""Settings: presets, files, flags; and what is wrong with them."""
+"""Settings: presets, files and flags, and errors in them."""
 
 import re
 import tomllib
@@ -18,7 +18,7 @@ from stereocell.read.dataset import MAX_VALUE
 from support.plans import plan_of
 
 
-def test_printed_settings_are_the_defaults_again() -> None:
+def test_reading_the_printed_settings_gives_the_defaults() -> None:
     text = settings_module.to_toml(settings_module.Settings())
     assert (
         settings_module.apply(settings_module.Settings(), tomllib.loads(text), "here")
@@ -29,7 +29,7 @@ def test_printed_settings_are_the_defaults_again() -> None:
     assert all("  # " in line for line in keys)
 
 
-def test_the_header_says_whether_the_file_is_to_be_edited() -> None:
+def test_the_header_states_whether_the_file_is_meant_to_be_edited() -> None:
     template = settings_module.to_toml(settings_module.Settings(), header=settings_module.TEMPLATE)
     assert template.startswith("# StereoCell settings. Every key may be left out")
     record = settings_module.to_toml(settings_module.Settings())
@@ -38,7 +38,7 @@ def test_the_header_says_whether_the_file_is_to_be_edited() -> None:
     assert tomllib.loads(record) == tomllib.loads(template)
 
 
-def test_any_channel_name_survives_the_file() -> None:
+def test_any_channel_name_is_read_back_from_the_file() -> None:
     odd = 'a"b\\c\n\t\x00\x7f\u6f22'
     settings = settings_module.apply(settings_module.Settings(), {"iso_values": {odd: 1.5}}, "here")
     assert settings_module.from_dict(tomllib.loads(settings_module.to_toml(settings))) == settings
@@ -59,7 +59,7 @@ def test_presets_load(preset: str) -> None:
     assert settings_module.from_dict(settings_module.to_dict(settings)) == settings
 
 
-def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None:
+def test_flags_override_the_file_and_the_file_overrides_the_preset(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[window]\nlow_percentile = 3\n[surface]\nalpha_um = 2.5\n[plan]\nlevel = 1\n")
     settings = settings_module.load("cycif", file, flags={"plan": {"level": 2}})
@@ -69,7 +69,7 @@ def test_flags_override_the_file_and_the_file_the_preset(tmp_path: Path) -> None
     assert settings.surface.body_um == 1.5  # from the preset
 
 
-def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
+def test_a_user_s_own_preset_is_a_toml_file(tmp_path: Path) -> None:
     file = tmp_path / "ours.toml"
     file.write_text('[isovalue]\ncriterion = "pekar-mean"\n[iso_values]\n"Hoechst 33342" = 800\n')
     settings = settings_module.load(str(file), None, flags={})
@@ -93,8 +93,8 @@ def test_own_preset_is_a_toml_file(tmp_path: Path) -> None:
         ("[plan]\nchannels = 3\n", "channels is 3, expected a list"),
         ("[plan]\nmax_voxels = 0\n", "plan.max_voxels is 0, expected 1 or more"),
         ("[plan]\ntime = -1\n", "plan.time is -1, expected 0 or more"),
-        ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um: found 1,0,1, expected z,y,x in um"),
-        ("[plan]\nspacing_um = [1, 2]\n", "spacing_um: found 1,2, expected z,y,x in um"),
+        ("[plan]\nspacing_um = [1, 0, 1]\n", "spacing_um is 1,0,1, expected z,y,x in um"),
+        ("[plan]\nspacing_um = [1, 2]\n", "spacing_um is 1,2, expected z,y,x in um"),
         ('[plan]\nmodality = "MRI"\n', "plan.modality is 'MRI', expected one of AR, AU, BDUS"),
         ("[surface]\nclosed_tiles = 1\n", "closed_tiles is 1, expected true or false"),
         ("[surface]\nwrap = 3\n", "surface.wrap is 3, expected text"),
@@ -126,7 +126,7 @@ def test_wrong_settings_are_one_clear_line(tmp_path: Path, text: str, message: s
     assert "\n" not in str(raised.value)
 
 
-def test_unknown_preset_lists_the_known() -> None:
+def test_an_unknown_preset_lists_the_known_ones() -> None:
     with pytest.raises(
         UsageError,
         match=r"one of ct, ct-bone, cycif, em, lightsheet, mri, pet, vessels or a \.toml file",
@@ -141,14 +141,14 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("preset", [None, "ct", "ct-bone", "mri"])
 @pytest.mark.parametrize("pixel_um", [488.0, 900.0, 1000.0])
-def test_a_body_of_20_mm_is_no_fragment_in_a_head_of_thick_slices(
+def test_an_object_of_20_mm_is_not_a_fragment_in_a_head_of_thick_slices(
     preset: str | None, pixel_um: float
 ) -> None:
     surface = settings_module.load(preset, None, flags={}).surface
     resolved = surface.resolved((6500.0, pixel_um, pixel_um))
     assert float(resolved.min_diagonal_um) <= 20_000
     assert float(resolved.max_fragment_um) <= 20_000
-    # a speck of one voxel is a fragment, however thick its slice is
+    # a speck of one voxel is a fragment even in a thick slice
     assert float(resolved.min_diagonal_um) > np.hypot(6500.0, np.hypot(pixel_um, pixel_um))
 
 
@@ -156,12 +156,16 @@ def test_a_body_of_20_mm_is_no_fragment_in_a_head_of_thick_slices(
 @pytest.mark.parametrize(
     ("spacing_um", "field_um", "expected_um"),
     [
-        (500.0, 250_000.0, 10_000.0),  # a head: the preset's own size
-        (200.0, 60_000.0, 3_000.0),  # a finger: a twentieth of it
-        (100.0, 5_000.0, 300.0),  # a mouse's paw: three voxels, which are more than a twentieth
+        (500.0, 250_000.0, 10_000.0),  # a head, with the preset's own size
+        (200.0, 60_000.0, 3_000.0),  # a finger, with a twentieth of its length
+        (
+            100.0,
+            5_000.0,
+            300.0,
+        ),  # a mouse's paw, with three voxels, which are more than a twentieth
     ],
 )
-def test_a_preset_s_size_of_bodies_is_bounded_by_the_field_of_view(
+def test_a_preset_s_smallest_object_is_bounded_by_the_field_of_view(
     preset: str, spacing_um: float, field_um: float, expected_um: float
 ) -> None:
     surface = settings_module.load(preset, None, flags={}).surface
@@ -170,20 +174,20 @@ def test_a_preset_s_size_of_bodies_is_bounded_by_the_field_of_view(
     assert float(resolved.max_fragment_um) <= 2 * expected_um
 
 
-def test_a_size_that_the_user_gives_holds_in_any_field_of_view() -> None:
+def test_a_size_given_by_the_user_applies_to_any_field_of_view() -> None:
     flags = {"surface": {"min_diagonal_um": 10_000.0}}
     surface = settings_module.load("ct", None, flags=flags).surface
     assert surface.resolved((100.0, 100.0, 100.0), 5_000.0).min_diagonal_um == 10_000.0
 
 
 @pytest.mark.parametrize("region", ["", "0:20,0:20,0:20"])
-def test_a_region_has_the_sizes_of_the_whole_field_of_view(region: str) -> None:
+def test_the_sizes_for_a_region_are_those_of_the_whole_field_of_view(region: str) -> None:
     level = Level((40, 40, 100), (1.0, 1.0, 1.0))
     plan = plan_of({"region": region}, (level,), surface={"body_um": 50.0})
     assert plan.settings.surface.min_diagonal_um == 5.0
 
 
-def test_auto_lengths_of_even_voxels_count_spacings() -> None:
+def test_auto_lengths_of_cubic_voxels_are_multiples_of_the_spacing() -> None:
     resolved = settings_module.SurfaceOptions().resolved((2.0, 1.0, 1.0))
     assert (resolved.min_diagonal_um, resolved.max_fragment_um) == (6.0, 12.0)
     assert resolved.max_cavity_um == 8.0
@@ -192,12 +196,12 @@ def test_auto_lengths_of_even_voxels_count_spacings() -> None:
 def test_auto_lengths_follow_the_spacing() -> None:
     resolved = settings_module.SurfaceOptions().resolved((5.0, 2.0, 2.0))
     assert (resolved.smoothing_um, resolved.max_alpha_um) == (2.0, 10.0)
-    assert resolved.alpha_um == "auto"  # by the channel's components
+    assert resolved.alpha_um == "auto"  # chosen later by the channel's components
     with pytest.raises(UsageError, match="alpha_um is -1"):
         settings_module.SurfaceOptions(alpha_um=-1.0).resolved((1.0, 1.0, 1.0))
 
 
-def test_whole_number_without_end_is_wrong_usage(tmp_path: Path) -> None:
+def test_an_endless_whole_number_is_wrong_usage(tmp_path: Path) -> None:
     file = tmp_path / "huge.toml"
     file.write_text("[isovalue]\nmin_area_share = " + "9" * 400)
     with pytest.raises(UsageError, match=r"isovalue\.min_area_share is 9"):
@@ -213,13 +217,13 @@ NUMBERS = [
 ]
 
 
-def test_every_section_has_numbers() -> None:
+def test_each_section_has_numbers() -> None:
     assert {section for section, _ in NUMBERS} >= {"plan", "surface", "lod", "objects", "unwrap"}
 
 
 @pytest.mark.parametrize(("section", "key"), NUMBERS)
 @pytest.mark.parametrize("value", [10**20, -(10**20)])
-def test_every_number_has_bounds(section: str, key: str, value: int) -> None:
+def test_each_number_has_bounds(section: str, key: str, value: int) -> None:
     default = getattr(getattr(Settings(), section), key)
     given = [value, value, value] if isinstance(default, tuple) else value
     with pytest.raises(UsageError) as raised:
@@ -227,19 +231,19 @@ def test_every_number_has_bounds(section: str, key: str, value: int) -> None:
     assert re.match(rf"{section}[. ]({key}|percentiles)", str(raised.value))
 
 
-def test_voxel_values_of_settings_and_of_inputs_have_one_bound() -> None:
+def test_voxel_values_in_settings_and_inputs_have_the_same_bound() -> None:
     assert MAX_VOXEL_VALUE == MAX_VALUE
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "expected"),
     [
         ({"plan": {"grid": "\udcff"}}, "here: plan.grid is '\\xff', expected text in UTF-8"),
         ({"plan": {"channels": ["a", "\udce9"]}}, "here: plan.channels is '\\xe9', expected text"),
         ({"iso_values": {"\ud800": 1.0}}, "here: iso_values.\\ud800 is '\\ud800', expected text"),
     ],
 )
-def test_texts_that_are_not_utf8_are_named(values: dict[str, object], told: str) -> None:
+def test_texts_that_are_not_utf8_are_reported(values: dict[str, object], expected: str) -> None:
     with pytest.raises(UsageError) as raised:
         settings_module.apply(Settings(), values, "here")
-    assert str(raised.value).startswith(told)
+    assert str(raised.value).startswith(expected)

@@ -1,4 +1,4 @@
-"""Which channels show when a specimen is opened."""
+"""The channels that show when a specimen is opened."""
 
 import pytest
 
@@ -23,12 +23,12 @@ def channels(*names: str, source: str = "") -> list[Channel]:
         ([], ["a", "b", "c", "d", "e"], {"a", "b", "c", "d"}),
     ],
 )
-def test_the_first_stains_show_or_the_label_maps_alone(
+def test_the_first_stains_show_or_only_the_label_maps(
     names: list[str], label_maps: list[str], shown: set[str]
 ) -> None:
     assert shown_at_first(channels(*names), label_maps) == shown
 
 
-def test_of_a_classified_head_the_brain_alone_shows() -> None:
+def test_only_the_brain_shows_of_a_head_with_tissue_classes() -> None:
     head = channels("skin", "grey matter", "white matter", "CSF", source="classes.nii")
     assert shown_at_first(head) == {head[1].id, head[2].id}

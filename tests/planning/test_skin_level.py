@@ -1,4 +1,4 @@
-"""The level that the plan advises for a CT that was mapped to 8 bits is that of its skin."""
+"""The plan advises the level of skin for a CT that was mapped to 8 bits."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ AIR, FAT, MUSCLE, BONE = -1000, -100, 60, 700
 
 
 def _trunk() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return a limb in Hounsfield units: bone, muscle, fat; and which voxels lie in its skin."""
+    """Return a limb of bone, muscle and fat in Hounsfield units, and the voxels inside its skin."""
     _, y, x = np.indices(SHAPE)
     away = np.hypot(y - 30, x - 28)
     hu = np.select([away < 5, away < 16, away < 22], [BONE, MUSCLE, FAT], AIR).astype(float)
@@ -40,7 +40,7 @@ def test_the_level_advised_for_8_bits_keeps_the_fat_below_the_skin(
     level = float(evidence.flags.partition("--iso-value 0=")[2].split()[0])
     solid = voxels > level
     dice = 2 * np.count_nonzero(solid & body) / (solid.sum() + body.sum())
-    assert dice > 0.92  # without the fat it is .69
+    assert dice > 0.92  # without the fat the Dice coefficient is .69
     assert "no scaling to Hounsfield units is known" in evidence.basis
     assert ("the window cut off" in evidence.basis) == (window[0] > -1000)
 
@@ -48,7 +48,7 @@ def test_the_level_advised_for_8_bits_keeps_the_fat_below_the_skin(
 def test_padding_beside_air_with_noise_is_not_taken_for_air(tmp_path: Path) -> None:
     hu, body = _trunk()
     voxels = _mapped(hu, -1024, 2000)
-    voxels[:, :, :4] = voxels[:, :, -4:] = 0  # outside of the scanner's field
+    voxels[:, :, :4] = voxels[:, :, -4:] = 0  # outside of the scanner's field of view
     affine = np.diag([1.0, 1.0, 1.0, 1.0])
     source = nifti_files.write(tmp_path / "a.nii.gz", affine, voxels.transpose(2, 1, 0))
     evidence = find_ct_evidence(open_dataset(source))

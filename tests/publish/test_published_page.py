@@ -126,7 +126,7 @@ def test_manifest_of_an_earlier_version_or_of_another_list_is_not_published(
     content = json.loads(file.read_text("utf-8"))
     del content["sha256"]
     file.write_text(json.dumps(content))
-    assert "manifest.json: has no hash of its content" in run(bundle, tmp_path / "site")[2]
+    assert "manifest.json: found no hash of its content" in run(bundle, tmp_path / "site")[2]
     write(out, {"sw.js": b"other;"})
     shutil.copy(out / "bundle/manifest.json", file)
     said = run(bundle, tmp_path / "site")[2]

@@ -108,7 +108,7 @@ def test_a_level_without_any_chunk_is_refused(
     shutil.rmtree(path / "0" / "c")
     code, said = plan(path, tmp_path, capsys)
     assert code == 1
-    assert "level 0: found none of 4 chunks, expected those that hold voxels" in said
+    assert "level 0: found none of 4 chunks, expected the chunks that hold voxels" in said
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -81,7 +81,9 @@ def test_a_link_out_of_a_tiff_s_folder_is_refused(home: Path) -> None:
 
 def test_planes_in_a_pipe_are_refused_and_not_waited_for(home: Path) -> None:
     os.mkfifo(home / "b.ome.tif")
-    assert "'b.ome.tif': is no regular file" in refusal(tiff_of(home / "x.ome.tif", "b.ome.tif"))
+    assert "'b.ome.tif': found a folder, device or pipe" in refusal(
+        tiff_of(home / "x.ome.tif", "b.ome.tif")
+    )
 
 
 def test_the_files_of_a_set_are_found(home: Path) -> None:
@@ -217,7 +219,7 @@ def test_a_dicomdir_s_references_are_not_followed(home: Path) -> None:
 def test_a_pipe_or_a_device_is_refused_as_a_source(home: Path, name: str, kind: str) -> None:
     path = home / name
     os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
-    assert re.search(r"is no regular file, expected one$", refusal(path))
+    assert re.search(r"found a folder, device or pipe, expected a regular file$", refusal(path))
 
 
 def test_a_source_named_by_a_link_is_the_user_s_own_choice(home: Path) -> None:

@@ -1,4 +1,4 @@
-"""Closed copies of tiles: manifolds by another library's word, whose union is the whole."""
+"""Closed copies of tiles are manifolds by another library, and their union is the whole."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -27,7 +27,7 @@ ERROR = 0.02
 
 @pytest.fixture(scope="module")
 def distance() -> NDArray[np.float32]:
-    """A ball, um, round the point where four tiles meet, and one that leaves the region."""
+    """Distances in um to two balls: one where four tiles meet, and one that leaves the region."""
     z, y, x = (i * h for i, h in zip(np.indices(REGION.shape), SPACING, strict=True))
     away = [
         np.sqrt((z - c) ** 2 + (y - b) ** 2 + (x - a) ** 2) - radius
@@ -58,7 +58,7 @@ def test_copies_are_manifolds_and_their_union_is_the_whole(distance: NDArray[np.
         assert (copy.faults, copy.fallbacks) == (find_defects(mesh).total, 0) == (0, 0)
         copies.append(as_manifold(mesh))
         assert copies[-1].status() == manifold3d.Error.NoError
-        # no further than a voxel past the cuts
+        # at most a voxel past the cuts
         reach = mesh.positions.max(axis=0)[[2, 0]] / [SPACING[0], SPACING[2]]
         ends = [tile.lattice(REGION).stop[0], tile.lattice(REGION).stop[2]]
         assert (reach < np.array(ends)).all()
@@ -75,21 +75,21 @@ def test_copies_are_manifolds_and_their_union_is_the_whole(distance: NDArray[np.
 def test_stl_is_read_back_by_vtk(distance: NDArray[np.float32], tmp_path: Path) -> None:
     mesh = close(distance, REGION).mesh
     write_stl(tmp_path / "a.stl", mesh)
-    read = pv.read(tmp_path / "a.stl")  # merges equal corners
+    read = pv.read(tmp_path / "a.stl")  # VTK merges equal corners
     assert read.n_cells == len(mesh.triangles)
     assert read.is_manifold
     assert read.volume == pytest.approx(as_manifold(mesh).volume(), rel=1e-5)
     assert (tmp_path / "a.stl").stat().st_size == 84 + 50 * len(mesh.triangles)
     again = Mesh(np.float32(read.points), np.uint32(read.regular_faces), np.float32(read.points))
-    assert as_manifold(again).volume() > 0  # wound outward
+    assert as_manifold(again).volume() > 0  # triangles are wound outwards
 
 
-def test_nothing_inside_is_no_copy(distance: NDArray[np.float32]) -> None:
+def test_a_tile_without_a_solid_has_no_copy(distance: NDArray[np.float32]) -> None:
     nothing = -abs(distance) - 1
     assert close_tile(nothing, Lattice.of_whole(REGION, SPACING), max_error_um=1) is None
 
 
-def test_a_copy_that_simplification_spoilt_stays_unsimplified(
+def test_a_copy_with_defects_after_simplification_stays_unsimplified(
     distance: NDArray[np.float32], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def spoil(mesh: Mesh, planes: tuple[Plane, ...], max_error_um: float) -> Simplified:
@@ -106,7 +106,9 @@ def test_a_copy_that_simplification_spoilt_stays_unsimplified(
     assert copy.fallbacks == 2  # both balls
 
 
-def test_a_unit_s_record_tells_of_its_copy(tmp_path: Path, distance: NDArray[np.float32]) -> None:
+def test_a_unit_s_record_describes_its_closed_copy(
+    tmp_path: Path, distance: NDArray[np.float32]
+) -> None:
     copy = close(distance, REGION)
     volume = np.zeros((3, 3, 3), np.uint8)
     save_unit(tmp_path / "with", Unit((), copy, volume, "", 0, 0, {}))

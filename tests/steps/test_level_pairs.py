@@ -1,4 +1,4 @@
-"""Neighbouring tiles meet without a crack at any pair of levels: in the files, once decoded."""
+"""Neighbouring tiles in decoded files meet without a crack at any pair of levels of detail."""
 
 from dataclasses import replace
 from itertools import pairwise, product
@@ -30,7 +30,7 @@ STEP_M = choose_step(8.0)
 
 @pytest.fixture(scope="module")
 def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drawn], ...]:
-    """The decoded levels of two tiles, whose common plane cuts bodies and what joins them."""
+    """The decoded levels of two tiles, whose common plane cuts objects and their bridges."""
     noise = np.random.default_rng(5).normal(size=REGION.shape)
     field = ndimage.gaussian_filter(noise, (1.5, 3, 3))
     field = (1000 * field / field.std()).astype(np.float32)
@@ -62,12 +62,14 @@ def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drawn], ...]:
 
 
 def _unmatched(*parts: Drawn) -> NDArray[np.float32]:
-    """Return the ends of directed edges that lack an opposite, (n, 2, 3), once all is welded."""
+    """Return the ends of directed edges without an opposite edge after welding, (n, 2, 3)."""
     triangles = np.concatenate([part.positions_m[part.triangles] for part in parts])
     points, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     corners = numbers.reshape(-1, 3).astype(np.int64)
     edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges = edges[edges[:, 0] != edges[:, 1]]  # ends that the lattice joins
+    edges = edges[
+        edges[:, 0] != edges[:, 1]
+    ]  # drops edges whose ends fall onto the same lattice point
     count = len(points)
     ahead, behind = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
     keys, places = np.unique(np.concatenate([ahead, behind]), return_inverse=True)
@@ -84,13 +86,15 @@ def test_two_tiles_close_at_any_pair_of_levels(
     one, other = levels[0][ours], levels[1][theirs]
     for alone in (one, other):
         ends = _unmatched(alone)
-        assert len(ends) > 20  # else this would show nothing
+        assert len(ends) > 20  # otherwise the test would show nothing
         assert (ends[..., 0] == ends[0, 0, 0]).all()
     assert len(_unmatched(one, other)) == 0
 
 
 @pytest.mark.slow
-def test_levels_get_lighter_and_rims_stay(levels: tuple[list[Drawn], ...]) -> None:
+def test_coarser_levels_have_fewer_triangles_and_the_same_rims(
+    levels: tuple[list[Drawn], ...],
+) -> None:
     for tile in levels:
         counts = [len(level.triangles) for level in tile]
         assert len(counts) == 4

@@ -1,4 +1,4 @@
-"""Every field of every step changes its key, at any depth, and no place on a disk does."""
+"""Each field of each step changes its key, at any depth, and paths do not."""
 
 import copy
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ from support.onnx_models import write_model
 from support.step_record import find_steps
 
 SHAPE = (16, 24, 48)
-# fields that count by another one, or only name a place
+# Fields that another field stands for, or that only name a place
 PLACES = {("SourceRef", "source"), ("Labels", "name"), ("Labels", "shape"), ("Labels", "color")}
 PLACES |= {("WriteStageTile", "stage_dir")}
 
@@ -57,12 +57,12 @@ def steps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Keyed]:
     return found
 
 
-def test_the_build_has_a_step_of_each_class(steps: dict[str, Keyed]) -> None:
+def test_the_tested_build_has_a_step_of_each_class(steps: dict[str, Keyed]) -> None:
     assert steps.keys() == {step.__name__ for step in find_steps()}
 
 
 @pytest.mark.parametrize("name", [step.__name__ for step in find_steps()])
-def test_every_field_changes_the_key_and_no_place_does(steps: dict[str, Keyed], name: str) -> None:
+def test_each_field_changes_the_key_and_no_path_does(steps: dict[str, Keyed], name: str) -> None:
     step = steps[name]
     changed = 0
     for path, other in variants(step):
@@ -89,11 +89,11 @@ def test_a_network_counts_by_its_file_and_classes_and_never_by_its_name(
     assert len({first, steps["LearnTissue"].key, *keys}) == 4
 
 
-Path_ = tuple[tuple[str, str], ...]  # of class and field, from the step inwards
+Path_ = tuple[tuple[str, str], ...]  # names of class and field, from the step inwards
 
 
 def variants(value: Any) -> Iterator[tuple[Path_, Any]]:
-    """Yield a copy of a dataclass for each of its values, at any depth, with that one changed."""
+    """Yield a copy of a dataclass for each of its values, at any depth, with this value changed."""
     for one in fields(value):
         here = (type(value).__name__, one.name)
         for path, other in _others(getattr(value, one.name)):

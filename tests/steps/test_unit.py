@@ -1,4 +1,4 @@
-"""One unit in memory: its 8-bit volume and the range of voxel values that it bears."""
+"""One unit in memory: its 8-bit volume, and the range of voxel values that it can process."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def _given(scale: float) -> UnitInput:
 
 
 @pytest.mark.parametrize("scale", [2.0**-100, 2.0**100])
-def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> None:
+def test_voxels_whose_squares_overflow_float32_give_the_same_unit(scale: float) -> None:
     ball = blurred_ball(SHAPE, SPACING, (2.7, 2.7, 2.7), 1.5, 0.2)
     plain = build_unit(Volume(ball, SPACING), _given(1.0))
     scaled = build_unit(Volume(ball * np.float32(scale), SPACING), _given(scale))
@@ -42,7 +42,7 @@ def test_voxels_whose_squares_leave_float32_give_the_same_unit(scale: float) -> 
         np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
 
 
-def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end() -> None:
+def test_the_apron_has_the_neighbours_voxels_and_repeats_voxels_at_the_region_s_ends() -> None:
     voxels = np.arange(np.prod(SHAPE), dtype=np.float32).reshape(SHAPE) % 251
     lattice = Lattice(BOX, Box((0, 10, 20), (10, 20, 40)), BOX, SPACING, (0.0, 0.0, 0.0))
     given = replace(_given(1.0), lattice=lattice, intensity_window=(0.0, 255.0))
@@ -54,7 +54,7 @@ def test_volume_has_its_neighbours_voxels_as_apron_and_repeats_the_region_s_end(
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16, np.float32])
 @pytest.mark.parametrize("window", [(0.0, 255.0), (20.0, 90.0)])
 @pytest.mark.parametrize("bits", [16, 8])
-def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_asked_for(
+def test_voxels_are_kept_as_measured_if_8_bits_lose_something_unless_8_bits_are_set(
     dtype: type, window: tuple[float, float], bits: int
 ) -> None:
     voxels = np.random.default_rng(3).integers(0, 127, SHAPE).astype(dtype)
@@ -70,7 +70,7 @@ def test_voxels_stay_as_measured_where_8_bits_lose_something_and_not_if_8_are_as
 
 
 @pytest.mark.slow
-def test_texels_are_held_against_the_voxels_not_against_the_planes_that_carry_the_surface() -> None:
+def test_texels_are_compared_with_the_voxels_and_not_with_the_thinned_planes() -> None:
     given = replace(_given(1.0), step=(1, 3, 3))
     unwrap = replace(given.options.unwrap, maps=True, texel_um=0.02)
     given = replace(given, options=replace(given.options, unwrap=unwrap.resolved(SPACING)))

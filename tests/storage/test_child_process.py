@@ -1,4 +1,4 @@
-"""A library that ends its process, or never ends, becomes one error in the parent."""
+"""A library that ends its process or never returns causes one error in the parent."""
 
 import math
 import os
@@ -33,7 +33,8 @@ def test_arrays_pass_to_the_child_and_back_unchanged() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "words"), [(signal.SIGABRT, "SIGABRT"), (signal.SIGKILL, "SIGKILL (killed, as for")]
+    ("number", "words"),
+    [(signal.SIGABRT, "SIGABRT"), (signal.SIGKILL, "SIGKILL (killed, probably for")],
 )
 def test_a_death_by_a_signal_is_an_error_that_names_it(number: int, words: str) -> None:
     with pytest.raises(ChildError, match=r"its process ended by " + words.replace("(", r"\(")):
@@ -57,7 +58,7 @@ def test_memory_beyond_the_bound_ends_the_child() -> None:
         run_in_child(bytes, 2_000_000_000, bounds=Bounds(memory_bytes=200_000_000))
 
 
-def test_errors_of_ours_and_bugs_are_raised_in_the_parent() -> None:
+def test_stereocell_errors_and_bugs_are_raised_in_the_parent() -> None:
     with pytest.raises(SourceError, match=r"a\.parquet: found nothing"):
         run_in_child(refuse, "a.parquet: found nothing")
     with pytest.raises(ValueError, match=r"math domain error|nonnegative") as caught:
@@ -90,12 +91,15 @@ def test_a_child_ends_with_its_parent_even_inside_a_call() -> None:
     assert gone == [child]
 
 
-def test_interpreters_are_started_in_one_place_for_libraries_that_may_abort() -> None:
+def test_only_one_module_starts_interpreters_for_libraries_that_may_abort() -> None:
     package = Path(stereocell.__file__).parent
     starters = {
         file.relative_to(package).as_posix()
         for file in package.rglob("*.py")
         if "[sys.executable" in file.read_text(encoding="utf-8")
     }
-    compiling = {"kernels/cache_place.py", "kernels/compile_all.py"}  # run no library on a source
+    compiling = {
+        "kernels/cache_place.py",
+        "kernels/compile_all.py",
+    }  # these run no library on a source
     assert starters == {"storage/child_process.py", *compiling}

@@ -1,4 +1,4 @@
-"""Files are recognised by their first bytes where the format of their ending has a mark."""
+"""Files are recognised by their first bytes if the format of their ending has a mark."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ MARKED = (".glb", ".ply", ".3mf", ".usda", ".usdc", ".usd", ".usdz")
 
 
 @pytest.mark.parametrize("ending", [*MARKED, ".GLB"])
-def test_a_text_with_the_ending_of_another_format_is_said_to_have_other_content(
+def test_a_text_with_the_ending_of_another_format_is_reported_to_have_other_content(
     tmp_path: Path, ending: str
 ) -> None:
     file = tmp_path / f"mine{ending}"
@@ -22,7 +22,7 @@ def test_a_text_with_the_ending_of_another_format_is_said_to_have_other_content(
 
 
 @pytest.mark.parametrize("ending", [".usda", ".usdc", ".usd"])
-def test_a_layer_is_a_usd_file(tmp_path: Path, ending: str) -> None:
+def test_a_layer_is_recognised_as_a_usd_file(tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"mine{ending}"
     Usd.Stage.CreateNew(str(file)).Save()
     assert contents_of(file).words == "a USD file"

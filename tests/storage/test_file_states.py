@@ -1,4 +1,4 @@
-"""The states of an input's files: files and folders, links, and files that vanish meanwhile."""
+"""The states of an input's files: folders, links, and files that vanish in the meantime."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A disk that fills up in the middle of a build, in each phase; then room is made."""
+"""A disk fills up in the middle of each phase of a build, and is emptied later."""
 
 import subprocess
 from pathlib import Path
@@ -17,13 +17,13 @@ def _resize(disk: Path, size: str) -> None:
 
 
 @pytest.mark.slow
-def test_full_disk_is_one_line_leaves_no_half_file_and_the_build_goes_on_later(
+def test_a_full_disk_is_one_line_leaves_no_partial_file_and_the_build_goes_on_later(
     tmp_path: Path,
     small_disk: Path,
     capfd: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    if not IS_EXHAUSTIVE:  # the report takes longest to draw, and little of the disk
+    if not IS_EXHAUSTIVE:  # drawing the report takes longest and needs little of the disk
         monkeypatch.setattr("stereocell.report.phase.run_report", lambda out: None)
     body = np.stack([phantoms.f_phantom()] * 2)
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", body, "CZYX", names=["a", "b"])

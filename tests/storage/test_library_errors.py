@@ -1,4 +1,4 @@
-"""Exceptions of a library on a damaged file become one line; our own bugs keep their traceback."""
+"""Exceptions of libraries on damaged files become one line; bugs keep their traceback."""
 
 import gzip
 import io
@@ -38,7 +38,7 @@ CLASSES = (
 
 
 def raised_in_the_package(error: Exception) -> None:
-    """Raise an exception as a bug of ours would: from a file of the package."""
+    """Raise an exception from a file of the package, as a bug of StereoCell would."""
     file = Path(library_errors.__file__).with_name("a_bug.py")
     code = compile("def bug(error):\n    raise error\n", str(file), "exec")
     names: dict[str, Callable[[Exception], None]] = {}
@@ -90,7 +90,7 @@ DECODERS: list[Callable[[], object]] = [
 
 
 @pytest.mark.parametrize("decode", DECODERS)
-def test_bytes_that_a_decoder_refuses_are_damaged_and_have_the_remedy(
+def test_bytes_that_a_decoder_refuses_are_reported_as_damaged_with_a_remedy(
     decode: Callable[[], object],
 ) -> None:
     with pytest.raises(SourceError) as caught, one_line("a.tif", "pages that are whole"):
@@ -119,14 +119,14 @@ def test_other_errors_of_libraries_are_not_called_damage(fail: Callable[[], obje
 @pytest.mark.parametrize(
     "error", [AssertionError("ours"), NameError("ours"), StopIteration("ours")]
 )
-def test_a_bug_of_our_own_keeps_its_traceback(boundary: Callable, error: Exception) -> None:
+def test_a_bug_of_stereocell_keeps_its_traceback(boundary: Callable, error: Exception) -> None:
     with pytest.raises(type(error)) as caught, boundary("a.tif", "a TIFF file, whole"):
         raised_in_the_package(error)
     assert caught.value is error
     assert traceback.extract_tb(error.__traceback__)[-1].name == "bug"
 
 
-def test_the_boundary_of_a_reader_lets_errors_of_our_own_parsing_pass() -> None:
+def test_the_boundary_of_a_reader_does_not_catch_errors_of_stereocell_s_parsing() -> None:
     with pytest.raises(ValueError, match="ours"), library_boundary("a.tif", "a TIFF file, whole"):
         raised_in_the_package(ValueError("ours"))
 

@@ -32,7 +32,7 @@ def test_warnings_and_log_lines_inside_a_boundary_are_not_shown(boundary: str) -
     assert (run.stdout, run.stderr) == ("", "shown again\n")
 
 
-def test_a_warning_of_our_own_code_is_shown_all_the_same() -> None:
+def test_a_warning_of_stereocell_s_own_code_is_shown() -> None:
     names = {"__name__": "stereocell.read.some", "warnings": warnings}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -1,4 +1,4 @@
-"""Two commands never write into one OUT at once, and none is kept out by one that is gone."""
+"""Two commands never write into one OUT at once, and a command that has ended blocks nobody."""
 
 import os
 import signal
@@ -42,7 +42,7 @@ def hold(out: Path) -> subprocess.Popen[str]:
     return process
 
 
-def test_the_second_is_refused_by_name_of_the_first(
+def test_a_second_command_is_refused_with_the_name_of_the_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -56,7 +56,7 @@ def test_the_second_is_refused_by_name_of_the_first(
             )
             assert line.endswith(" is writing here: wait until it has ended")
         assert [file.name for file in out.iterdir()] == [LOCK]
-        assert main(["check", str(out)]) == 1  # whoever only reads is let in
+        assert main(["check", str(out)]) == 1  # a command that only reads is not refused
         assert "is writing here" not in capsys.readouterr().out
     finally:
         first.kill()
@@ -64,7 +64,7 @@ def test_the_second_is_refused_by_name_of_the_first(
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
-def test_what_a_killed_command_held_is_free(tmp_path: Path, end: signal.Signals) -> None:
+def test_an_out_is_free_after_its_command_was_killed(tmp_path: Path, end: signal.Signals) -> None:
     first = hold(tmp_path)
     os.kill(first.pid, end)
     first.wait()
@@ -74,7 +74,7 @@ def test_what_a_killed_command_held_is_free(tmp_path: Path, end: signal.Signals)
     assert not (tmp_path / LOCK).exists()
 
 
-def test_a_lock_that_can_not_be_removed_is_free_and_hides_no_fault(
+def test_a_lock_that_can_not_be_removed_blocks_nobody_and_hides_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(path: Path, missing_ok: bool = False) -> None:
@@ -101,17 +101,17 @@ def test_work_for_a_command_that_has_ended_leaves_nothing(tmp_path: Path) -> Non
         with working_for(claim):
             write_bytes(out / "in_time", b"x")
         (out / "in_time").unlink()
-    refused = r"out: the command that asked for this has ended"
+    refused = r"out: the command that sent this task has ended"
     with working_for(claim), pytest.raises(OutputError, match=refused):
         write_bytes(out / "late", b"x")
     assert not out.exists()
-    with alone_in(out, "build"), working_for(claim):  # another one
+    with alone_in(out, "build"), working_for(claim):  # another command holds OUT
         with pytest.raises(OutputError, match=refused), replacing_folder(out / "late"):
             pass
         assert [path.name for path in out.iterdir()] == [LOCK]
 
 
-def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) -> None:
+def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
     write_bytes(tmp_path / "a", b"old")
     with alone_in(tmp_path, "build"):
         claim = held()
@@ -123,20 +123,22 @@ def test_what_ends_while_a_file_is_written_leaves_the_old_one(tmp_path: Path) ->
             temporary.write_bytes(b"new")
             (tmp_path / LOCK).write_bytes(b"another's")
 
-    with pytest.raises(OutputError, match="the command that asked for this has ended"):
+    with pytest.raises(OutputError, match="the command that sent this task has ended"):
         write()
     assert (tmp_path / "a").read_bytes() == b"old"
     assert sorted(path.name for path in tmp_path.iterdir()) == [LOCK, "a"]
 
 
-def test_another_machine_of_the_same_name_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_machine_with_the_same_host_name_is_distinguished(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     here = machine()
     assert machine() == here
     monkeypatch.setattr(Path, "read_text", lambda *_: "started at another time")
     assert (machine() != here) == Path("/proc/sys/kernel/random/boot_id").exists()
 
 
-def test_of_many_at_once_one_is_in_at_a_time(tmp_path: Path) -> None:
+def test_of_many_commands_only_one_at_a_time_holds_out(tmp_path: Path) -> None:
     inside, most, refused = 0, 0, 0
     count = threading.Lock()
 
@@ -160,10 +162,10 @@ def test_of_many_at_once_one_is_in_at_a_time(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert (most, inside) == (1, 0)
-    assert refused < 400  # somebody came in
+    assert refused < 400  # at least one command held OUT
 
 
-def test_nothing_is_left_of_a_command_that_wrote_nothing(
+def test_a_command_that_wrote_nothing_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "a" / "b" / "out"
@@ -177,7 +179,7 @@ def test_nothing_is_left_of_a_command_that_wrote_nothing(
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_of_somebody_else_is_said_in_a_line(tmp_path: Path) -> None:
+def test_a_folder_without_write_access_is_reported_in_one_line(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     expected = r"can't be written .* expected a folder of your own"
     with pytest.raises(OutputError, match=expected), alone_in(tmp_path / "out", "build"):
@@ -185,7 +187,7 @@ def test_a_folder_of_somebody_else_is_said_in_a_line(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
 
 
-def test_a_file_in_its_place_is_said_in_a_line(tmp_path: Path) -> None:
+def test_a_file_in_place_of_out_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="can't be written"), alone_in(tmp_path / "file", "build"):
         pass
@@ -208,7 +210,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_command_leaves_finished_files_and_no_halves(
+def test_an_interrupted_command_leaves_finished_files_and_no_partial_ones(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     out = tmp_path / "out"

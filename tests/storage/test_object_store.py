@@ -1,4 +1,4 @@
-"""An OUT on object storage: the same bytes as in a folder, object by object, and refusals."""
+"""An OUT on object storage has the same bytes as a folder; and errors with it."""
 
 import hashlib
 import json
@@ -68,7 +68,7 @@ def there(store: ObjectStore, volume: Path) -> str:
 
 
 def kept(store: ObjectStore, prefix: str) -> dict[str, str]:
-    """The SHA-256 of every object of a build; seconds differ, and nothing is made of them."""
+    """The SHA-256 of each object of a build, except the seconds, which differ."""
     fs = store.files()
     return {
         name.removeprefix(f"{prefix}/"): hashlib.sha256(fs.cat_file(name)).hexdigest()
@@ -77,7 +77,7 @@ def kept(store: ObjectStore, prefix: str) -> dict[str, str]:
 
 
 def marks(store: ObjectStore, prefix: str) -> dict[str, str]:
-    """The store's own hash of every object of a build, by one request and not one for each."""
+    """The store's own hash of each object of a build, by one request for all."""
     return {
         name.removeprefix(f"{prefix}/"): about["ETag"]
         for name, about in store.files().find(prefix, detail=True).items()
@@ -122,7 +122,7 @@ def test_an_input_written_during_a_build_is_reported_if_its_bytes_differ(
 
 
 @pytest.mark.exhaustive
-def test_exports_from_there_are_those_from_a_folder(
+def test_exports_from_object_storage_equal_those_from_a_folder(
     store: ObjectStore, there: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     store.files().get("bucket/there", str(tmp_path / "here"), recursive=True)
@@ -145,7 +145,7 @@ def of_parts(found: dict[str, str]) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_objects_are_the_files_of_a_folder(
+def test_the_objects_of_a_build_equal_the_files_of_a_local_one(
     store: ObjectStore,
     volume: Path,
     local: dict[str, str],
@@ -157,17 +157,17 @@ def test_objects_are_the_files_of_a_folder(
     assert of_parts(found) == of_parts(local)
     assert {"plan.json", "phases.json", "report/index.html"} <= found.keys()
     assert not [key for key in found if "/." in f"/{key}"]
-    # nothing to do, and nothing done
+    # there is nothing to do, and nothing is done
     assert main(["build", str(volume), "-o", there, *ARGUMENTS]) == 0
-    told = capsys.readouterr()
-    assert "stage    s3://bucket/there/stage/stage.usda\n" in told.out
+    output = capsys.readouterr()
+    assert "stage    s3://bucket/there/stage/stage.usda\n" in output.out
     for phase in ("plan", "units", "stage", "bundle", "report"):
-        assert f"{phase}: up to date" in told.err
+        assert f"{phase}: up to date" in output.err
     assert marks(store, "bucket/there") == marked
 
 
 @pytest.mark.exhaustive
-def test_what_is_lost_or_half_made_there_is_made_again(
+def test_missing_and_unfinished_objects_are_made_again(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fs = store.files()
@@ -193,7 +193,7 @@ def test_what_is_lost_or_half_made_there_is_made_again(
 
 
 @pytest.mark.exhaustive
-def test_flipped_bits_there_are_named_and_get_no_further(
+def test_flipped_bits_in_objects_are_reported_and_not_used(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fs = store.files()
@@ -220,15 +220,15 @@ def test_flipped_bits_there_are_named_and_get_no_further(
 
 
 @pytest.mark.slow
-def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_alone(
+def test_a_partly_uploaded_bundle_is_uploaded_again_and_foreign_files_stay(
     store: ObjectStore, volume: Path, there: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fs, out = store.files(), "bucket/there"
     before = of_parts(marks(store, out))
     phases = json.loads(fs.cat_file(f"{out}/phases.json"))
-    phases["bundle"]["key"] = ""  # begun
+    phases["bundle"]["key"] = ""  # an empty key means that the phase has begun
     fs.pipe_file(f"{out}/phases.json", json.dumps(seal(phases)).encode())
-    fs.rm(f"{out}/bundle/manifest.json")  # it comes last
+    fs.rm(f"{out}/bundle/manifest.json")  # the manifest is uploaded last
     assert make_assets(volume, there, GRID, "--workers", "0") == 0
     assert of_parts(marks(store, out)) == before
     fs.rm(f"{out}/bundle", recursive=True)
@@ -248,18 +248,18 @@ def test_a_bundle_that_was_half_put_there_is_put_again_and_what_is_none_is_left_
 
 
 @pytest.mark.exhaustive
-def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
+def test_a_build_killed_during_uploads_goes_on_to_the_same_bytes(
     store: ObjectStore, volume: Path, local: dict[str, str]
 ) -> None:
     fs, out = store.files(), "s3://bucket/killed"
-    finished: dict[str, object] = {}  # objects of finished units: when they were put there
+    finished: dict[str, object] = {}  # times of upload of the objects of finished units
     for part in ("units/r0_c", "bundle/volumes/"):
         command = [sys.executable, "-m", "stereocell.cli", "build", str(volume), "-o", out]
         build = subprocess.Popen(
             [*command, *ARGUMENTS], stderr=subprocess.DEVNULL, start_new_session=True
         )
         while build.poll() is None and not _objects(fs, f"bucket/killed/{part}"):
-            time.sleep(0.05)  # the store has to answer each time
+            time.sleep(0.05)  # each time the store has to answer
         os.killpg(build.pid, signal.SIGKILL)
         assert build.wait() == -signal.SIGKILL
         for name, found in _objects(fs, "bucket/killed/units/r0_c").items():
@@ -272,7 +272,7 @@ def test_killed_while_it_puts_objects_there_a_build_goes_on_to_the_same_bytes(
 
 
 def _objects(fs: Any, start: str) -> dict[str, object]:
-    """When each object was put there whose name starts so."""
+    """The time of upload of each object whose name begins with a prefix."""
     fs.invalidate_cache()
     return {
         name: found["LastModified"]
@@ -282,7 +282,7 @@ def _objects(fs: Any, start: str) -> dict[str, object]:
 
 
 @pytest.mark.slow
-def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
+def test_the_command_that_writes_is_named_and_a_dead_one_blocks_nobody(
     store: ObjectStore, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fs, lock = store.files(), "bucket/held/.lock"
@@ -301,12 +301,12 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
         assert " is writing here: " in capsys.readouterr().err
     dead, ended = (subprocess.Popen([sys.executable, "-c", ""]) for _ in range(2))
     dead.wait()
-    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # its id is not free yet
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # its process ID is not free yet
     for gone in (
         {"process": dead.pid},
         {"process": dead.pid, "start": "another"},
         {"process": ended.pid, "start": "another"},
-        {"start": "another"},  # its id has been given away again: to us
+        {"start": "another"},  # its process ID was reused by this process
     ):
         fs.pipe_file(lock, json.dumps({**here, **gone}).encode())
         assert main(["units", "s3://bucket/held"]) == 1
@@ -320,7 +320,7 @@ def test_who_writes_there_is_named_and_a_dead_one_is_not_waited_for(
 
 
 @pytest.mark.slow
-def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) -> None:
+def test_a_lock_is_held_if_it_was_written_but_the_answer_was_lost(store: ObjectStore) -> None:
     with before(store.endpoint) as faults:
         fs = ObjectStore(store.kind, faults.endpoint).files()
         faults.once["PUT", "/.lock"] = "lost"
@@ -333,7 +333,7 @@ def test_a_lock_whose_putting_was_done_and_not_told_is_held(store: ObjectStore) 
 
 
 @pytest.mark.slow
-def test_who_reads_leaves_what_a_command_is_making_there(store: ObjectStore) -> None:
+def test_reading_commands_do_not_remove_unfinished_objects(store: ObjectStore) -> None:
     fs = store.files()
     owner = {"process": os.getpid(), "machine": machine(), "start": start_of(os.getpid())}
     made = {
@@ -352,25 +352,25 @@ def _put_slowly(file: Path) -> None:
     time.sleep(0.2)
 
 
-def test_each_thread_of_a_worker_tells_what_it_put_itself(store: ObjectStore) -> None:
+def test_each_thread_of_a_worker_reports_its_own_uploads(store: ObjectStore) -> None:
     with (
         workspace.opened("s3://bucket/threads", command="build") as root,
         ThreadPoolExecutor(2) as threads,
     ):
         work, _ = object_store_tasks.carried(_put_slowly)
-        told = list(threads.map(work, [root / "a", root / "b"]))
-    assert told == [(None, {"a": 1}), (None, {"b": 1})]
+        output = list(threads.map(work, [root / "a", root / "b"]))
+    assert output == [(None, {"a": 1}), (None, {"b": 1})]
 
 
-def test_work_for_a_command_that_has_ended_puts_nothing_there(store: ObjectStore) -> None:
+def test_work_for_a_command_that_has_ended_uploads_nothing(store: ObjectStore) -> None:
     fs = store.files()
     with workspace.opened("s3://bucket/late", command="build") as root:
         work, _ = object_store_tasks.carried(_put_slowly)
-    carried = pickle.dumps(work)  # to a cluster's worker
+    carried = pickle.dumps(work)  # sent to a cluster's worker
     for lock in (None, b"another's"):
         if lock is not None:
             fs.pipe_file("bucket/late/.lock", lock)
-        with pytest.raises(OutputError, match=r"bucket/late: the command that asked .* has ended"):
+        with pytest.raises(OutputError, match=r"bucket/late: the command that sent .* has ended"):
             pickle.loads(carried)(root / "a")
         assert "bucket/late/a" not in fs.find("bucket/late")
     workspace.forget(root)
@@ -395,15 +395,19 @@ def test_a_lock_that_was_not_renewed_is_taken_over(
         monkeypatch.setattr("stereocell.storage.object_lock.STALE_S", -1e6)
         with alone_at(fs, path, "there", "units"):
             assert json.loads(fs.cat_file(path))["command"] == "units"
-            with pytest.raises(OutputError, match=r"there: was taken over by .*: start it again"):
+            with pytest.raises(OutputError, match=r"there: .* has taken over, .*: start it again"):
                 _wait_for(require)
-            assert json.loads(fs.cat_file(path))["command"] == "units"  # and stays so
+            assert (
+                json.loads(fs.cat_file(path))["command"] == "units"
+            )  # the lock stays with the second command
         assert not fs.exists(path)
     assert not fs.exists(path)
 
 
 @pytest.mark.slow
-def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_showing_a_build_fetches_only_its_bundle(
+    there: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen: list[set[str]] = []
 
     def serve(out: Path, *_: object, **__: object) -> None:
@@ -412,7 +416,7 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
 
     monkeypatch.setattr("stereocell.serve.server.serve", serve)
     assert main(["serve", there]) == 0
-    # the two records are small; OUT is recognised by them
+    # two small records are fetched, too, by which OUT is recognised
     assert seen == [{"bundle", "plan.json", "provenance.json"}]
 
 
@@ -423,7 +427,7 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
         (
             ["units", "https://me:secret@x.org/out?sig=secret"],
             2,
-            "OUT is https://x.org/out: expected a folder or an s3:// address",
+            "OUT is https://x.org/out, expected a folder or an s3:// address",
         ),
         (["iso", "x.nii", "-o", "s3://a:b@c/x", "--channel", "0", "--tile", "r"], 2, "s3://c/x"),
         (["units", "s3://nowhere/out"], 1, "s3://nowhere/out/.lock: "),
@@ -438,7 +442,7 @@ def test_who_shows_it_fetches_the_bundle_alone(there: str, monkeypatch: pytest.M
         (["units", "nothing://x"], 1, "nothing://x: Protocol not known: nothing"),
     ],
 )
-def test_what_is_no_place_is_said_in_a_line(
+def test_an_address_that_can_not_be_written_is_reported_in_one_line(
     store: ObjectStore,
     capsys: pytest.CaptureFixture[str],
     arguments: list[str],
@@ -453,7 +457,9 @@ def test_what_is_no_place_is_said_in_a_line(
 
 @pytest.mark.slow
 @pytest.mark.exhaustive
-def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: Path) -> None:
+def test_tissue_classes_are_learned_and_built_on_object_storage(
+    store: ObjectStore, tmp_path: Path
+) -> None:
     voxels, _ = blobs(2)
     source = phantoms.write_ome_tiff(tmp_path / "blobs.ome.tif", voxels[None], "CZYX")
     for out in (str(tmp_path / "out"), "s3://bucket/classes"):
@@ -468,7 +474,7 @@ def test_tissue_classes_are_found_and_built_there(store: ObjectStore, tmp_path: 
 
 
 @pytest.mark.slow
-def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
+def test_folders_of_killed_commands_are_removed_and_those_in_use_are_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -478,7 +484,7 @@ def test_what_killed_commands_left_is_removed_and_what_others_work_in_is_not(
     folders = {
         f"stereocell.{ours}.{dead.pid}.killed": False,
         f"stereocell.{ours}.{os.getpid()}.working": True,
-        f"stereocell.0000beef.{dead.pid}.ofanother": True,  # its process is on that machine
+        f"stereocell.0000beef.{dead.pid}.ofanother": True,  # its process is on another machine
         f"stereocell.0000beef.{dead.pid}.longago": False,
         "stereocell.notes": True,
     }

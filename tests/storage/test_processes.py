@@ -1,4 +1,4 @@
-"""How many cores this process may use."""
+"""The number of cores that this process may use."""
 
 import math
 import os
@@ -11,7 +11,7 @@ from stereocell.storage import processes
 from stereocell.storage.processes import container_cores, cores
 
 
-def test_cores_are_those_that_dask_counts() -> None:
+def test_cores_are_counted_like_dask_counts_them() -> None:
     assert cores() == cpu_count()
 
 
@@ -34,7 +34,7 @@ def test_affinity_and_quota_both_bound_the_cores(monkeypatch: pytest.MonkeyPatch
         ({"one/two/cpu.max": "damaged"}, math.inf),
     ],
 )
-def test_quota_is_that_of_the_container_s_group(
+def test_the_quota_is_that_of_the_container_s_group(
     tmp_path: Path, files: dict[str, str], expected: float
 ) -> None:
     group = tmp_path / "proc/self/cgroup"

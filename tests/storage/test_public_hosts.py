@@ -26,12 +26,12 @@ PUBLIC = ["8.8.8.8", "193.62.193.80", "2001:4860:4860::8888", "::ffff:8.8.8.8", 
 
 
 @pytest.mark.parametrize("number", PRIVATE)
-def test_private_numbers(number: str) -> None:
+def test_private_ip_addresses_are_not_public(number: str) -> None:
     assert not is_public(number)
 
 
 @pytest.mark.parametrize("number", PUBLIC)
-def test_public_numbers(number: str) -> None:
+def test_public_ip_addresses_are_public(number: str) -> None:
     assert is_public(number)
 
 
@@ -42,12 +42,14 @@ def test_public_numbers(number: str) -> None:
         *("[::1]", "[::ffff:127.0.0.1]", "[fd00::1]", "169.254.169.254", "0"),
     ],
 )
-def test_a_host_in_the_network_is_refused_however_it_is_written(host: str) -> None:
+def test_a_host_in_a_private_network_is_refused_however_it_is_written(host: str) -> None:
     with pytest.raises(SourceError, match="private network"):
         public_numbers_of(f"http://{host}/a")
 
 
-def test_a_name_that_resolves_into_the_network_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_host_name_that_leads_into_a_private_network_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     answers = {"rebound.example": ["93.184.215.14", "10.0.0.7"], "open.example": ["93.184.215.14"]}
 
     def getaddrinfo(host: str, port: int, **options: Any) -> list[Any]:
@@ -56,7 +58,7 @@ def test_a_name_that_resolves_into_the_network_is_refused(monkeypatch: pytest.Mo
     monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
     assert public_numbers_of("https://open.example/x") == ["93.184.215.14"]
     require_public("s3://bucket/x.zarr")
-    with pytest.raises(SourceError, match="name this address yourself"):
+    with pytest.raises(SourceError, match="name it yourself"):
         require_public("https://rebound.example/x.zarr")
 
 
@@ -67,7 +69,7 @@ def test_a_name_that_resolves_into_the_network_is_refused(monkeypatch: pytest.Mo
         *("http://host:0/", "http://host:99999/", "http://[::1/", "data:text/plain,a", "//host/a"),
     ],
 )
-def test_other_addresses_are_refused(address: str) -> None:
+def test_addresses_that_are_not_http_are_refused(address: str) -> None:
     with pytest.raises(SourceError, match="expected https://"):
         split_address(address)
 

@@ -40,7 +40,7 @@ def test_functions_of_a_survey_fit_the_definition_of_the_bundle() -> None:
         ({"another": "text"}, r"\$\.another: 'text' is not of type 'number'"),
     ],
 )
-def test_values_beyond_the_shared_definition_are_refused(
+def test_values_outside_of_the_shared_definition_are_refused(
     changed: dict[str, Any], fault: str
 ) -> None:
     with pytest.raises(OutputError, match=fault):

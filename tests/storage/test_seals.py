@@ -1,4 +1,4 @@
-"""Sealed records of JSON and of text are read and refused in the same words."""
+"""Faults of sealed JSON and of sealed texts are reported in the same words."""
 
 import hashlib
 import json
@@ -68,8 +68,8 @@ def test_each_fault_of_a_sealed_record_has_one_line_for_both_kinds(
     )
     file.write_text(json.dumps(KEY) if name.endswith("json") else SETTINGS)
     line = fault()
-    assert line.startswith(": has no hash of its content, expected ")
-    assert line.endswith(": it is of an earlier version, or was written or changed by hand")
+    assert line.startswith(": found no hash of its content, expected ")
+    assert line.endswith(": an earlier version wrote it, or it was written or changed by hand")
     file.unlink()
     file.mkdir()
     with pytest.raises(OutputError, match=r"can't be read \(Is a directory\)$"):

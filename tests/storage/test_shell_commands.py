@@ -1,4 +1,4 @@
-"""Commands that messages name have real places, so that they can be pasted into a shell."""
+"""Commands in messages have real paths, so that they can be pasted into a shell."""
 
 import ast
 import re
@@ -21,7 +21,7 @@ COMMAND = re.compile(r"`(stereocell [^`]*)`")
 
 
 @pytest.mark.parametrize("place", ["out/mine", ODD, "two  words", "a`b", "-x y"])
-def test_a_shell_reads_the_real_place_from_a_message(place: str) -> None:
+def test_a_shell_reads_the_real_path_from_a_command_in_a_message(place: str) -> None:
     places = {"OUT": place, "INPUT": "in put"}
     line = fill_in("x: run `stereocell plan INPUT -o OUT` first", places)
     command = line.removeprefix("x: run `stereocell").removesuffix("` first")
@@ -31,12 +31,12 @@ def test_a_shell_reads_the_real_place_from_a_message(place: str) -> None:
     assert done.stdout.splitlines() == ["plan", "in put", "-o", place]
 
 
-def test_places_that_are_not_known_keep_their_words() -> None:
+def test_words_for_unknown_paths_stay_in_a_message() -> None:
     line = "OUT: run `stereocell build INPUT -o ANOTHER_OUT`, then `stereocell publish OUT TARGET`"
     assert fill_in(line, {"OUT": "a"}) == line.replace("publish OUT", "publish a")
 
 
-def test_every_place_in_a_command_of_a_message_is_one_that_is_filled_in() -> None:
+def test_each_word_for_a_path_in_a_message_can_be_filled_in() -> None:
     named = {
         (file.relative_to(SOURCES).as_posix(), word)
         for file in SOURCES.rglob("*.py")
@@ -57,13 +57,13 @@ def _pasted(capfd: pytest.CaptureFixture[str]) -> list[str]:
     return shlex.split(command)[1:]
 
 
-def test_remedies_lead_from_an_empty_folder_to_a_stage_in_a_place_of_an_odd_name(
+def test_following_remedies_leads_from_an_empty_folder_to_a_stage(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     source, out = make_source(tmp_path / f"{ODD}.ome.tif"), tmp_path / ODD
     assert main(["units", str(out), "--workers", "0"]) == 1
     words = _pasted(capfd)
-    assert words == ["plan", "INPUT", "-o", str(out)]  # no input was given
+    assert words == ["plan", "INPUT", "-o", str(out)]  # INPUT stays, because no input was given
     assert main(["plan", str(source), *words[2:], "--grid", "1x1"]) == 0
     capfd.readouterr()
     assert main(["stage", str(out), "--workers", "0"]) == 1
@@ -81,7 +81,7 @@ def test_remedies_lead_from_an_empty_folder_to_a_stage_in_a_place_of_an_odd_name
 
 
 @pytest.mark.parametrize("name", sorted(name for name, at in PLACES.items() if at.reads))
-def test_command_on_nothing_names_the_folder_that_it_was_given(
+def test_a_command_on_an_empty_folder_names_that_folder(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
     out = tmp_path / ODD

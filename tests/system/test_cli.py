@@ -57,7 +57,7 @@ def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             ["--iso-value", "F body=1", "--iso-value", "F body=2"],
             "--iso-value names channel 'F body' twice, expected once",
         ),
-        (["--preset", "mri", "--spacing-um", ".2,.01,.01"], "0.2 um apart: expected 4 or more"),
+        (["--preset", "mri", "--spacing-um", ".2,.01,.01"], "0.2 um apart, expected 4 or more"),
     ],
 )
 def test_wrong_usage_is_one_line_and_leaves_nothing(

@@ -41,7 +41,7 @@ _CHOICE = (
 )
 _SHIFTED = "values like Hounsfield units plus 1024, and its level of 300 is meant for"
 _IGNORED = (
-    "NIfTI: its level is given, so the same in all tiles: --iso-scope tile is for levels that"
+    "NIfTI: the settings state its level, so all tiles have the same one, and --iso-scope tile"
 )
 
 

@@ -196,7 +196,9 @@ def test_stage_that_was_not_finished_is_not_exported(
     assert main(["stage", str(out), "--workers", "0"]) == 1
     capsys.readouterr()
     assert main(["bundle", str(out), "--workers", "0"]) == 1
-    assert f"stage: begun and not finished: run `stereocell stage {out}`" in capsys.readouterr().err
+    assert (
+        f"stage: began and did not finish: run `stereocell stage {out}`" in capsys.readouterr().err
+    )
     assert main(["check", str(out)]) == 1
     (_unit(out) / "volume.npy").write_bytes(whole)
     assert main(["stage", str(out), "--workers", "0"]) == 0
@@ -208,7 +210,7 @@ def test_one_unit_s_run_says_how_many_are_missing(
 ) -> None:
     assert main(["plan", str(source), "-o", str(tmp_path / "out"), "--grid", "2x1"]) == 0
     assert main(["units", str(tmp_path / "out"), "--workers", "0", "--only", "r0_c1/1"]) == 0
-    assert "units: 3 of 4 are still to be built" in capsys.readouterr().err
+    assert "units: 3 of 4 units are not built yet" in capsys.readouterr().err
 
 
 # The command, which interrupts itself and its worker once that writes: however slow the

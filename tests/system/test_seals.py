@@ -108,8 +108,8 @@ def test_plan_of_an_earlier_version_is_answered_by_the_remedy(
     (out / "plan.json").write_text(json.dumps(plan))
     assert main([command[0], str(out), *command[1:]]) == 1
     line = error_line(capfd)
-    assert "plan.json: has no hash of its content" in line
-    assert "of an earlier version" in line
+    assert "plan.json: found no hash of its content" in line
+    assert "an earlier version wrote it" in line
     (out / "plan.json").unlink()  # the remedy
     assert main(["plan", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]) == 0
     assert (out / "plan.json").read_bytes() == (built / "plan.json").read_bytes()
@@ -126,7 +126,7 @@ def test_whole_build_of_an_earlier_version_goes_on_after_the_remedy(
         lines = (out / name).read_bytes().splitlines(keepends=True)
         (out / name).write_bytes(b"".join(lines[:-1]))
     (out / "units" / "plan.key").write_text("0123abcd")
-    assert "is of an earlier version" in _faults(out)
+    assert "an earlier version wrote it" in _faults(out)
     build = ["build", str(built.parent / "f.ome.tif"), "-o", str(out), "--grid", "1x1"]
     assert main([*build, "--workers", "0"]) == 1
     assert f"remove it and run `stereocell plan {build[1]} -o {out}`" in error_line(capfd)
@@ -207,7 +207,7 @@ def test_document_that_no_command_could_read_is_not_written(
 
 
 def test_settings_and_numbers_that_no_reader_takes_are_not_written(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="no TOML"):
+    with pytest.raises(OutputError, match="this is not TOML"):
         write_bytes(tmp_path / SETTINGS, b"[plan\n")
     with pytest.raises(OutputError, match="not written"):
         write_json(tmp_path / "seconds.json", {"meshes": float("nan")})

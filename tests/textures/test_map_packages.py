@@ -43,7 +43,7 @@ def test_maps_are_refused_before_any_work_if_a_package_of_the_extra_is_missing(
     out = tmp_path / "out"
     assert main(["build", source, "-o", str(out), "--maps"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"--maps takes the package {package}: " in line
+    assert f"--maps needs the package {package}: " in line
     assert line.endswith("pip install 'stereocell[maps]'")
     assert not out.exists()
 
@@ -97,4 +97,4 @@ def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again
         assert capsys.readouterr().err.endswith("pip install 'stereocell[maps]'\n")
     assert main(["check", "--deep", "--workers", "0", str(out)]) == 1
     told = capsys.readouterr()
-    assert "a surface with baked maps takes the package alktx2" in told.out + told.err
+    assert "a surface with baked maps needs the package alktx2" in told.out + told.err

@@ -146,9 +146,9 @@ def test_a_pipe_in_the_stage_is_refused_and_not_waited_for(
     (out / "stage" / name).unlink()
     os.mkfifo(out / "stage" / name)
     assert bundle(out) == 1
-    assert "is no regular file" in capsys.readouterr().err
+    assert "found a folder, device or pipe, expected a regular file" in capsys.readouterr().err
     assert main(["check", str(out)]) == 1
-    assert "is no regular file" in capsys.readouterr().out
+    assert "found a folder, device or pipe, expected a regular file" in capsys.readouterr().out
 
 
 def test_check_refuses_a_stage_that_leads_out(

@@ -190,7 +190,7 @@ def test_unknown_version_is_found(out):
 def test_broken_json_is_found(out):
     (out / "bundle" / "files.json").write_text("{")
     found = lines(out)
-    assert "no JSON" in found["file list"].detail
+    assert "not JSON" in found["file list"].detail
 
 
 def test_level_that_lies_elsewhere_is_found(out):

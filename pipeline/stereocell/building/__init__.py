@@ -1,1 +1,1 @@
-"""Passes and phases on OUT. Only this package knows their order."""
+"""Run the passes and phases of a build on OUT. Only this package knows their order."""

@@ -1,4 +1,4 @@
-"""The inputs of a bundle: the composed stage, as it lies in OUT or as an artist edited it."""
+"""Find the inputs of a bundle: the composed stage in OUT, or one that an artist has edited."""
 
 from pathlib import Path
 
@@ -14,10 +14,15 @@ from stereocell.usd.write_previews import PREVIEWS
 
 
 def require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
-    """Return the path of the stage to export. Raises OutputError where that can't be begun."""
+    """Return the path of the stage to export.
+
+    layer  layer named by --stage; None: OUT's own stage
+
+    Raises OutputError if the stage is missing or unfinished.
+    """
     out_folder.require_finished("stage")
     if out_folder.has(out_folder.plan_file):
-        plan = out_folder.plan()  # no phase goes on beside a plan that was changed by hand
+        plan = out_folder.plan()  # raises an error if the plan was changed by hand
         if plan.settings.unwrap.maps:
             require_map_packages()
     path = layer if layer is not None else out_folder.stage_file
@@ -27,9 +32,9 @@ def require_stage(out_folder: OutFolder, layer: Path | None) -> Path:
 
 
 def require_kept_stage(out_folder: OutFolder) -> None:
-    """Raise StageError where a file that the stage's phase wrote is lost or damaged.
+    """Raise StageError if a file that the stage's phase wrote is missing or damaged.
 
-    A layer that may have been edited in place passes, and the bundle's writer names it.
+    A layer that may have been edited in place is accepted. The bundle's writer reports it.
     """
     if out_folder.has_begun("stage"):  # otherwise this build did not write the stage
         listed = written_files.read_stage_list(out_folder.stage_dir)
@@ -39,14 +44,14 @@ def require_kept_stage(out_folder: OutFolder) -> None:
 def bundle_step(out_folder: OutFolder, path: Path, viewer: Path | None) -> WriteBundle:
     """Return the step that writes the bundle. Raises StageError for foreign files.
 
-    path    the stage
-    viewer  the folder of the page; None: it is not built
+    path    file of the stage
+    viewer  folder of the viewer's page; None: it is not built
     """
     kept = out_folder.marks(path.parent)
-    files = dependencies(path, out_folder.stage_dir)  # first: it refuses foreign files
+    files = dependencies(path, out_folder.stage_dir)  # called first, since it refuses foreign files
     made_of = (str(path.absolute()), *states_of(files)) if kept is None else tuple(kept)
-    # an image may feed a surface, and is encoded then: by this version, or not at all
-    previews = out_folder.stage_dir / PREVIEWS  # which feed none
+    # The encoder's version counts only if there are images that a surface may use.
+    previews = out_folder.stage_dir / PREVIEWS  # no surface uses these images
     images = [file for file in files if may_be_image(file) and file.parent != previews]
     encoder = encoder_version() if images else None
     page = () if viewer is None else tuple(states_of(sorted(viewer.rglob("*"))))
@@ -54,7 +59,7 @@ def bundle_step(out_folder: OutFolder, path: Path, viewer: Path | None) -> Write
 
 
 def remove_half_bundle(out_folder: OutFolder) -> None:
-    """Remove a bundle whose command was killed while it stored the files, the manifest last."""
+    """Remove a bundle without a manifest, which is stored last: its command was killed before."""
     is_half = out_folder.is_stored and out_folder.is_begun("bundle")
     if is_half and not out_folder.has(out_folder.bundle_dir / MANIFEST):
         out_folder.remove(out_folder.bundle_dir)

@@ -1,7 +1,7 @@
-"""Check that a plan's inputs are unchanged: since the plan, and again once tasks have read them.
+"""Check that a plan's inputs have not changed, before tasks read them and afterwards.
 
-The fingerprint of a large volume covers a sample of its voxels. Size and date of its files are
-therefore compared, too: a file written while tasks ran may differ in voxels outside of the sample.
+The fingerprint of a large volume covers a sample of its voxels. Sizes and dates of its files are
+compared as well, because a file that changed while tasks ran may differ outside of the sample.
 """
 
 from collections.abc import Iterator
@@ -22,9 +22,9 @@ _SHOWN = 100  # characters of a path in a message
 
 
 class InputChangedError(SourceError):
-    """An input changed while tasks read it: their results may mix the old and the new input.
+    """An input changed while tasks read it, so their results may mix the old and the new input.
 
-    has_new_fingerprint  whether the fingerprint differs, and thus the names of the results, too
+    has_new_fingerprint  whether the input's fingerprint, and so the names of results, changed, too
     """
 
     def __init__(self, text: str, *, has_new_fingerprint: bool) -> None:
@@ -36,7 +36,7 @@ def require_input(plan: Plan) -> None:
     """Raise SourceError unless the input holds the voxels that were planned."""
     dataset = open_watched(source_of(plan))
     if dataset.fingerprint != plan.fingerprint:
-        # A DICOM file that was cut short is left out, which explains another fingerprint.
+        # An incomplete DICOM file is left out. The message names it as the likely reason.
         left_out = (remark for remark in dataset.remarks if remark.startswith(LEFT_OUT))
         remarks = "".join(f"; {remark}" for remark in left_out)
         raise SourceError(
@@ -46,12 +46,13 @@ def require_input(plan: Plan) -> None:
     levels, channels = len(dataset.levels), len(dataset.channels)
     if plan.level >= levels or any(c.index >= channels for c in plan.channels if not c.source):
         raise SourceError(
-            f"{plan.name}: holds {levels} levels and {channels} channels, the plan names others: "
-            "plan into another OUT"
+            f"{plan.name}: found {levels} levels and {channels} channels, expected the level and "
+            "channels of the plan: plan into another OUT"
         )
     if any(a > b for a, b in zip(plan.region.stop, dataset.levels[plan.level].shape, strict=True)):
         raise SourceError(
-            f"{plan.name}: level {plan.level} holds no such region: plan into another OUT"
+            f"{plan.name}: level {plan.level} is smaller than the plan's region: plan into another "
+            "OUT"
         )
 
 
@@ -81,13 +82,13 @@ def require_added(plan: Plan) -> None:
 
 
 def require_still(plan: Plan, *, again: str = "stereocell units OUT", is_last: bool = True) -> None:
-    """Raise InputChangedError where the image or a label map changed since it was first opened.
+    """Raise InputChangedError if the image or a label map changed since it was first opened.
 
-    again    the command that reads the input again
-    is_last  whether an input whose files can't be listed is compared, too, by its fingerprint
+    again    command that reads the input again
+    is_last  whether an input whose files can't be listed is compared by its fingerprint
 
-    Another date is accepted if the fingerprint covers all voxels and is the same. Raises
-    SourceError or OutputError where added channels changed.
+    A file with a new date is accepted if the fingerprint covers all voxels and is the same. Raises
+    SourceError or OutputError if added channels changed.
     """
     for name, ref in _inputs(plan):
         states = first_states(ref)
@@ -110,10 +111,10 @@ def _inputs(plan: Plan) -> Iterator[tuple[str, SourceRef]]:
 
 
 def _require_same(ref: SourceRef, words: str, again: str, *, is_written: bool) -> None:
-    """Raise InputChangedError unless the voxels are those of the reference's fingerprint.
+    """Raise InputChangedError unless the input still has the reference's fingerprint.
 
-    words       first words of the message: the input and the files that changed
-    again       the command that reads the input again
+    words       first words of the message, which name the input and the changed files
+    again       command that reads the input again
     is_written  whether the date or size of a file changed
     """
     remedy = (
@@ -125,7 +126,7 @@ def _require_same(ref: SourceRef, words: str, again: str, *, is_written: bool) -
         found = now.fingerprint
     except SourceError as error:
         forget()
-        text = f"{words}, and now {error}; {remedy}"
+        text = f"{words}; reading it again failed: {error}; {remedy}"
         raise InputChangedError(text, has_new_fingerprint=True) from error
     if found != ref.fingerprint:
         forget()
@@ -134,18 +135,18 @@ def _require_same(ref: SourceRef, words: str, again: str, *, is_written: bool) -
     if is_written and not covers_all(now):
         forget()
         raise InputChangedError(
-            f"{words}; the fingerprint is of a sample, which can't show whether all voxels are the "
+            f"{words}; the fingerprint covers a sample and can't show whether all voxels are the "
             f"same, so no unit is kept: run `{again}` again",
             has_new_fingerprint=False,
         )
 
 
 def _in_words(ref: SourceRef, states: FileStates, changed: list[str]) -> str:
-    """Return how many files changed, and the first one's name unless it may name a patient."""
+    """Return how many files changed, and the name of the first unless it may name a patient."""
     count, total = len(changed), len({*states.states, *changed})
     words = f"{count} of {total} files"
     if not changed:
-        return "its address lists no files"
+        return "its files can't be listed"
     if not format_of(ref.source).has_plain_names:
         return words if total > 1 else "its file"
     root = ref.source.partition("://")[2] or ref.source

@@ -1,8 +1,8 @@
-"""Compare the results of each phase with the plan, the units and the stage that lie in OUT now.
+"""Find results in OUT that were made of an earlier plan, earlier units or an earlier stage.
 
-Each phase records a digest of the documents in OUT that it was made of. The digest does not depend
-on code or versions, so results of an earlier version stay valid. A rebuild that is stopped between
-two phases leaves results of an earlier plan behind, each of which is whole by itself.
+A rebuild that is stopped between two phases leaves such results behind, and each is valid by
+itself. Therefore each phase records a digest of the documents in OUT that it was made of. The
+digest does not depend on code or versions, so results of an earlier version stay valid.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from stereocell.storage.json_files import find_sealed
 from stereocell.usd.written_files import digest_of, read_stage_list
 
 FIELD = "made_of"
-# phases after the plan in the order of a build, each with the parts of OUT that it is made of
+# Phases after the plan, in the order of a build, each with the parts of OUT that it is made of.
 _MADE_OF = {
     "units": ("plan",),
     "stage": ("plan", "units"),
@@ -24,7 +24,7 @@ _MADE_OF = {
 
 
 def made_of(out_folder: OutFolder, phase: str) -> str:
-    """Return a digest of the parts that a phase would be made of now; empty: one is unreadable."""
+    """Return a digest of the parts of OUT that a phase is made of; empty: one is unreadable."""
     parts = [_content_of(out_folder, part) for part in _MADE_OF.get(phase, ())]
     if not parts or None in parts:
         return ""
@@ -32,9 +32,9 @@ def made_of(out_folder: OutFolder, phase: str) -> str:
 
 
 def find_stale(out_folder: OutFolder) -> str | None:
-    """Return a line on the first phase whose results are of an earlier plan, units or stage.
+    """Return a line on the first phase that was made of an earlier plan, units or stage.
 
-    None: there is no such phase. The record of an earlier version has no digest, and is accepted.
+    None: there is no such phase. A record without a digest, of an earlier version, is accepted.
     Damaged documents are reported elsewhere.
     """
     if out_folder.phases_fault() is not None:
@@ -45,7 +45,7 @@ def find_stale(out_folder: OutFolder) -> str | None:
         if entry is None:
             continue
         if not entry["key"] and name != "units":  # each unit is written whole or not at all
-            return f"{out_folder.out / name}: begun and not finished: {_remedy(name)}"
+            return f"{out_folder.out / name}: began and did not finish: {_remedy(name)}"
         now = made_of(out_folder, name)
         if now and entry.get(FIELD, now) != now:
             words = " and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
@@ -57,7 +57,7 @@ def find_stale(out_folder: OutFolder) -> str | None:
 
 
 def require_current(out_folder: OutFolder) -> None:
-    """Raise OutputError where results of a phase are of an earlier plan, units or stage."""
+    """Raise OutputError if a phase's results were made of an earlier plan, units or stage."""
     if (fault := find_stale(out_folder)) is not None:
         raise OutputError(fault)
 
@@ -77,7 +77,7 @@ def _content_of(out_folder: OutFolder, part: str) -> object:
 
 
 def _remedy(phase: str) -> str:
-    """Return the commands that make a phase and all after it anew, as one line for a shell."""
+    """Return the commands that repeat a phase and all later ones, as one line for a shell."""
     names = list(_MADE_OF)
     commands = (f"stereocell {name} OUT" for name in names[names.index(phase) :])
     return f"run `{' && '.join(commands)}`"

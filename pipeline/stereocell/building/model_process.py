@@ -1,7 +1,7 @@
 """Run a user's network in a process of its own, with bounds on its time and memory.
 
-The bounds hold for each call: loading, and each patch. Usual networks stay below the defaults: a 3D
-U-Net of 30 million weights takes a minute and 3 GB for a patch of 128^3 voxels.
+The bounds apply to loading, and to each patch. Usual networks stay below the defaults: a 3D U-Net
+of 30 million weights takes a minute and 3 GB for a patch of 128^3 voxels.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,16 +20,16 @@ from stereocell.storage.location import Location
 from stereocell.tissue.onnx_classifier import Network
 from stereocell.tissue.onnx_session import OnnxSession, Tensor
 
-_MOST = 1e6  # seconds, a week and a half, or GB
-_LONGEST_NAME = 100  # characters of a class, which names a channel and its files
+_MOST = 1e6  # s, GB: largest bound that a user may set; 1e6 s are a week and a half
+_LONGEST_NAME = 100  # characters; longest name of a class, which also names a channel and files
 
 
 @dataclass(frozen=True, slots=True)
 class ModelBounds:
     """Bounds on a network.
 
-    seconds    most time in s for loading it, and for each patch
-    memory_gb  most resident memory, 10^9 bytes
+    seconds    longest time for loading the network, and for each patch, s
+    memory_gb  largest resident memory, 10^9 bytes
     """
 
     seconds: float = 300.0
@@ -42,7 +42,7 @@ class ModelBounds:
         ):
             if not 0 < value <= _MOST:
                 raise UsageError(
-                    f"{flag} is {value:g}, expected a number above 0, at most {_MOST:g}"
+                    f"{flag} is {value:g}, expected a number above 0 and at most {_MOST:g}"
                 )
 
 
@@ -50,7 +50,7 @@ class ModelBounds:
 def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
     """Yield the network of a file. Its process ends with the block.
 
-    Raises SourceError and UsageError as `Network.load` does, and SourceError beyond the bounds.
+    Raises SourceError and UsageError as `Network.load` does, and SourceError if it exceeds a bound.
     """
     with unchanged_while_read(Location.of(path), "run `stereocell tissue OUT` again"):
         try:
@@ -67,12 +67,12 @@ def opened_network(path: Path, bounds: ModelBounds) -> Iterator[Network]:
 
 
 def _require_printable(path: Path, network: Network) -> None:
-    """Raise SourceError where the name of a class has a character that can't be printed."""
+    """Raise SourceError if the name of a class is too long or can't be printed."""
     for name in network.classes:
         if not name.isprintable() or len(name) > _LONGEST_NAME:
             raise SourceError(
-                f"{path}: name of a class: found {name!r:.80}, expected printable characters, at "
-                f"most {_LONGEST_NAME}: rename it in the model's metadata"
+                f"{path}: name of a class is {name!r:.80}, expected at most {_LONGEST_NAME} "
+                "printable characters: rename it in the model's metadata"
             )
 
 
@@ -89,7 +89,7 @@ class _ChildSession:
         def start() -> Child:
             return Child(OnnxSession, content, bounds=bounds)
 
-        self._child = self._alive("loaded", start)
+        self._child = self._guard("loaded", start)
         return self
 
     def close(self) -> None:
@@ -115,14 +115,14 @@ class _ChildSession:
     def _call(self, doing: str, method: str, *arguments: Any) -> Any:
         child = self._child
         assert child is not None
-        return self._alive(doing, lambda: child.call(method, *arguments))
+        return self._guard(doing, lambda: child.call(method, *arguments))
 
-    def _alive(self, doing: str, work: Callable[[], Any]) -> Any:
+    def _guard(self, doing: str, work: Callable[[], Any]) -> Any:
         try:
             return work()
         except ChildError as error:
             raise SourceError(
-                f"{self._path}: {error} while it was {doing}, expected a network within "
-                f"{self._bounds.seconds:g} s a patch and {self._bounds.memory_gb:g} GB: if it is "
-                "sound, raise --model-seconds or --model-memory-gb"
+                f"{self._path}: {error} while it was {doing}, expected at most "
+                f"{self._bounds.seconds:g} s a patch and {self._bounds.memory_gb:g} GB: if the "
+                "network needs more, raise --model-seconds or --model-memory-gb"
             ) from None

@@ -1,4 +1,4 @@
-"""The records in OUT on a label map's objects: the notes of its file, and their table."""
+"""Keep notes on a label map's objects in OUT, and make the table of the objects from them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,9 +26,10 @@ NOTES = "units.schema.json#Notes"
 
 
 def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
-    """Keep what a label map's file says of its objects: the stage is made without that file.
+    """Write the names and columns of objects in a label map's file to OUT.
 
-    Raises SourceError.
+    The stage needs them and is made without that file. Raises SourceError if the file can't be
+    read.
     """
     file = _notes_file(out_folder, plan, labels)
     if find_sealed(file, NOTES) is not None:
@@ -41,7 +42,7 @@ def save_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> None:
 
 
 def read_notes(out_folder: OutFolder, plan: Plan, labels: Labels) -> ObjectNotes:
-    """Return what `save_notes` kept. Raises OutputError."""
+    """Return the notes that `save_notes` wrote. Raises OutputError."""
     file = _notes_file(out_folder, plan, labels)
     return _notes().validate_python(read_sealed(file, NOTES, AGAIN)["notes"])
 
@@ -53,7 +54,7 @@ def _notes_file(out_folder: OutFolder, plan: Plan, labels: Labels) -> Path:
 
 
 def _free_labels_reader(plan: Plan, labels: Labels) -> Callable[[Location], dict[int, str]] | None:
-    """Return the function that reads the segments' free names; None: they are not used."""
+    """Return the function that reads the segments' free-text names; None: they are not used."""
     wanted = plan.settings.objects.segment_labels
     return format_of(labels.ref.source).read_free_labels if wanted else None
 
@@ -66,7 +67,7 @@ def _notes() -> TypeAdapter[ObjectNotes]:
 def table_of_objects(
     out_folder: OutFolder, plan: Plan, labels: Labels, located: Located
 ) -> tuple[ObjectTable, list[str]]:
-    """Return the table of a label map's objects, and remarks on what did not fit it."""
+    """Return the table of a label map's objects, and remarks for the user."""
     index = out_folder.index()
     names = {tile.id: f"{tile.id}/{labels.id}" for tile in plan.tiles}
     facts = {

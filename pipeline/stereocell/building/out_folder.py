@@ -1,8 +1,8 @@
 """OUT: the paths of all results, and the files that list them.
 
-A result's name is the key of its step: a hash of everything that it depends on, such as the input
-and the step's settings and VERSION. It is written under a temporary name and renamed, so a killed
-run resumes and a finished one does nothing.
+The name of a result is the key of its step, a hash of everything that the result depends on. A
+result is written under a temporary name and renamed, so a killed run resumes and a finished one
+does nothing.
 """
 
 import json
@@ -31,7 +31,7 @@ PLAN = "plan.schema.json"
 PHASES, INDEX = "units.schema.json#Phases", "units.schema.json#Index"
 EXPORTS = "units.schema.json#Exports"
 PROVENANCE, PLAN_KEY = "units.schema.json#Provenance", "units.schema.json#PlanKey"
-_NAMES = {"plan", "units", "stage", "bundle", "report"}  # of the phases
+_NAMES = {"plan", "units", "stage", "bundle", "report"}  # names of the phases
 _UNFINISHED = {"key": "", "results": "", "seconds": 0.0, "about": ""}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _RUN_UNITS = "run `stereocell units OUT` first"
@@ -42,10 +42,10 @@ PHASES_AGAIN = (
 
 
 def require_build_or_nothing(out: Path, source: str | Path) -> None:
-    """Raise OutputError where OUT holds something else than a build.
+    """Raise OutputError if OUT holds anything other than a build.
 
-    The source's own file may lie there, and files whose names begin with a dot: no result has such
-    a name.
+    The source's own file may lie there. Files whose names begin with a dot may as well, because no
+    result has such a name.
     """
     found = contents_of(out)
     if found.kind in (Kind.FILE, Kind.SCENE):
@@ -79,11 +79,12 @@ class OutFolder:
         self.report_file = out / "report" / "index.html"
 
     def require_name(self) -> None:
-        """Raise UsageError where USD can't have OUT's path: it holds a control character."""
+        """Raise UsageError if OUT's path has a control character, which USD can't read."""
         path = str(self.out.absolute())
         if _CONTROL.search(path):
             raise UsageError(
-                f"OUT is {path!r}, expected a path without control characters: USD reads none such"
+                f"OUT is {path!r}, expected a path without control characters, because USD can't "
+                "read them"
             )
 
     def require_writable(self) -> None:
@@ -98,11 +99,11 @@ class OutFolder:
                 f"{self.out}: can't be written ({error.strerror}), expected a folder of your own"
             ) from None
 
-    # --- files, which may be objects of a storage
+    # --- files, which may be objects of an object storage
 
     @property
     def is_stored(self) -> bool:
-        """Whether OUT is on object storage: its files are here only while they are needed."""
+        """Whether OUT is on object storage; then its files are local only while they are needed."""
         return workspace.is_mirrored(self.out)
 
     def has(self, file: Path) -> bool:
@@ -122,11 +123,11 @@ class OutFolder:
         workspace.remove(path)
 
     def fetch(self, folder: Path) -> None:
-        """Fetch all files of a folder, for functions that read files of this machine."""
+        """Fetch all files of a folder, for functions that read local files."""
         workspace.fetch(folder)
 
     def marks(self, folder: Path) -> list[tuple[str, int, str]] | None:
-        """Return key, bytes and mark of all objects below a folder; None: OUT is not stored."""
+        """Return key, bytes and mark of all objects below a folder; None: OUT is a local folder."""
         return workspace.objects_below(folder)
 
     # --- the plan
@@ -137,7 +138,7 @@ class OutFolder:
         write_sealed(self.plan_file, to_json(self._without_place(plan)))
 
     def require_readable(self, plan: Plan) -> None:
-        """Raise OutputError where commands could not read the plan once it is written."""
+        """Raise OutputError if commands could not read the plan after it is written."""
         content = to_json(self._without_place(plan))
         data = json.dumps(sealed(content)).encode()
         from_json(parse(self.plan_file, data, PLAN, NOT_WRITTEN), NOT_WRITTEN)
@@ -163,22 +164,25 @@ class OutFolder:
         root = self.out.resolve()
         return _with_sources(plan, lambda source: str(root / source) if source else source)
 
-    # --- results of the units' two passes
+    # --- results of the passes over the voxels
 
     def statistics_file(self, channel_id: str, key: str) -> Path:
         """Return the path of a channel's statistics."""
         return self.out / "units" / f"window-{channel_id}-{key}.json"
 
     def notes_file(self, labels_id: str, fingerprint: str) -> Path:
-        """Return the path of what a label map's own file says of its objects."""
+        """Return the path of the notes on objects from a label map's own file."""
         return self.out / "units" / f"notes-{labels_id}-{fingerprint[:12]}.json"
 
-    def tile_result(self, what: str, tile_id: str, channel_id: str, key: str) -> Path:
-        """Return the path of what the pass `what` before the units found of one tile."""
-        return self.out / "units" / tile_id / channel_id / f"{what}-{key}.json"
+    def tile_result(self, pass_name: str, tile_id: str, channel_id: str, key: str) -> Path:
+        """Return the path of the result of one pass for one tile."""
+        return self.out / "units" / tile_id / channel_id / f"{pass_name}-{key}.json"
 
     def unit_dir(self, name: str, key: str) -> Path:
-        """Return the folder of one unit's meshes and volume; `name`: `<tile>/<channel>`."""
+        """Return the folder of one unit's meshes and volume.
+
+        name  `<tile>/<channel>`
+        """
         return self.out / "units" / name / key
 
     def tile_file(self, tile_id: str) -> Path:
@@ -186,7 +190,7 @@ class OutFolder:
         return self.out / "units" / tile_id / "stage.json"
 
     def survey(self) -> dict[str, Any]:
-        """Return each channel's statistics, iso-values by tile, and appearance, by channel id."""
+        """Return the content of survey.json by channel ID. Raises OutputError."""
         found = read_sealed(self.survey_file, SURVEY, _RUN_UNITS)
         return dict(found["channels"])
 
@@ -218,17 +222,17 @@ class OutFolder:
             for channel in plan.channels:
                 name = f"{tile.id}/{channel.id}"
                 if tile.id not in survey.get(channel.id, {"iso": {}})["iso"]:
-                    raise OutputError(f"{self.survey_file}: {name} is not in it: {_RUN_UNITS}")
+                    raise OutputError(f"{self.survey_file}: {name} is missing: {_RUN_UNITS}")
                 if name not in index:
-                    raise OutputError(f"{self.index_file}: {name} is not in it: {_RUN_UNITS}")
+                    raise OutputError(f"{self.index_file}: {name} is missing: {_RUN_UNITS}")
         for tile_id, labels in product((tile.id for tile in plan.tiles), plan.labels):
             if f"{tile_id}/{labels.id}" not in index:
                 raise OutputError(
-                    f"{self.index_file}: {tile_id}/{labels.id} is not in it: {_RUN_UNITS}"
+                    f"{self.index_file}: {tile_id}/{labels.id} is missing: {_RUN_UNITS}"
                 )
 
     def remove_other_folders(self, parent: Path, keep: set[str]) -> None:
-        """Remove the folders in `parent` that an earlier plan left, all except `keep`."""
+        """Remove all folders in `parent` except `keep`. An earlier plan left them."""
         paths = [path.split("/") for path in sizes_of(parent)]
         for name in {parts[0] for parts in paths if len(parts) > 1} - keep:
             self.remove(parent / name)
@@ -236,12 +240,12 @@ class OutFolder:
     # --- the phases
 
     def phases(self) -> dict[str, dict[str, Any]]:
-        """Return the record of each phase; without a valid file no phase counts as done."""
+        """Return the record of each phase. If the file is damaged, no phase counts as done."""
         found = find_sealed(self.phases_file, PHASES)
         return dict.fromkeys(self._begun(), _UNFINISHED) if found is None else found
 
     def phases_fault(self) -> str | None:
-        """Return a line on a damaged record of the phases; None: it is sound, or there is none."""
+        """Return a line on a damaged record of the phases; None: it is intact or missing."""
         if not workspace.is_file(self.phases_file):
             return None
         try:
@@ -251,11 +255,11 @@ class OutFolder:
         return None
 
     def has_begun(self, name: str) -> bool:
-        """Return whether a phase has ever begun here, by this version or an earlier one."""
+        """Return whether a phase has ever begun in OUT, in this version or an earlier one."""
         return name in self._begun()
 
     def _begun(self) -> set[str]:
-        """Return the phases that a record names, even one of an earlier version."""
+        """Return the phases that phases.json names, even if an earlier version wrote it."""
         try:
             phases = read_json(self.phases_file, None, "")
         except OutputError:
@@ -267,16 +271,16 @@ class OutFolder:
         return not self.phases().get(name, {"key": "done"})["key"]
 
     def require_finished(self, name: str) -> None:
-        """Raise OutputError where a phase began and did not finish, or its record is damaged."""
+        """Raise OutputError if a phase began and did not finish, or its record is damaged."""
         if workspace.is_file(self.phases_file):
             read_sealed(self.phases_file, PHASES, PHASES_AGAIN)
         if self.is_begun(name):
             raise OutputError(
-                f"{self.out / name}: begun and not finished: run `stereocell {name} OUT` first"
+                f"{self.out / name}: began and did not finish: run `stereocell {name} OUT` first"
             )
 
     def save_phase(self, name: str, entry: Mapping[str, Any]) -> None:
-        """Save a phase's record; an empty key: it isn't finished."""
+        """Save the record of a phase; an empty key means that it isn't finished."""
         write_sealed(self.phases_file, {**self.phases(), name: entry})
 
 

@@ -1,7 +1,7 @@
 """Refuse to replace parts of OUT that no phase of a build wrote.
 
-A part that a phase wrote is written again if it is out of date or damaged. Files that no phase
-wrote, and layers of the stage that were edited in place, end the phase before it writes.
+A phase writes its own parts again if they are out of date or damaged. It stops before writing if
+it finds files that no phase wrote, or layers of the stage that were edited in place.
 """
 
 from pathlib import Path
@@ -19,12 +19,12 @@ from stereocell.usd.written_files import ADVICE, CHANGED, DOUBTFUL, find_damage,
 
 
 def require_own_places(out_folder: OutFolder, *, is_same_plan: bool) -> None:
-    """Raise OutputError where a phase after the plan would replace files that no phase wrote.
+    """Raise OutputError if a phase after the plan would replace files that no phase wrote.
 
-    is_same_plan  whether the plan stays as it is: then edited layers of the stage stay, too
+    is_same_plan  whether the plan stays the same, so that edited layers of the stage stay, too
 
-    All phases are checked before the first one writes. A build that ends half-way would leave the
-    units of one plan beside the bundle of another.
+    All phases are checked before the first one writes. Otherwise a build could stop half-way and
+    leave the units of one plan beside the bundle of another.
     """
     if is_forced():
         return
@@ -51,15 +51,15 @@ def require_own_stage(out_folder: OutFolder) -> None:
     edited = sorted(path for path, fault in faults.items() if fault in (CHANGED, DOUBTFUL))
     if edited:
         raise OutputError(
-            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage is to be written anew: "
-            + or_force(f"save what you edited elsewhere ({ADVICE})")
+            f"{folder / edited[0]}: {faults[edited[0]]}, and the stage must be written again: "
+            + or_force(f"save your edits elsewhere ({ADVICE})")
         )
 
 
 def require_own_bundle(out_folder: OutFolder) -> None:
-    """Raise OutputError where OUT/bundle holds files that no bundle phase wrote.
+    """Raise OutputError if OUT/bundle holds files that no bundle phase wrote.
 
-    If it is forced, a folder that is no bundle is removed.
+    With --force, a folder that is not a bundle is removed instead.
     """
     folder = out_folder.bundle_dir
     files = _files(folder)
@@ -73,7 +73,7 @@ def require_own_bundle(out_folder: OutFolder) -> None:
 
 
 def no_layer(path: Path, *, is_given: bool) -> OutputError:
-    """Return the error of a stage that is no file.
+    """Return the error for a stage that is not a file.
 
     is_given  whether --stage named the path; otherwise it is OUT's own stage
     """
@@ -84,7 +84,7 @@ def no_layer(path: Path, *, is_given: bool) -> OutputError:
 
 
 def require_own_report(out_folder: OutFolder) -> None:
-    """Raise OutputError where report.html is a page that no report phase wrote."""
+    """Raise OutputError if OUT's report is a page that no report phase wrote."""
     file = out_folder.report_file
     if out_folder.has(file) and not (
         is_sealed_text(file) or out_folder.has_begun("report") or is_forced()
@@ -93,14 +93,14 @@ def require_own_report(out_folder: OutFolder) -> None:
 
 
 def require_own_tissue(out_folder: OutFolder) -> None:
-    """Raise OutputError where OUT/tissue holds files without the record of `stereocell tissue`."""
+    """Raise OutputError if OUT/tissue holds files without the record of `stereocell tissue`."""
     folder = out_folder.out / FOLDER
     if _files(folder) and not out_folder.has(folder / RECORD) and not is_forced():
         raise refused(folder, _words(folder), "nothing or tissue classes of this build")
 
 
 def _files(folder: Path) -> set[str]:
-    """Return the relative paths of the files below a folder, except files of the system."""
+    """Return the relative paths of the files below a folder, except the operating system's."""
     return {path for path in sizes_of(folder) if not is_ignored(path.rpartition("/")[2])}
 
 

@@ -1,6 +1,7 @@
-"""The passes over a plan's voxels: each runs the steps whose results are missing.
+"""Run the passes over a plan's voxels: each runs the steps whose results are missing.
 
-All passes but that of the units find what the tiles of a channel or a label map share.
+The last pass builds the units. The passes before it find values that all tiles of a channel or a
+label map share, such as the level.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,7 +36,7 @@ ByChannel = dict[str, Results[R]]  # by channel ID, each by tile ID
 class Passes:
     """The passes over one plan, with the folder of their results and the workers.
 
-    Each raises SourceError where an input changed since the plan, TasksFailedError where steps
+    Each method raises SourceError if an input changed since the plan, TasksFailedError if steps
     fail.
     """
 
@@ -54,10 +55,10 @@ class Passes:
         return Results(kept, self.out_folder.out)
 
     def evidence(self, windows: Mapping[str, Window]) -> ByChannel[TileEvidence]:
-        """Return what each tile shows of the levels of a channel."""
+        """Return the evidence for a channel's levels in each tile."""
 
         def step_of(tile: Tile, channel: Channel) -> GatherEvidence | None:
-            if channel.source:  # shares of tissue, whose level is known
+            if channel.source:  # shares of tissue have a known level
                 return None
             return evidence_step(self.plan, tile.box, channel=channel, window=windows[channel.id])
 
@@ -66,14 +67,14 @@ class Passes:
     def components(self, found: Mapping[str, Found]) -> list[ByChannel[Sums]]:
         """Return the sums over each tile's components, for each level that a channel may have."""
 
-        def of_level(rung: int) -> ByChannel[Sums]:
+        def of_level(index: int) -> ByChannel[Sums]:
             def step_of(tile: Tile, channel: Channel) -> SumComponents | None:
-                return components_step(self.plan, tile, channel, found[channel.id], rung)
+                return components_step(self.plan, tile, channel, found[channel.id], index)
 
             return self._by_tile("components", step_of)
 
-        most = max((len(one.rungs) for one in found.values()), default=0)
-        return [of_level(rung) for rung in range(most)]
+        most = max((len(one.candidates) for one in found.values()), default=0)
+        return [of_level(index) for index in range(most)]
 
     def objects(self, labels: Labels) -> Located:
         """Return which tile builds which object of a label map."""
@@ -87,7 +88,7 @@ class Passes:
         return locate(self.plan, labels, parts, self.plan.settings.objects.smallest_voxels)
 
     def units(self, missing: list[Kept[Unit]]) -> None:
-        """Build units. This pass is the last one that reads the inputs."""
+        """Build the missing units. This pass is the last one that reads the inputs."""
         run_pass(self.out_folder, self.plan, self.engine, "units", missing, is_last=True)
 
     def _by_tile(
@@ -95,7 +96,7 @@ class Passes:
     ) -> ByChannel[R]:
         """Run a pass over the tiles of all channels.
 
-        step_of  returns the step of a tile of a channel; None: there is none
+        step_of  returns the step for one tile of a channel; None: there is nothing to do
         """
         kept: dict[str, dict[str, Kept[R]]] = {channel.id: {} for channel in self.plan.channels}
         for tile, channel in product(self.plan.tiles, self.plan.channels):

@@ -1,7 +1,8 @@
-"""A phase of a build: whether its results are whole, and made of the same as they would be now.
+"""A phase of a build: decide whether its results are complete and up to date, and record them.
 
-A phase is no work for the runner of steps. Its results lie at places that users know and may edit
-them in, so no key names them, and phases.json keeps the key beside a digest of the results.
+The runner of steps does not run phases. Users know the places of a phase's results and may edit
+them there, so the results are not named by a key. Instead, phases.json records the key and a digest
+of the results.
 """
 
 import hashlib
@@ -39,10 +40,10 @@ class Phase:
         self.is_whole = True  # False: some results are still missing
 
     def is_done(self, step: Keyed) -> bool:
-        """Return whether the phase's results are whole and made from the same inputs.
+        """Return whether the phase's results are complete and made from the same inputs.
 
-        Raises OutputError where there is work to do that would replace files that the phase did not
-        write, before it is recorded as begun.
+        If they are not, the phase is recorded as begun. Before that, OutputError is raised if the
+        phase would replace files that it did not write.
         """
         kind = _RESULTS[self.name]
         self.key, self.results = step.key, partial(kind.digest, self.out_folder)
@@ -50,12 +51,12 @@ class Phase:
         self.is_up_to_date = entry.get("key") == self.key and entry["results"] == self.results()
         if not self.is_up_to_date:
             kind.require_own(self.out_folder)
-            # an empty key: a killed phase is not done
+            # recorded without a key, so that a killed phase does not count as done
             self.save(0.0, is_finished=False)
         return self.is_up_to_date
 
     def print(self, *lines: str) -> None:
-        """Print lines on the phase."""
+        """Print lines that begin with the phase's name."""
         for line in lines:
             console.print(f"{self.name}: {line}", markup=False, soft_wrap=True)
 
@@ -64,20 +65,20 @@ class Phase:
         entry = {"key": "", "results": "", "about": "", "seconds": round(seconds, 2)}
         if is_finished:
             entry |= {"key": self.key, "results": self.results(), "about": self.about}
-        of = made_of(self.out_folder, self.name) if is_finished and self.is_whole else ""
-        self.out_folder.save_phase(self.name, {**entry, FIELD: of})
+        digest = made_of(self.out_folder, self.name) if is_finished and self.is_whole else ""
+        self.out_folder.save_phase(self.name, {**entry, FIELD: digest})
 
     def keep(self) -> None:
         """Record that the results are up to date with the plan, units and stage in OUT now."""
         entry = self.out_folder.phases().get(self.name)
-        of = made_of(self.out_folder, self.name) if self.is_whole else ""
-        if entry is not None and entry.get(FIELD, "") != of:
-            self.out_folder.save_phase(self.name, {**entry, FIELD: of})
+        digest = made_of(self.out_folder, self.name) if self.is_whole else ""
+        if entry is not None and entry.get(FIELD, "") != digest:
+            self.out_folder.save_phase(self.name, {**entry, FIELD: digest})
 
 
 @contextmanager
 def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
-    """Print and save a phase's duration; print "up to date" for a phase without work."""
+    """Yield a phase; at the end of the block print and save its duration, or print "up to date"."""
     start = time.perf_counter()
     if (fault := out_folder.phases_fault()) is not None:
         console.print(f"{name}: {fault}", markup=False, soft_wrap=True)
@@ -94,13 +95,13 @@ def phase_of(out_folder: OutFolder, name: str) -> Iterator[Phase]:
 
 
 def states_of(files: Iterable[Path]) -> list[tuple[str, int, int]]:
-    """Return each file's path, size and modification time: an edit changes them."""
+    """Return each file's path, size in bytes and modification time in ns, to notice edits."""
     found = [(file, file.stat()) for file in files]
     return [(str(file), status.st_size, status.st_mtime_ns) for file, status in found]
 
 
 def _digest_of_names(folder: Path) -> str:
-    """Return a digest of the names and sizes of all files below a folder: damage changes it."""
+    """Return a digest of the names and sizes of all files below a folder, to notice damage."""
     digest = hashlib.sha256()
     for path, size in sizes_of(folder).items():
         digest.update(f"{folder.name}/{path} {size}\n".encode())
@@ -108,7 +109,7 @@ def _digest_of_names(folder: Path) -> str:
 
 
 def _digest_of_bundle(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle; empty where one of its files is missing or damaged."""
+    """Return a digest of the bundle; empty: one of its files is missing or damaged."""
     path = out_folder.bundle_dir / FILES
     try:
         listed = read_list(path, "")
@@ -121,7 +122,7 @@ def _digest_of_bundle(out_folder: OutFolder) -> str:
 
 
 def digest_of_manifest(out_folder: OutFolder) -> str:
-    """Return a digest of the bundle's manifest, which is in no list; empty: there is none."""
+    """Return a digest of the bundle's manifest, which its list omits; empty: there is none."""
     return _digest_of_file(out_folder.bundle_dir / MANIFEST)
 
 
@@ -132,7 +133,7 @@ def _digest_of_file(file: Path) -> str:
 
 
 def _digest_of_stage(out_folder: OutFolder) -> str:
-    """Return a digest of the stage's list; empty where one of its files is missing or damaged."""
+    """Return a digest of the stage's list; empty: one of its files is missing or damaged."""
     try:
         listed = written_files.read_stage_list(out_folder.stage_dir)
     except OutputError:
@@ -143,10 +144,10 @@ def _digest_of_stage(out_folder: OutFolder) -> str:
 
 
 class _Results(NamedTuple):
-    """The results of a phase.
+    """Functions on the results of a phase.
 
-    digest       of them; empty where one is missing or damaged
-    require_own  raises OutputError where the phase would replace files that it did not write
+    digest       returns a digest of the results; empty: one is missing or damaged
+    require_own  raises OutputError if the phase would replace files that it did not write
     """
 
     digest: Callable[[OutFolder], str]
@@ -163,7 +164,7 @@ _RESULTS = {
 
 
 def is_finished(out_folder: OutFolder) -> bool:
-    """Return whether all phases of OUT's plan have finished, and their results are whole."""
+    """Return whether all phases of OUT's plan have finished, and their results are complete."""
     phases = out_folder.phases()
     return find_stale(out_folder) is None and all(
         name in phases and phases[name]["results"] == results.digest(out_folder)

@@ -1,8 +1,8 @@
-"""The way of a build, from top to bottom: plan -> units -> stage -> bundle. A report follows.
+"""The phases of a build, from top to bottom: plan -> units -> stage -> bundle. A report follows.
 
-The units come after passes that find what the tiles of a channel share: windows -> evidence ->
-levels -> components. Each phase is a function on OUT, and skips finished work: the name of a result
-is a key of all that it depends on.
+Before the units, passes find values that all tiles of a channel share: windows -> evidence ->
+levels -> components. Each phase is a function on OUT and skips finished work, because the name of a
+result is a key of everything that the result depends on.
 """
 
 from collections.abc import Sequence
@@ -71,19 +71,20 @@ def make_plan(
 ) -> Plan:
     """Write OUT/plan.json and the settings used (TOML). The same plan again changes nothing.
 
-    choice  notes on how the settings were chosen; see `load_for`
-    title   the name of the specimen; empty: the one that the source gives it
-    engine  the workers of all other phases, where these follow at once: before anything is written,
-            a cluster is joined, and the places of the phases are guarded; None: the plan alone
+    choice  notes on how the preset was chosen; see `load_for`
+    title   name of the specimen; empty: the source's name for it
+    engine  workers of the other phases, if these follow at once. Then a cluster is joined, and the
+            places of all phases are checked, before anything is written. None: only the plan is
+            made
 
-    Raises StereoCellError; OUT is unchanged then.
+    Raises StereoCellError, and leaves OUT unchanged then.
     """
     require_apart(source, out)
     out_folder = OutFolder(out)
     out_folder.require_name()
     with phase_of(out_folder, "plan") as phase:
         if engine is not None:
-            require_own_places(out_folder, is_same_plan=True)  # what no plan may replace
+            require_own_places(out_folder, is_same_plan=True)  # fails early, whatever the plan is
         plan = settle(source, settings, choice, title=title)
         plan = replace(plan, notes=(*plan.notes, *notes_on_levels(plan)))
         text = to_readable_toml(plan.settings)
@@ -93,7 +94,7 @@ def make_plan(
         if engine is not None:
             require_own_places(out_folder, is_same_plan=there == plan)
             engine.join()
-        print_notes(plan)  # only now, since an error is printed alone
+        print_notes(plan)  # printed late, so that an error would stand alone
         if there is not None and (changes := changes_of(there, plan)):
             phase.print(changes)
         phase.is_up_to_date = not replace_plan(out_folder, plan)
@@ -104,11 +105,11 @@ def make_plan(
 
 
 def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
-    """Find windows and levels for all units, then build the units, or `only` one of them.
+    """Find windows and levels for all units, then build the units, or one of them.
 
-    only  `<tile>/<channel>`; None: all units
+    only  `<tile>/<channel>` of the unit to build; None: all units
 
-    Raises SourceError where the source changed since the plan, TasksFailedError where units fail.
+    Raises SourceError if the source changed since the plan, TasksFailedError if units fail.
     """
     out_folder = OutFolder(out)
     plan = out_folder.plan()
@@ -136,7 +137,7 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
             phase.about = f"{len(to_build)} of {len(units)} units"
         phase.is_whole = len(missing) == len(to_build)
         if not phase.is_whole:
-            phase.print(f"{len(missing) - len(to_build)} of {len(units)} are still to be built")
+            phase.print(f"{len(missing) - len(to_build)} of {len(units)} units are not built yet")
         else:
             out_folder.save_units(plan, {name: step.key for name, step in steps.items()})
             if to_build:
@@ -145,7 +146,7 @@ def run_units(out: Path, engine: Engine, *, only: str | None = None) -> None:
 
 
 def _survey(passes: Passes, phase: Phase) -> Survey:
-    """Find each channel's window, level, repair and appearance, one for all its tiles."""
+    """Find the window, level, repair and appearance of each channel, the same for all tiles."""
     plan = passes.plan
     found_windows = passes.windows()
     windows, files = dict(found_windows), found_windows.files()
@@ -169,10 +170,12 @@ def _survey(passes: Passes, phase: Phase) -> Survey:
 
 
 def run_stage(out: Path, engine: Engine) -> None:
-    """Write OUT/stage from the units: its layers, looks/, tiles/ and, where there is
-    a surface, specimen.usdz; last their list, files.json. Other files stay.
+    """Write OUT/stage from the units.
 
-    Raises OutputError where units are missing or damaged, TasksFailedError where tiles fail.
+    It holds the layers, looks/, tiles/, and specimen.usdz if there is a surface. Their list,
+    files.json, is written last. Other files stay.
+
+    Raises OutputError if units are missing or damaged, TasksFailedError if tiles fail.
     """
     out_folder = OutFolder(out)
     plan = out_folder.plan()
@@ -194,7 +197,7 @@ def run_stage(out: Path, engine: Engine) -> None:
         if phase.is_done(stage):
             return
         out_folder.remove(stage_dir / USDZ_NAME)
-        out_folder.remove(out_folder.stage_list)  # the list of the earlier stage
+        out_folder.remove(out_folder.stage_list)  # lists the files of the earlier stage
         run_missing(engine, "stage", tiles.values())
         phase.print(stage.write(stage_dir))
         out_folder.remove_other_folders(stage_dir / "tiles", {*tiles})
@@ -207,8 +210,8 @@ def run_stage(out: Path, engine: Engine) -> None:
         if measured := sum(one.measured_bytes for one in made.values()):
             whole = sum(entry["bytes"] for entry in files.values())
             phase.print(
-                f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, for other "
-                "windows; --bits 8 leaves them out"
+                f"{measured / 1e6:.1f} of {whole / 1e6:.1f} MB are voxels as measured, which other "
+                "windows need; --bits 8 leaves them out"
             )
         stage.write_list(stage_dir, files)
         phase.print(describe_parts(read_stage_list(stage_dir)))
@@ -217,11 +220,12 @@ def run_stage(out: Path, engine: Engine) -> None:
 def run_bundle(
     out: Path, engine: Engine, *, stage: Path | None = None, is_strict: bool = False
 ) -> None:
-    """Write OUT/bundle from the composed stage: OUT/stage/stage.usda, or a layer over it (`stage`).
+    """Write OUT/bundle from the composed stage.
 
+    stage      layer over the stage, with edits; None: OUT/stage/stage.usda
     is_strict  whether an edit that the bundle does not take over is an error
 
-    Raises OutputError where the stage is missing, StageError where it can't be read.
+    Raises OutputError if the stage is missing, StageError if it can't be read.
     """
     out_folder = OutFolder(out)
     with phase_of(out_folder, "bundle") as phase:
@@ -231,8 +235,8 @@ def run_bundle(
         require_kept_stage(out_folder)
         remove_half_bundle(out_folder)
         if not is_forced():
-            require_bundle(out_folder.bundle_dir)  # before the phase is begun
-        if is_strict:  # also where the bundle is finished: another command may have made it
+            require_bundle(out_folder.bundle_dir)  # fails before the phase is recorded as begun
+        if is_strict:  # checked even for a finished bundle, which may be made without --strict
             with opened_stage(path) as composed:
                 composed.require_all_taken()
         if not phase.is_done(step):
@@ -246,7 +250,7 @@ def run_bundle(
                 for note in write_bundle(composed, written, out_folder.bundle_dir, viewer):
                     phase.print(note)
             phase.about = "" if stage is None else f"of {printable(path.name)}"
-        elif stage is not None:  # lost edits are named whenever somebody asks for the layer
+        elif stage is not None:  # lost edits are reported again, although nothing is written
             with opened_stage(path) as composed:
                 phase.print(*composed.notes(out_folder.stage_file))
     out_folder.remove(out_folder.parts_dir)

@@ -1,4 +1,4 @@
-"""Replace the plan in OUT: only by one of the same input, and never settings that a user wrote."""
+"""Replace the plan in OUT by another plan of the same input, but never a user's own settings."""
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.model.errors import OutputError, UsageError
@@ -10,9 +10,9 @@ from stereocell.storage.sealed_text import is_sealed_text
 
 
 def replace_plan(out_folder: OutFolder, plan: Plan) -> bool:
-    """Write plan.json; return whether it changed.
+    """Write plan.json, and return whether it changed.
 
-    Raises OutputError where OUT holds a build of another input.
+    Raises OutputError if OUT holds a build of another input.
     """
     if replaced_plan(out_folder, plan) == plan:
         return False
@@ -21,10 +21,10 @@ def replace_plan(out_folder: OutFolder, plan: Plan) -> bool:
 
 
 def replaced_plan(out_folder: OutFolder, plan: Plan) -> Plan | None:
-    """Return the plan that `plan` would replace; None: there is none.
+    """Return the plan in OUT that `plan` would replace; None: there is none.
 
-    Raises OutputError, unless it is forced, where that was changed by hand or is of another
-    input.
+    Raises OutputError, except with --force, if the plan in OUT was changed by hand or belongs to
+    another input.
     """
     try:
         there = out_folder.plan() if out_folder.has(out_folder.plan_file) else None
@@ -43,7 +43,7 @@ def replaced_plan(out_folder: OutFolder, plan: Plan) -> Plan | None:
 
 
 def require_own_settings(out_folder: OutFolder, plan: Plan, there: Plan | None) -> None:
-    """Raise OutputError where stereocell.toml is the user's own file, not a plan's record."""
+    """Raise OutputError if OUT/stereocell.toml is the user's own file and not a plan's record."""
     file = out_folder.settings_file
     if not out_folder.has(file) or is_sealed_text(file) or is_forced():
         return

@@ -1,4 +1,4 @@
-"""Run steps that read a plan's inputs: these are compared before and after."""
+"""Run steps that read a plan's inputs, and compare the inputs before and after."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -26,15 +26,15 @@ def run_on_input(
     *,
     is_last: bool = False,
 ) -> None:
-    """Call a function that reads the inputs and writes results; without results, do nothing.
+    """Call a function that reads the inputs and writes results. Without results, do nothing.
 
     run      runs the steps of one pass
-    results  the places of their results
+    results  places of their results
     is_last  whether no other pass follows
 
-    Raises SourceError where an input changed since the plan or while the steps ran. In the second
-    case their results are removed. If the fingerprint did not change, results of the old and the
-    new input have the same names, so all results are removed.
+    Raises SourceError if an input changed since the plan or while the steps ran. In the second case
+    their results are removed. If the fingerprint stayed the same, results of the old and the new
+    input have the same names, so all results are removed.
     """
     if not results:
         return
@@ -44,7 +44,7 @@ def run_on_input(
     begin(out_folder, plan, results)
     try:
         run()
-    except BaseException:  # a changed input may be its cause, and is then reported instead
+    except BaseException:  # if a changed input may be the cause, that is reported instead
         _require_still(out_folder, plan, results, is_last=False)
         raise
     _require_still(out_folder, plan, results, is_last=is_last)
@@ -59,12 +59,12 @@ def run_pass(
     *,
     is_last: bool = False,
 ) -> int:
-    """Run the steps of one pass whose results are missing; return their number.
+    """Run the steps of one pass whose results are missing, and return their number.
 
-    label    the pass, for progress and errors
+    label    name of the pass, for progress and errors
     is_last  whether no other pass follows
 
-    Raises SourceError as `run_on_input` does, TasksFailedError where steps fail.
+    Raises SourceError as `run_on_input` does, TasksFailedError if steps fail.
     """
     guard = partial(run_on_input, out_folder, plan, is_last=is_last)
     return run_missing(engine, label, wanted, guard)

@@ -1,7 +1,7 @@
-"""A note in OUT on the pass that reads the inputs now. A killed command leaves the note behind.
+"""Keep a note in OUT on the running pass, so that the results of a killed pass can be checked.
 
-The input may have changed during a killed pass. The next command therefore compares the inputs with
-the note, and removes the results of that pass where they differ.
+An input may have changed during a killed pass, which leaves its note behind. The next command
+compares the inputs with the note, and removes the results of that pass if they differ.
 """
 
 import hashlib
@@ -19,24 +19,24 @@ _SCHEMA = "units.schema.json#Running"
 
 
 def begin(out_folder: OutFolder, plan: Plan, results: Sequence[Path]) -> None:
-    """Write the note: the inputs, and the results that a pass is about to make."""
+    """Write the note on the inputs, and on the results that a pass is about to make."""
     names = [result.relative_to(out_folder.out).as_posix() for result in results]
     write_json(out_folder.running_file, {"inputs": _digest(plan), "results": names})
 
 
 def end(out_folder: OutFolder) -> None:
-    """Remove the note: the pass ended, and its inputs were compared."""
+    """Remove the note, after the pass has ended and its inputs have been compared."""
     out_folder.remove(out_folder.running_file)
 
 
 def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
-    """Remove the results of a killed pass if an input was written to since the pass began."""
+    """Remove the results of a killed pass if an input has changed since the pass began."""
     left = find_json(out_folder.running_file, _SCHEMA)
     if left is None:
         return
     if left["inputs"] != _digest(plan):
         console.print(
-            "units: an input was written to after an earlier command began to read it and was "
+            "units: an input changed after an earlier command had begun to read it and was "
             "stopped: the last results of that command are made again"
         )
         for result in (out_folder.out / name for name in left["results"]):
@@ -46,7 +46,7 @@ def remove_mixed(out_folder: OutFolder, plan: Plan) -> None:
 
 
 def _digest(plan: Plan) -> str:
-    """Return a digest of the files of image and label maps. Small files count by their content."""
+    """Return a digest of the state of all input files. Small files count by their content."""
     digest = hashlib.sha256()
     for ref in (source_of(plan), *(labels.ref for labels in plan.labels)):
         digest.update("".join(open_states(ref).lines()).encode())

@@ -1,8 +1,8 @@
-"""The one place where commands ask the documents of OUT for their seals, before they rely on them.
+"""Check the seals of OUT's documents before a command relies on them.
 
-Each command that reads a build names the parts that it depends on in `NEEDS`. `stereocell check`
-asks all parts, by the same functions. So a record that was damaged or changed by hand is found by
-the first command that would go on from it, with the remedy that `check` names.
+`NEEDS` lists the parts of OUT that each command depends on. `stereocell check` checks all parts, by
+the same functions. So the first command that would use a damaged or edited record reports it, with
+the same remedy as `check`.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ _PLAN_AGAIN = "run `stereocell plan INPUT -o OUT` again"
 UNITS_AGAIN = "run `stereocell units OUT`"
 _EXPORTS_AGAIN = "remove it: the next export of each file then takes --force"
 _REPORT_AGAIN = "run `stereocell report OUT` again"
-# command -> the parts of OUT that it depends on
+# For each command, the parts of OUT that it depends on.
 NEEDS = {
     "units": ("plan",),
     "tissue": ("plan",),
@@ -41,9 +41,9 @@ _Check = Callable[[], object]
 
 
 def require_documents(out_folder: OutFolder, command: str) -> None:
-    """Raise OutputError where a document that a command depends on is missing, damaged or changed.
+    """Raise OutputError if a document that a command depends on is missing, damaged or edited.
 
-    A folder that holds a stage or a bundle without the records of a build passes.
+    A folder with a stage or a bundle, but without the records of a build, is accepted.
     """
     if not _is_build(out_folder):
         return
@@ -53,7 +53,7 @@ def require_documents(out_folder: OutFolder, command: str) -> None:
 
 
 def find_document_faults(out_folder: OutFolder, *parts: str) -> list[str]:
-    """Return a line on each document of some parts that is missing, damaged or changed."""
+    """Return a line on each document of these parts that is missing, damaged or edited."""
     faults = []
     for check in (check for part in parts for check in checks_of(out_folder, part)):
         try:
@@ -64,17 +64,17 @@ def find_document_faults(out_folder: OutFolder, *parts: str) -> list[str]:
 
 
 def checks_of(out_folder: OutFolder, part: str) -> list[_Check]:
-    """Return the checks of a part's documents, each of which raises OutputError."""
+    """Return the checks of a part's documents. Each raises OutputError for a fault."""
     return _PARTS[part](out_folder)
 
 
 def has_units(out_folder: OutFolder) -> bool:
-    """Return whether OUT holds units: a copy that is only looked at needs none."""
+    """Return whether OUT holds units. A copy that is only viewed needs none."""
     return bool(out_folder.names(out_folder.units_dir))
 
 
 def has_report(out_folder: OutFolder) -> bool:
-    """Return whether OUT holds a report, or should: its phase ended, and the units are there."""
+    """Return whether OUT holds a report, or must: its phase has ended and the units are there."""
     is_recorded = bool(out_folder.phases().get("report", {"key": ""})["key"])
     return out_folder.has(out_folder.report_file) or (is_recorded and has_units(out_folder))
 
@@ -122,7 +122,7 @@ def _require_stage_list(out_folder: OutFolder) -> None:
     wrote = out_folder.phases()["stage"]
     if wrote["results"] != written_files.digest_of(listed):
         raise OutputError(
-            f"{out_folder.stage_list}: damaged, not the list that was written: "
+            f"{out_folder.stage_list}: differs from the list that was written: "
             f"{written_files.REMEDY}"
         )
 

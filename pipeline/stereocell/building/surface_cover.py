@@ -1,7 +1,7 @@
-"""How a channel's surface covers the source's voxels above its level, noise aside.
+"""Measure how much of the source's voxels above the level a channel's surface encloses.
 
-The voxels that only noise lifts above the level are not counted. Where a level lies one deviation
-of the noise above the ground, they are a sixth of the ground, and no surface should hold them.
+Voxels that only noise lifts above the level are not counted, because no surface should enclose
+them. If the level lies one deviation of the noise above the background, they are a sixth of it.
 """
 
 from collections.abc import Iterable
@@ -17,23 +17,24 @@ from stereocell.steps.find_window import FindWindow
 from stereocell.steps.gather_evidence import GatherEvidence
 from stereocell.steps.unit_files import cover_of, load_record
 
-# Both were tried on a CT of a trunk in voxels of 3 mm, at 300 HU: from 59 % left out to 17 and 5 %.
+# Remedies for a surface that leaves out much. They were tried on a CT of a trunk with voxels of
+# 3 mm, at 300 HU. The first reduced the part left out from 59 % to 17 %, both together to 5 %.
 REMEDY = (
-    "in a file for --config, under [surface], max_shift = 0.02 keeps thin ones, and "
-    "min_diagonal_um = 0 with max_fragment_um = 0 small ones"
+    "in a file for --config, under [surface], max_shift = 0.02 keeps thin structures, and "
+    "min_diagonal_um = 0 with max_fragment_um = 0 keeps small ones"
 )
-NO_REMEDY = "settings that keep those would keep much of this noise, too"
-# Voxels of structure for each voxel of noise that the remedy keeps, at the least. On 60 dim nuclei
-# in noise the remedy makes 54 times the triangles, of noise.
+NO_REMEDY = "settings that keep them would keep much of this noise, too"
+# Least number of voxels of structure for each voxel of noise at which the remedy is advised. With
+# 60 dim nuclei in noise the remedy makes 54 times as many triangles, most of them noise.
 LEAST_GAIN = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceCover:
-    """How the solids of a channel cover the source's voxels above the level.
+    """How much of the source's voxels above the level the solids of a channel enclose.
 
-    cover   without the voxels that only noise lifts above the level
-    lifted  the number of these voxels, none of which the solid holds
+    cover   counts without the voxels that only noise lifts above the level
+    lifted  number of these voxels, which lie outside of the solid
     """
 
     cover: Cover
@@ -41,10 +42,11 @@ class SurfaceCover:
 
     @classmethod
     def of(cls, cover: Cover, lifted: Lifted) -> "SurfaceCover":
-        """Return the cover as its units measured it, without the voxels that noise lifts.
+        """Return the cover measured by the units, without the voxels that only noise lifts.
 
-        Beside the surface, noise lifts as many voxels above the level as it takes below it, and
-        these lie in the solid. Of voxels near the level so many count as noise at most.
+        Near the surface, noise lifts as many voxels above the level as it takes below. The latter
+        lie in the solid and can be counted. So at most as many voxels near the level count as
+        noise.
         """
         added, left_out = cover.solid - cover.covered, cover.source - cover.covered
         noise = min(left_out, round(lifted.far + min(lifted.near, added)))
@@ -57,19 +59,19 @@ class SurfaceCover:
 
     @property
     def words(self) -> str:
-        """Both shares, for a reader."""
+        """The shares as text for a reader."""
         beside = f"; noise alone lifts about {self.lifted:,} others above it" if self.lifted else ""
         return self.cover.words + beside
 
     @property
     def remedy(self) -> str:
-        """The settings that keep what is left out, or why there are none."""
+        """The settings that keep the structures left out, or why there are no such settings."""
         left_out = self.cover.source - self.cover.covered
         return REMEDY if left_out >= LEAST_GAIN * self.lifted else NO_REMEDY
 
 
 def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
-    """Return a line for each channel that loses more than MAX_MISSING; all units are built."""
+    """Return a line for each channel that loses more than MAX_MISSING. All units must be built."""
     index, survey, notes = out_folder.index(), read_survey(out_folder), []
     for channel in plan.channels:
         total = Cover(0, 0, 0)
@@ -82,7 +84,7 @@ def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
         lifted = lifted_by_tile(out_folder, plan, survey[channel.id])
         found = SurfaceCover.of(total, sum_lifted(lifted.values()))
         if found.missing > MAX_MISSING:
-            noise = f", beside about {found.lifted:,} that only noise lifts there" * bool(
+            noise = f", not counting about {found.lifted:,} that only noise lifts there" * bool(
                 found.lifted
             )
             notes.append(
@@ -94,10 +96,10 @@ def notes_on_cover(out_folder: OutFolder, plan: Plan) -> list[str]:
 
 
 def lifted_by_tile(out_folder: OutFolder, plan: Plan, survey: ChannelSurvey) -> dict[str, Lifted]:
-    """Return how many voxels noise lifts above a channel's level in each tile, by its evidence.
+    """Return how many voxels noise lifts above a channel's level in each tile, by tile ID.
 
-    Without a bound on smoothing no noise was measured, and a file of evidence may be gone since:
-    such tiles are left out.
+    Tiles without the file of their evidence are left out, and all tiles if no noise was measured
+    because smoothing is not bounded.
     """
     window = FindWindow.FORM.find(out_folder.out / survey.statistics_file)
     deviations = plan.settings.surface.max_shift
@@ -119,5 +121,5 @@ def lifted_by_tile(out_folder: OutFolder, plan: Plan, survey: ChannelSurvey) -> 
 
 
 def sum_lifted(lifted: Iterable[Lifted]) -> Lifted:
-    """Return the sums over tiles."""
+    """Return the sum over tiles."""
     return sum(lifted, Lifted(0.0, 0.0))

@@ -1,11 +1,11 @@
-"""survey.json, which schemas/units.schema.json describes for other readers."""
+"""Read and write survey.json; schemas/units.schema.json describes it."""
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.planning.survey import Survey, surveys
 
 
 def read_survey(out_folder: OutFolder) -> Survey:
-    """Return the content of survey.json. Raises OutputError where it is missing or damaged."""
+    """Return the survey in survey.json. Raises OutputError if it is missing or damaged."""
     return surveys().validate_python(out_folder.survey())
 
 

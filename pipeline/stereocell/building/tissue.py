@@ -1,7 +1,7 @@
-"""Tissue classes as channels of a build: learned in the planned region, stored in OUT/tissue.
+"""Add tissue classes to a build: learn them in the planned region and store them in OUT/tissue.
 
-Each class becomes a channel of 8-bit probabilities: OUT/tissue/classes.ome.zarr, a second source in
-the plan. Its window is 0..255; its surface lies at probability 1/2.
+Each class becomes a channel of probabilities in 8 bits, with the window 0..255 and the surface at
+probability 1/2. Its source is OUT/tissue/classes.ome.zarr, a second source in the plan.
 """
 
 import math
@@ -31,8 +31,8 @@ from stereocell.storage.shell_commands import fill_in
 from stereocell.tissue.classify import AUTO_CLASSES, TissueOptions
 from stereocell.tissue.onnx_classifier import Network
 
-LEVEL = 127.5  # iso-value, 0..255: probability 1/2
-MAX_VOXELS = 250_000_000  # largest region to learn in, voxels; about 40 bytes each
+LEVEL = 127.5  # iso-value of a class, 0..255, at probability 1/2
+MAX_VOXELS = 250_000_000  # voxels; largest region to learn in, at about 40 bytes each
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +40,11 @@ class TissueRequest:
     """The options of `stereocell tissue`.
 
     classes     number of classes; None: auto, or the model's number
-    channel     of the input, by name or index; empty: the first
+    channel     channel of the input, by name or index; empty: the first
     model       the user's ONNX file; None: the classes are learned
-    everywhere  learn in all voxels outside the background; else, in MR, inside the brain
-    bounds      the most time and memory of the model
+    everywhere  whether to learn in all voxels outside the background; otherwise, in MR, only inside
+                the brain
+    bounds      bounds on the model's time and memory
     """
 
     classes: int | Literal["auto"] | None = None
@@ -54,7 +55,7 @@ class TissueRequest:
 
 
 def parse_classes(text: str) -> int | Literal["auto"]:
-    """Return the value of `--classes`. Raises UsageError where it is invalid."""
+    """Return the value of `--classes`. Raises UsageError if it is invalid."""
     if text == "auto":
         return "auto"
     if not text.isdecimal() or int(text) not in AUTO_CLASSES:
@@ -64,18 +65,18 @@ def parse_classes(text: str) -> int | Literal["auto"]:
 
 
 def add_tissue(out: Path, request: TissueRequest) -> Plan:
-    """Learn the classes, write OUT/tissue, and replace earlier ones in the plan.
+    """Learn the classes, write OUT/tissue, and replace earlier classes in the plan.
 
-    Classes are not learned again where OUT/tissue is whole and made from the same voxels and
-    options, by the same VERSION of `LearnTissue`.
+    Classes are not learned again if OUT/tissue is complete and was made from the same voxels and
+    options by the same VERSION of `LearnTissue`.
 
-    Raises StereoCellError; plan and OUT/tissue are unchanged then.
+    Raises StereoCellError, and leaves the plan and OUT/tissue unchanged then.
     """
     out_folder = OutFolder(out)
     require_documents(out_folder, "tissue")
     there = out_folder.plan()
     require_own_tissue(out_folder)
-    # classes that are learned again may be the same, so that the plan and the stage stay
+    # Learning again may give the same classes, so the plan and the stage may stay the same.
     require_own_places(out_folder, is_same_plan=any(one.source for one in there.channels))
     plan = without_tissue(there)
     channel = _find_channel(plan, request.channel)
@@ -102,8 +103,8 @@ def _add(
     out = out_folder.out
     if network is not None and request.classes not in (None, "auto", network.count):
         raise UsageError(
-            f"--classes is {request.classes}, and {network.name} has {network.count}: expected the "
-            "same, or no --classes"
+            f"--classes is {request.classes}, expected {network.count}, the number of classes of "
+            f"{network.name}, or no --classes"
         )
     method: TissueOptions | Network
     if network is None:
@@ -124,7 +125,7 @@ def _add(
 
 
 def without_tissue(plan: Plan) -> Plan:
-    """Return the plan of the input's own channels."""
+    """Return the plan with only the input's own channels."""
     own = tuple(channel for channel in plan.channels if not channel.source)
     added = {channel.name for channel in plan.channels if channel.source}
     values = {name: v for name, v in plan.settings.iso_values.items() if name not in added}
@@ -153,7 +154,7 @@ def _with_classes(plan: Plan, source: str, fingerprint: str, record: Mapping[str
 
 
 def _keep(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
-    """Learn the classes unless OUT/tissue holds them, whole; print which."""
+    """Learn the classes unless OUT/tissue holds them, and print what was done."""
     folder = out_folder.out / FOLDER
     if step.is_whole(folder):
         console.print("tissue: up to date")
@@ -170,11 +171,11 @@ def _learn(out_folder: OutFolder, plan: Plan, step: LearnTissue) -> None:
     found = step.run()
     require_still(plan, again="stereocell tissue OUT")
     _require_free([one.name for one in found.classes], plan)
-    # The fingerprint is a placeholder of equal length.
+    # The fingerprint is not known yet; zeros of the same length stand in its place.
     planned = _with_classes(plan, _source_in(out_folder.out), "0" * 64, found.record)
     out_folder.require_readable(planned)
     step.FORM.write(out_folder.out / FOLDER, found)
-    open_source.cache_clear()  # the same address holds another volume now
+    open_source.cache_clear()  # the address holds another volume now
 
 
 def _find_channel(plan: Plan, wanted: str) -> Channel:
@@ -193,12 +194,13 @@ def _find_channel(plan: Plan, wanted: str) -> Channel:
 
 
 def _require_free(names: Sequence[str], plan: Plan) -> None:
-    """Raise SourceError where a class has the name of one of the input's channels."""
+    """Raise SourceError if a class has the name of one of the input's channels."""
     taken = {channel.name for channel in plan.channels}
     for name in names:
         if name in taken:
             raise SourceError(
-                f"{plan.name}: has a channel {name!r} of its own, expected none of that name"
+                f"{plan.name}: a channel is named {name!r}, like a class of tissue, expected no "
+                "channel of this name"
             )
 
 

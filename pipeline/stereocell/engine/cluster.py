@@ -1,4 +1,4 @@
-"""Join a running Dask cluster, and check that it can do the work."""
+"""Join a running Dask cluster, and check that its workers can do the work."""
 
 import hashlib
 import json
@@ -19,14 +19,16 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _ANSWER_S = 8  # s for a scheduler to answer
-_WORKER_S = 20  # s for its first worker to appear
-_MAX_BYTES = 1 << 20  # largest size of a scheduler file in bytes
+_WORKER_S = 20  # s for the first worker of a scheduler to appear
+_MAX_BYTES = 1 << 20  # bytes; largest scheduler file
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+")
 _TLS_HELP = (
     "expected certificates in Dask's configuration, and DASK_CONFIG to name its file (see "
     "docs/cluster.md)"
 )
-_EXPECTED = "expected the address of a Dask scheduler, as tls://host:8786, or its scheduler file"
+_EXPECTED = (
+    "expected the address of a Dask scheduler, such as tls://host:8786, or its scheduler file"
+)
 
 
 class ClusterError(StereoCellError):
@@ -36,23 +38,26 @@ class ClusterError(StereoCellError):
 def join(scheduler: str, shared: Path | None) -> Any:
     """Return a client of a cluster.
 
-    scheduler  address, as `tls://host:8786`, or the path of a scheduler file
-    shared     a file that all workers must see, or None
+    scheduler  address, such as `tls://host:8786`, or the path of a scheduler file
+    shared     a file that all workers must see; None: there is none
 
-    A scheduler with TLS (`tls://`) takes the certificates of Dask's configuration.
+    For a scheduler with TLS (`tls://`) the certificates come from Dask's configuration.
 
-    Raises ClusterError where the scheduler doesn't answer or refuses us, or where the workers lack
-    StereoCell, would write other bytes than this process (another version of StereoCell or of a
-    library, other code), or don't see the file.
+    Raises ClusterError in these cases:
+
+    - The scheduler does not answer, or refuses this client.
+    - A worker lacks StereoCell, or does not see the file.
+    - A worker has other code, or another version of StereoCell or of a library. It might write
+      other bytes than this process.
     """
     is_file = Path(scheduler).is_file()
     address = _address_in(Path(scheduler)) if is_file else scheduler
     if not is_file and not _ADDRESS.fullmatch(address):
-        raise ClusterError(f"--scheduler {scheduler}: no such file and no address; {_EXPECTED}")
+        raise ClusterError(f"--scheduler {scheduler}: found no such file; {_EXPECTED}")
     from distributed import Client
 
     try:
-        # The client is not the default one, so that a caller's own use of Dask stays as it is.
+        # The client does not become Dask's default, because the caller may use Dask, too.
         client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, OverflowError, ValueError, TypeError, KeyError, RuntimeError) as error:
         raise ClusterError(f"--scheduler {scheduler}: {_reason(error)}") from None
@@ -65,20 +70,23 @@ def join(scheduler: str, shared: Path | None) -> Any:
 
 
 def is_open_to_all(client: Any) -> bool:
-    """Return whether a cluster runs the code of everybody who can reach its scheduler's port."""
+    """Return whether anybody who can reach the scheduler's port can run code on the cluster."""
     return not str(client.scheduler.address).startswith("tls://")
 
 
 def _reason(error: Exception) -> str:
-    """Return why a scheduler can't be joined, and a remedy."""
-    text = str(error).splitlines()[0] if str(error) else "it does not answer"
+    """Return why a scheduler can't be joined, and what to do."""
+    text = str(error).splitlines()[0] if str(error) else "the scheduler does not answer"
     if isinstance(error, TypeError) and "ssl_context" in text:  # Dask's message
-        return f"it admits only clients with a certificate, and this command has none; {_TLS_HELP}"
+        return (
+            "the scheduler admits only clients with a certificate, and this command has none; "
+            f"{_TLS_HELP}"
+        )
     return f"{text}; {_EXPECTED}"
 
 
 def _address_in(file: Path) -> str:
-    """Return the address in a scheduler file. Raises ClusterError where there is none."""
+    """Return the address in a scheduler file. Raises ClusterError if there is none."""
     try:
         with file.open("rb") as opened:
             content = json.loads(opened.read(_MAX_BYTES))
@@ -94,9 +102,13 @@ def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
     try:
         client.wait_for_workers(1, timeout=_WORKER_S)
     except TimeoutError:
-        raise ClusterError(f"--scheduler {scheduler}: has no workers") from None
-    ours = _look()
-    for address, answer in client.run(_look_at, str(shared or ""), on_error="return").items():
+        raise ClusterError(
+            f"--scheduler {scheduler}: the cluster has no workers, expected at least one"
+        ) from None
+    ours = _describe()
+    for address, answer in client.run(
+        _describe_worker, str(shared or ""), on_error="return"
+    ).items():
         if isinstance(answer, BaseException):
             raise ClusterError(
                 f"worker {address}: can't run StereoCell: {type(answer).__name__}: {answer}"
@@ -105,19 +117,22 @@ def _require_able(client: Any, scheduler: str, shared: Path | None) -> None:
 
 
 def able(function: Callable[[T], R], shared: Path | None) -> Callable[[T], R]:
-    """Return a function that first applies the checks of `join` to its own worker.
+    """Return a function that first applies the checks of `join` to the worker it runs on.
 
-    Workers may join while others are at work.
+    A worker may join the cluster after `join` has checked the others.
     """
-    return _Able(function, _look(), shared)
+    return _Able(function, _describe(), shared)
 
 
 @dataclass(frozen=True, slots=True)
-class _Sight:
-    """A worker: versions of StereoCell and libraries, a digest of our code, access to a file.
+class _Installation:
+    """The installation of StereoCell on a worker.
 
-    extras  versions of packages of extras that make results; empty: not installed. A worker may
-            lack one, because few builds use it. A build that needs it reports that by itself
+    versions  versions of StereoCell and of the libraries that make results
+    extras    versions of optional packages that make results; empty: not installed. A worker may
+              lack one, because few builds use it, and a build that needs it reports that by itself
+    code      digest of StereoCell's code
+    sees      whether the worker sees the shared file
     """
 
     host: str
@@ -130,16 +145,18 @@ class _Sight:
 @dataclass(frozen=True, slots=True)
 class _Able(Generic[T, R]):
     function: Callable[[T], R]
-    ours: _Sight
+    ours: _Installation
     shared: Path | None
 
     def __call__(self, task: T) -> R:
-        here = _look_at(str(self.shared or ""))
+        here = _describe_worker(str(self.shared or ""))
         _require_alike("a worker on", here, self.ours, self.shared)
         return self.function(task)
 
 
-def _require_alike(who: str, worker: _Sight, ours: _Sight, shared: Path | None) -> None:
+def _require_alike(
+    who: str, worker: _Installation, ours: _Installation, shared: Path | None
+) -> None:
     who = f"{who} {worker.host}"
     found = dict(worker.versions)
     for name, expected in ours.versions:
@@ -156,24 +173,24 @@ def _require_alike(who: str, worker: _Sight, ours: _Sight, shared: Path | None) 
         )
     if not worker.sees:
         raise ClusterError(
-            f"{who}: does not see {shared}; expected OUT in a file system that all of the "
-            "cluster share"
+            f"{who}: does not see {shared}, expected OUT in a file system that the whole cluster "
+            "shares"
         )
 
 
-def _look_at(shared: str) -> _Sight:
-    return replace(_look(), sees=not shared or Path(shared).exists())
+def _describe_worker(shared: str) -> _Installation:
+    return replace(_describe(), sees=not shared or Path(shared).exists())
 
 
-def _look() -> _Sight:
+def _describe() -> _Installation:
     versions = {"StereoCell": version("stereocell"), **all_libraries()}
     extras = tuple((name, version_of(name)) for name in MAKERS)
-    return _Sight(socket.gethostname(), tuple(versions.items()), extras, _digest_of_code())
+    return _Installation(socket.gethostname(), tuple(versions.items()), extras, _digest_of_code())
 
 
 @cache
 def _digest_of_code() -> str:
-    """Return a digest of this installation's own code."""
+    """Return a digest of StereoCell's code on this machine."""
     digest, package = hashlib.sha256(), Path(__file__).parents[1]
     for file in sorted(package.rglob("*.py")):
         digest.update(f"{file.relative_to(package).as_posix()}\n".encode() + file.read_bytes())

@@ -12,11 +12,11 @@ from stereocell.model.errors import StereoCellError
 
 T = TypeVar("T")
 
-_LOOK_S = 15  # s between looks for workers
-_LOOKS = 12  # looks without a worker until the workers count as gone
-_POLL_S = 0.05  # s between looks at finished tasks
-_AHEAD = 64  # least number of tasks that wait for a worker
-_GONE = "its workers are gone and did not come back: the same command goes on from here"
+_LOOK_S = 15  # s between checks for workers
+_LOOKS = 12  # checks without a worker after which the workers count as gone
+_POLL_S = 0.05  # s between checks for finished tasks
+_AHEAD = 64  # least number of tasks that are submitted ahead
+_GONE = "its workers are gone and did not come back: run the same command to go on from here"
 
 
 def run_on_cluster(
@@ -24,7 +24,7 @@ def run_on_cluster(
 ) -> Iterator[Outcome]:
     """Yield the outcome of each task, in the order of completion.
 
-    A killed worker fails all tasks that waited on it. Each of them runs once more, alone, so that
+    If a worker is killed, all tasks that waited on it fail. Each of them runs again, alone, so that
     only the task that kills its worker fails again.
     """
     waiting, futures = iter(range(len(tasks))), {}
@@ -55,15 +55,15 @@ def run_on_cluster(
 
 
 def _is_killed(error: BaseException | None) -> bool:
-    """Return whether a task's worker died under it in each of Dask's four tries."""
+    """Return whether the task's worker died in each of Dask's four tries."""
     return type(error).__name__ == "KilledWorker"
 
 
 def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     """Yield the futures that `submit` returns, in the order of completion, until it returns None.
 
-    At most `_AHEAD` tasks, or twice as many as workers if that is more, wait at a time: each takes
-    memory of the scheduler. The iterator ends early once the workers have been absent for long.
+    At most `_AHEAD` tasks wait at a time, or twice as many as threads if that is more, because each
+    takes memory of the scheduler. The iterator ends early if the workers are absent for long.
     """
     from distributed import as_completed
 
@@ -72,7 +72,7 @@ def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
     while missed < _LOOKS:
         if time.monotonic() - looked > _LOOK_S:
             threads = 0
-            with suppress(Exception):  # the scheduler is gone: its futures report it
+            with suppress(Exception):  # if the scheduler is gone, the futures report it
                 threads = sum(client.nthreads().values())
             looked, missed = time.monotonic(), 0 if threads else missed + 1
             most = max(_AHEAD, 2 * threads)
@@ -91,7 +91,7 @@ def _completed(client: Any, submit: Callable[[], Any]) -> Iterator[Any]:
 def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
     """Wait for a task. Return its result and None, or None and its error.
 
-    A lost scheduler is such an error, and so are workers that stay away.
+    It is an error, too, if the scheduler is lost or no workers come back.
     """
     from distributed import CancelledError
 
@@ -102,7 +102,7 @@ def _outcome_of(client: Any, future: Any) -> tuple[Any, BaseException | None]:
             # This may wait again: a result that was lost with its worker is computed again.
             return (None, failure) if failure else (future.result(timeout=_LOOK_S), None)
         except CancelledError:
-            gone = "the cluster's scheduler is gone: the same command goes on from here"
+            gone = "the cluster's scheduler is gone: run the same command to go on from here"
             return None, ClusterError(gone)
         except TimeoutError:
             missed = 0 if client.scheduler_info()["workers"] else missed + 1

@@ -1,6 +1,6 @@
 """Stop a command by Ctrl-C, or by SIGTERM, which batch systems and Kubernetes send.
 
-Ctrl-C reaches every process of a terminal's group; only the command itself must react to it.
+Ctrl-C reaches every process that a terminal started, but only the command itself must react to it.
 """
 
 import signal
@@ -11,12 +11,12 @@ from contextlib import contextmanager
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM; it stops a command as Ctrl-C does: locks and half-written files are removed."""
+    """SIGTERM has arrived. It stops a command like Ctrl-C: locks and partial files are removed."""
 
 
 @contextmanager
 def answering_sigterm() -> Iterator[None]:
-    """Raise Terminated on SIGTERM inside the block; without effect outside the main thread."""
+    """Inside the block, raise Terminated on SIGTERM. It has no effect outside the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -37,34 +37,34 @@ def interrupts_put_off() -> Iterator[None]:
 
     The last signal that arrived is raised at the end.
     """
-    came: list[int] = []
+    arrived: list[int] = []
     before = {}
-    if threading.current_thread() is threading.main_thread():  # only it can set handlers
+    if threading.current_thread() is threading.main_thread():  # no other thread can set handlers
         for number in (signal.SIGINT, signal.SIGTERM):
-            if callable(signal.getsignal(number)):  # neither ignored nor the system's default
-                before[number] = signal.signal(number, lambda found, _: came.append(found))
+            if callable(signal.getsignal(number)):  # ignored and default signals stay as they are
+                before[number] = signal.signal(number, lambda found, _: arrived.append(found))
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[-1])
+        if arrived:
+            signal.raise_signal(arrived[-1])
 
 
 @contextmanager
 def children_ignore_interrupts() -> Iterator[None]:
-    """Inside the block, start processes and threads that SIGINT doesn't reach (inherited mask).
+    """Let processes and threads that are started inside the block ignore SIGINT (Ctrl-C).
 
-    Without it each worker prints a traceback of its own. A SIGINT inside the block is not lost: it
-    is delivered at the end. Windows has no such mask: there each worker prints its own.
+    Without it each worker prints a traceback of its own. A SIGINT inside the block is delivered at
+    its end. Windows has no signal mask to inherit, so there the workers do print tracebacks.
     """
     if sys.platform == "win32":
         yield
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # its start unblocks SIGINT in our thread
+    resource_tracker.ensure_running()  # started before, because it unblocks SIGINT in this thread
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -1,4 +1,4 @@
-"""Tasks with OUT on object storage: each worker opens it and returns a list of its uploads."""
+"""Run tasks with OUT on object storage: each worker opens it and returns a list of its uploads."""
 
 import threading
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from stereocell.storage.workspace import forget, joined, opened_here
 T = TypeVar("T")
 R = TypeVar("R")
 
-_working = threading.Lock()  # a worker of several threads runs one task at a time
+_working = threading.Lock()  # lets a worker with several threads run one task at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class _Carried(Generic[T, R]):
 
 @dataclass(frozen=True, slots=True)
 class _Asked(Generic[T, R]):
-    """A function that writes into a folder as long as the command that holds the claim runs."""
+    """A function that may write into a folder only while the command that claimed it runs."""
 
     function: Callable[[T], R]
     claim: Claim
@@ -44,7 +44,7 @@ class _Asked(Generic[T, R]):
 
 
 def carried(function: Callable[[T], R]) -> tuple[Callable[[T], Any], Callable[[Any], R]]:
-    """Return the function for workers to run in its place, and one that unpacks its result."""
+    """Return a function for workers to run instead, and a function that unpacks its result."""
     mirror = opened_here()
     if mirror is None:
         claim = held()

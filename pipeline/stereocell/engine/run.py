@@ -1,9 +1,9 @@
 """Run a function over many tasks: inline, on worker processes of this machine, or on a cluster.
 
-Processes of this machine take their tasks over pipes (`worker_pool`). A cluster is a Dask scheduler
-at an address: `dask scheduler` and `dask worker` by hand, or started by dask-jobqueue or
-dask-kubernetes. Its workers must see OUT and the input under the same paths, and run the same
-StereoCell.
+Processes of this machine receive their tasks over pipes (`worker_pool`). A cluster is a Dask
+scheduler with an address. It is started by hand (`dask scheduler`, `dask worker`), by dask-jobqueue
+or by dask-kubernetes. Its workers must see OUT and the input under the same paths, and have the
+same version of StereoCell.
 """
 
 import time
@@ -35,15 +35,15 @@ from stereocell.storage.processes import shortage
 
 T = TypeVar("T")
 R = TypeVar("R")
-# is given the label of running tasks, how many are done and how many there are, and the name of the
-# task that has just ended; empty: none has ended yet
+# Called with the label of the running tasks, the number of finished tasks and of all tasks, and the
+# name of the task that has just ended. The name is empty before the first one ends.
 Watch = Callable[[str, int, int, str], None]
 
 _END_S = 30  # s for a cluster's client to close
-_PACE_S = 10  # s that tasks have run before their pace is told
+_PACE_S = 10  # s that tasks run before the remaining time is printed
 
 _OPEN_CLUSTER = (
-    "cluster: it has no certificates (TLS), so everybody who reaches its ports can run code as the "
+    "cluster: found no certificates (TLS), so everybody who reaches its ports can run code as the "
     "user of its workers: see docs/cluster.md"
 )
 
@@ -51,16 +51,16 @@ console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 class TasksFailedError(StereoCellError):
-    """Some tasks failed; all others are finished. The text has a line for each reason."""
+    """Some tasks failed, and all others have finished. The text has a line for each reason."""
 
 
 class Engine:
     """Workers for the duration of a build.
 
-    workers    processes on this machine; 0: none, tasks run inline (for debugging)
-    scheduler  address (`tcp://...`) or scheduler file of a running cluster, used instead
-    shared     a file that the cluster's workers must see: it lies in OUT
-    watch      is called as tasks begin and whenever one has ended; None: nobody watches
+    workers    processes on this machine; 0: tasks run inline (for debugging)
+    scheduler  address (`tcp://...`) or scheduler file of a running cluster to use instead
+    shared     a file in OUT that the cluster's workers must see
+    watch      called when tasks begin, and when a task has ended; None: no progress is reported
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Engine:
         self._pool: WorkerPool | None = None
 
     def join(self) -> None:
-        """Join the cluster, where there is one; `run` does so, too. Raises ClusterError."""
+        """Join the cluster, if there is one. `run` does so, too. Raises ClusterError."""
         if self._scheduler and self._client is None:
             self._client = join(self._scheduler, self._shared)
             if is_open_to_all(self._client):
@@ -92,12 +92,13 @@ class Engine:
         *,
         needs: Sequence[str] = (),
     ) -> list[R]:
-        """Return a result for each (name, argument), in their order, with a progress bar.
+        """Return the results of all tasks in their order, and show a progress bar.
 
+        tasks  name and argument of each
         needs  names of modules that all workers need, besides the function's own
 
-        A task that fails doesn't stop the others. Raises TasksFailedError at the end where some
-        failed, ClusterError where the workers can't be started or joined.
+        A task that fails doesn't stop the others. Raises TasksFailedError at the end if some
+        failed, ClusterError if the cluster can't be joined, WorkersError if workers can't start.
         """
         if not tasks:
             return []
@@ -116,10 +117,10 @@ class Engine:
                     advance(tasks[place][0], error is not None)
                     self.watch(label, len(results) + len(failures), len(tasks), tasks[place][0])
         except KeyboardInterrupt:
-            self.close()  # at once: workers would write into folders that are being removed
+            self.close()  # at once, or workers would write into folders that are being removed
             raise
         if failures:
-            named: dict[str, list[str]] = {}  # one line for all tasks that failed alike
+            named: dict[str, list[str]] = {}  # tasks that failed for the same reason share a line
             for place in sorted(failures):
                 named.setdefault(failures[place], []).append(tasks[place][0])
             lines = [f"{', '.join(names)}: {reason}" for reason, names in named.items()]
@@ -135,7 +136,7 @@ class Engine:
             for place, task in enumerate(tasks):
                 try:
                     result = function(task)
-                except Exception as error:  # a failed unit doesn't end the build, as on a worker
+                except Exception as error:  # as on a worker, a failed task doesn't stop the others
                     yield place, None, error
                 else:
                     yield place, result, None
@@ -153,14 +154,14 @@ class Engine:
     ) -> Iterator[Outcome]:
         """Run the tasks on the cluster, or on processes of this machine.
 
-        function  the task by itself
-        work      the same, wrapped for a worker
+        function  the function of a task
+        work      the same function, wrapped for a worker
         """
         if self._scheduler:
             self.join()
             return run_on_cluster(self._client, able(work, self._shared), tasks)
         if self._pool is None:
-            if not are_compiled():  # each worker would do it, for half a minute
+            if not are_compiled():  # otherwise each worker would spend half a minute on it
                 console.print("compiling loops, once on this machine", markup=False)
                 compile_in_process()
             plain = function.func if isinstance(function, partial) else function
@@ -170,8 +171,8 @@ class Engine:
     def close(self) -> None:
         """End the workers of this machine, or leave the cluster, which runs on.
 
-        A Ctrl-C or SIGTERM meanwhile is raised afterwards. A client that is only half closed would
-        close itself as Python ends, and wait for ten minutes for a thread that has ended.
+        A Ctrl-C or SIGTERM in the meantime is raised afterwards. Otherwise a client that is only
+        half closed would close itself when Python ends, and wait ten minutes for a dead thread.
         """
         pool, self._pool = self._pool, None
         client, self._client = self._client, None
@@ -199,8 +200,8 @@ def _in_words(error: BaseException) -> str:
 def _progress(label: str, total: int) -> Iterator[Callable[[str, bool], None]]:
     """Yield a function to call at the end of each task, with its name and whether it failed.
 
-    On a terminal it draws a bar; elsewhere, as in a log, it prints a line for each task. Both say
-    how long the others will take, at the pace so far.
+    On a terminal it draws a bar; elsewhere, such as in a log, it prints a line for each task. Both
+    show how long the remaining tasks will take at the pace so far.
     """
     if not console.is_terminal:
         done, start = 0, time.monotonic()

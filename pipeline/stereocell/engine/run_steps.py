@@ -1,4 +1,4 @@
-"""Run the steps whose results are not kept yet."""
+"""Run the steps whose results are missing in OUT."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from stereocell.storage.workspace import cached
 
 R = TypeVar("R")
 S = TypeVar("S", bound="Reads")
-# runs a function that reads the inputs and writes results at these places
+# Runs a function that reads the inputs and writes results to the places in the second argument.
 Guard = Callable[[Callable[[], object], Sequence[Path]], None]
 
 
 class Reads(Protocol):
     """A task that reads OUT.
 
-    inputs  files and folders of OUT that it reads, which are files of its machine meanwhile
+    inputs  files and folders of OUT that it reads; they are local files while it runs
     """
 
     @property
@@ -28,9 +28,9 @@ class Reads(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Work, with the place of its files.
+    """Work, and the place of its result.
 
-    name    for progress and errors, as `<tile>/<channel>`
+    name    name for progress and errors, such as `<tile>/<channel>`
     inputs  see `Reads`
     """
 
@@ -40,18 +40,18 @@ class Task:
     inputs: tuple[Path, ...] = ()
 
     def is_whole(self) -> bool:
-        """Return whether the result lies at its place, as it was written."""
+        """Return whether the result lies at its place, undamaged."""
         return self.step.is_whole(self.place)
 
 
 @dataclass(frozen=True, slots=True)
 class Kept(Task, Generic[R]):
-    """A step that keeps its result as a document or as the folder of a unit."""
+    """A step whose result is kept as a document or as the folder of a unit."""
 
     step: Step[R]
 
     def read(self) -> R:
-        """Return the result of a step that keeps a document. Raises OutputError."""
+        """Return the result of a step whose result is a document. Raises OutputError."""
         form: Any = self.step.FORM
         assert isinstance(form, Document)
         result: R = form.read(self.place)
@@ -59,12 +59,12 @@ class Kept(Task, Generic[R]):
 
 
 class Results(Mapping[str, R]):
-    """Results of a pass by name, each read from its file whenever it is asked for.
+    """Results of a pass by name. Each access reads the result from its file.
 
-    The evidence of a tile takes .3 MB unpacked and .1 MB in its file. Results of thousands of tiles
-    would fill the memory.
+    Results of thousands of tiles would fill the memory: the evidence of one tile takes .1 MB in its
+    file and .3 MB unpacked.
 
-    out  the folder that `files` counts from
+    out  folder to which `files` is relative
     """
 
     def __init__(self, kept: Mapping[str, Kept[R]], out: Path) -> None:
@@ -87,19 +87,19 @@ class Results(Mapping[str, R]):
 
 
 def run_plainly(run: Callable[[], object], results: Sequence[Path]) -> None:
-    """Run steps that read no inputs, whose results are at these places."""
+    """Run steps that read no inputs, so that nothing is compared before or after."""
     run()
 
 
 def run_missing(
     engine: Engine, label: str, wanted: Iterable[Task], guard: Guard = run_plainly
 ) -> int:
-    """Run the tasks whose results are missing or damaged; return their number.
+    """Run the tasks whose results are missing or damaged, and return their number.
 
-    label  the pass, for progress and errors
-    guard  runs the work, so that it can compare the inputs before and after
+    label  name of the pass, for progress and errors
+    guard  runs the work, and may compare the inputs before and after
 
-    Raises TasksFailedError where tasks fail; all others are finished then.
+    Raises TasksFailedError if tasks fail, after all others have finished.
     """
     missing = {task.place: task for task in wanted if not task.is_whole()}
     tasks = [(task.name, task) for task in missing.values()]
@@ -110,12 +110,12 @@ def run_missing(
 
 
 def keep(task: Task) -> None:
-    """Compute one result and write it, on a worker."""
+    """Compute one result and write it. Runs on a worker."""
     with cached(*task.inputs):
         task.step.keep(task.place)
 
 
 def with_inputs(function: Callable[[S], R], task: S) -> R:
-    """Return a function's result for a task, on a worker."""
+    """Return a function's result for a task. Runs on a worker."""
     with cached(*task.inputs):
         return function(task)

@@ -1,8 +1,8 @@
-"""A step of a build: something that is computed once, and kept under a key of its inputs.
+"""A step of a build: a computation that runs once, and whose result is kept under a key.
 
-The key of a result is a hash of the step's class name, its VERSION and its fields. So a result
-stays valid until somebody raises VERSION, whatever else changes in the code. `make lint` compares
-the code that each step reaches with a recorded digest, and asks for a decision where it changed.
+The key is a hash of the step's class name, its VERSION and its fields. So a result stays valid
+until somebody raises VERSION, even if the code changes. `make lint` compares the code that each
+step reaches with a recorded digest. If it changed, the developer has to decide about VERSION.
 """
 
 import hashlib
@@ -19,27 +19,29 @@ from stereocell.storage.json_files import find_sealed, read_sealed, write_sealed
 
 R = TypeVar("R")
 R_contra = TypeVar("R_contra", contravariant=True)
-_KEY_DIGITS = 20  # hexadecimal: 80 bits
+_KEY_DIGITS = 20  # hexadecimal digits of a key; 80 bits
 
 
 class Form(Protocol[R_contra]):
     """The form in which a step's result lies in OUT."""
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether a result lies there, as it was written."""
+        """Return whether an undamaged result lies there."""
 
     def write(self, place: Path, result: R_contra) -> None:
-        """Write a result, whole or not at all. Raises OutputError."""
+        """Write a result completely or not at all. Raises OutputError."""
 
 
 class Keyed:
-    """Work that is skipped where its key is unchanged. Subclasses are frozen dataclasses.
+    """Work that is skipped if its key has not changed. Subclasses are frozen dataclasses.
 
-    A field that does not change the result is not a field, except one with `compare=False`: it only
-    says where something lies. Work that a phase carries out as a whole is a direct subclass, with a
-    method of its own, as `write` of `WriteStage`: see building/phase.py.
+    All fields count in the key, so a subclass has no field that does not change the result. The
+    exception is a field with `compare=False`, which only states where something lies.
 
-    VERSION  is raised when the same fields give another result
+    Work that a phase does as a whole is a direct subclass with a method of its own, such as
+    `WriteStage.write` (see building/phase.py).
+
+    VERSION  must be raised when the same fields give another result
     """
 
     __slots__ = ()
@@ -54,17 +56,17 @@ class Keyed:
 
 
 class Work(ABC):
-    """The work of one worker: it writes files at a place. Subclasses are picklable."""
+    """Work for one worker, which writes its result to a place. Subclasses are picklable."""
 
     __slots__ = ()
 
     @abstractmethod
     def is_whole(self, place: Path) -> bool:
-        """Return whether the result lies at a place, as it was written."""
+        """Return whether an undamaged result lies at a place."""
 
     @abstractmethod
     def keep(self, place: Path) -> None:
-        """Compute the result and write it to a place, whole or not at all. Raises OutputError."""
+        """Compute the result, and write it completely or not at all. Raises OutputError."""
 
 
 class Step(Keyed, Work, Generic[R]):
@@ -81,7 +83,7 @@ class Step(Keyed, Work, Generic[R]):
         """Compute the result."""
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether the result lies at a place, as it was written."""
+        """Return whether an undamaged result lies at a place."""
         return self.FORM.is_whole(place)
 
     def keep(self, place: Path) -> None:
@@ -91,12 +93,12 @@ class Step(Keyed, Work, Generic[R]):
 
 @dataclass(frozen=True, slots=True)
 class Document(Generic[R]):
-    """A result as a sealed JSON file that fits a schema.
+    """The form of a result that is a sealed JSON file with a schema.
 
-    schema     a file of schemas/, with `#Name` for one of its definitions
-    to_json    the result as values of JSON
-    from_json  the result again, of content that fits the schema
-    remedy     the user's next step where the file is damaged
+    schema     file in schemas/, with `#Name` for one of its definitions
+    to_json    converts the result to values of JSON
+    from_json  converts content that fits the schema to the result
+    remedy     what the user should do if the file is damaged
     """
 
     schema: str
@@ -105,7 +107,7 @@ class Document(Generic[R]):
     remedy: str
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether the file fits its schema and its hash."""
+        """Return whether the file fits its schema and matches its hash."""
         return find_sealed(place, self.schema) is not None
 
     def write(self, place: Path, result: R) -> None:
@@ -123,7 +125,11 @@ class Document(Generic[R]):
 
 
 def key_of(content: Any) -> str:
-    """Return the key of values of JSON."""
+    """Return the key of some JSON values: the first digits of their SHA-256.
+
+    >>> key_of({"level": 1}) == key_of({"level": 1}) != key_of({"level": 2})
+    True
+    """
     text = json.dumps(content, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]
 
@@ -131,8 +137,9 @@ def key_of(content: Any) -> str:
 def content_of(value: Any) -> Any:
     """Return a field as values of JSON, for a key.
 
-    An object with a `key_content` counts by it: a source by its fingerprint, never by its path. A
-    step counts by its own key. Raises TypeError for a path, as for all types that are not listed.
+    An object with a `key_content` method is replaced by what it returns. So a source counts by its
+    fingerprint and never by its path. A step counts by its own key. Raises TypeError for any other
+    type, such as a path.
     """
     if isinstance(value, Keyed):
         return value.key
@@ -153,4 +160,4 @@ def content_of(value: Any) -> Any:
         return [content_of(one) for one in value]
     if isinstance(value, set | frozenset):
         return sorted(content_of(one) for one in value)
-    raise TypeError(f"a key holds a {type(value).__name__}, expected plain values")
+    raise TypeError(f"a key contains a {type(value).__name__}, expected plain values")

@@ -1,8 +1,8 @@
-"""The libraries that steps and readers use, from the record that ships with the package.
+"""Look up the libraries that steps and readers use, in the record that ships with the package.
 
-step_record.json is written by `make record-steps`. It holds a digest of the code that each step and
-each reader reaches, with its VERSION, and the libraries that this code imports. No key of a result
-depends on it: the digests are for `make lint`, the libraries for the provenance of results.
+`make record-steps` writes step_record.json. For each step and reader it holds the VERSION, a digest
+of the code that it reaches, and the libraries that this code imports. The digests are for
+`make lint`, the libraries for the provenance of results. No key of a result depends on the record.
 """
 
 import json
@@ -19,9 +19,10 @@ RECORD = Path(__file__).with_name("step_record.json")
 def libraries_of(*names: str) -> dict[str, str]:
     """Return the version of each installed library that steps or readers use.
 
-    A new step or reader has no libraries until `make record-steps`, for which `make lint` asks.
+    names  names of step classes and of formats (read/known_formats.py)
 
-    names  of steps' classes, and of formats (read/known_formats.py)
+    A new step or reader has no libraries until `make record-steps` has run; `make lint` asks for
+    that.
     """
     found: dict[str, str] = {}
     for name in names:
@@ -37,7 +38,7 @@ def all_libraries() -> dict[str, str]:
 
 @cache
 def _versions(library: str) -> Mapping[str, str]:
-    """Return the versions of a library; of a pattern as `bioio_*`, those of all that fit."""
+    """Return the versions of a library, or of all libraries that match a pattern like `bioio_*`."""
     if "*" in library:
         names = {one.metadata["Name"] for one in distributions()}
         fitting = sorted(one for one in names if fnmatch(one.replace("-", "_"), library))

@@ -1,13 +1,13 @@
 """Run tasks on worker processes of this machine, over pipes.
 
 A pipe has two ends and no address. No port is opened, so nobody else on the machine or in the
-network can reach a worker or the command. (Dask's local cluster listens on ports. Without
+network can reach a worker or the command. Dask's local cluster listens on ports: without
 certificates, every program that connects to one can run code as the user who builds. A pool over
-pipes needs no certificates, starts sooner, and knows which task killed its worker.)
+pipes needs no certificates, starts sooner, and knows which task killed its worker.
 
-On Linux, workers are forked from a server that has imported what they need. A process that starts
-from nothing imports for 1.7 s of CPU. The server imports once for all workers of a command, and
-they share its memory until they write. It has no threads, so that it can fork.
+On Linux, workers are forked from a server process that has imported all modules they need. A
+process started without it imports them for 1.7 s of CPU. The server imports once for all workers of
+a command, and they share its memory until they write. It has no threads, so that it can fork.
 """
 
 import multiprocessing
@@ -29,18 +29,18 @@ from stereocell.model.errors import StereoCellError
 
 T = TypeVar("T")
 
-_START_S = 300  # s for workers to start: the machine may be busy
+_START_S = 300  # s for workers to start, on a machine that may be busy
 _END_S = 30  # s for workers to end
 _MOST_PIPES = 60  # Windows waits for at most 63 handles at a time
 
 KILLED = (
-    "its worker process was killed each time, most likely for want of memory: try fewer --workers "
+    "its worker process was killed each time, most likely for lack of memory: try fewer --workers "
     "or a smaller --tile-size"
 )
 
 _server_environment: dict[str, str] = {}  # empty: no server has been started
 
-Outcome = tuple[int, Any, BaseException | None]  # index of a task, its result or its error
+Outcome = tuple[int, Any, BaseException | None]  # index of a task, its result, its error
 
 
 class WorkersError(StereoCellError):
@@ -56,10 +56,10 @@ class _Worker:
 
 
 class WorkerPool:
-    """Worker processes, which the first tasks start and which stay until `close`.
+    """Worker processes. They start with the first tasks and stay until `close`.
 
     count    number of processes
-    modules  names of modules that all workers need: the server imports them once
+    modules  names of modules that all workers need; the server imports them once
     """
 
     def __init__(self, count: int, *modules: str) -> None:
@@ -72,16 +72,16 @@ class WorkerPool:
     def run(self, function: Callable[[T], Any], tasks: Sequence[T]) -> Iterator[Outcome]:
         """Yield the outcome of each task, in the order of completion.
 
-        A task whose worker ends without an answer runs once more, with nothing beside it: most
-        likely the machine lacked memory for several tasks at a time. Raises WorkersError where
-        workers can't start.
+        A task whose worker ends without an answer runs again, alone, because the machine most
+        likely lacked memory for several tasks at a time. Raises WorkersError if workers can't
+        start.
         """
         try:
             while len(self._workers) < self._count:
                 self._workers.append(self._start())
             yield from self._outcomes(function, tasks)
         finally:
-            # Workers are still busy if the caller stopped early. Nobody waits for their answers.
+            # If the caller stopped early, workers are still busy with answers that nobody needs.
             if self._busy():
                 self.close()
 
@@ -115,7 +115,7 @@ class WorkerPool:
     def close(self) -> None:
         """End the workers: idle ones by closing their pipes, busy ones at once.
 
-        A Ctrl-C or SIGTERM meanwhile is raised afterwards.
+        A Ctrl-C or SIGTERM in the meantime is raised afterwards.
         """
         with interrupts_put_off():
             workers, self._workers = self._workers, []
@@ -131,11 +131,11 @@ class WorkerPool:
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
-        # a daemon: Python ends it where an error keeps the command from calling `close`
+        # Python ends a daemon by itself if an error keeps the command from calling `close`.
         process = self._context.Process(target=serve, args=(theirs,), daemon=True)
         with children_ignore_interrupts(), _main_from_a_file():
             process.start()
-        theirs.close()  # the worker then has the only one, and its end closes the pipe
+        theirs.close()  # only the worker keeps this end, so the pipe closes when the worker ends
         return _Worker(process, ours)
 
     def _busy(self) -> list[_Worker]:
@@ -146,26 +146,26 @@ class WorkerPool:
     ) -> None:
         request = pickle.dumps((function, tasks[task]))
         worker.task = task
-        # a worker that has died is noticed by the next attempt to receive its answer
+        # a dead worker is noticed when its answer is received
         with suppress(ConnectionError):
             worker.pipe.send_bytes(request)
 
     def _heard(self) -> list[_Worker]:
-        """Return the busy workers that have sent something or have died; wait for the first."""
+        """Wait for busy workers that have sent something or have died, and return them."""
         by_pipe = {worker.pipe: worker for worker in self._busy()}
         is_starting = not any(worker.is_ready for worker in by_pipe.values())
         heard = connection.wait(list(by_pipe), _START_S if is_starting else None)
         if not heard:
             raise WorkersError(
                 f"--workers: the processes did not answer within {_START_S} s: wait until this "
-                "machine is less busy, or try fewer --workers; 0 needs none"
+                "machine is less busy, or try fewer --workers; --workers 0 needs no processes"
             )
         return [worker for pipe, worker in by_pipe.items() if pipe in heard]
 
     def _receive(self, worker: _Worker) -> Outcome | None:
-        """Return the outcome of a worker's task; None: it has said that it is ready.
+        """Return the outcome of a worker's task; None: the worker only reported that it is ready.
 
-        Raises EOFError or OSError where the worker has died.
+        Raises EOFError or OSError if the worker has died.
         """
         answer = worker.pipe.recv()
         if not worker.is_ready:
@@ -176,7 +176,7 @@ class WorkerPool:
         return task, *answer
 
     def _replace(self, worker: _Worker) -> None:
-        """Start another process in the place of one that has died."""
+        """Start another process in place of one that has died."""
         worker.pipe.close()
         worker.process.join(_END_S)
         if not worker.is_ready:
@@ -189,20 +189,20 @@ class WorkerPool:
 
 
 def leave_if_importing_main() -> None:
-    """End this process without a word if it is a worker that imports the command's script.
+    """End this process silently if it is a worker that imports the command's script.
 
     A worker imports the script that started it. A script without the line
     `if __name__ == "__main__":` then starts its build again, and the command reports that.
     """
-    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing asks
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # multiprocessing's test
         os._exit(1)  # an exception would print a traceback
 
 
 @contextmanager
 def _main_from_a_file() -> Iterator[None]:
-    """Inside the block, hide the name of a main module that comes from no file.
+    """Inside the block, hide the name of a main module that does not come from a file.
 
-    A worker would import it by that name. `python - < script.py` is called `<stdin>`.
+    A worker would try to import it by that name, for example `<stdin>` for `python - < script.py`.
     """
     main = vars(sys.modules["__main__"])
     name = main.get("__file__")
@@ -217,13 +217,16 @@ def _main_from_a_file() -> Iterator[None]:
 
 
 def _choose_context(modules: Sequence[str]) -> Any:
-    """Return multiprocessing's context of a fork server, or the one that starts from nothing.
+    """Return multiprocessing's context that forks workers from a server, or that spawns them.
 
-    Workers start from nothing in three cases. The system has no such server (Windows), or its
-    libraries fail after a fork (macOS). The server can't have its socket, because the folder of
-    temporary files has a long name or is full. The environment has changed since the server
-    started. Before Python 3.11.1 the server's socket was open to all users of the machine
-    (CVE-2022-42919).
+    Workers are spawned as fresh processes in these cases:
+
+    - The system has no fork server (Windows), or its libraries fail after a fork (macOS).
+    - The server can't open its socket, because the folder of temporary files has a long name or is
+      full.
+    - The environment has changed since the server started.
+    - Python is older than 3.11.1, where the server's socket was open to all users of the machine
+      (CVE-2022-42919).
     """
     is_safe = sys.platform == "linux" and sys.version_info >= (3, 11, 1)
     method = "forkserver" if is_safe and _has_server(modules) else "spawn"
@@ -231,7 +234,7 @@ def _choose_context(modules: Sequence[str]) -> Any:
 
 
 def _has_server(modules: Sequence[str]) -> bool:
-    """Return whether workers can be forked from a server; start it where there is none."""
+    """Return whether workers can be forked from a server. Start the server if there is none."""
     from multiprocessing import forkserver  # Windows lacks it
 
     if _server_environment:

@@ -1,7 +1,7 @@
-"""Run tasks in a worker process: its side of the pipe.
+"""Run tasks in a worker process, at its end of the pipe.
 
-The process starts with the function `serve`. This module imports little, because a worker that
-starts from nothing imports it before anything else.
+The process starts with the function `serve`. This module imports little, because a spawned worker
+imports it before anything else.
 """
 
 import os
@@ -12,7 +12,7 @@ from multiprocessing import connection, parent_process
 from multiprocessing.connection import Connection
 from typing import Any
 
-READY = "ready"  # the first answer of a worker: it has started
+READY = "ready"  # first answer of a worker, once it has started
 
 
 def serve(pipe: "Connection[Any, Any]") -> None:
@@ -20,7 +20,7 @@ def serve(pipe: "Connection[Any, Any]") -> None:
 
     A request is the pickled (function, task). The answer is (result, None) or (None, error).
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the command itself reacts to Ctrl-C
     threading.Thread(target=end_with_parent, daemon=True).start()
     try:
         pipe.send(READY)
@@ -31,16 +31,16 @@ def serve(pipe: "Connection[Any, Any]") -> None:
 
 
 def _answer(request: bytes) -> bytes:
-    """Return the pickled answer to a request; an error of the task is an answer, too."""
+    """Return the pickled answer to a request, which may be the task's error."""
     try:
         function, task = pickle.loads(request)
         return pickle.dumps((function(task), None))
-    except Exception as error:  # the command decides what a task's error means
+    except Exception as error:  # the command decides how to treat a task's error
         return _pickled_error(error)
 
 
 def _pickled_error(error: Exception) -> bytes:
-    """Return an error in pickled form. One that can't be pickled becomes a RuntimeError."""
+    """Return the pickled error. An error that can't be pickled becomes a RuntimeError."""
     try:
         answer = pickle.dumps((None, error))
         pickle.loads(answer)
@@ -51,9 +51,9 @@ def _pickled_error(error: Exception) -> bytes:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as the command's process has ended, also in the middle of a task.
+    """End this process as soon as the command's process has ended, even in the middle of a task.
 
-    A killed command can't stop its workers, and their results would appear after its end.
+    A killed command can't stop its workers, whose results would appear after its end.
     """
     parent = parent_process()
     if parent is not None:

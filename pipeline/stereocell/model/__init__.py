@@ -1,1 +1,1 @@
-"""Nouns: frozen dataclasses that every package speaks in. No file, no algorithm."""
+"""Data types that all packages share, mostly frozen dataclasses. No files and no algorithms."""

@@ -4,7 +4,7 @@ AXES = "tczyx"
 
 
 def axes_of(text: str) -> str:
-    """Return the letters of a text of `--axes`, as ImageJ's users may type it.
+    """Return the letters in the value of `--axes`, which may be typed as in ImageJ.
 
     >>> axes_of("Z, C, Y, X")
     'zcyx'
@@ -13,6 +13,6 @@ def axes_of(text: str) -> str:
 
 
 def is_axes(letters: str) -> bool:
-    """Whether letters name axes as `--axes` does: z, y and x, perhaps t and c, each once."""
+    """Return whether the letters are z, y and x, and perhaps t and c, each once."""
     is_known = set("zyx") <= set(letters) <= set(AXES)
     return is_known and len(set(letters)) == len(letters)

@@ -10,8 +10,10 @@ from stereocell.model.identifiers import to_identifier
 from stereocell.model.lattice_field import LatticeField
 
 SurfaceConfidence = Literal["clear", "unsure", "none"]
-LOW_CONFIDENCE = 0.6  # 0..1; half of the surfaces below were right (docs/decisions/levels.md)
-DEFAULT_FUNCTION = "default"  # the transfer function of a stage that selects none
+# 0..1; a surface with less is unsure. Half of the unsure surfaces were right
+# (docs/decisions/levels.md).
+LOW_CONFIDENCE = 0.6
+DEFAULT_FUNCTION = "default"  # transfer function of a stage that selects none
 OpacityPoints = tuple[tuple[float, float], ...]  # (intensity, opacity), both 0..1, rising intensity
 ShapeKind = Literal["rectangle", "triangle"]
 
@@ -20,12 +22,14 @@ ShapeKind = Literal["rectangle", "triangle"]
 class Shape:
     """One shape of a 2D transfer function; see transfer/shapes2d.py and docs/transfer-functions.md.
 
-    values     its ends, 0..1 in the window; a triangle's at `gradients[1]`
-    gradients  its ends, 0..1 of the channel's gradient_max
-    tip        the value, 0..1, at which a triangle's sides meet at gradient 0; a rectangle has none
-    color      linear RGB 0..1, a factor to the channel's colour
-    opacity    0..1, what one finest voxel spacing absorbs
-    softness   0..1, the share of the way from its edges to its middle over which opacity rises
+    values     least and largest intensity, 0..1 in the window; a triangle has them at
+               `gradients[1]`
+    gradients  least and largest gradient, 0..1 of the channel's gradient_max
+    tip        intensity, 0..1, at which the sides of a triangle meet at gradient 0; unused for a
+               rectangle
+    color      linear RGB, 0..1, multiplied with the channel's colour
+    opacity    share of light that one finest voxel spacing absorbs, 0..1
+    softness   share of the way from the edges to the middle over which opacity rises, 0..1
     """
 
     kind: ShapeKind
@@ -42,14 +46,14 @@ Shapes = tuple[Shape, ...]
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLevel:
-    """Where a channel's surface lies: level(x) = background(x) + iso, in the denoised voxels.
+    """The level of a channel's surface: level(x) = background(x) + iso, in the denoised voxels.
 
-    iso           voxel values above the background; the mean of `by_tile`
+    iso           voxel values above the background; the mean of `by_tile` if tiles differ
     background    voxel values, knots in voxels of the level that is built; None: 0 everywhere
     smoothing_um  sigma of the Gaussian after the median
-    by_tile       where tiles have levels of their own (`--iso-scope tile`): the field of them
-    median_size   voxels (z, y, x) that the median is taken over; 1, 1, 1: there is none
-    max_shift     by how much both may move a value, voxel values; None: by any
+    by_tile       the iso-values as a field, if tiles have their own (`--iso-scope tile`)
+    median_size   size of the median in voxels (z, y, x); 1, 1, 1: no median
+    max_shift     most that median and Gaussian may move a value, in voxel values; None: no bound
     """
 
     iso: float
@@ -75,7 +79,7 @@ class SurfaceLevel:
 
     @property
     def words(self) -> str:
-        """The level for a reader: `162 above a background of 90 to 210`."""
+        """The level as text, for example `162 above a background of 90 to 210`."""
         span = self.background_range
         above = "" if span is None else f" above a background of {span[0]:.4g} to {span[1]:.4g}"
         return f"{self.iso:.5g}{above}"
@@ -83,13 +87,13 @@ class SurfaceLevel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TransferFunctions2d:
-    """A channel's 2D transfer functions, and the numbers that they are read by.
+    """A channel's 2D transfer functions, and the numbers that define their scale.
 
-    gradient_max  the gradient magnitude that is 1 to shapes; see transfer/joint_histogram.py
+    gradient_max  gradient magnitude that counts as 1 in shapes; see transfer/joint_histogram.py
     functions     shapes by the function's name; empty: all functions of the channel are 1D
 
-    All fields but `functions` are numbers. survey.json, the stage (usd/numbers2d.py) and the
-    bundle's transfer2d.json take each over by its name; defaults are those of schemas/usd.
+    All fields except `functions` are numbers. They have the same names in survey.json, in the stage
+    (usd/numbers2d.py) and in the bundle's transfer2d.json. Defaults are those of schemas/usd.
     """
 
     gradient_max: float = 0.5
@@ -101,18 +105,19 @@ class Appearance:
     """How one channel is drawn in all tiles.
 
     color             linear RGB, 0..1
-    window            the voxel values that become 0 and 1 in the 8-bit volumes
-    iso_value         with the background's mean, in voxel values; None: there is no surface
-    iso_confidence    0..1, of the channel
-    surface           whether there is one, and whether it is to be trusted
-    painted_by        id of the channel whose intensity is painted on the surface; empty: none
+    window            voxel values that become 0 and 1 in the 8-bit volumes
+    iso_value         iso-value plus the mean background, voxel values; None: there is no surface
+    iso_confidence    confidence of the channel's level, 0..1
+    surface           whether there is a clear or an unsure surface, or none
     transfer_functions  opacity points by name; `default` is among them
-    transfer_2d       those functions that are two-dimensional
-    threshold         voxel value where the body begins (adaptive_threshold.py); None: not found
-    surface_reason    why there is no surface, or why it is unsure; empty: a clear one
-    function          the transfer function that the channel opens with
+    painted_by        ID of the channel whose intensity is painted on the surface; empty: none
+    transfer_2d       the two-dimensional functions
+    threshold         voxel value at which the specimen begins (adaptive_threshold.py); None: not
+                      found
+    surface_reason    why there is no surface, or why it is unsure; empty: it is clear
+    level             the exact level of the surface; None: there is none
+    function          transfer function that the channel opens with
     opens             whether the channel shows when the specimen is opened
-    level             where exactly the surface lies; None: there is none
     """
 
     name: str
@@ -146,22 +151,22 @@ class Appearance:
 
 
 def normalized(value: float | None, window: tuple[float, float]) -> float | None:
-    """Return a voxel value on a window's scale: 0 is its lower end, 1 its upper."""
+    """Return a voxel value on a window's scale, 0 at its lower and 1 at its upper end."""
     low, high = window
     return None if value is None else (value - low) / (high - low)
 
 
 @dataclass(frozen=True, slots=True)
 class PaintColors:
-    """A surface's colour and that of the channel that is painted on it, linear RGB 0..1."""
+    """The colour of a surface and of the channel that is painted on it, linear RGB, 0..1."""
 
     base: tuple[float, float, float]
     painted: tuple[float, float, float]
 
     def mix(self, intensity: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return linear RGB (..., 3) of intensities (...): 0 the surface's colour, 255 the other's.
+        """Return linear RGB, float32 (..., 3), of intensities, uint8 (...).
 
-        The intensity of half of the window mixes them half and half.
+        0 gives the surface's colour, 255 the painted channel's; values between mix them linearly.
         """
         share = intensity[..., None].astype(np.float32) / 255
         base, painted = (np.array(color, np.float32) for color in (self.base, self.painted))

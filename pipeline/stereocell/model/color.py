@@ -1,9 +1,9 @@
-"""Colour spaces."""
+"""Convert between colour spaces: linear RGB, sRGB and CIELab."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-_D50 = np.array([0.9642, 1.0, 0.8249])  # XYZ of white
+_D50 = np.array([0.9642, 1.0, 0.8249])  # XYZ of white under D50
 _RGB_OF_D50 = np.array(  # linear sRGB of XYZ under D50
     [
         [3.1338561, -1.6168667, -0.4906146],
@@ -25,9 +25,10 @@ def to_srgb8(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def linear_color(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Return linear RGB, 0..1, of sRGB bytes 0..255.
+    """Return linear RGB, 0..1, of sRGB bytes, 0..255 (IEC 61966-2-1:1999).
 
-    References: IEC 61966-2-1:1999.
+    >>> linear_color((255, 0, 0))
+    (1.0, 0.0, 0.0)
     """
     red, green, blue = (_linear(value / 255.0) for value in rgb)
     return red, green, blue
@@ -38,7 +39,7 @@ def _linear(value: float) -> float:
 
 
 def linear_color_of_lab(lab: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return linear RGB, 0..1, of a CIELab colour under D50; what sRGB lacks is clipped.
+    """Return linear RGB, 0..1, of a CIELab colour under D50. Colours outside of sRGB are clipped.
 
     References: CIE 15; IEC 61966-2-1:1999; adaptation from D50 to D65 by Bradford's matrix.
     """
@@ -50,7 +51,7 @@ def linear_color_of_lab(lab: tuple[float, float, float]) -> tuple[float, float, 
 
 
 def lab_of_linear(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return CIELab (n, 3) under D50 of linear RGB (n, 3), 0..1: the inverse of the above."""
+    """Return CIELab under D50, float64 (n, 3), of linear RGB (n, 3), 0..1."""
     share = linear @ np.linalg.inv(_RGB_OF_D50).T / _D50
     bent = np.where(share > (6 / 29) ** 3, np.cbrt(share), share / (3 * (6 / 29) ** 2) + 4 / 29)
     x, y, z = bent.T

@@ -1,7 +1,7 @@
-"""The colour that fluorescence is shown in: by its wavelength, or by the dye in a channel's name.
+"""Choose the colour of fluorescence by its wavelength, or by the dye in a channel's name.
 
-Bands of the spectrum have one colour each, in the order that the eye sees them, and light enough to
-be shaded. Emission maxima of dyes are those that their makers and FPbase publish, rounded.
+Each band of the spectrum has one colour, close to that of its light but light enough to be shaded.
+Emission maxima of dyes are those that their makers and FPbase publish, rounded.
 """
 
 import re
@@ -10,7 +10,8 @@ from stereocell.model.color import linear_color
 
 Color = tuple[float, float, float]
 
-# Upper end of a band, nm, and its colour. Far red and infrared light, which no eye sees, is pink.
+# Upper end of a band in nm, and its colour in sRGB. Far red and infrared light, which is invisible,
+# is shown in pink.
 _BANDS = (
     (435.0, 0x8F6CF2),
     (480.0, 0x4F70F5),
@@ -22,10 +23,10 @@ _BANDS = (
     (720.0, 0xE864B4),
     (2000.0, 0xB08CA8),
 )
-_SHORTEST_NM = 300.0  # shorter numbers are no emission of a dye: they are left out
+_SHORTEST_NM = 300.0  # nm; a smaller number is not the emission of a dye
 
-# Families of dyes that are numbered by the light they emit, nm, and by the light they absorb.
-# BODIPY has both numbers, or the last one only.
+# Families of dyes that are named after the light they emit or absorb, in nm. BODIPY has both
+# numbers, or only the last one.
 _BY_EMISSION = re.compile(
     r"(?<![a-z])(?:qdot|quantum dot|qd|bu?v|bb|brilliant (?:ultra ?)?(?:violet|blue)|super bright"
     r"|e ?fluor|opal|m?irfp|bodipy(?: [0-9]{3})?) ?([3-9][0-9]{2})(?![0-9])"
@@ -34,11 +35,11 @@ _BY_EXCITATION = re.compile(
     r"(?<![a-z])(?:atto|cf|dylight|jfx?|janelia ?fluor|i ?fluor|hilyte(?: ?fluor)?|ir ?dye"
     r"|(?:abberior )?star|dyomics|dy|chromeo) ?([3-9][0-9]{2})(?![0-9])"
 )
-_SHIFT_NM = 20.0  # from the light that such a dye absorbs to the light that it emits: 10 to 35
-_VISIBLE_NM = 400.0  # dyes that absorb shorter light emit at about _BLUE_NM
-_BLUE_NM = 442.0
+_SHIFT_NM = 20.0  # nm from absorption to emission of such a dye; 10 to 35 in reality
+_VISIBLE_NM = 400.0  # nm; dyes that absorb shorter light emit at about _BLUE_NM
+_BLUE_NM = 442.0  # nm
 
-# Stains that are named by a colour, and its emission maximum, nm
+# Stains that are named after a colour, and the emission maximum of each colour in nm
 _BY_WORD = re.compile(
     r"(?<![a-z])(?:sytox(?: aadvanced)?|(?:mito|lyso|er|cell) ?tracker|cell ?mask|cell ?trace"
     r"|zombie|live dead(?: fixable)?) ?(violet|blue|green|yellow|orange|deep red|far red|red)"
@@ -48,7 +49,7 @@ _WORDS_NM = {
     "deep red": 665, "far red": 665,
 }  # fmt: skip
 
-# Emission maximum, nm, by a pattern of the name in lower case with single spaces
+# Emission maximum in nm, by a pattern for names in lower case with single spaces
 _DYES = tuple(
     (re.compile(rf"(?<![a-z])(?:{pattern})(?![a-z0-9]|\.[0-9])"), nm)
     for pattern, nm in {
@@ -78,7 +79,7 @@ _DYES = tuple(
 
 
 def color_of_wavelength(nm: float) -> Color | None:
-    """Return the colour, linear RGB, of light of a wavelength; None for no wavelength of a dye."""
+    """Return the colour (linear RGB) of light of this wavelength; None: no dye emits such light."""
     if not _SHORTEST_NM <= nm <= _BANDS[-1][0]:
         return None
     code = next(code for end, code in _BANDS if nm <= end)
@@ -86,7 +87,11 @@ def color_of_wavelength(nm: float) -> Color | None:
 
 
 def emission_of(name: str) -> float | None:
-    """Return the emission maximum, nm, of the dye that a channel's name holds; None: of none."""
+    """Return the emission maximum in nm of the dye in a channel's name; None: it names no dye.
+
+    >>> emission_of("Alexa Fluor 488"), emission_of("CD31")
+    (519.0, None)
+    """
     plain = " ".join(re.sub(r"[^a-z0-9.]+", " ", name.lower()).split())
     if (found := _BY_EMISSION.search(plain)) is not None:
         return float(found[1])
@@ -99,7 +104,7 @@ def emission_of(name: str) -> float | None:
 
 
 def color_of_name(name: str) -> Color | None:
-    """Return the colour, linear RGB, of the dye that a channel's name holds; None: of none."""
+    """Return the colour (linear RGB) of the dye in a channel's name; None: it names no dye."""
     nm = emission_of(name)
     return None if nm is None else color_of_wavelength(nm)
 
@@ -107,16 +112,20 @@ def color_of_name(name: str) -> Color | None:
 def color_of_channel(
     rgb: tuple[int, int, int] | None, nm: float | str | None, dye: str = ""
 ) -> Color | None:
-    """Return the colour, linear RGB, that a file states, else that of its light.
+    """Return the colour (linear RGB) that a file states, or else the colour of its light.
 
-    rgb  0 to 255 each; None: not stated. Black counts as not stated: it can't be seen, and is what
-         some programs write for none
+    rgb  sRGB, 0..255; None: not stated. Black counts as not stated, because it is invisible, and
+         some programs write it if there is no colour
+    nm   emission wavelength; None: not stated
+    dye  name of the dye; empty: not stated
+
+    None: the file states none of them.
     """
     return color_of_light(nm, dye) if rgb is None or not any(rgb) else linear_color(rgb)
 
 
 def color_of_light(nm: float | str | None, dye: str = "") -> Color | None:
-    """Return the colour, linear RGB, of a stated wavelength in nm, or else of a stated dye."""
+    """Return the colour (linear RGB) of a wavelength in nm, or of a dye; None: neither is known."""
     try:
         found = None if nm is None else color_of_wavelength(float(nm))
     except ValueError:

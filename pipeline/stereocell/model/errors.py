@@ -1,19 +1,20 @@
-"""Errors that a user can cause or repair: one line, exit code 1 (2 for wrong usage).
+"""Errors that a user can cause or repair: one line, and exit code 1 (2 for wrong usage).
 
 All other exceptions are bugs and keep their traceback.
 """
 
 import re
 
-# Values of more characters are cut. A path is seldom as long, and a file's name never.
+# Characters: a value of at least _LONGEST is shortened to its first and last ones. Paths are seldom
+# so long, and file names never.
 _LONGEST, _KEPT_AHEAD, _KEPT_BEHIND = 300, 200, 60
 _LONG_VALUE = re.compile(rf"\S{{{_LONGEST},}}|'[^'\n]{{{_LONGEST},}}'|\"[^\"\n]{{{_LONGEST},}}\"")
 
 
 class StereoCellError(Exception):
-    """The message names the file or tile and the field, the value found and the value expected.
+    """An error whose message names the file or tile, the field, the value found and the expected.
 
-    A value of many characters is cut in its middle, wherever the message quotes it.
+    Long values in the message are shortened in their middle.
     """
 
     exit_code = 1
@@ -23,14 +24,14 @@ class StereoCellError(Exception):
 
 
 def shortened(value: str) -> str:
-    """Return a value, with its middle left out where it is long."""
+    """Return a value, without its middle if it is long."""
     if len(value) < _LONGEST:
         return value
     return f"{value[:_KEPT_AHEAD]}...{value[-_KEPT_BEHIND:]}"
 
 
 class UsageError(StereoCellError):
-    """The command itself is wrong: an unknown key, a flag that contradicts another."""
+    """The command itself is wrong, such as an unknown key, or a flag that contradicts another."""
 
     exit_code = 2
 
@@ -44,7 +45,7 @@ class OutputError(StereoCellError):
 
 
 class NoSurfaceError(StereoCellError):
-    """The voxels have no iso-surface. The caller records the reason, and the build goes on."""
+    """The voxels have no iso-surface. The caller records the reason, and the build continues."""
 
 
 class StageError(StereoCellError):

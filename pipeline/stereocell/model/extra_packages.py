@@ -1,7 +1,7 @@
-"""Packages that an extra of StereoCell installs, such as `pip install 'stereocell[draco]'`.
+"""Import packages that an extra installs, such as `pip install 'stereocell[draco]'`.
 
-They are imported by name, where they are used. So the cache keys of results that do not use them do
-not depend on them. A result that uses one puts its version into its own key.
+They are imported by name where they are used, so keys of other results do not depend on them. A
+result that uses such a package has the package's version in its key.
 """
 
 from importlib import import_module
@@ -9,28 +9,29 @@ from typing import Any
 
 from stereocell.model.errors import UsageError
 
-# packages of extras that change bytes of a result: workers of a cluster must have the same versions
+# Packages of extras that change the bytes of a result. All workers of a cluster must have the same
+# versions.
 MAKERS = ("alktx2", "pymeshlab", "xatlas")
 
 
 def import_extra(module: str, *, extra: str, wanted_by: str) -> Any:
     """Return a module of an extra.
 
-    wanted_by  the flag or the work that needs it, the subject of the error's sentence
+    wanted_by  flag or work that needs it; the error's sentence begins with it
 
-    Raises UsageError, with the command that installs the extra, where the import fails.
+    Raises UsageError, with the command that installs the extra, if the import fails.
     """
     try:
         return import_module(module)
-    except (ImportError, OSError):  # OSError: a library that the package itself loads is missing
+    except (ImportError, OSError):  # OSError: the package can't load one of its libraries
         raise UsageError(
-            f"{wanted_by} takes the package {module}: pip install 'stereocell[{extra}]'"
+            f"{wanted_by} needs the package {module}: pip install 'stereocell[{extra}]'"
         ) from None
 
 
 def version_of(package: str) -> str:
-    """Return the version of an installed package; empty: it is not installed."""
-    from importlib.metadata import PackageNotFoundError, version  # imports 40 more modules
+    """Return the version of a package; empty: it is not installed."""
+    from importlib.metadata import PackageNotFoundError, version  # slow: imports 40 more modules
 
     try:
         return version(package)

@@ -1,8 +1,8 @@
-"""The plane in which a source's images lie, and arrays turned so that the images come first.
+"""Find the plane of a source's images, and turn arrays so that the slices come first.
 
-A volume is turned into the patient's frame after it is read, so that the images of a CT may lie
-across any of its axes. All that belongs "in the plane" of an image (a median, the noise between
-neighbours, runs of padding) works on arrays that `slices_first` has turned.
+A volume is turned into the patient's frame after reading, so the images of a CT may lie across any
+axis. Operations in the plane of an image (a median, the noise between neighbours, runs of padding)
+work on arrays that `slices_first` has turned.
 """
 
 from collections.abc import Sequence
@@ -15,19 +15,19 @@ from stereocell.model.spacing import Spacing
 
 T = TypeVar("T")
 
-# Ratio of two spacings above which voxels along the coarser axis are no neighbours any more: a
-# filter across it would mix structures that have nothing to do with one another.
+# Ratio of two spacings above which voxels along the coarser axis do not count as neighbours. A
+# filter across them would mix unrelated structures.
 MAX_RATIO = 2.0
 
 
 def find_slice_axis(stated: int, spacing_um: Spacing) -> int:
-    """Return the axis (of z, y, x) across which the images of a volume lie.
+    """Return the axis across which the images of a volume lie: 0, 1 or 2 for z, y, x.
 
-    stated      the axis that the source states, or that its reader takes for it
-    spacing_um  (z, y, x)
+    stated      axis that the source states, or that its reader assumes
+    spacing_um  voxel spacing (z, y, x)
 
-    One axis that is much coarser than both others is that axis, whatever is stated: a volume may
-    have been sampled anew along other axes than the scanner's.
+    If one axis is much coarser than both others, it is returned instead of the stated one. The
+    volume may have been resampled along other axes than the scanner's.
     """
     _, middle, coarsest = sorted(spacing_um)
     return spacing_um.index(coarsest) if coarsest > MAX_RATIO * middle else stated

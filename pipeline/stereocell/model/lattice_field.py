@@ -1,8 +1,8 @@
-"""Fields that are linear between the knots of a lattice: iso-values and backgrounds.
+"""Fields of iso-values and backgrounds, which are linear between the knots of a grid.
 
-Each tile has its own iso-value, and neighbours must agree on their common plane. So the surface is
-extracted where f(x) = iso(x); iso is linear from tile centre to tile centre, and constant beyond
-the last one. The background that is subtracted from f is such a field too, on its own lattice.
+Each tile may have its own iso-value, but neighbours must agree on their common plane. So the
+surface is extracted where f(x) = iso(x). The field iso is linear from tile centre to tile centre,
+and constant beyond the last one. The background that is subtracted from f is such a field, too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,26 +15,26 @@ from numpy.typing import NDArray
 
 from stereocell.model.tiling import Box, Tile
 
-_AT_ONCE = 1 << 16  # voxels: as float64 they stay in a processor's cache
+_AT_ONCE = 1 << 16  # voxels; as float64 they fit into a processor's cache
 
 
 @dataclass(frozen=True, slots=True)
 class LatticeField:
     """Values at the knots of a grid.
 
-    centres  three rising tuples, (z, y, x), in voxels of the level
-    values   float64 (z, y, x), one for each combination of centres; in voxel values
+    centres  positions of the knots along z, y and x, ascending, in voxels of the level
+    values   float64 (z, y, x), in voxel values
     """
 
     centres: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
     values: NDArray[np.float64]
 
     def at(self, box: Box) -> NDArray[np.float32]:
-        """Return the field at the voxels of the box, float32; it broadcasts over (z, y, x).
+        """Return the field at the voxels of a box, float32, which broadcasts over (z, y, x).
 
-        An axis has length 1 where only one centre reaches into the box. A value depends on its
-        voxel's position alone, bit by bit: interpolation runs axis by axis, and weights follow from
-        the voxel's index.
+        An axis has length 1 if only one centre influences the box. Each value depends only on its
+        voxel's position, to the last bit: interpolation runs axis by axis, with weights that follow
+        from the voxel's index.
         """
         near = self.around(box)
         weights = [
@@ -45,7 +45,7 @@ class LatticeField:
         field = np.empty((*columns.shape[:2], len(weights[2].share)), np.float32)
         low, high, share = weights[2].low, weights[2].high, weights[2].share
         cuts = [0, *(np.flatnonzero(np.diff(low + high)) + 1).tolist(), len(share)]
-        many = max(1, _AT_ONCE // max(1, field[:1].size))  # the whole in float64 takes GBs
+        many = max(1, _AT_ONCE // max(1, field[:1].size))  # all planes in float64 would take GBs
         for z in range(0, len(field), many):
             some = columns[z : z + many]
             for x, end in pairwise(cuts):  # between two centres
@@ -54,7 +54,7 @@ class LatticeField:
         return field
 
     def around(self, window: Box) -> "LatticeField":
-        """Return the part of the field that reaches into a unit's window: it decides the result."""
+        """Return the part of the field that influences a window, for the key of its unit."""
         keep = []
         for axis, centres in enumerate(self.centres):
             first = np.searchsorted(centres, window.start[axis], side="right") - 1
@@ -69,7 +69,7 @@ class LatticeField:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, *_: Any) -> Any:
-        """Let pydantic read and write a field as `from_json` and `to_json` do."""
+        """Let pydantic convert a field by `from_json` and `to_json`."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(
@@ -86,7 +86,10 @@ class LatticeField:
 
 @dataclass(frozen=True, slots=True)
 class _Weights:
-    """A voxel lies at `share` of the way from centre `low` to centre `high`; arrays (n,)."""
+    """Positions of voxels between centres: at `share` of the way from `low` to `high`.
+
+    All arrays have one entry for each voxel; `low` and `high` are indices of centres.
+    """
 
     low: NDArray[np.intp]
     high: NDArray[np.intp]
@@ -94,7 +97,7 @@ class _Weights:
 
 
 def _weights(centres: NDArray[np.float64], start: int, stop: int) -> _Weights:
-    """Return the weights of voxels start..stop; of the first one alone if there is one centre."""
+    """Return the weights of voxels start..stop, or of the first one if there is only one centre."""
     voxels = np.arange(start, stop if len(centres) > 1 else start + 1, dtype=np.float64)
     below = np.searchsorted(centres, voxels, side="right") - 1
     low = np.clip(below, 0, len(centres) - 1)
@@ -115,7 +118,7 @@ def _blend(values: NDArray[np.float64], axis: int, weights: _Weights) -> NDArray
 def make_iso_field(tiles: Sequence[Tile], found: Mapping[str, float | None]) -> LatticeField | None:
     """Return the field of one channel's iso-values; None if no tile has one.
 
-    found  iso-value by tile id, in voxel values; None: the tile takes the mean of the others
+    found  iso-value by tile ID, in voxel values; None: the tile takes the mean of the others
     """
     known = [value for value in found.values() if value is not None]
     if not known:

@@ -15,11 +15,11 @@ class Mesh:
     normals    float32 (n, 3)  unit length, pointing out
     uvs        float32 (n, 2)  origin at the lower left, v upwards (USD's convention), or None
     tangents   float32 (n, 4)  xyz and the bitangent's sign (glTF's convention), or None
-    colors     float32 (n, 3)  linear RGB 0..1 as read from a stage, or None: the channel's colour
-    openness   float32 (n,)    1 - ambient occlusion as read from a stage, 0..1, or None
-    objects    int32   (n,)    which object of its tile a vertex belongs to, from 0, or None: see
-                               object_table.py; each object's vertices are its own, and together
-    paint      float32 (n,)    of objects: intensity of the sampled channel, 0..1, or None
+    colors     float32 (n, 3)  linear RGB, 0..1, read from a stage; None: the channel's colour
+    openness   float32 (n,)    1 - ambient occlusion, 0..1, read from a stage, or None
+    objects    int32   (n,)    object of each vertex, counted in its tile from 0 (object_table.py),
+                               or None. The vertices of an object are contiguous and not shared
+    paint      float32 (n,)    intensity of the painted channel on objects, 0..1, or None
     """
 
     positions: NDArray[np.float32]
@@ -45,14 +45,14 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How a level of detail was made, and how true it is.
+    """How a level of detail was made, and how accurate it is.
 
     away, back  distances from the iso-surface to this mesh, and from this mesh to the iso-surface
-    samples     points spread over each of the two, at which these were measured
-    mended      bodies that were simplified again, because the first attempt had defects
-    fallbacks   bodies that kept the previous level's surface, because every attempt had defects
-    faults      defects that are left, by the exact check: see `find_defects`
-    angle_deg   1st percentile of the triangles' smallest angles, in degrees
+    samples     number of points on each surface at which the distances were measured
+    mended      components that were simplified again, because the first attempt had defects
+    fallbacks   components that kept the previous level's surface, because all attempts had defects
+    faults      defects that are left by the exact check (see `find_defects`)
+    angle_deg   1st percentile of the triangles' smallest angles, degrees
     enclosed    share of the iso-surface's area that lies inside this mesh or on it, 0..1
     """
 
@@ -68,13 +68,13 @@ class Quality:
 
 @dataclass(frozen=True, slots=True)
 class Baked:
-    """Values baked from the fine surface: at texels (h, w) if the level has UVs, else at vertices.
+    """Values baked from the fine surface: (h, w) texels if the level has UVs, or (n,) vertices.
 
-    openness  uint8, (h, w) or (n,); 255: no ambient occlusion
-    paint     uint8, (h, w) or (n,); intensity of the sampled channel, or None
-    texel_um  edge of a texel on the surface, in um; 0: no maps
+    openness  uint8, 255 without ambient occlusion
+    paint     uint8, intensity of the painted channel; None: none is painted
+    texel_um  edge of a texel on the surface, um; 0: there are no maps
     charts    number of UV charts
-    reason    why there are no maps; empty if there are
+    reason    why there are no maps; empty: there are maps
     """
 
     openness: NDArray[np.uint8]
@@ -88,12 +88,12 @@ class Baked:
 class Lod:
     """One level of detail. `lod0` is the finest.
 
-    distance_um  99th percentile of the distances between this mesh and the iso-surface, of points
-                 spread over both: see `measure_spread`
+    distance_um  99th percentile of the distances between this mesh and the iso-surface, at points
+                 on both (see `measure_spread`)
     normal_map   uint8 (h, w, 3), tangent space, row 0 at the top (v = 1), or None
-    quality      None where the writer doesn't know it
-    baked        ambient occlusion and sampled channel; None: neither
-    farthest_um  the largest of these distances, where there is no `quality`; None: not known
+    quality      None: not known
+    baked        ambient occlusion and painted channel; None: neither
+    farthest_um  largest of these distances, if there is no `quality`; None: not known
     """
 
     mesh: Mesh
@@ -105,7 +105,7 @@ class Lod:
 
     @property
     def largest_um(self) -> float:
-        """The largest distance that was found between this mesh and the iso-surface, um."""
+        """The largest measured distance between this mesh and the iso-surface, um."""
         if self.quality is None:
             return self.distance_um if self.farthest_um is None else self.farthest_um
         return max(self.distance_um, self.quality.away.max, self.quality.back.max)

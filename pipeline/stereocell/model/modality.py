@@ -1,10 +1,10 @@
-"""Imaging modalities: the defined terms of DICOM's Modality (0008,0060), PS3.3 C.7.3.1.1.1."""
+"""Codes of imaging modalities: defined terms of DICOM's Modality (0008,0060), PS3.3 C.7.3.1.1.1."""
 
 _TERMS = (
     "AR AU BDUS BI BMD CFM CR CT DG DMS DX ECG EEG EMG EOG EPS ES FID GM HC HD IO IOL IVOCT IVUS "
     "KER LEN LP LS M3D MG MR NM OAM OCT OP OPM OPT OPTBSV OPTENF OPV OSS OT PA PT PX RF RG "
     "RTDOSE RTIMAGE SM SRF SEG TG US VA XA XC"
 )
-SEGMENTATION = "SEG"  # of channels that a command has derived from another image
-TRACER_MODALITIES = ("PT", "NM")  # PET and SPECT: how much of a tracer there is
-MODALITIES = frozenset(_TERMS.split())  # terms of modalities that make images
+SEGMENTATION = "SEG"  # code of channels that a command has derived from another image
+TRACER_MODALITIES = ("PT", "NM")  # PET and SPECT, which measure the amount of a tracer
+MODALITIES = frozenset(_TERMS.split())  # codes of modalities that make images

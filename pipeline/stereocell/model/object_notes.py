@@ -1,15 +1,15 @@
-"""What a label map's own file says of its objects."""
+"""Names, colours and columns of objects, from the file of their label map."""
 
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectNotes:
-    """Names, colours and further columns by label; each may be missing for some.
+    """Names, colours and further columns by label. A label may lack any of them.
 
-    names       for people
-    colors      linear RGB, 0..1
-    columns     by the property's name: numbers or texts by label
+    names    name for people, by label
+    colors   linear RGB, 0..1, by label
+    columns  number or text by label, by the column's name
     """
 
     names: dict[int, str] = field(default_factory=dict)

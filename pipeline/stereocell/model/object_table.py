@@ -1,25 +1,26 @@
-"""Objects of a label map and what is known of each: a table with a row an object."""
+"""The table of a label map's objects, with a row for each object."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_CATEGORIES = 255  # most words of a column; a column with more is left out, and the log says so
-MISSING = -1  # the code of an object without a category
+MAX_CATEGORIES = 255  # most categories of a column; a column with more is left out with a note
+MISSING = -1  # code of an object without a category
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
     """One property of all objects.
 
-    id          an identifier, unique in its table: the name of a primvar and of files
-    name        for people, as the table or the pipeline calls it
-    about       what the numbers are, for people: `Mean of CD8 over its voxels`; may be empty
+    id          identifier, unique in its table; it names a primvar and files
+    name        name for people, from the table or the pipeline
+    values      float32 (n,): numbers, NaN if missing; or codes of categories, MISSING if there is
+                none
+    about       explanation for people, such as `Mean of CD8 over its voxels`; may be empty
     unit        `um`, `um2`, `um3`, `counts`, or empty
-    values      float32 (n,), NaN: missing; of categories their codes, MISSING: none
-    categories  for people, by code; empty: the values are numbers
-    colors      linear RGB 0..1 by code, as many as categories
+    categories  names of the categories by code; empty: the values are numbers
+    colors      linear RGB, 0..1, of each category
     """
 
     id: str
@@ -33,10 +34,10 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class SharedWalls:
-    """Walls that objects share.
+    """Interfaces between objects.
 
-    labels    uint64 (m, 2), of the two objects
-    area_um2  float32 (m,), at the finest level; NaN: not known
+    labels    uint64 (m, 2), labels of the two objects
+    area_um2  float32 (m,), area at the finest level; NaN: not known
     """
 
     labels: NDArray[np.uint64]
@@ -47,17 +48,18 @@ class SharedWalls:
 class ObjectTable:
     """All objects of a label map, n rows, in the order of the tiles that hold them.
 
-    labels   uint64 (n,), the objects' numbers in the label map, each once
-    names    for people, by row, as organs have them; empty: the numbers are all there is
-    boxes    float32 (n, 6): least and largest (x, y, z), um, as `world` of the meshes
-    rows     int32 by tile: the rows of the objects in a tile's meshes, in the order in which the
-             meshes number them (Mesh.objects). An object that is larger than its tile's
-             surroundings has a piece in several tiles, and one row
+    labels   uint64 (n,), labels of the objects, each once
+    boxes    float32 (n, 6): least and largest x, y, z in um, world coordinates like the meshes'
+    rows     int32 by tile: rows of the objects in a tile's meshes, in the order in which the meshes
+             number them (Mesh.objects). A cut object has pieces in several tiles, and one row
     columns  the properties; `volume_um3` is always the first
-    default  ID of the column that colours objects first; empty: each has a hue of its own
-    walls    int32 (m, 2): rows of two objects that share a wall, each pair once; None: not known
-    wall_um2 float32 (m,), the area of that wall at the finest level; NaN: not known
-    colors   float32 (n, 3), linear RGB: the label map's own; NaN: it has none. None: of no object
+    names    names for people, such as those of organs; empty: objects have no names
+    default  ID of the column that colours objects at first; empty: each has a hue of its own
+    walls    int32 (m, 2): rows of two objects with a common interface, each pair once; None: not
+             known
+    wall_um2 float32 (m,), area of each interface at the finest level; NaN: not known
+    colors   float32 (n, 3), linear RGB from the label map's file, NaN for an object without one;
+             None: no object has one
     """
 
     labels: NDArray[np.uint64]
@@ -71,7 +73,7 @@ class ObjectTable:
     colors: NDArray[np.float32] | None = None
 
     def of_tile(self, tile: str) -> "ObjectTable":
-        """Return the table of one tile's objects, in the order in which its meshes number them."""
+        """Return the table of one tile's objects, in the order of its meshes' numbers."""
         rows = self.rows[tile]
         return replace(
             self,
@@ -86,7 +88,7 @@ class ObjectTable:
         )
 
     def touching(self, tile: str) -> SharedWalls:
-        """Return the walls of a tile's objects, theirs the first label."""
+        """Return the interfaces of a tile's objects. The first label is the tile's own object."""
         if self.walls is None or self.wall_um2 is None:
             return SharedWalls(np.zeros((0, 2), np.uint64), np.zeros(0, np.float32))
         both = np.concatenate([self.walls, self.walls[:, ::-1]])

@@ -1,4 +1,4 @@
-"""Settings declared once: a dataclass field with its default, its comment and its flag."""
+"""Declare a setting once, as a dataclass field with its default, comment, flag and bounds."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -6,19 +6,19 @@ from typing import Any
 from stereocell.model.errors import UsageError
 
 AUTO = "auto"
-MAX_LENGTH_UM = 1e12  # um: float32 and browsers still draw places so far from the origin
-MAX_COUNT = 2**53  # whole numbers up to here stay whole in JSON and in float64
-EIGHT_BITS = 8  # of a voxel in the stage; with more, the voxels as measured are kept as well
-MAX_VOXEL_VALUE = 1e30  # squares and differences of larger ones overflow float32
+MAX_LENGTH_UM = 1e12  # um; float32 and browsers can draw positions so far from the origin
+MAX_COUNT = 2**53  # JSON and float64 hold whole numbers up to this exactly
+EIGHT_BITS = 8  # bits of a voxel in the stage; with more, the voxels as measured are kept, too
+MAX_VOXEL_VALUE = 1e30  # squares and differences of larger values overflow float32
 
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """How a setting is given to a command.
+    """The flag by which a setting is given to a command.
 
-    name  as `--tile-size`
-    help  what `--help` says of it; empty: the setting's comment
-    form  what its text looks like, where its type does not tell: `z,y,x`, `CHANNEL=VALUE`
+    name  name of the flag, such as `--tile-size`
+    help  text of `--help`; empty: the setting's comment
+    form  form of its value, if its type does not show it: `z,y,x`, `CHANNEL=VALUE`
     """
 
     name: str
@@ -43,9 +43,9 @@ WHOLE_NUMBER = Bounds(-MAX_COUNT, MAX_COUNT)
 def setting(
     default: Any, comment: str, *, flag: Flag | None = None, bounds: Bounds | None = None
 ) -> Any:
-    """Return a dataclass field: its default and comment become a line of `stereocell.toml`.
+    """Return a dataclass field. Its default and comment become a line of `stereocell.toml`.
 
-    bounds  of a number: every setting that may be one has them
+    bounds  bounds of a number; every setting that may be a number has them
     """
     metadata = {"comment": comment, "flag": flag, "bounds": bounds}
     if isinstance(default, dict):
@@ -54,7 +54,7 @@ def setting(
 
 
 def require_bounds(section: str, options: Any) -> None:
-    """Raise UsageError for the first number of a section of settings beyond its bounds."""
+    """Raise UsageError for the first number in a section of settings that exceeds its bounds."""
     for one in fields(options):
         bounds, given = one.metadata["bounds"], getattr(options, one.name)
         if bounds is None:
@@ -75,7 +75,12 @@ def _words(bounds: Bounds) -> str:
 
 
 def length_um(where: str, value: float | str, auto: float) -> float:
-    """Return a setting that is a length in um, or `auto` where it is left open. UsageError."""
+    """Return a setting that is a length in um, or `auto` if the setting is "auto".
+
+    where  name of the setting, for messages
+
+    Raises UsageError for any other value.
+    """
     if value == AUTO:
         return auto
     if isinstance(value, str) or not value >= 0:

@@ -1,8 +1,8 @@
 """Cut a lattice of voxels into tiles that share their border planes.
 
-Neighbours share ONE plane of lattice points: a tile's own points run from `start` to `stop`
-inclusive where another tile follows. So each cell belongs to exactly one tile, and surfaces meet
-without cracks and without clipping.
+Neighbours share ONE plane of lattice points: where another tile follows, a tile's points run from
+`start` to `stop` inclusive. So each cell belongs to exactly one tile, and surfaces meet without
+cracks and without clipping.
 """
 
 from collections.abc import Sequence
@@ -19,31 +19,31 @@ class Box:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Return the number of voxels, (z, y, x)."""
+        """The number of voxels, (z, y, x)."""
         z, y, x = (b - a for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 
     @property
     def slices(self) -> tuple[slice, slice, slice]:
-        """Return the box as indices of the level, (z, y, x)."""
+        """The box as slices of the whole level, (z, y, x)."""
         z, y, x = (slice(a, b) for a, b in zip(self.start, self.stop, strict=True))
         return z, y, x
 
     def slab(self, axis: int, start: int, stop: int) -> "Box":
-        """Return the part of the box between two planes across an axis."""
+        """Return the part of the box from plane `start` to before plane `stop` along an axis."""
         starts, stops = list(self.start), list(self.stop)
         starts[axis], stops[axis] = start, stop
         (z0, y0, x0), (z1, y1, x1) = starts, stops
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def slices_in(self, window: "Box") -> tuple[slice, slice, slice]:
-        """Return the box as indices of an array that covers `window`."""
+        """Return the box as slices of an array that covers `window`."""
         start, stop, first = self.start, self.stop, window.start
         z, y, x = (slice(a - w, b - w) for a, b, w in zip(start, stop, first, strict=True))
         return z, y, x
 
     def grown(self, halo: tuple[int, int, int], within: "Box") -> "Box":
-        """Return the box larger by `halo` voxels on each side, clipped to `within`."""
+        """Return the box grown by `halo` voxels on each side, but within another box."""
         start = (max(a - h, low) for a, h, low in zip(self.start, halo, within.start, strict=True))
         stop = (min(b + h, high) for b, h, high in zip(self.stop, halo, within.stop, strict=True))
         z0, y0, x0 = start
@@ -51,10 +51,10 @@ class Box:
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def thinned(self, region: "Box", step: tuple[int, int, int], *, outward: bool = False) -> "Box":
-        """Return the box in thinned planes: every `step`-th is kept, from the region's first on.
+        """Return the box in indices of thinned planes: every `step`-th from the region's first.
 
-        It ends with the last kept plane inside it. With `outward` it ends with the next kept plane,
-        if the region has one, so that boxes that share a plane still share one.
+        The box ends with the last kept plane inside it. With `outward` it ends with the next kept
+        plane, if the region has one, so that boxes that share a plane still share one.
         """
         start, stop = [], []
         ends = zip(self.start, self.stop, region.start, region.stop, step, strict=True)
@@ -69,7 +69,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Tile:
-    """`id` is `r<row>_c<column>`, with `_z<k>` where the depth is split; `box`: its own voxels."""
+    """A tile of the region.
+
+    id   `r<row>_c<column>`, followed by `_z<k>` if the depth is split
+    box  the tile's own voxels
+    """
 
     id: str
     box: Box
@@ -77,16 +81,17 @@ class Tile:
     def lattice(self, region: Box) -> Box:
         """Return the box of the lattice points between which the tile's cells lie.
 
-        It has one plane more than `box` on each side where another tile follows.
+        It has one more plane than `box` at the end of each axis where another tile follows.
         """
         z, y, x = (min(b + 1, end) for b, end in zip(self.box.stop, region.stop, strict=True))
         return Box(self.box.start, (z, y, x))
 
 
 def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
-    """Return the tiles of `region`, row by row; the last tile of an axis may be smaller.
+    """Return the tiles of a region, row by row. The last tile of an axis may be smaller.
 
-    tile_size  voxels (z, y, x). A last tile of a single plane has no cells: it joins its neighbour
+    tile_size  voxels (z, y, x). A single plane that is left at the end has no cells, so it joins
+               the last tile
     """
     axes = []
     for low, high, size in zip(region.start, region.stop, tile_size, strict=True):
@@ -98,9 +103,9 @@ def cut(region: Box, tile_size: tuple[int, int, int]) -> tuple[Tile, ...]:
 
 
 def cut_evenly(region: Box, columns: int, rows: int) -> tuple[Tile, ...]:
-    """Return columns x rows tiles, row by row; their sizes differ by one voxel at most.
+    """Return columns x rows tiles, row by row. Their sizes differ by at most one voxel.
 
-    The region must have at least two voxels per tile along y and x.
+    The region must have at least two voxels for each tile along y and x.
     """
     axes = [
         [low + i * (high - low) // count for i in range(count + 1)]

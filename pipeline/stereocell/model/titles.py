@@ -1,3 +1,3 @@
-"""The title of a specimen, as a person gives it."""
+"""The title that a user gives a specimen."""
 
 MAX_TITLE = 120  # characters

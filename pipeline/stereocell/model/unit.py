@@ -13,8 +13,8 @@ from stereocell.model.mesh import Lod, Mesh
 class Closed:
     """A closed copy of a tile's surface.
 
-    faults     defects that are left, by the exact check
-    fallbacks  bodies that were not simplified: all of them, if simplification left defects
+    faults     defects that are left by the exact check
+    fallbacks  components that were not simplified; all of them, if simplification left defects
     """
 
     mesh: Mesh
@@ -24,21 +24,23 @@ class Closed:
 
 @dataclass(frozen=True, slots=True)
 class ObjectFacts:
-    """What a unit of a label map knows of its n objects, or pieces of objects, by their order.
+    """Measurements of the n objects, or pieces of cut objects, in a unit of a label map.
 
-    labels    uint64 (n,), their numbers in the label map, ascending
-    voxels    int64 (n,)
-    area_um2  float64 (n,), of the surface, without the planes that cut it into pieces
-    walls     int32 (m,), which object touches another one; `beside` uint64 (m,), that one's number;
-              `wall_um2` float64 (m,), the area that they share
-    means     float64 (n, channels), of the image's channels over an object's voxels
-    p95s      float64 (n, channels), their 95th percentiles; NaN: of a piece
-    pieces    int32 (k,), which of the n are pieces; `quantiles` float32 (k, channels, q), of each,
-              evenly from its least to its largest: the pieces' p95s are found together
-    changed   voxels that were changed so that no object touches itself by an edge or a corner
-    bias      the largest share of an object's volume that a level has more or less, by level
-    stopped   levels of which simplifying did not come to an end: they are finer than is asked for
-    thin      uint64 (k,), the numbers of objects too thin to be built, which are not among the n
+    labels    uint64 (n,), labels, ascending
+    voxels    int64 (n,), number of voxels
+    area_um2  float64 (n,), area of the surface without the planes that cut an object into pieces
+    walls     int32 (m,), index of the object at each interface
+    beside    uint64 (m,), label of the object on the other side
+    wall_um2  float64 (m,), area of the interface
+    means     float64 (n, channels), means of the image's channels over an object's voxels
+    p95s      float64 (n, channels), their 95th percentiles; NaN for a piece
+    pieces    int32 (k,), indices of the pieces
+    quantiles float32 (k, channels, q), evenly spaced quantiles of each piece, from which the 95th
+              percentile of the whole object is found
+    changed   number of voxels changed so that no object touches itself at an edge or a corner
+    bias      largest relative error of an object's volume in each level of detail
+    stopped   levels of detail whose simplification stopped early, so that they are too fine
+    thin      uint64 (k,), labels of objects too thin to be built; they are not among the n
     """
 
     labels: NDArray[np.uint64]
@@ -57,16 +59,16 @@ class ObjectFacts:
     thin: NDArray[np.uint64]
 
 
-# Share of the source's voxels above a level, beyond which a surface that leaves them out is named
+# Share of the source's voxels above the level, 0..1; a note names a surface that leaves out more.
 MAX_MISSING = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """Voxels of the source above a surface's level, and the solid that is built, by their number.
+    """Numbers of voxels that show how well a solid encloses the source's voxels above the level.
 
-    source   voxels above the level, as they were read
-    covered  those of them that lie in the solid
+    source   voxels of the source above the level, before any filter
+    covered  voxels of `source` that lie in the solid
     solid    voxels in the solid
     """
 
@@ -91,7 +93,7 @@ class Cover:
 
     @property
     def words(self) -> str:
-        """Both shares, for a reader."""
+        """The shares as text for a reader."""
         return (
             f"the solid covers {1 - self.missing:.1%} of the source's voxels above the level, and "
             f"{self.added:.1%} of the solid lies below it"
@@ -102,14 +104,15 @@ class Cover:
 class Unit:
     """The result of one unit of work.
 
-    closed   a closed copy of lod0, if one is asked for and the tile has connected components
-    volume   uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side;
-             None: of a label map
-    reason   why there is no surface; empty if there is one
-    seconds  time spent, by step
-    measured  the same voxels as they were read; None: not kept, or `volume` is no different
-    objects   of a label map; None: of an image's channel
-    cover     of the surface by the source's voxels; None: there is no level, or a label map's
+    closed    closed copy of lod0, if it is requested and the tile has a surface; otherwise None
+    volume    uint8 (z, y, x): the lattice's voxels, window applied, and APRON voxels on every side;
+              None for a label map
+    reason    why there is no surface; empty: there is one
+    seconds   seconds spent, by step
+    measured  voxels of `volume` as measured; None: not kept, or equal to `volume`
+    objects   measurements of a label map's objects; None for a channel of an image
+    cover     how much of the source's voxels the solid encloses; None: there is no level, or this
+              is a label map
     """
 
     lods: tuple[Lod, ...]

@@ -1,8 +1,8 @@
-"""Find texts that are not UTF-8, as arguments and file names of another encoding become."""
+"""Find texts that are not UTF-8, such as arguments and file names in another encoding."""
 
 
 def escaped_bytes(text: str) -> str:
-    """Return a text that is not UTF-8, with its other bytes escaped; empty: it is UTF-8.
+    """Return a text with its bytes that are not UTF-8 escaped; empty: all of it is UTF-8.
 
     >>> escaped_bytes("caf\\udce9")
     'caf\\\\xe9'
@@ -12,6 +12,6 @@ def escaped_bytes(text: str) -> str:
     except UnicodeEncodeError:
         try:
             return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-        except UnicodeEncodeError:  # no bytes become such a text
+        except UnicodeEncodeError:  # the text has surrogates that stand for no byte
             return text.encode("utf-8", "backslashreplace").decode()
     return ""

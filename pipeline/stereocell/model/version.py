@@ -1,4 +1,4 @@
-"""The program's name and version, as output files carry it."""
+"""The program's name and version, for output files."""
 
 from importlib.metadata import version
 

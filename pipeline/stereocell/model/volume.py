@@ -1,4 +1,4 @@
-"""The type that all stages share: voxels and their position, and the one axis swap."""
+"""Voxels with their position, and the only place where image axes become world axes."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,12 +11,12 @@ from stereocell.model.spacing import Point, Spacing
 
 @dataclass(frozen=True, slots=True)
 class Volume:
-    """One channel's window.
+    """The voxels of one channel in a window.
 
     voxels      (z, y, x), integer or float32
     spacing_um  distance between voxels in um, (z, y, x)
     origin_um   CENTRE of voxel (0, 0, 0) in um, (z, y, x)
-    slice_axis  of z, y, x: the source's images lie across it; see model/image_plane.py
+    slice_axis  axis across the source's images: 0, 1 or 2 for z, y, x (model/image_plane.py)
     """
 
     voxels: NDArray[Any]

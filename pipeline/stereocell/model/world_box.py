@@ -13,7 +13,7 @@ def world_box(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the lower and upper corner (x, y, z), world um, of the box between two points.
 
-    first_um, last_um  (z, y, x), um
+    first_um, last_um  image positions (z, y, x), um
     """
     corners = zyx_to_xyz(np.stack([first_um, last_um])) + 0.0  # adding 0.0 turns -0.0 into 0.0
     return corners.min(axis=0), corners.max(axis=0)
@@ -22,7 +22,7 @@ def world_box(
 def move_box(
     low: NDArray[np.float64], high: NDArray[np.float64], matrix: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the axis-aligned box around a moved box: lower and upper corner (x, y, z), world um.
+    """Return lower and upper corner (x, y, z), um, of the axis-aligned box around a moved box.
 
     low, high  corners (x, y, z), um
     matrix     (4, 4) for row vectors

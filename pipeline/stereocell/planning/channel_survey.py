@@ -1,6 +1,7 @@
-"""The survey of the channels: one level, repair and appearance for all tiles of each.
+"""Survey each channel: choose one level, one repair and one appearance for all of its tiles.
 
-Pure: the passes over the voxels come before (building/passes.py), and the units after.
+This module reads no voxels. It sums up what the passes over the voxels found
+(building/passes.py), before the units are built.
 """
 
 import math
@@ -23,7 +24,7 @@ from stereocell.planning.level_choice import (
     Found,
     check_components,
     choose_by_components,
-    find_doubt,
+    explain_uncertainty,
     given_level,
     level_of_tile,
 )
@@ -34,21 +35,21 @@ from stereocell.steps.find_window import Window
 from stereocell.steps.sum_components import Sums
 from stereocell.transfer.channel_statistics import make_appearance
 
-KEPT_OF_MASK = 0.9  # share of a mask's voxels; a note says when smoothing leaves less
+KEPT_OF_MASK = 0.9  # share of a mask's voxels; a note warns if smoothing keeps less
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The level that a channel's components speak for.
+    """The level that was chosen for a channel by its connected components.
 
-    found       what is known of the channel's levels; without levels if this one parts nothing
-    rung        index into the channel's levels
-    components  the sums over the components of each tile at this level
-    iso         each tile's part of the level
+    found       the channel's levels; empty if all voxels lie on one side of the chosen level
+    index       index of the chosen level in `found.candidates`
+    components  sums over the components of each tile at this level, by tile ID
+    iso         the level in each tile, by tile ID
     """
 
     found: Found
-    rung: int
+    index: int
     components: Components
     iso: dict[str, TileIso]
 
@@ -59,30 +60,36 @@ def choose_level_of(
     evidence: Results[TileEvidence],
     components: Sequence[Results[Sums]],
 ) -> Chosen:
-    """Return the level of one channel; `components`: of each level that it may have."""
-    of_rungs = [dict(one) for one in components[: len(found.rungs)]]
-    rung = choose_by_components(plan.settings.isovalue, of_rungs)
-    sums: Components = of_rungs[rung] if of_rungs else {}
-    if found.is_fixed and of_rungs:
+    """Return the level of one channel.
+
+    components  sums over the components of each tile, for each candidate level in order
+    """
+    by_level = [dict(one) for one in components[: len(found.candidates)]]
+    index = choose_by_components(plan.settings.isovalue, by_level)
+    sums: Components = by_level[index] if by_level else {}
+    if found.is_fixed and by_level:
         found = check_components(plan, found, sums)
     files = {"evidence": evidence.files()}
-    if of_rungs:
-        files["components"] = components[rung].files()
+    if by_level:
+        files["components"] = components[index].files()
     iso = {
         tile.id: level_of_tile(
             plan,
             tile,
             found,
-            rung,
-            {what: by_tile[tile.id] for what, by_tile in files.items() if tile.id in by_tile},
+            index,
+            {kind: by_tile[tile.id] for kind, by_tile in files.items() if tile.id in by_tile},
         )
         for tile in plan.tiles
     }
-    return Chosen(found, rung, sums, iso)
+    return Chosen(found, index, sums, iso)
 
 
 def survey_channel(plan: Plan, channel: Channel, chosen: Chosen, window_file: str) -> ChannelSurvey:
-    """Return the survey of one channel; `window_file`: the file of its window, relative to OUT."""
+    """Return the survey of one channel.
+
+    window_file  file of the channel's window, relative to OUT
+    """
     found, components = chosen.found, chosen.components.values()
     most_faces = max((one["kept_faces"] for one in components), default=0)
     large, thin = (sum(one[key] for one in components) for key in ("large_voxels", "thin_voxels"))
@@ -111,8 +118,8 @@ def survey_channel(plan: Plan, channel: Channel, chosen: Chosen, window_file: st
 def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
     """Return how a channel is drawn in all tiles."""
     found = chosen.found
-    level = found.rungs[chosen.rung] if found.rungs else None
-    confidence = float(level is not None)  # a level that the settings state is no guess
+    level = found.candidates[chosen.index] if found.candidates else None
+    confidence = float(level is not None)  # 1 for a level that the settings state
     if isinstance(level, Level) and not found.is_given:
         confidence = level.confidence
     painter = plan.painter(channel)
@@ -122,7 +129,7 @@ def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
         statistics=replace(found.window.statistics, background=found.background),
         level=_surface_level(plan, chosen),
         confidence=confidence,
-        doubt=found.doubt or find_doubt(found, chosen.rung, list(chosen.iso.values())),
+        doubt=found.reason or explain_uncertainty(found, chosen.index, list(chosen.iso.values())),
         modality=SEGMENTATION if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
         unevenness=max(plan.spacing_um) / min(plan.spacing_um),
@@ -136,7 +143,7 @@ def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
 
 
 def _surface_level(plan: Plan, chosen: Chosen) -> SurfaceLevel | None:
-    """Return the level as the volume's appearance states it; None: there is no surface."""
+    """Return the level for the channel's appearance; None: there is no surface."""
     values = {tile: one.value for tile, one in chosen.iso.items()}
     known = [value for value in values.values() if value is not None]
     if not known:
@@ -152,7 +159,7 @@ def _surface_level(plan: Plan, chosen: Chosen) -> SurfaceLevel | None:
 
 
 def notes_on_holders(plan: Plan, windows: Mapping[str, Window]) -> Iterator[str]:
-    """Yield a line for each channel whose table or head holder is left out."""
+    """Yield a line for each channel from which a CT's table or head holder is left out."""
     holders = {one.base or one.name: windows[one.id].holder for one in plan.channels}
     for name, holder in holders.items():
         if holder is not None:
@@ -161,7 +168,7 @@ def notes_on_holders(plan: Plan, windows: Mapping[str, Window]) -> Iterator[str]
 
 
 def notes_on_survey(plan: Plan, survey: Survey, chosen: Mapping[str, Chosen]) -> Iterator[str]:
-    """Yield the lines on each channel: a mask, no background, thinned planes, no clear level."""
+    """Yield the lines on each channel: masks, missing background, thinned planes, unsure levels."""
     for channel in plan.channels:
         surveyed = survey[channel.id]
         for remark in _remarks(plan, channel, surveyed, chosen[channel.id]):
@@ -177,7 +184,7 @@ def _remarks(
         remark = f"a mask of {mask[0]:g} and {mask[1]:g}, whose surface lies half-way"
         yield remark + _loss(plan, surveyed, chosen.components)
     if found.subtracts and found.background is None:
-        yield "there is no background to subtract: its level counts from 0"
+        yield "found no background to subtract: its level counts from 0"
     if thinning := surveyed.thinning(plan):
         yield thinning
     if surveyed.appearance.surface_reason:
@@ -187,7 +194,7 @@ def _remarks(
 
 
 def _loss(plan: Plan, surveyed: ChannelSurvey, components: Components) -> str:
-    """Return the remark on a mask that smoothing takes much of; empty: it does not."""
+    """Return the remark on a mask that shrinks much by smoothing; empty: it does not."""
     inside = sum(one["voxels"] for one in components.values())
     counts = np.asarray(surveyed.statistics.histogram)
     share = counts[-1] / max(1, counts.sum())
@@ -196,6 +203,6 @@ def _loss(plan: Plan, surveyed: ChannelSurvey, components: Components) -> str:
         return ""
     smoothing = float(plan.settings.surface.smoothing_um)
     return (
-        f"; {left:.0%} of it is left by a median of 3 x 3 voxels and a Gaussian of {smoothing:g} "
-        "um (surface.smoothing_um)"
+        f"; {left:.0%} of it is left after a median of 3 x 3 voxels and a Gaussian of "
+        f"{smoothing:g} um (surface.smoothing_um)"
     )

@@ -1,4 +1,7 @@
-"""The channels of a build, each of its surfaces one, and settings that are given by channel."""
+"""The channels of a build and the settings that users give by channel.
+
+If a source channel has several surfaces, each surface is a channel of its own.
+"""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,43 +17,46 @@ from stereocell.tissue.head_classes import GREY_MATTER, WHITE_MATTER
 from stereocell.transfer.windows import NAMED
 
 T = TypeVar("T")
-ALL = "*"  # the key of settings by channel that stands for all that have none
+ALL = "*"  # key in settings by channel that stands for all channels without a key of their own
 
-# Colours (linear RGB) of channels whose file names none, on a dark ground; blue stays nuclei's. Any
-# two differ by 10 (CIEDE2000, lightness for less: light changes it) to normal sight, without red
-# and without green; the first three by 23. None is a pure primary, which a screen can't shade.
-# Source of the colour blindness: Machado et al., IEEE TVCG 15(6), 2009. doi:10.1109/TVCG.2009.113
+# Linear RGB of channels whose file names no colour, for a dark ground. Blue is kept for nuclei. Any
+# two differ by at least 10 (CIEDE2000), the first three by 23, in normal sight and in red and green
+# blindness. Lightness counts for less, because light in the scene changes it. No colour is a pure
+# primary, which a screen can't shade.
+# Colour blindness is simulated by Machado et al., IEEE TVCG 15(6), 2009. doi:10.1109/TVCG.2009.113
 PALETTE = tuple(
     linear_color((code >> 16, code >> 8 & 255, code & 255))
     for code in (0x4F70F5, 0xF0CD3C, 0xB4566E, 0x92ECF6, 0xF6F0DC, 0xA0562C, 0x3F8CA0, 0xB4C078)
 )
 
 
-_PALE = 0.6  # linear RGB: a colour whose least part is more has no lighter one beside it
-# Colours (linear RGB) of bone in CT: warm and neutral, as it is usually drawn ...
+_PALE = 0.6  # linear RGB, 0..1; if all components exceed it, a lighter colour would look the same
+# Linear RGB of bone in CT: warm and nearly neutral, as bone is usually drawn.
 FLESH = (0.78, 0.66, 0.55)
-# ... of a CT's skin. Light that is scattered many times in a paler one leaves no shade ...
+# Linear RGB of skin in CT. On paler skin, light that scatters many times would leave no shading.
 SKIN = (0.72, 0.5, 0.37)
-# ... and of the brightest tissue of an MR, which is nearly white in its slices.
+# Linear RGB of the brightest tissue of an MR, which is nearly white in its slices.
 MR_GREY = (0.92, 0.88, 0.82)
-# Most channels that show when a specimen is opened: as many as the viewer draws volumes of at once
+# Most channels that show when a specimen is opened; the viewer draws as many volumes at once.
 MOST_SHOWN = 4
 BODY_MODALITIES = ("MR", "CT")
-# Classes of tissue that an MR of a head is looked at for: skin, skull and fluid would hide them.
+# Classes of tissue that people want to see in an MR of a head. Skin, skull and fluid hide them.
 BRAIN = frozenset({GREY_MATTER, WHITE_MATTER})
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A channel that is built. `index` counts in the source; `color` is linear RGB, 0..1.
+    """A channel that is built.
 
-    source       a source for this channel alone, which a command added to the plan: one level, the
-                 planned one, and voxels uint8 with the window 0..255; empty: the plan's source
-    fingerprint  of that source
-    rung         which level of the ladder has the surface, or a voxel value, as 162 or 162+b;
-                 empty: the settings'
-    base         the name of the channel whose voxels these are, where it has several surfaces;
-                 empty: its own
+    index        place among the source's channels, from 0
+    color        linear RGB, 0..1
+    source       source of this channel alone, which a command added to the plan. It has only the
+                 planned level, and voxels in uint8 with the window 0..255. Empty: the plan's source
+    fingerprint  fingerprint of that source
+    rung         which of the found levels has the surface (`inner`), or a voxel value (`162`), or
+                 a value above the background (`162+b`); empty: the settings decide
+    base         name of the source's channel, if it has several surfaces and this is one of them;
+                 empty: `name` is the source's channel
     """
 
     index: int
@@ -63,7 +69,7 @@ class Channel:
 
     @property
     def voxels_id(self) -> str:
-        """The ID under which results of the voxels alone lie, whatever surface is made of them."""
+        """The ID of results that depend on the voxels alone, and not on the surface."""
         return to_identifier(self.base or self.name)
 
     @property
@@ -73,14 +79,15 @@ class Channel:
 
 
 def shown_at_first(channels: Sequence[Channel], label_maps: Sequence[str] = ()) -> frozenset[str]:
-    """Return the IDs of the channels that show when the specimen is opened: at most MOST_SHOWN.
+    """Return the IDs of the channels that show when the specimen is opened, at most MOST_SHOWN.
 
     label_maps  IDs of the label maps that are built beside the channels
 
-    Label maps show alone, since their closed objects would hide an image, or lie in it. Where
-    classes of a brain are built, they alone show. A channel of autofluorescence shows the same
-    tissue as the others do: its surface would hide theirs, or run through it. Of the others the
-    first ones show. All of a dozen stains at once hide one another.
+    - Label maps show without the image, because their closed objects hide it or lie inside it.
+    - Classes of a brain show without other channels.
+    - Autofluorescence is hidden. It shows the same tissue as the other channels, so its surface
+      would hide theirs or cross it.
+    - Otherwise the first channels show. A dozen stains at once would hide one another.
     """
     if label_maps:
         return frozenset(label_maps[:MOST_SHOWN])
@@ -92,7 +99,7 @@ def shown_at_first(channels: Sequence[Channel], label_maps: Sequence[str] = ()) 
 
 
 def shows_own_light(name: str) -> bool:
-    """Return whether a channel's name says that it holds the tissue's own light, and no stain's."""
+    """Return whether a channel's name says that it shows autofluorescence and not a stain."""
     return re.search(r"auto.?fluo|^background$|^af$", name.strip(), re.IGNORECASE) is not None
 
 
@@ -102,11 +109,12 @@ def has_brain(channels: Iterable[Channel]) -> bool:
 
 
 def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> list[Channel]:
-    """Return the channels, with one for each surface that the settings ask for.
+    """Return the channels, with one channel for each surface that the settings ask for.
 
-    wanted  `surfaces` of the settings: rungs or voxel values between commas, by name or index
+    wanted  `surfaces` of the settings, by channel name or index: level names or voxel values,
+            separated by commas
 
-    Raises UsageError.
+    Raises UsageError for an unknown channel, level name or value, and for a repeated surface.
     """
     given = by_name("--surfaces", wanted, channels)
     found: list[Channel] = []
@@ -128,7 +136,7 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
             found.append(replace(channel, rung=rungs[0]))
             continue
         for place, rung in enumerate(rungs):
-            # towards white from surface to surface inwards, or towards black where it is white
+            # each further surface is lighter; if the channel's colour is pale, darker
             share, end = place / len(rungs), float(min(channel.color) < _PALE)
             red, green, blue = (part + share * (end - part) for part in channel.color)
             found.append(
@@ -144,7 +152,7 @@ def with_surfaces(channels: Sequence[Channel], wanted: Mapping[str, str]) -> lis
 
 
 def _require_level(name: str, rung: str) -> None:
-    """Raise UsageError where a surface is asked for neither by a rung nor by a voxel value."""
+    """Raise UsageError if a surface is named neither by a level's name nor by a voxel value."""
     try:
         parse_level("", rung)
     except UsageError:
@@ -155,9 +163,11 @@ def _require_level(name: str, rung: str) -> None:
 
 
 def by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> dict[str, T]:
-    """Return values by channel name; a key is a name, or an index where no name equals it.
+    """Return settings by channel name.
 
-    The key ALL is for the channels that no other names; presets use it.
+    flag   name of the setting, for messages
+    given  values by channel name or index; a name that looks like an index counts as a name. The
+           key ALL, which presets use, stands for the channels without a key of their own
     """
     found: dict[str, T] = {}
     for key, value in given.items():
@@ -168,13 +178,13 @@ def by_name(flag: str, given: Mapping[str, T], channels: Sequence[Channel]) -> d
             raise UsageError(f"{flag} names channel {name!r} by name and by index, expected one")
         found[name] = value
     if ALL in given:
-        # a surface that is chosen by its rung or value has its level from there
+        # a channel with a `rung` has its level from there, so ALL does not apply to it
         found = {one.name: given[ALL] for one in channels if not one.rung} | found
     return found
 
 
 def require_no_background(settings: Settings, channels: Sequence[Channel], modality: str) -> None:
-    """Raise UsageError where a level is given above the background of what has none."""
+    """Raise UsageError if a level counts from the background of an MR or CT, which has none."""
     if modality not in BODY_MODALITIES:
         return
     given = [(f"--iso-value {key}", value) for key, value in settings.iso_values.items()]
@@ -186,20 +196,20 @@ def require_no_background(settings: Settings, channels: Sequence[Channel], modal
     for flag, value in given:
         if parse_level(flag, value)[1]:
             raise UsageError(
-                f"{flag}={value}: a level above the background, which is never "
-                f"subtracted of {modality}, expected a voxel value"
+                f"{flag}={value}: found a level above the background, which is never subtracted "
+                f"from {modality}, expected a voxel value"
             )
 
 
 def windows_of(
     windows: Mapping[str, str], channels: Sequence[Channel], modality: str
 ) -> dict[str, str]:
-    """Return windows by channel name; that of voxels with several surfaces goes to each."""
+    """Return windows by channel name; a source channel's window applies to all of its surfaces."""
     for key, window in windows.items():
         if window in NAMED and modality != "CT":
-            kind = f"this is {modality}" if modality else "nothing says that this is one"
+            kind = f"the input is {modality}" if modality else "the input is not known to be a CT"
             raise UsageError(
-                f"--window {key}={window}: a window in Hounsfield units, of CT, and {kind}: "
+                f"--window {key}={window}: this window is in Hounsfield units, and {kind}, "
                 "expected LOW:HIGH in voxel values, or --preset ct"
             )
     found: dict[str, str] = {}
@@ -220,11 +230,11 @@ def windows_of(
 def painted(
     paint: Mapping[str, str], channels: Sequence[Channel], *, labels: Sequence[str] = ()
 ) -> dict[str, str]:
-    """Return channel name -> name of the channel that is sampled onto its surface.
+    """Return, by channel name, the name of the channel that is painted on its surface.
 
-    labels  names of label maps, whose objects may be painted, too
+    labels  names of label maps; their objects may be painted, too
 
-    Raises UsageError.
+    Raises UsageError for an unknown channel, and for one that is painted on itself.
     """
     if paint and not channels:
         raise UsageError("--paint: found no channel of an image, expected one beside the labels")
@@ -234,7 +244,7 @@ def painted(
     names = [channel.name for channel in channels]
     first = list({channel.index: channel for channel in reversed(channels)}.values())[::-1]
     found = {
-        # of voxels with several surfaces any channel has the intensity
+        # the surfaces of one source channel share its voxels, so any of them can be painted
         name: _name("--paint", key, channels if key in names else first)
         for name, key in given.items()
     }

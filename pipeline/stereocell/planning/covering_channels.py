@@ -1,21 +1,24 @@
-"""Leave the surface out of a channel that covers the specimen, where it would hide the others'.
+"""Build no surface of a channel that covers the specimen, because it would hide other surfaces.
 
-A background or a marker of nearly all cells has a level like any other channel, but its surface
-wraps the block, and hides what the other surfaces show. So it is drawn as a volume alone. What
-tells it is the share of the region that lies above its level, as the components are counted:
-smoothed, background subtracted. Names tell nothing here.
+A background, or a marker of nearly all cells, has a level like any other channel. Its surface
+wraps the whole block and hides the other surfaces, so the channel is drawn as a volume only. The
+criterion is the share of the region's voxels above the level, after smoothing and subtraction of
+the background. The channel's name does not matter.
 
-The share was tuned on microscopes' channels that have others beside them:
+The limit, surface.max_share, was tuned on microscopes' volumes with several channels:
 
-| volume | channels that cover | the largest of the others |
+| volume | channels that cover, share | other channel with the largest share |
 |---|---|---|
 | brain_cells_2ch | background .86 | signal .02 |
 | sample `cells`, 13 channels | HLADR .69, Ki67 .63 | CD45 .38 |
 | sample `cycif` | none | MART1 .22 |
 | sample `brain-cells` | none | Cells .04 |
 
-A surface is left as it is where the settings state its level, or ask for it; of scans of patients,
-whose skin is meant to be seen; and where no other channel has a smaller one.
+The surface stays in three cases:
+
+- The settings state its level or ask for the surface.
+- The volume is a scan of a patient, whose skin is meant to be seen.
+- No other channel has a surface that it could hide.
 """
 
 import math
@@ -29,7 +32,7 @@ from stereocell.planning.plan import Plan
 
 
 def leave_out_covering(plan: Plan, chosen: Mapping[str, Chosen]) -> dict[str, Chosen]:
-    """Return the channels' levels, by channel ID, without those of channels that cover the others.
+    """Return the levels by channel ID, without those of channels that cover the others.
 
     A channel covers the others if more than surface.max_share of the region lies above its level.
     """
@@ -52,15 +55,15 @@ def leave_out_covering(plan: Plan, chosen: Mapping[str, Chosen]) -> dict[str, Ch
 
 
 def _share_inside(plan: Plan, chosen: Chosen) -> float:
-    """Return the share of the region's voxels above a channel's level; 0: it has none."""
-    if not chosen.found.rungs:
+    """Return the share of the region's voxels above a channel's level; 0: it has no level."""
+    if not chosen.found.candidates:
         return 0.0
     inside = sum(one["voxels"] for one in chosen.components.values())
     return float(inside / math.prod(plan.region.shape))
 
 
 def _without_surface(channel: Channel, chosen: Chosen, share: float) -> Chosen:
-    level = chosen.found.rungs[chosen.rung]
+    level = chosen.found.candidates[chosen.index]
     value = level.value if isinstance(level, Level) else level
     reason = (
         f"drawn as a volume: its surface, at {value:.5g}, would hold {share:.0%} of the specimen "
@@ -68,8 +71,8 @@ def _without_surface(channel: Channel, chosen: Chosen, share: float) -> Chosen:
     )
     return replace(
         chosen,
-        found=replace(chosen.found, rungs=(), doubt=reason),
-        rung=0,
+        found=replace(chosen.found, candidates=(), reason=reason),
+        index=0,
         components={},
         iso={id_: replace(one, value=None, confidence=None) for id_, one in chosen.iso.items()},
     )

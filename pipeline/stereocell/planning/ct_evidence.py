@@ -1,8 +1,8 @@
-"""Whether voxels look like CT: in Hounsfield units, or with the offset of 1024 that scanners store.
+"""Find out whether voxels look like a CT's, in Hounsfield units or shifted by 1024.
 
-A file that states no modality is taken for CT where its values are Hounsfield units, and for MR or
-PET otherwise. A CT whose values were shifted, or mapped to 8 bits, is taken for MR then, so the
-plan names the flags by which it is built as a CT.
+A file that states no modality is taken for CT if its values are Hounsfield units, and for MR or
+PET otherwise. A CT whose values were shifted or mapped to 8 bits would be taken for MR. Therefore
+the plan prints the flags that build it as a CT.
 """
 
 from dataclasses import dataclass
@@ -16,28 +16,32 @@ from stereocell.model.volume import Volume
 from stereocell.planning.skin_level import find_skin_level
 from stereocell.read import Dataset
 
-# At least AIR_SHARE of the voxels lie within AIR_SPREAD of air, and 99 % lie below metal.
+# HU, HU, share 0..1, HU: in a CT at least _AIR_SHARE of the voxels lie within _AIR_SPREAD of air,
+# and 99 % lie below _MAX_HU, the value of metal.
 _AIR_HU, _AIR_SPREAD, _AIR_SHARE, _MAX_HU = -1000.0, 150.0, 0.02, 4000.0
-_SOFT_HU, _SOFT_SHARE = 40.0, 0.02  # soft tissue, and the least share of voxels within AIR_SPREAD
-LEVELS_HU = {"ct": -300.0, "ct-bone": 300.0}  # of the presets
-WINDOW_HU = (-1024.0, 2000.0)  # window of the presets
+_SOFT_HU, _SOFT_SHARE = (
+    40.0,
+    0.02,
+)  # soft tissue, and least share of voxels within _AIR_SPREAD of it
+LEVELS_HU = {"ct": -300.0, "ct-bone": 300.0}  # iso-value of each preset
+WINDOW_HU = (-1024.0, 2000.0)  # window of both presets
 _LIKE_HU = "values like Hounsfield units"
-_OFFSET = 1024.0  # that scanners add to store Hounsfield units without a sign; some programs: 1000
-_PLANES = 8  # in the middle, that are looked at
-_LEAST_RANGE_HU = 20.0  # least range of 99.8 % of the voxels: normalised values have less
+_OFFSET = 1024.0  # HU that scanners add to store values without a sign; some programs add 1000
+_PLANES = 8  # planes in the middle of the volume that are read
+_LEAST_RANGE_HU = 20.0  # least range of 99.8 % of a CT's voxels; normalised values have less
 NO_SCALE = "since no scaling to Hounsfield units is known"
 
 
 @dataclass(frozen=True, slots=True)
 class CtEvidence:
-    """The evidence in the values of a volume that it is a CT.
+    """Whether the voxel values of a volume look like those of a CT.
 
-    is_hounsfield  whether they are Hounsfield units
-    words          what they look like, for the plan
-    flags          the flags by which a CT of these values is built; empty: it is by the preset
-    bone_flags     the same for bone; empty: no level of bone is known
-    least          the darkest voxel
-    basis          where the level of `flags` comes from; empty: it is in Hounsfield units, shifted
+    is_hounsfield  whether the values look like Hounsfield units
+    words          what the values look like, as words for the plan
+    flags          flags that build these values as a CT; empty: the preset alone does
+    bone_flags     flags that build the bones of such a CT; empty: no level of bone is known
+    least          value of the darkest voxel
+    basis          how the level in `flags` was found; empty: it is the preset's, shifted
     """
 
     is_hounsfield: bool
@@ -49,12 +53,12 @@ class CtEvidence:
 
     @property
     def has_no_air(self) -> bool:
-        """Whether no voxel is as dark as air, so that levels of CT mean nothing."""
+        """Whether no voxel is as dark as air, so that the levels of CT do not apply."""
         return not self.is_hounsfield and self.least > LEVELS_HU["ct"]
 
 
 def find_ct_evidence(dataset: Dataset) -> CtEvidence:
-    """Return what the values in the middle of the first channel say about CT."""
+    """Return whether the values in the middle of the first channel look like a CT's."""
     middle = read_middle(dataset)
     voxels = middle.voxels
     least = float(np.min(voxels))
@@ -74,19 +78,19 @@ def find_ct_evidence(dataset: Dataset) -> CtEvidence:
     if low >= high:
         return CtEvidence(False, words, "--preset ct", least=least, basis=NO_SCALE)
     level, origin = find_skin_level(middle)
-    # three digits: the level is one that a user looks at and moves
+    # three digits, because the user reads the level and adjusts it
     rounded = (float(f"{low:.3g}"), float(f"{high:.3g}"))
     flags, basis = _flags("ct", float(f"{level:.3g}"), rounded), f"{origin}, {NO_SCALE}"
     return CtEvidence(False, words, flags, least=least, basis=basis)
 
 
 def is_other_scale(dataset: Dataset, level: float) -> bool:
-    """Return whether the voxels of a CT show that they are no Hounsfield units.
+    """Return whether the voxels of a CT show that they are not Hounsfield units.
 
-    level  of the preset, Hounsfield units: values without a sign may still be ones that were cut
-           off at 0, as long as that level lies among them
+    level  the preset's level, in Hounsfield units. Unsigned values may be Hounsfield units that
+           were clipped at 0; then the level must not lie below all of them
 
-    A part of a body without air keeps its level: nothing shows that it is shifted.
+    A part of a body without air returns False, because nothing shows that its values are shifted.
     """
     if dataset.stored_dtype == np.uint8:
         return True
@@ -98,11 +102,11 @@ def is_other_scale(dataset: Dataset, level: float) -> bool:
 
 
 def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
-    """Return DICOM's code of what took a volume, empty if it is not known, and a note for the plan.
+    """Return DICOM's code of a volume's modality, empty if not known, and a note for the plan.
 
-    stated  the settings', where the input says none
+    stated  modality in the settings; it counts if the input states none
 
-    A volume of one channel in Hounsfield units is a CT, of whatever size: of a mouse, too.
+    A volume of one channel in Hounsfield units is a CT whatever its size; it may show a mouse.
     """
     known = dataset.modality or stated
     if known or len(dataset.channels) != 1 or dataset.dtype.kind == "u":
@@ -113,7 +117,10 @@ def recognise_modality(dataset: Dataset, stated: str) -> tuple[str, str]:
 
 
 def read_middle(dataset: Dataset) -> Volume:
-    """Return planes of the first channel: corners alone may be padding, and the middle all body."""
+    """Return whole planes from the middle of the first channel.
+
+    Corners may hold padding only, and the middle of a plane may hold the body only.
+    """
     depth, height, width = dataset.levels[0].shape
     first = max(0, (depth - _PLANES) // 2)
     middle = Box((first, 0, 0), (min(depth, first + _PLANES), height, width))
@@ -126,7 +133,7 @@ def _flags(preset: str, level: float, window: tuple[float, float]) -> str:
 
 
 def _has_air(voxels: NDArray[Any], shift: float) -> bool:
-    """Whether values are Hounsfield units plus a shift, by air and by the lack of larger ones."""
+    """Return whether the voxels hold air, and few values above a CT's, both moved by `shift` HU."""
     is_air = np.abs(voxels - (_AIR_HU + shift)) <= _AIR_SPREAD
     return float(is_air.mean()) >= _AIR_SHARE and float(np.quantile(voxels, 0.99)) <= (
         _MAX_HU + shift
@@ -134,9 +141,9 @@ def _has_air(voxels: NDArray[Any], shift: float) -> bool:
 
 
 def _is_shifted(voxels: NDArray[Any], shift: float) -> bool:
-    """Whether values without a sign have the peaks of air and of soft tissue, and little between.
+    """Return whether unsigned values have peaks of air and of soft tissue, and little in between.
 
-    Air alone is no sign: near 0 lies the background of any image.
+    Air is not enough, because the background of any image lies near 0.
     """
     if float(np.min(voxels)) < 0 or not _has_air(voxels, shift):
         return False

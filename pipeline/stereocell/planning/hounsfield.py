@@ -1,9 +1,11 @@
 """Decide whether the values of a CT are Hounsfield units, and build it as another volume if not.
 
-Where the source itself states that they are none, or the voxels show it, levels and windows of the
-presets are not used, and others are found. Where the voxels merely show no air, the settings stay
-as they are given. In all cases nothing is compared with Hounsfield units: no functions of tissues
-are offered, no table or head holder is looked for, and no window of a CT console fits.
+If the source states that its values are not Hounsfield units, or the voxels show it, the build
+finds levels and windows by itself instead of using the presets'. If the voxels only lack air, the
+settings stay as they are.
+
+In both cases no value is compared with Hounsfield units. No transfer functions by tissue are
+offered, no table or head holder is looked for, and no window of a CT console is accepted.
 """
 
 from dataclasses import dataclass, replace
@@ -17,12 +19,13 @@ from stereocell.planning.settings import HOUNSFIELD, Settings, load
 from stereocell.read import Dataset
 from stereocell.transfer.windows import NAMED
 
-# Hounsfield units of fat and air lie below, and so does this share of the voxels at least. An
-# offset of 1000 or 1024 leaves the noise of air there alone, and 8 bits leave nothing.
+# HU, share 0..1: in Hounsfield units fat and air lie below _DARK_HU, and at least _DARK_SHARE of
+# the voxels do. With an offset of 1000 or 1024 only the noise of air lies there, in 8 bits nothing.
 _DARK_HU, _DARK_SHARE = -30.0, 0.02
 NOTE = (
-    "the values of this CT are no Hounsfield units: functions of tissues, such as bone, are not "
-    "offered, and a table or head holder is not looked for, so it stays (--as hounsfield: they are)"
+    "the values of this CT are not Hounsfield units: transfer functions by tissue, such as bone, "
+    "are not offered, and a table or head holder is kept (--as hounsfield takes the values for "
+    "Hounsfield units)"
 )
 _PRESETS = ("ct", "ct-bone")  # presets with levels and windows in Hounsfield units
 
@@ -31,9 +34,9 @@ _PRESETS = ("ct", "ct-bone")  # presets with levels and windows in Hounsfield un
 class Modality:
     """The kind of scanner or microscope that took a volume.
 
-    code           DICOM's; empty: it is not known
-    is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT
-    note           what the voxels showed of it; empty: nothing
+    code           DICOM's code; empty: not known
+    is_hounsfield  whether the values of a CT may be compared with Hounsfield units
+    note           note for the plan on how the modality was recognised; empty: none
     """
 
     code: str
@@ -46,12 +49,12 @@ def settle_modality(
 ) -> tuple[Settings, Modality]:
     """Return a volume's modality, and the settings without levels that do not fit its values.
 
-    are_labels  whether only objects of label maps are built: their numbers are no measurements
+    are_labels  whether only objects of label maps are built; their numbers are not measurements
 
-    Raises UsageError where a window in Hounsfield units is asked for of other values.
+    Raises UsageError if a window in Hounsfield units is requested for other values.
     """
     code, note = dataset.modality or settings.plan.modality, ""
-    is_asserted = settings.plan.taken_as == HOUNSFIELD  # by the user
+    is_asserted = settings.plan.taken_as == HOUNSFIELD  # the user says so
     if not dataset.has_hounsfield_units:
         settings, code = without_hounsfield(settings), ""
     elif not are_labels and is_asserted:
@@ -68,14 +71,14 @@ def settle_modality(
 
 
 def _level_of_preset(settings: Settings) -> float | None:
-    """Return the level in Hounsfield units that a preset put in; None: there is none."""
+    """Return the level in Hounsfield units that a preset has set; None: no preset has."""
     level = settings.iso_values.get(ALL)
     presets = [load(name, None, flags={}).iso_values[ALL] for name in _PRESETS]
     return float(level) if level is not None and level in presets else None
 
 
 def without_hounsfield(settings: Settings) -> Settings:
-    """Return the settings without the levels and windows that a preset for CT put in."""
+    """Return the settings without the level and window that a preset for CT has set."""
     presets = [load(name, None, flags={}) for name in _PRESETS]
     levels = dict(settings.iso_values)
     if any(levels.get(ALL) == preset.iso_values[ALL] for preset in presets):
@@ -86,18 +89,18 @@ def without_hounsfield(settings: Settings) -> Settings:
     return replace(settings, iso_values=levels, windows=windows)
 
 
-def believe(dataset: Dataset, taken_as: str) -> Dataset:
-    """Return the source; if the user takes its values for Hounsfield units, they count as such."""
+def assert_hounsfield(dataset: Dataset, taken_as: str) -> Dataset:
+    """Return the source, with values in Hounsfield units if `--as hounsfield` says so."""
     if taken_as != HOUNSFIELD or dataset.has_hounsfield_units:
         return dataset
     return replace(dataset, has_hounsfield_units=True)
 
 
 def has_hounsfield(dataset: Dataset, modality: str) -> bool:
-    """Return whether values may be compared with Hounsfield units, if the modality is CT.
+    """Return whether the values of a CT may be compared with Hounsfield units.
 
-    A source that states both its modality and signed values is believed: a part of a brain has
-    neither fat nor air.
+    A source that states its modality and has signed values is trusted. Its voxels are not tested,
+    because a part of a brain has neither fat nor air.
     """
     if modality != "CT":
         return dataset.has_hounsfield_units
@@ -108,10 +111,10 @@ def has_hounsfield(dataset: Dataset, modality: str) -> bool:
 
 
 def require_no_console_window(settings: Settings) -> None:
-    """Raise UsageError where a window is given by its name, which stands for Hounsfield units."""
+    """Raise UsageError if a window is given by name, because names stand for Hounsfield units."""
     for key, window in settings.windows.items():
         if window in NAMED:
             raise UsageError(
-                f"--window {key}={window}: a window in Hounsfield units, and the values of this CT "
-                "are none: expected LOW:HIGH in voxel values"
+                f"--window {key}={window}: this window is in Hounsfield units, and the values of "
+                "this CT are not, expected LOW:HIGH in voxel values"
             )

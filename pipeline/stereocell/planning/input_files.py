@@ -1,7 +1,7 @@
-"""The files of a build's inputs, as they were when this process first opened them.
+"""Notice when input files change during a build.
 
-A plan records sizes and dates before it reads a voxel. Each pass over the tiles compares them at
-its end.
+A plan records the sizes and dates of its input files before it reads a voxel. Each pass over the
+tiles compares them at its end.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ _tables: dict[str, FileStates] = {}  # by the path in the settings
 
 
 def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> SourceRef:
-    """Return the reference to a source that is read as the settings say."""
+    """Return the reference to a source, with the settings that say how it is read."""
     return SourceRef(
         source,
         options.time,
@@ -31,8 +31,8 @@ def as_asked(source: str, options: PlanOptions, *, fingerprint: str = "") -> Sou
     )
 
 
-def open_anew(ref: SourceRef) -> Dataset:
-    """Return the dataset for a new plan: opened again where its files changed since then."""
+def reopen(ref: SourceRef) -> Dataset:
+    """Return the dataset for a new plan; it is opened again if its files have changed."""
     known = _first.pop(_key(ref), None)
     if known is not None and known.changed():
         open_source.cache_clear()
@@ -40,7 +40,7 @@ def open_anew(ref: SourceRef) -> Dataset:
 
 
 def open_watched(ref: SourceRef) -> Dataset:
-    """Return the dataset; record the state of its files if this process has not done so yet."""
+    """Return the dataset, and record the state of its files the first time it is opened."""
     dataset = open_source(ref)
     if _key(ref) not in _first:
         _first[_key(ref)] = FileStates.look(Location.of(ref.source), dataset.files)
@@ -48,25 +48,25 @@ def open_watched(ref: SourceRef) -> Dataset:
 
 
 def open_states(ref: SourceRef) -> FileStates:
-    """Return the files as this process first saw them; the first call is made now if need be."""
+    """Return the state of the files when this process first opened them, now at the latest."""
     open_watched(ref)
     return _first[_key(ref)]
 
 
 def first_states(ref: SourceRef) -> FileStates | None:
-    """Return the files as this process first saw them; None: it has not opened them yet."""
+    """Return the state of the files when this process first opened them; None: it has not yet."""
     return _first.get(_key(ref))
 
 
 def watch_table(path: str) -> None:
-    """Record the state of a table's file before a plan reads it."""
+    """Record the state of a table's file, before the plan reads the table."""
     location = Location.of(path)
     whole = location.path if location.is_local else location.source
     _tables[path] = FileStates.look(location, [whole])
 
 
 def require_table(path: str) -> None:
-    """Raise SourceError where a table changed since this process planned with it."""
+    """Raise SourceError if a table has changed since this process planned with it."""
     states = _tables.get(path)
     if states is not None and states.changed():
         forget()
@@ -77,7 +77,7 @@ def require_table(path: str) -> None:
 
 
 def forget() -> None:
-    """Forget all inputs, so that they are opened again: one of them changed."""
+    """Forget the state of all inputs, so that they are opened again after one has changed."""
     _first.clear()
     _tables.clear()
     open_source.cache_clear()

@@ -1,9 +1,9 @@
-"""Hold a source's channels to be intensities: of a label map no iso-surface is meant.
+"""Check that a source's channels hold intensities and not labels, which have no iso-surface.
 
-The metadata go before the voxels: an image that is said to be of labels is one.
+If the metadata say that the image is a label map, it is one. Otherwise blocks of voxels decide.
 
-Cameras don't count with 4 bytes and programs that number objects do. So of wide integers a block
-that holds one or two values, which tells nothing else, is taken for a part of a label map.
+A block with one or two values could be either. If its integers have 4 bytes or more, it is taken
+for a part of a label map: cameras have fewer bytes, and programs that number objects use as many.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,26 +20,26 @@ from stereocell.objects.label_rule import Kind, recognise
 from stereocell.read import Dataset
 from stereocell.steps.labels import Labels
 
-_SIDE = 128  # voxels: largest edge of a block that is looked at
-_MIN_SIDE = 32  # voxels: smallest edge of a block, however many channels are looked at
-_WIDE = 4  # bytes
-_MAX_EXACT = 2.0**53  # whole numbers below are exact as float64
-_FEW_VALUES = 8  # fewer tell nothing
-_IMAGE_S_PIECE = 7.5  # voxels of equal values in images (objects/label_rule.py), at most
-_MAX_CHANNELS = 4  # looked at in blocks of _SIDE; most label maps come with fewer others
+_SIDE = 128  # voxels; largest edge of a block that is read
+_MIN_SIDE = 32  # voxels; smallest edge of a block, however many channels are read
+_WIDE = 4  # bytes of a voxel; wider integers than cameras deliver
+_MAX_EXACT = 2.0**53  # float64 holds all whole numbers below this exactly
+_FEW_VALUES = 8  # different values; an image needs more to be recognised
+_IMAGE_S_PIECE = 7.5  # voxels; largest mean piece of equal values in images (objects/label_rule.py)
+_MAX_CHANNELS = 4  # channels that are read in blocks of _SIDE; with more, blocks are smaller
 
 
 def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, level: int) -> None:
-    """Raise UsageError where a channel looks like a label map.
+    """Raise UsageError if a channel looks like a label map.
 
-    Blocks of every channel are read at full resolution, from the middle of what is built on, until
-    one has three values: two tell nothing. The more channels, the smaller the blocks.
+    Blocks of each channel are read at full resolution, from the middle of the region outwards,
+    until a block has three values. Blocks are smaller if there are many channels.
 
     region  voxels of the level that is built
     """
     if dataset.labels:
         raise UsageError(
-            f"{dataset.shown}: is a label map: found {dataset.labels}, expected intensities: "
+            f"{dataset.shown}: this is a label map: found {dataset.labels}, expected intensities: "
             "--labels . builds its objects; --as intensity takes it for an image, as suits the "
             "mask of one object"
         )
@@ -65,10 +65,10 @@ def require_intensities(dataset: Dataset, channels: Sequence[int], region: Box, 
             )
 
 
-def doubt_of(labels: Labels) -> str:
-    """Return what is said of a label map whose middle looks like an image; empty: it does not.
+def note_on_intensities(labels: Labels) -> str:
+    """Return the note on a label map whose middle looks like an image; empty: it does not.
 
-    Raises SourceError.
+    Raises SourceError if the label map can't be read.
     """
     box = next(_blocks(Box((0, 0, 0), labels.shape), _SIDE))
     voxels = labels.open().read(box)
@@ -85,7 +85,12 @@ def doubt_of(labels: Labels) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What the blocks of a channel hold; `is_plain`: one or two values, none of them negative."""
+    """The kind of voxels in the blocks of a channel.
+
+    values    number of different values besides 0
+    pieces    number of connected pieces of equal voxels
+    is_plain  whether there are only one or two values, and none is negative
+    """
 
     kind: Kind
     values: int
@@ -94,9 +99,10 @@ class _Found:
 
 
 def _look_at(dataset: Dataset, index: int, finest: Box, side: int) -> _Found:
-    """Return what the first block with three values or more holds; where none has, all blocks.
+    """Return the kind of voxels in the first block with three or more values.
 
-    Blocks with one object each have two values each, and are a label map where these differ.
+    Without such a block, all blocks together decide. If each block holds another single object,
+    the channel is a label map.
     """
     values: set[int] = set()
     is_plain = True
@@ -116,9 +122,11 @@ def _look_at(dataset: Dataset, index: int, finest: Box, side: int) -> _Found:
 
 
 def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:
-    """Return the voxels as integers: programs save labels as floats too. None: some are no labels.
+    """Return the voxels as integers; None: some are not whole numbers, so they are not labels.
 
-    voxels  (z, y, x), as stored; NaN is no object
+    Some programs save labels as floats.
+
+    voxels  (z, y, x), as stored; NaN counts as 0, no object
     """
     if voxels.dtype.kind in "iu":
         return voxels
@@ -133,7 +141,7 @@ def _whole_numbers(voxels: NDArray[Any]) -> NDArray[Any] | None:
 def _blocks(region: Box, most: int) -> Iterator[Box]:
     """Yield blocks of the region: its middle, then the middles of its eight octants.
 
-    most  voxels of a block's edge
+    most  largest edge of a block, voxels
     """
     for z, y, x in ((2, 2, 2), *product((1, 3), repeat=3)):
         sides = []

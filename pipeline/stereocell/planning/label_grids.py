@@ -1,7 +1,7 @@
-"""The grid of a label map on its image: spacing, place, and the part of the image that it covers.
+"""Lay the grid of a label map on its image: find its spacing and place, and how much it covers.
 
-Both files state a grid, and the grids may contradict each other. A label map with as many voxels as
-its image has one number for each of the image's voxels, whatever spacing it states.
+Both files state a grid, and the grids may contradict each other. If the label map has as many
+voxels as the image, it has one number for each voxel of the image, whatever spacing it states.
 """
 
 from collections.abc import Iterator
@@ -13,8 +13,8 @@ from stereocell.model.rigid_transform import IDENTITY
 from stereocell.read.dataset import Dataset
 from stereocell.read.statements import Statement, Subject, Trust, settle
 
-_MAX_ROUNDING = 1e-6  # largest difference of two rotations' elements: rounding
-_HALF = 0.5  # voxel: smaller differences of two grids come from rounding
+_MAX_ROUNDING = 1e-6  # elements of two rotation matrices that differ by less are equal
+_HALF = 0.5  # voxels; smaller differences between two grids come from rounding
 _NOUNS = ("plane{} (z)", "row{} (y)", "column{} (x)")
 _TURNED = ("voxel{} along z", "voxel{} along y", "voxel{} along x")  # axes of the patient
 _SPACING = Subject("voxel spacing (z, y, x)", "um")
@@ -23,42 +23,44 @@ Triple = tuple[float, float, float]
 
 
 def origin_on(image: Dataset, labels: Dataset) -> Triple:
-    """Return the centre of the labels' first voxel, from the image's (z, y, x), um.
+    """Return the centre of the labels' first voxel from that of the image's, (z, y, x) in um.
 
-    Raises SourceError where they are turned to the image, or which way round they lie is not known.
+    Raises SourceError if the labels are rotated to the image, or if their orientation on it is not
+    known.
     """
     if _ways_round(image) != _ways_round(labels):
         raise SourceError(
             f"{labels.shown}: found {_ways_round(labels)}, and the image has "
-            f"{_ways_round(image)}: which way round the labels lie on it is not known, expected "
-            "both in formats that say it alike, as both NIfTI or both TIFF"
+            f"{_ways_round(image)}: the orientation of the labels on the image is not known, "
+            "expected formats that state orientation in the same way, such as NIfTI for both, or "
+            "TIFF for both"
         )
     if image.has_sides or image.placement != IDENTITY:
         between = np.linalg.inv(np.array(image.placement)) @ np.array(labels.placement)
         if np.abs(between[:3, :3] - np.eye(3)).max() > _MAX_ROUNDING:
             raise SourceError(
-                f"{labels.shown}: lies turned to the image, expected labels along its axes"
+                f"{labels.shown}: is rotated to the image, expected labels along the image's axes"
             )
         x, y, z = (float(part) for part in between[:3, 3])
         return z, -y, x
     if labels.levels[0].shape == image.levels[0].shape and not any(labels.offset_um):
-        return 0.0, 0.0, 0.0  # on the same voxels: a file without a place means no other one
+        return 0.0, 0.0, 0.0  # without a stated place, labels of equal shape lie on the same voxels
     places = zip(labels.offset_um, image.offset_um, strict=True)
     z, y, x = (own - first for own, first in places)
     return z, y, x
 
 
 def _ways_round(dataset: Dataset) -> str:
-    """Return by what a reader laid a dataset's axes, for messages."""
+    """Return how a reader found the orientation of a dataset's axes, for messages."""
     if dataset.has_sides:
         return "axes by a patient's sides"
     return "its file's own axes" if dataset.placement == IDENTITY else "axes by guessed sides"
 
 
 def has_other_spacing(image: Dataset, labels: Dataset) -> bool:
-    """Return whether labels have as many voxels as the image, and another spacing by their file.
+    """Return whether labels have as many voxels as the image, but state another spacing.
 
-    Patients' images state their whole geometry, and are laid by it.
+    Images of patients return False: they state their whole geometry, which is used.
     """
     one, other = image.levels[0], labels.levels[0]
     if one.shape != other.shape or image.placement != IDENTITY or labels.placement != IDENTITY:
@@ -68,7 +70,7 @@ def has_other_spacing(image: Dataset, labels: Dataset) -> bool:
 
 
 def settle_spacing(image: Dataset, labels: Dataset) -> tuple[str, ...]:
-    """Return the note on labels whose file states another spacing than the image's."""
+    """Return the notes on labels whose file states another spacing than the image."""
     statements = [
         Statement(image.levels[0].spacing_um, "the image, which has as many voxels,"),
         Statement(labels.levels[0].spacing_um, "the labels' file", Trust.REPEATED),
@@ -77,14 +79,14 @@ def settle_spacing(image: Dataset, labels: Dataset) -> tuple[str, ...]:
 
 
 def note_on_assumed(image: Dataset, level: int) -> str:
-    """Return the note on labels that state no voxel size, on a level with as many voxels."""
+    """Return the note on labels without a voxel size, which take that of a level of equal shape."""
     reason = f"as level {level} of the image has as many voxels"
     assumed = Statement(image.levels[level].spacing_um, reason, Trust.ASSUMED)
     return settle(_SPACING, [assumed]).notes[0]
 
 
 def require_overlap(image: Dataset, labels: Dataset, origin_um: Triple) -> None:
-    """Raise SourceError where labels lie beside the image: one of them states a wrong place."""
+    """Raise SourceError if labels and image do not overlap, because one states a wrong place."""
     if any(high <= low for low, high in _shared(image, labels, origin_um)):
         first = ", ".join(f"{part:g}" for part in origin_um)
         raise SourceError(
@@ -94,7 +96,7 @@ def require_overlap(image: Dataset, labels: Dataset, origin_um: Triple) -> None:
 
 
 def note_on_cover(image: Dataset, labels: Dataset, origin_um: Triple) -> str:
-    """Return the note on labels that cover a part of the image, or reach beyond it."""
+    """Return the note on labels that cover only a part of the image, or reach beyond it."""
     parts = list(_uncovered(image, labels, origin_um))
     beyond = list(_beyond(image, labels, origin_um))
     notes = [f"cover {' and '.join(parts)} of the image"] if parts else []
@@ -106,15 +108,15 @@ def note_on_cover(image: Dataset, labels: Dataset, origin_um: Triple) -> str:
         ""
         if states_place
         else (
-            "; their file states no place, so they are laid from the image's first voxel on: "
-            "labels of a crop need its place, as a translation in OME-Zarr"
+            "; their file states no place, so they start at the image's first voxel: labels of a "
+            "crop must state its place, for example as a translation in OME-Zarr"
         )
     )
     return f"{'; '.join(notes)}{assumed}"
 
 
 def _shared(image: Dataset, labels: Dataset, origin_um: Triple) -> Iterator[tuple[float, float]]:
-    """Yield first and last place that both grids cover along z, y and x, voxels of the image."""
+    """Yield the ends of the overlap of both grids along z, y and x, in voxels of the image."""
     finest, own = image.levels[0], labels.levels[0]
     for axis in range(3):
         step, spacing, n = finest.spacing_um[axis], own.spacing_um[axis], own.shape[axis]
@@ -123,7 +125,7 @@ def _shared(image: Dataset, labels: Dataset, origin_um: Triple) -> Iterator[tupl
 
 
 def _uncovered(image: Dataset, labels: Dataset, origin_um: Triple) -> Iterator[str]:
-    """Yield the covered part along each axis where it is not the whole one."""
+    """Yield the covered part of the image along each axis that is not covered completely."""
     finest = image.levels[0]
     for axis, (low, high) in enumerate(_shared(image, labels, origin_um)):
         n, slack = finest.shape[axis], _slack(image, labels, axis)
@@ -150,6 +152,9 @@ def _nouns(image: Dataset) -> tuple[str, ...]:
 
 
 def _slack(image: Dataset, labels: Dataset, axis: int) -> float:
-    """Return the voxels of the image by which ends may differ, as sizes are rounded in halving."""
+    """Return by how many voxels of the image the ends may differ.
+
+    The sizes of coarse levels are rounded, so a coarse label map may be a little longer.
+    """
     ratio = labels.levels[0].spacing_um[axis] / image.levels[0].spacing_um[axis]
     return max(_HALF, ratio - 1) + 1e-6

@@ -1,11 +1,11 @@
-"""The label maps of a build: where each is, and how it lies on the image."""
+"""Find the label maps of a build, and lay each on the image."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from stereocell.model.errors import SourceError, UsageError
 from stereocell.model.identifiers import to_identifier
-from stereocell.planning.input_files import as_asked, open_anew
+from stereocell.planning.input_files import as_asked, reopen
 from stereocell.planning.label_grids import (
     has_other_spacing,
     note_on_assumed,
@@ -21,15 +21,15 @@ from stereocell.read.remarks import CAST
 from stereocell.steps.labels import Labels, Triple
 from stereocell.steps.open_source import SourceRef
 
-SELF = "."  # in place of a path: the input itself
-_SHOWN = 4  # names in a note
-_COLOURS = "colour pixels"  # how a reader's remark on them begins
-_AVERAGED = ("resampled", "interpolated")  # in what a reader says of voxels between others
+SELF = "."  # stands in place of a path for the input itself
+_SHOWN = 4  # most names in a note
+_COLOURS = "colour pixels"  # first words of a reader's remark on colour images
+_AVERAGED = ("resampled", "interpolated")  # words in a reader's remark on averaged voxels
 
 
 @dataclass(frozen=True, slots=True)
 class FoundLabels:
-    """The label maps of a build, and notes on what was chosen or assumed in laying them."""
+    """The label maps of a build, and notes on what was chosen or assumed about their grids."""
 
     labels: tuple[Labels, ...]
     notes: tuple[str, ...]
@@ -39,7 +39,7 @@ class FoundLabels:
 class _Opened:
     """A label map's dataset, how it was opened, and where its first voxel lies on the image.
 
-    origin_um  (z, y, x), from the centre of the image's first voxel
+    origin_um  centre of its first voxel from that of the image's, (z, y, x) in um
     notes      sentences without the label map's name
     """
 
@@ -50,7 +50,7 @@ class _Opened:
 
 
 def are_alone(wanted: Mapping[str, str]) -> bool:
-    """Return whether the input itself is a label map, so that there is no image."""
+    """Return whether the input itself is a label map, so that the build has no image."""
     return any(SELF in pair for pair in wanted.items())
 
 
@@ -63,29 +63,29 @@ def find_labels(
     colors: Sequence[Triple],
     taken: Sequence[str],
 ) -> FoundLabels:
-    """Return the label maps that are asked for, by name, in the order given.
+    """Return the requested label maps, in the order given.
 
     image   the input, which may be a label map itself
-    wanted  path by name: empty means one of the input's own `labels`, SELF the input
-    colors  by turns
+    wanted  path by name; an empty path means one of the input's own `labels`, SELF the input
+    colors  linear RGB, given to the label maps in turn
     taken   names of the image's channels
 
-    Raises UsageError, SourceError.
+    Raises UsageError for a name that can't be used, SourceError for a map that does not fit.
     """
     found: list[Labels] = []
     notes: list[str] = []
-    # but for their case: on Windows and macOS their files would be one
+    # compared in small letters, because Windows and macOS ignore case in file names
     ids = [to_identifier(name).lower() for name in taken]
     for name, place in wanted.items():
         if not name.isprintable():
             raise UsageError(f"--labels {name!r:.60}: expected a name without control characters")
         opened = _opened(image, source, name, place, settings.plan)
         title = name
-        if name == SELF:  # the name of a patient's file may be the patient's
+        if name == SELF:  # the file of a patient may bear the patient's name
             title = "labels" if image.has_sides else image.name
         channels = opened.dataset.channels
-        several = len(channels) > 1  # segments that overlap come as several
-        told = [*opened.notes, *_on_channels([one.name for one in channels])]
+        several = len(channels) > 1  # readers return overlapping segments as several channels
+        own_notes = [*opened.notes, *_on_channels([one.name for one in channels])]
         for index, channel in enumerate(channels):
             one = Labels(
                 f"{title} {channel.name}" if several else title,
@@ -99,31 +99,31 @@ def find_labels(
             )
             if one.id.lower() in ids:
                 raise UsageError(
-                    f"--labels {one.name}: a channel has that name (small letters or capitals), "
-                    f"expected another one, as {one.name}_objects=PATH"
+                    f"--labels {one.name}: a channel has this name already (case is ignored), "
+                    f"expected another name, such as {one.name}_objects=PATH"
                 )
             ids.append(one.id.lower())
             found.append(one)
         if SELF not in (name, place):
             require_overlap(image, opened.dataset, opened.origin_um)
             cover = note_on_cover(image, opened.dataset, opened.origin_um)
-            told += [cover] if cover else []
-        notes += [f"labels {title!r}: {note}" for note in told]
+            own_notes += [cover] if cover else []
+        notes += [f"labels {title!r}: {note}" for note in own_notes]
     return FoundLabels(tuple(found), tuple(notes))
 
 
 def _opened(image: Dataset, source: str, name: str, place: str, options: PlanOptions) -> _Opened:
-    """Return a label map's dataset, and how it was opened."""
+    """Return a label map's dataset, how it was opened, and its place on the image."""
     if SELF in (name, place):
         ref = as_asked(source, options, fingerprint=image.fingerprint)
         return _Opened(_as_stored(image), ref, (0.0, 0.0, 0.0))
     resolved = resolve(place or f"{source.rstrip('/')}/labels/{name}")
     ref = SourceRef(resolved.source, 0, ())
     try:
-        dataset = open_anew(ref)
+        dataset = reopen(ref)
     except SourceError as error:
         if "voxel size" not in str(error):
-            remedy = "" if place else f"; or give its path, as --labels {name}=PATH"
+            remedy = "" if place else f"; or give its path by --labels {name}=PATH"
             raise SourceError(f"--labels {name}: {error}{remedy}") from error
         return _without_size(image, ref, options, error)
     dataset, ref, note = _at_time(image, _as_stored(dataset), ref, options)
@@ -132,28 +132,28 @@ def _opened(image: Dataset, source: str, name: str, place: str, options: PlanOpt
     if has_other_spacing(image, dataset):
         notes += settle_spacing(image, dataset)
         ref = replace(ref, spacing_um=image.levels[0].spacing_um)
-        dataset = open_anew(ref)
+        dataset = reopen(ref)
     return _finished(dataset, ref, origin, notes)
 
 
 def _without_size(
     image: Dataset, ref: SourceRef, options: PlanOptions, error: SourceError
 ) -> _Opened:
-    """Return a label map that states no voxel size, on the image's level of the same shape."""
+    """Return a label map without a voxel size, laid on the image's level of the same shape."""
     ref = replace(ref, spacing_um=image.levels[0].spacing_um)
-    dataset = _as_stored(open_anew(ref))
+    dataset = _as_stored(reopen(ref))
     shape = dataset.levels[0].shape
     same = (index for index, level in enumerate(image.levels) if level.shape == shape)
     if (level := next(same, None)) is None:
         is_turned = sorted(shape) == sorted(image.levels[0].shape)
-        hint = ": its axes are in another order, save it as (z, y, x)" if is_turned else ""
+        hint = ": its axes are in another order; save it as (z, y, x)" if is_turned else ""
         raise SourceError(
             f"{dataset.shown}: states no voxel size: found {_by(shape)} voxels (z, y, x), "
             f"expected the image's {_by(image.levels[0].shape)}{hint}"
         ) from error
     if level:
         ref = replace(ref, spacing_um=image.levels[level].spacing_um)
-        dataset = open_anew(ref)
+        dataset = reopen(ref)
     dataset, ref, note = _at_time(image, dataset, ref, options)
     notes = [*([note] if note else []), note_on_assumed(image, level)]
     origin = image.levels[level].origin_um if level else origin_on(image, dataset)
@@ -163,11 +163,13 @@ def _without_size(
 def _at_time(
     image: Dataset, dataset: Dataset, ref: SourceRef, options: PlanOptions
 ) -> tuple[Dataset, SourceRef, str]:
-    """Return a label map at the image's point in time, if it has several, and a note if not."""
+    """Return a label map at the image's point in time, and a note if it has only one point."""
     if dataset.time_points == 1:
         if image.time_points == 1:
             return dataset, ref, ""
-        note = f"one point in time, laid on --time {options.time} of {image.time_points}"
+        note = (
+            f"has one point in time, which is used for --time {options.time} of {image.time_points}"
+        )
         return dataset, ref, note
     if options.time >= dataset.time_points:
         raise SourceError(
@@ -176,13 +178,13 @@ def _at_time(
         )
     if options.time:
         ref = replace(ref, time=options.time)
-        dataset = open_anew(ref)
+        dataset = reopen(ref)
     return dataset, ref, ""
 
 
 def _finished(dataset: Dataset, ref: SourceRef, origin_um: Triple, notes: Sequence[str]) -> _Opened:
-    """Return an opened label map with its reader's own notes."""
-    # numbers of objects are read as they are
+    """Return an opened label map with the notes of its reader."""
+    # labels are read without a cast, so a note on one does not apply
     own = [note for note in dataset.notes if not note.startswith(CAST)]
     ref = replace(ref, fingerprint=dataset.fingerprint)
     return _Opened(dataset, ref, origin_um, (*own, *notes))
@@ -197,7 +199,7 @@ def _on_channels(names: Sequence[str]) -> list[str]:
 
 
 def _as_stored(dataset: Dataset) -> Dataset:
-    """Return a dataset whose voxels are the file's own. Raises SourceError for any other."""
+    """Return the dataset. Raises SourceError if its voxels are not as the file stores them."""
     for remark in dataset.remarks:
         if remark.startswith(_COLOURS):
             raise SourceError(
@@ -205,8 +207,8 @@ def _as_stored(dataset: Dataset) -> Dataset:
             )
         if any(word in remark for word in _AVERAGED):
             raise SourceError(
-                f"{dataset.shown}: {remark}: found numbers of objects, which have no means, "
-                "expected labels on a grid that needs none"
+                f"{dataset.shown}: {remark}: found averaged numbers of objects, which mean "
+                "nothing, expected labels on a grid that needs no averaging"
             )
     return dataset
 

@@ -1,4 +1,4 @@
-"""Notes on a label map's objects: how many, which ones are cut, doubts on their numbers."""
+"""Notes on a label map's objects: their count, which are cut, and suspicious numbers."""
 
 from collections.abc import Iterator
 from math import prod
@@ -19,19 +19,25 @@ from stereocell.planning.plan import Plan
 from stereocell.steps.find_extents import FindExtents
 from stereocell.steps.labels import Labels
 
-_COUNTED_AT_ONCE = 1 << 25  # voxels of a label map that `plan` counts: half a second
-_SIDES = 6  # sides of a volume, all of which a background touches
-_SIDES_OF_MOST_VOXELS = 3  # at least that many, where it has over half of the voxels
+_COUNTED_AT_ONCE = 1 << 25  # voxels of the largest label map that `plan` counts, in half a second
+_SIDES = 6  # sides of a volume; a background touches all of them
+_SIDES_OF_MOST_VOXELS = 3  # fewest sides that a background with over half of the voxels touches
 
 
 def notes_on_numbers(labels: Labels, located: Located) -> Iterator[str]:
-    """Yield a sentence on each doubt about a label map's numbers. Raises SourceError."""
+    """Yield a sentence on each suspicious number of a label map.
+
+    Raises SourceError if the label map can't be read.
+    """
     if len(located.extents.labels):
         yield from filter(None, (_background(labels, located), _merged(labels, located)))
 
 
 def _background(labels: Labels, located: Located) -> str:
-    """Return the note on a largest object that touches most sides; empty: there is none."""
+    """Return the note on an object that is probably the background; empty: there is none.
+
+    It is the largest object and touches most sides of the volume.
+    """
     extents = located.extents
     largest = int(np.argmax(extents.voxels))
     start = [int(edges[0]) for edges in located.grid.edges]
@@ -51,7 +57,7 @@ def _background(labels: Labels, located: Located) -> str:
 
 
 def _merged(labels: Labels, located: Located) -> str:
-    """Return the note on numbers that the file's type can't tell apart; empty: it can."""
+    """Return the note on objects that share a number in the file's data type; empty: none do."""
     dtype, largest = labels.open().dataset.stored_dtype, int(located.extents.labels[-1])
     if dtype.kind == "f":
         exact = 2 ** (np.finfo(dtype).nmant + 1)
@@ -59,8 +65,8 @@ def _merged(labels: Labels, located: Located) -> str:
             return ""
         return (
             f"{labels.name}: found numbers up to {largest} in {dtype.name}, which rounds whole "
-            f"numbers beyond {exact:,}: objects with neighbouring numbers are one object there; "
-            f"save the labels as uint32"
+            f"numbers beyond {exact:,}: objects with neighbouring numbers become one object; save "
+            "the labels as uint32"
         )
     count = len(located.extents.labels) + located.small
     if dtype.kind == "u" and dtype.itemsize <= 2 and count == largest == np.iinfo(dtype).max:
@@ -79,14 +85,17 @@ def notes_on_objects(labels: Labels, located: Located) -> Iterator[str]:
 
 
 def describe_objects(labels: Labels, located: Located) -> str:
-    """Return how many objects there are, which are cut, and how many are left out, in words."""
+    """Return the line on how many objects there are, which are cut, and how many left out."""
     summary = counted(len(located.owners), "object")
     cut = located.extents.labels[located.owners == CUT]
     if len(cut):
         shown = ", ".join(map(str, cut[:8].tolist())) + ", ..." * (len(cut) > 8)
-        summary += f", {len(cut)} of them larger than a tile and half around it, and cut ({shown})"
+        summary += (
+            f", {len(cut)} of them cut at tile borders, because they reach farther than half a "
+            f"tile beyond their own ({shown})"
+        )
     if located.small:
-        summary += f"; {located.small} of too few voxels are left out (objects.smallest_voxels)"
+        summary += f"; {located.small} with too few voxels are left out (objects.smallest_voxels)"
     return f"{labels.name}: {summary}"
 
 
@@ -96,9 +105,10 @@ def is_large(labels: Labels) -> bool:
 
 
 def notes_before_units(plan: Plan) -> Iterator[str]:
-    """Yield of each label map what its units will cut, from its voxels where these are few.
+    """Yield the note on which objects of each label map will be cut.
 
-    Raises SourceError where they are no labels.
+    Small label maps are counted; for large ones the note states the size of an object that is cut.
+    Raises SourceError if the voxels are not labels.
     """
     for labels in plan.labels:
         boxes = tile_boxes(TileGrid.of(plan, labels))
@@ -111,6 +121,7 @@ def notes_before_units(plan: Plan) -> Iterator[str]:
             largest = np.max([box.shape for box in boxes.values()], axis=0) * labels.spacing_um
             z, y, x = ((1 + 2 * AROUND) * largest).tolist()
             yield (
-                f"{labels.name}: objects larger than a tile and half around it, {z:.4g} x {y:.4g} "
-                f"x {x:.4g} um (z, y, x), will be cut at the tiles' planes: `units` names them"
+                f"{labels.name}: objects that reach farther than half a tile beyond their own, out "
+                f"of {z:.4g} x {y:.4g} x {x:.4g} um (z, y, x), will be cut at tile borders: "
+                "`units` names them"
             )

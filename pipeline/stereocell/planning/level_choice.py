@@ -1,4 +1,4 @@
-"""Which level of a channel has its surface: the given one, a rung of the ladder, its threshold."""
+"""Choose the level of a channel's surface: the given one, one that was found, or a threshold."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -31,36 +31,39 @@ from stereocell.planning.vessel_levels import choose_connected, find_vessel_leve
 from stereocell.steps.find_window import Window
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
-APART_SHARE = 0.25  # share of all voxels inside: a rung whose largest components hold less has many
-# the same where many components may touch: the share, and the least number of components but specks
+# Share of the voxels inside, 0..1: at a level that parts cells, the largest components hold less.
+APART_SHARE = 0.25
+# Share of the voxels inside, and components without specks: where cells touch, the largest
+# components may hold this share if there are at least this many components.
 JOINED_SHARE, MANY = 2 / 3, 30
-# Share of all voxels that cells of a cleared tissue fill at least: in a stack whose cells stood at
-# 1675, a level of 8384 left .02 % inside
+# Least share of all voxels that cells of cleared tissue fill. Tuned on a stack with cells at 1675,
+# where a wrong level of 8384 left 0.02 % inside.
 APART_LEAST = 5e-4
-APART_MOST = 0.1  # share of all voxels that sparse cells fill at most
+APART_MOST = 0.1  # largest share of all voxels that sparse cells fill
 Components = dict[str, Mapping[str, Any]]  # ComponentSums by tile ID
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is known of a channel's level before its components are.
+    """The levels of a channel, as they are known before its components are counted.
 
-    window    of the channel
-    levels    what its tiles add up to; None where there is no evidence
-    evidence  each tile's; empty for shares of tissue, whose level is known
-    rungs     the levels that may have the surface: the given one, or clear ones; the first is
-              taken, unless its components speak against it
-    doubt     why there is none
-    is_fixed  whether all tiles have the same level, whatever they hold: a given one, or a mask's
-    is_given  whether the settings state the level: a standard, as 300 HU for bone, and no guess
+    window      the channel's window
+    levels      all levels that its tiles show together; None: there is no evidence
+    evidence    evidence of each tile, by tile ID; empty for shares of tissue, whose level is known
+    candidates  levels that may have the surface: the given one, or clear ones. The first is taken
+                unless the components favour another
+    subtracts   whether the levels count from the background
+    reason      why there is no surface; empty: there is one
+    is_fixed    whether all tiles have the same level, because it is given or the channel is a mask
+    is_given    whether the settings state the level, so that it is certain (300 HU for bone)
     """
 
     window: Window
     levels: ChannelLevels | None
     evidence: Mapping[str, TileEvidence]
-    rungs: tuple[Level | float, ...]
+    candidates: tuple[Level | float, ...]
     subtracts: bool
-    doubt: str
+    reason: str
     is_fixed: bool = False
     is_given: bool = False
 
@@ -70,15 +73,18 @@ class Found:
         return self.window.statistics.background if self.subtracts else None
 
 
-GROUND_ENDS = (0.05, 0.95)  # quantiles of a background: its dim and its bright side
-# The rise of the background, as a share of a level's contrast, from which on the light is uneven
+GROUND_ENDS = (0.05, 0.95)  # quantiles of a background that stand for its dim and bright side
+# Share of a level's contrast: if the background rises by more across the volume, light is uneven.
 UNEVEN_GROUND = 0.5
 
 
 def find_level(
     plan: Plan, channel: Channel, window: Window, evidence: Mapping[str, TileEvidence]
 ) -> Found:
-    """Return a channel's level; `evidence` by tile ID, empty where there is none."""
+    """Return a channel's levels.
+
+    evidence  evidence by tile ID; empty for shares of tissue
+    """
     given = given_level(plan, channel)
     if not evidence:
         assert given is not None
@@ -96,19 +102,19 @@ def find_level(
     levels = find(subtracts=None if given is None else given[1])
     wants_cells = (channel.rung or options.rung) == APART and _shows_cells(plan)
     if given is None and wants_cells and not levels.subtracts:
-        # cells in dim and in bright tissue have their height above the tissue in common; without
-        # sparse ones, a level above it is that of the tissue's own texture
+        # Cells in dim and in bright tissue rise equally far above the tissue. If nothing sparse
+        # rises above it, such a level would only show the tissue's own texture.
         above = find(subtracts=True)
         has_cells = any(level.share <= APART_MOST for level in above.clear)
         levels = above if has_cells else levels
     mask, half = window.counting.mask, None
     if mask is not None and criterion not in CRITERIA:
-        # blurred, a mask has its own edge half-way; peaks of its blur are no levels
+        # A blurred mask has its edge half-way. Other peaks come from the blur and are not levels.
         half = levels.judge(sum(mask) / 2)
         levels = replace(levels, ladder=(half,) if levels.has_both_sides(half.value) else ())
     if given is not None:
         value, subtracts = given
-        # where there is no background to be above, nothing can be said of such a level
+        # A level above the background can only be judged if the background was subtracted.
         rated = levels.judge(value) if subtracts == levels.subtracts else value
         return Found(
             window, levels, evidence, (rated,), subtracts, "", is_fixed=True, is_given=True
@@ -121,12 +127,12 @@ def find_level(
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
     clear = levels.shown(highest)
-    doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
+    reason = f"no clear surface: {levels.doubt}" if levels.doubt else ""
     if criterion == ADAPTIVE and clear:
         threshold = window.statistics.threshold
         if threshold is None:
-            nothing = "no clear surface: the channel's histogram has no threshold"
-            return Found(window, levels, evidence, (), False, nothing)
+            missing = "no clear surface: the channel's histogram has no threshold"
+            return Found(window, levels, evidence, (), False, missing)
         plain = replace(levels, subtracts=False)
         rated = threshold.value if levels.subtracts else levels.judge(threshold.value)
         return Found(window, plain, evidence, (rated,), False, "", is_fixed=True)
@@ -138,53 +144,56 @@ def find_level(
     elif clear:
         place = RUNGS[rung]
         if place >= len(clear):
-            doubt = f"no clear surface: {len(clear)} clear levels, none that is the {rung}"
+            reason = f"no clear surface: found {len(clear)} clear levels, none of them the {rung}"
         clear = clear[place : place + 1]
-    return Found(window, levels, evidence, clear, levels.subtracts, doubt)
+    return Found(window, levels, evidence, clear, levels.subtracts, reason)
 
 
 def highest_of(statistics: ChannelStatistics, subtracts: bool) -> float:
-    """Return the display window's upper end, in voxel values or above the mean background."""
+    """Return the upper end of the display window.
+
+    subtracts  whether it counts from the mean background; otherwise it is a voxel value
+    """
     under = statistics.background if subtracts else None
     return statistics.window[1] - (0.0 if under is None else float(under.values.mean()))
 
 
-def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
-    """Return why a level that the program found cannot be called clear; empty: it can.
+def explain_uncertainty(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
+    """Return why a level that the program found is not clear; empty: it is clear.
 
-    chosen  index into `found.rungs`
-    tiles   the level of each tile, with its own confidence
+    chosen  index into `found.candidates`
+    tiles   the level of each tile, with the tile's own confidence
     """
-    if found.is_fixed or found.levels is None or not found.rungs:
+    if found.is_fixed or found.levels is None or not found.candidates:
         return ""
-    level = found.rungs[chosen]
+    level = found.candidates[chosen]
     if not isinstance(level, Level):
         return ""
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
     if level in found.levels.ladder and level not in clear and clear:
         return (
-            f"it falls short of a clear level by a little ({level.doubt}), and the next one, "
-            f"{clear[0].value:.5g}, leaves {clear[0].share:.3%} of the voxels inside"
+            f"the level is nearly clear ({level.doubt}), but the next clear level, "
+            f"{clear[0].value:.5g}, leaves only {clear[0].share:.3%} of the voxels inside"
         )
     if level.value > highest:
-        return f"it lies above the display window, which ends at {highest:.5g}"
+        return f"the level lies above the display window, which ends at {highest:.5g}"
     if all(tile.confidence is None for tile in tiles):
-        return "no tile by itself has enough voxels on both sides of it"
+        return "no tile by itself has enough voxels on both sides of the level"
     if uneven := _uneven_light(found, level):
         return uneven
     if bodies := bodies_in_haze(level, found.levels.ladder):
         return (
-            f"it may be a haze around brighter bodies, whose level, {bodies.value:.5g}, has "
-            f"{bodies.contrast / level.contrast:.0f} times its contrast and {bodies.share:.2%} of "
-            "the voxels inside"
+            "the surface may enclose a haze around brighter structures: their level, "
+            f"{bodies.value:.5g}, has {bodies.contrast / level.contrast:.0f} times the contrast "
+            f"and {bodies.share:.2%} of the voxels inside"
         )
     return ""
 
 
 def _uneven_light(found: Found, level: Level) -> str:
-    """Return why one level may lose the bodies of a dim side; empty: the ground is even enough.
+    """Return why one level may miss structures on a dim side; empty: the background is even.
 
-    A ground that crosses the level is a large body itself, and no light.
+    A background that reaches the level is a large structure itself and does not show uneven light.
     """
     ground = found.window.statistics.background
     if ground is None or found.subtracts:
@@ -193,21 +202,21 @@ def _uneven_light(found: Found, level: Level) -> str:
     if bright >= level.value or bright - dim < UNEVEN_GROUND * level.contrast:
         return ""
     return (
-        f"the ground rises from {dim:.5g} to {bright:.5g}, as in uneven light, beside a contrast "
-        f"of {level.contrast:.5g}: bodies on the dim side may be missing"
+        f"the background rises from {dim:.5g} to {bright:.5g}, as in uneven light, and the "
+        f"contrast is {level.contrast:.5g}: structures on the dim side may be missing"
     )
 
 
 def _shows_cells(plan: Plan) -> bool:
-    """Return whether a cell is at least a voxel wide; in coarser voxels there is tissue alone."""
+    """Return whether a cell is at least one voxel wide; coarser voxels only show tissue."""
     body_um = plan.settings.surface.body_um
     return not body_um or min(plan.spacing_um) <= body_um
 
 
 def _fit_for_cells(levels: tuple[Level, ...], highest: float) -> tuple[Level, ...]:
-    """Return the levels that cells may lie at: all but specks, and none that no window shows.
+    """Return the levels that may show cells: within the window, and with more inside than specks.
 
-    The outermost stays in any case, since it is the surface where there are no cells.
+    The outermost level is always among them, because it is the surface if there are no cells.
     """
     return levels[:1] + tuple(
         level for level in levels[1:] if level.share >= APART_LEAST and level.value <= highest
@@ -215,7 +224,10 @@ def _fit_for_cells(levels: tuple[Level, ...], highest: float) -> tuple[Level, ..
 
 
 def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
-    """Return the iso-value that the user gives for a channel, and whether above the background."""
+    """Return a channel's iso-value in the settings, and whether it counts from the background.
+
+    None: the settings state no value.
+    """
     if channel.rung:
         if channel.rung in (*RUNGS, NO_SURFACE):
             return None
@@ -224,29 +236,29 @@ def given_level(plan: Plan, channel: Channel) -> tuple[float, bool] | None:
     return None if given is None else parse_level(f"--iso-value {channel.name}", given)
 
 
-def choose_by_components(options: IsoValueOptions, of_rungs: Sequence[Components]) -> int:
-    """Return the index of the level that a channel's components speak for.
+def choose_by_components(options: IsoValueOptions, by_level: Sequence[Components]) -> int:
+    """Return the index of the level whose connected components fit the settings best.
 
-    of_rungs  the ComponentSums of each tile at each level; one level alone is taken as it is
+    by_level  the ComponentSums of each tile, for each level; a single level is returned unjudged
     """
-    if len(of_rungs) < 2:
+    if len(by_level) < 2:
         return 0
-    return choose_connected(of_rungs) if options.rung == CONNECTED else choose_rung(of_rungs)
+    return choose_connected(by_level) if options.rung == CONNECTED else choose_apart(by_level)
 
 
-def choose_rung(of_rungs: Sequence[Components]) -> int:
-    """Return the index of the level that has the most components.
+def choose_apart(by_level: Sequence[Components]) -> int:
+    """Return the index of the level with the most components among those that part cells.
 
-    A level counts if its largest components, one a tile, hold less than APART_SHARE of the voxels
-    inside. Where cells touch they may hold JOINED_SHARE, if MANY components are of a size with one
-    another: the bright parts of a whole brain are a few large pieces among a hundred specks.
-    Without such a level the outermost is returned.
+    A level parts cells if its largest components, one of each tile, hold less than APART_SHARE of
+    the voxels inside. Where cells touch, they may hold up to JOINED_SHARE if there are MANY
+    components without specks. The bright parts of a whole brain fail this: they are a few large
+    pieces among a hundred specks. If no level parts cells, the outermost is returned.
 
-    of_rungs  the ComponentSums of each tile at each level, outermost first
+    by_level  the ComponentSums of each tile, for each level, outermost first
     """
     best, most = 0, (0, 0.0)
-    for place, components in enumerate(of_rungs):
-        # summed over the tiles: a component that fills all of them is the largest in each
+    for place, components in enumerate(by_level):
+        # The largest are summed over the tiles, since one component may be the largest in each.
         voxels, largest, count, kept = (
             sum(one[key] for one in components.values())
             for key in ("voxels", "largest", "count", "kept")
@@ -259,11 +271,11 @@ def choose_rung(of_rungs: Sequence[Components]) -> int:
 
 
 def check_components(plan: Plan, found: Found, components: Components) -> Found:
-    """Return what is known of a level with its components: one that parts nothing has no surface.
+    """Return the channel's levels, without a surface if all voxels lie on one side of the level.
 
-    components  the ComponentSums of each tile at the level that is taken
+    components  the ComponentSums of each tile at the chosen level
     """
-    if not found.rungs or not components:
+    if not found.candidates or not components:
         return found
     inside = sum(one["voxels"] for one in components.values())
     if 0 < inside < sum(math.prod(tile.box.shape) for tile in plan.tiles):
@@ -272,10 +284,14 @@ def check_components(plan: Plan, found: Found, components: Components) -> Found:
 
 
 def check_histogram(found: Found) -> Found:
-    """Return the same before there are components: exact but for a few hot voxels."""
-    if not found.is_fixed or not found.rungs or found.levels is None:
+    """Return the channel's levels, without a surface if the whole histogram lies on one side.
+
+    This is `check_components` before the components are counted. Its answer is exact except for a
+    few hot voxels.
+    """
+    if not found.is_fixed or not found.candidates or found.levels is None:
         return found
-    value = _value_of(found.rungs[0])
+    value = _value_of(found.candidates[0])
     if found.subtracts != found.levels.subtracts or found.levels.has_both_sides(value):
         return found
     return _without_surface(
@@ -285,8 +301,9 @@ def check_histogram(found: Found) -> Found:
 
 def _without_surface(found: Found, side: str) -> Found:
     above = " above the background" if found.subtracts else ""
-    reason = f"no surface: all voxels lie {side} the level {_value_of(found.rungs[0]):.5g}{above}"
-    return replace(found, rungs=(), doubt=reason)
+    level = _value_of(found.candidates[0])
+    reason = f"no surface: all voxels lie {side} the level {level:.5g}{above}"
+    return replace(found, candidates=(), reason=reason)
 
 
 def _value_of(level: Level | float) -> float:
@@ -296,16 +313,16 @@ def _value_of(level: Level | float) -> float:
 def level_of_tile(
     plan: Plan, tile: Tile, found: Found, chosen: int, files: dict[str, str]
 ) -> TileIso:
-    """Return the level of one tile at the rung chosen for its channel, with the files it came from.
+    """Return the level of one tile, and the files it came from.
 
     plan    its setting `isovalue.scope` says whether each tile has a level of its own
-    found   what the survey found of the channel
-    chosen  index into `found.rungs`
-    files   the tile's own results, relative to OUT, by what they hold
+    found   the channel's levels
+    chosen  index of the channel's level in `found.candidates`
+    files   files of the tile's results, relative to OUT, by kind of result
     """
-    if not found.rungs:
+    if not found.candidates:
         return TileIso(None, 0.0, None, files)
-    level, below = found.rungs[chosen], 0.0
+    level, below = found.candidates[chosen], 0.0
     if found.background is not None:
         under = np.broadcast_to(found.background.at(tile.box), tile.box.shape)
         below = float(np.mean(under, dtype=np.float64))
@@ -317,7 +334,7 @@ def level_of_tile(
     judged = found.levels.judge_tile(level, tile_evidence)
     if plan.settings.isovalue.scope == "tile" and not found.is_fixed:
         value = found.levels.level_of_tile(level, tile_evidence)
-    # A tile judges a level among all that lies above it, and the channel among what lies up to the
-    # next level: a tile is no surer than its channel.
+    # A tile is never more confident than its channel. A tile compares the level with all voxels
+    # above it, a channel only with those up to the next level.
     sure = None if judged is None else min(judged.confidence, level.confidence)
     return TileIso(value, below, sure, files)

@@ -1,10 +1,11 @@
-"""A first look at the levels of a channel, while the plan is made: on blocks, in a second.
+"""Estimate the level of each channel while the plan is made, from a few blocks, in a second.
 
-`units` finds the level on all voxels. The plan states it, and the levels near it, before hours are
-spent on a build. Blocks of full resolution tell that better than a coarse level, which
-has less noise and other slopes. A small volume is looked at as a whole.
+`units` finds the level on all voxels. The plan states an estimate and the levels near it, before
+hours are spent on a build. Blocks at full resolution are better for that than a coarse resolution
+level, which has less noise and other slopes. A small volume is read as a whole.
 
-Light that falls off along an axis is not looked for: few blocks have means that differ by chance.
+Light that falls off along an axis is not corrected, because the means of a few blocks differ by
+chance.
 """
 
 import math
@@ -39,22 +40,22 @@ from stereocell.steps.open_source import open_source
 from stereocell.transfer.channel_statistics import find_statistics
 from stereocell.transfer.joint_histogram import sample_boxes
 
-# Voxels of all channels together that are looked at: this share of all, within these bounds. In
-# cells, brains and heads the levels of the blocks are within 15 % of those of all voxels, and
-# confidences within .12
+# Share of the voxels of all channels that is read, and its bounds in voxels. In cells, brains and
+# heads the levels of the blocks were within 15 % of those of all voxels, and confidences within
+# 0.12.
 SHARE, BOUNDS = 1 / 12, (2_000_000, 3_000_000)
-LEAST = 200_000  # voxels of one channel, however many there are
-MOST_VOXELS = 500_000_000  # of a channel's region: blocks of larger ones lie in too many chunks
-MAX_CHANNELS = 12  # channels that are looked at
-PASSES = 3  # that find the background; all six find nearly the same levels
+LEAST = 200_000  # fewest voxels of one channel, however many channels there are
+MOST_VOXELS = 500_000_000  # largest region, voxels; blocks of larger ones lie in too many chunks
+MAX_CHANNELS = 12  # most channels whose level is estimated
+PASSES = 3  # passes that find the background; the build's six find nearly the same levels
 BLOCK = (12, 40, 40)  # voxels (slice, row, column) of a block
 
 
 def notes_on_levels(plan: Plan) -> list[str]:
     """Return a line for each channel: its level, or "no surface", and whether the level is unsure.
 
-    Regions beyond MOST_VOXELS are not looked at: each block would cost a chunk of many times its
-    size. Beyond MAX_CHANNELS one line stands for all others.
+    Regions of more than MOST_VOXELS are not read, because each block would cost a chunk of many
+    times its size. One line stands for all channels beyond MAX_CHANNELS.
     """
     own = [one for one in plan.channels if not one.source]
     notes = {one.name: note_before_reading(plan, one) for one in own}
@@ -67,12 +68,12 @@ def notes_on_levels(plan: Plan) -> list[str]:
     others = len(own) - len(lines)
     if others:
         rest = f"{counted(others, 'other channel')}" if lines else "the channels"
-        lines.append(f"the plan looks at no level of {rest}: the build finds these")
+        lines.append(f"the plan does not estimate the levels of {rest}: the build finds them")
     return lines
 
 
 def _found_in_blocks(plan: Plan, wanted: Sequence[Channel]) -> dict[str, str]:
-    """Return a note on each of the first channels whose level is looked for, by its name."""
+    """Return the notes on the first MAX_CHANNELS of these channels, by channel name."""
     channels = max(1, len(wanted))
     every = SHARE * channels * math.prod(plan.region.shape)
     most = max(LEAST, int(min(max(every, BOUNDS[0]), BOUNDS[1])) // channels)
@@ -85,14 +86,14 @@ def _found_in_blocks(plan: Plan, wanted: Sequence[Channel]) -> dict[str, str]:
 
 
 def estimate_level(plan: Plan, channel: Channel, boxes: Sequence[Box]) -> Found:
-    """Return a channel's level as some boxes of the region alone tell it: all of it, or blocks."""
+    """Return a channel's levels as found in some boxes, which may be the whole region."""
     source, is_whole = open_source(source_of(plan, channel=channel)), list(boxes) == [plan.region]
     volumes = [source.read(channel.index, box, plan.level) for box in boxes]
     window = _window(plan, channel, boxes, volumes)
     evidence = {}
     for place, (box, volume) in enumerate(zip(boxes, volumes, strict=True)):
         step = evidence_step(plan, box, channel=channel, window=window)
-        found = evidence_of(step, volume, box)  # without a halo, which would be most of a block
+        found = evidence_of(step, volume, box)  # no halo: it would be larger than the block
         evidence[str(place)] = found if is_whole else replace(found, profiles=None)
     return find_level(plan, channel, window, evidence)
 
@@ -100,10 +101,10 @@ def estimate_level(plan: Plan, channel: Channel, boxes: Sequence[Box]) -> Found:
 def _window(
     plan: Plan, channel: Channel, boxes: Sequence[Box], volumes: Sequence[Volume]
 ) -> Window:
-    """Return a channel's window as the boxes tell it.
+    """Return a channel's window as found in the boxes.
 
-    Side by side the boxes stand for the region as a coarser level does. So the background is found
-    on them, too.
+    The boxes side by side look like a coarse level of the region, so the background is found on
+    them, too.
     """
     step = window_step(plan, channel)
     spacing, axis = volumes[0].spacing_um, volumes[0].slice_axis
@@ -136,7 +137,7 @@ def _window(
 
 
 def _side_by_side(boxes: Sequence[Box], volumes: Sequence[Volume]) -> NDArray[Any]:
-    """Return the voxels of blocks that stand in rows along z, y and x, as one array."""
+    """Return the voxels of blocks on a regular grid, as one array without gaps (z, y, x)."""
     z, y, x = (len({box.start[axis] for box in boxes}) for axis in range(3))
     blocks = [volume.voxels for volume in volumes]
     rows = [blocks[place : place + x] for place in range(0, len(blocks), x)]

@@ -1,4 +1,4 @@
-"""The plan's note on a channel's level: the level, "no surface", or that the build finds it."""
+"""Write the plan's note on a channel's level, or on who finds it later."""
 
 from stereocell.isosurface.channel_level import FEW_SHARE
 from stereocell.isosurface.level import Level
@@ -6,12 +6,11 @@ from stereocell.isosurface.near_levels import ABOVE_BACKGROUND, MARK, find_near_
 from stereocell.isosurface.options import APART, CONNECTED, NO_SURFACE
 from stereocell.model.channel import LOW_CONFIDENCE
 from stereocell.planning.channels import Channel
-from stereocell.planning.level_choice import Found, find_doubt, given_level
+from stereocell.planning.level_choice import Found, explain_uncertainty, given_level
 from stereocell.planning.plan import Plan
 from stereocell.planning.survey import TileIso
 
-# A confidence that blocks estimate may lie below the bound by this much and is not called unsure
-MARGIN = 0.1
+MARGIN = 0.1  # confidence; blocks estimate it so coarsely that a level this much below passes
 _CHOICES = {
     APART: "the one with the most separate pieces",
     CONNECTED: "the lowest at which vessels get longer and not only thicker",
@@ -19,12 +18,12 @@ _CHOICES = {
 
 
 def note_before_reading(plan: Plan, channel: Channel) -> str:
-    """Return the note on a channel whose level no voxel is needed for; empty: one has to look."""
+    """Return the note on a channel whose level is known without voxels; empty: it is not."""
     rung = channel.rung or plan.settings.isovalue.rung
     given = given_level(plan, channel)
     if given is not None:
         value, is_above = given
-        return f"level {value:.5g}{MARK + ABOVE_BACKGROUND if is_above else ''}, as it is given"
+        return f"level {value:.5g}{MARK + ABOVE_BACKGROUND if is_above else ''}, from the settings"
     if rung == NO_SURFACE:
         base = channel.base or channel.name
         return f"no surface is built by default (--surfaces {base}=outer builds one)"
@@ -32,44 +31,46 @@ def note_before_reading(plan: Plan, channel: Channel) -> str:
 
 
 def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
-    """Return the note on a level that was looked for.
+    """Return the note on the levels that were found.
 
-    is_whole  whether all voxels were looked at: else the levels are estimates
+    is_whole  whether all voxels were read; otherwise the levels are estimates
     """
     mark, tail = (MARK, ABOVE_BACKGROUND) if found.subtracts else ("", "")
     about, digits = ("", 5) if is_whole else ("about ", 3)
-    rungs = [rung for rung in found.rungs if isinstance(rung, Level)]
-    if found.is_fixed and found.rungs:
-        (rung,) = found.rungs
-        value = rung.value if isinstance(rung, Level) else rung
-        kind = "the adaptive threshold" if found.window.counting.mask is None else "half-way"
+    levels = [level for level in found.candidates if isinstance(level, Level)]
+    if found.is_fixed and found.candidates:
+        (level,) = found.candidates
+        value = level.value if isinstance(level, Level) else level
+        kind = "the adaptive threshold"
+        if found.window.counting.mask is not None:
+            kind = "half-way between the two values of a mask"
         return f"level {about}{value:.{digits}g}, {kind}"
-    if len(rungs) > 1:
+    if len(levels) > 1:
         choice = _CHOICES[plan.settings.isovalue.rung]
-        return f"the build takes one of {about}{words_of(rungs, mark, digits)}: {choice}{tail}"
+        return f"the build takes one of {about}{words_of(levels, mark, digits)}: {choice}{tail}"
     ladder = () if found.levels is None else found.levels.ladder
-    if not rungs:
+    if not levels:
         near = find_near_levels(ladder, None, is_unsure=False)
-        doubt = found.doubt.removeprefix("no clear surface: ")
-        text = f"no surface{'' if is_whole else ' in the blocks that were looked at'}: {doubt}"
+        reason = found.reason.removeprefix("no clear surface: ")
+        text = f"no surface{'' if is_whole else ' in the blocks that were read'}: {reason}"
     else:
-        unsure = _doubt(plan, found, is_whole)
-        near = find_near_levels(ladder, rungs[0].value, is_unsure=bool(unsure))
-        text = f"level {about}{words_of(rungs, mark, digits)}"
+        unsure = _explain_uncertainty(plan, found, is_whole)
+        near = find_near_levels(ladder, levels[0].value, is_unsure=bool(unsure))
+        text = f"level {about}{words_of(levels, mark, digits)}"
         text = f"unsure {text}: {unsure}" if unsure else f"clear {text}"
     beside = f"; near levels: {words_of(near, mark, digits)}" if near else ""
     return f"{text}{beside}{tail}"
 
 
-def _doubt(plan: Plan, found: Found, is_whole: bool) -> str:
+def _explain_uncertainty(plan: Plan, found: Found, is_whole: bool) -> str:
     """Return why a build will call the only level unsure; empty: it will not."""
-    (level,) = found.rungs
+    (level,) = found.candidates
     assert isinstance(level, Level)
-    # in whichever tile they lie, the voxels of one side are too few for it
+    # even if one tile held all voxels of the smaller side, they would be too few
     is_bare = min(level.share, 1 - level.share) * len(plan.tiles) < FEW_SHARE
     tile = TileIso(level.value, 0.0, None if is_bare else level.confidence, {})
     least = LOW_CONFIDENCE - (0.0 if is_whole else MARGIN)
-    doubt = find_doubt(found, 0, [tile])
-    if not doubt and level.confidence < least:
+    reason = explain_uncertainty(found, 0, [tile])
+    if not reason and level.confidence < least:
         return f"its confidence is {level.confidence:.2f}, expected at least {LOW_CONFIDENCE:g}"
-    return doubt
+    return reason

@@ -1,8 +1,8 @@
-"""Which tile builds which object of a label map.
+"""Decide which tile builds which object of a label map.
 
-An object belongs to the tile that holds its centroid, and is built there as a whole where its box
-lies in that tile and half a tile around it. Any other is cut at the planes between tiles: each tile
-builds a piece, and all are one object.
+An object belongs to the tile that holds its centroid. It is built there as a whole if its box
+reaches at most half a tile beyond that tile. Otherwise it is cut at the planes between tiles: each
+tile builds a piece, and the pieces stay one object.
 """
 
 from collections.abc import Mapping
@@ -18,17 +18,17 @@ from stereocell.objects.extents import Extents, merge_extents
 from stereocell.planning.plan import Plan
 from stereocell.steps.labels import Labels
 
-AROUND = 0.5  # tiles; an object that is whole goes no farther beyond its tile
-HALO = 42  # voxels; what lies farther from a wall moves it by less than the lattice's step
-CUT = -1  # the tile of an object that is cut
+AROUND = 0.5  # tiles; farthest that an uncut object reaches beyond its tile
+HALO = 42  # voxels; anything farther from an interface moves it by less than the lattice's step
+CUT = -1  # stands in place of a tile's index for an object that is cut
 
 
 @dataclass(frozen=True, slots=True)
 class TileGrid:
     """The tiles of a plan in the voxels of a label map.
 
-    edges  by axis (z, y, x): ascending indices of voxels; tile k goes from edge k to edge k + 1
-    ids    tile IDs by their places (z, y, x)
+    edges  for each axis (z, y, x), ascending voxel indices; tile k reaches from edge k to k + 1
+    ids    tile IDs by place in the grid (z, y, x)
     """
 
     edges: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
@@ -36,13 +36,13 @@ class TileGrid:
 
     @classmethod
     def of(cls, plan: Plan, labels: Labels) -> "TileGrid":
-        """Return the tiles of a plan; those at the ends of a whole image go to the labels' ends."""
+        """Return the tiles of a plan. If the whole image is built, they cover all of the labels."""
         starts = [sorted({tile.box.start[axis] for tile in plan.tiles}) for axis in range(3)]
         is_whole = not plan.settings.plan.region
         edges = []
         for axis in range(3):
             ends = np.array([*starts[axis], plan.region.stop[axis]], np.float64)
-            # between two voxels of the image
+            # tile borders lie half-way between two voxels of the image
             at_um = plan.origin_um[axis] + (ends - 0.5) * plan.spacing_um[axis]
             places = (at_um - labels.origin_um[axis]) / labels.spacing_um[axis]
             cut = np.ceil(places - 1e-6).astype(np.int64).clip(0, labels.shape[axis])
@@ -57,13 +57,13 @@ class TileGrid:
         return cls((z_edges, y_edges, x_edges), ids)
 
     def box(self, place: tuple[int, int, int]) -> Box:
-        """Return a tile's voxels; they may be none."""
+        """Return a tile's voxels; the box may be empty."""
         pairs = [(int(e[k]), int(e[k + 1])) for e, k in zip(self.edges, place, strict=True)]
         (z0, z1), (y0, y1), (x0, x1) = pairs
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def places(self, voxels: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the tiles' places (n, 3) of voxels (n, 3) of the region."""
+        """Return the places of the tiles (n, 3) that hold these voxels (n, 3) of the region."""
         parts = [
             np.searchsorted(e, v, side="right") - 1
             for e, v in zip(self.edges, voxels.T, strict=True)
@@ -73,13 +73,13 @@ class TileGrid:
 
 @dataclass(frozen=True, slots=True)
 class Located:
-    """All objects of a label map that are built.
+    """The objects of a label map that are built, and their tiles.
 
-    extents  of those, by ascending label
-    owners   int64 (n,): the tile, counted in `tiles`, or CUT
-    tiles    IDs
-    small    objects left out for having too few voxels
-    parts    by tile: the labels of its own voxels
+    extents  extents of the n objects, by ascending label
+    owners   int64 (n,): index into `tiles` of the tile that builds the object, or CUT
+    tiles    tile IDs
+    small    number of objects left out because they have too few voxels
+    parts    labels among each tile's own voxels, by tile ID
     """
 
     grid: TileGrid
@@ -90,13 +90,13 @@ class Located:
     parts: Mapping[str, NDArray[np.uint64]]
 
     def owned(self, tile: str) -> NDArray[np.int64]:
-        """Return the numbers of the objects that a tile builds: whole ones, then pieces' ones."""
+        """Return the indices of the objects that a tile builds: uncut ones, then cut ones."""
         whole = np.flatnonzero(self.owners == self.tiles.index(tile))
         cut = np.flatnonzero((self.owners == CUT) & np.isin(self.extents.labels, self.parts[tile]))
         return np.concatenate([whole, cut])
 
     def window(self, tile: str) -> Box | None:
-        """Return the voxels of a label map that a tile's objects need; None: it has none."""
+        """Return the voxels of a label map that a tile's objects need; None: it has no objects."""
         numbers = self.owned(tile)
         if not len(numbers):
             return None
@@ -113,7 +113,7 @@ class Located:
         return Box((z0, y0, x0), (z1, y1, x1))
 
     def near(self, window: Box) -> NDArray[np.int64]:
-        """Return the numbers of the objects whose box meets a window."""
+        """Return the indices of the objects whose box overlaps a window."""
         low, high = self.extents.low, self.extents.high
         return np.flatnonzero((low < window.stop).all(axis=1) & (high > window.start).all(axis=1))
 
@@ -121,9 +121,11 @@ class Located:
 def locate(
     plan: Plan, labels: Labels, parts: Mapping[str, Extents], smallest_voxels: int
 ) -> Located:
-    """Return the objects of a label map with their tiles; `parts`: what each tile holds.
+    """Return the objects of a label map with their tiles.
 
-    Raises UsageError where a tile has more objects than its file can name.
+    parts  extents of the labels in each tile, by tile ID
+
+    Raises UsageError if a tile has more objects than its file can number.
     """
     grid = TileGrid.of(plan, labels)
     whole = merge_extents(list(parts.values()))
@@ -153,7 +155,7 @@ def locate(
         if (count := len(located.owned(id_))) > MAX_OBJECTS:
             raise UsageError(
                 f"{labels.name}: found {count:,} objects in tile {id_}, expected at most "
-                f"{MAX_OBJECTS:,}: give it more tiles (--grid COLUMNSxROWS)"
+                f"{MAX_OBJECTS:,}: build more tiles (--grid COLUMNSxROWS)"
             )
     return located
 

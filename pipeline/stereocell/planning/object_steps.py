@@ -1,4 +1,4 @@
-"""The steps that build the objects of a plan's label maps, with all that they depend on."""
+"""Make the steps that build the objects of a plan's label maps."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,14 +16,14 @@ from stereocell.planning.survey import Survey
 from stereocell.steps.build_objects import BuildObjects, Image, Painted
 from stereocell.steps.labels import Labels
 
-_NO_EDGES = (np.zeros(0, np.int64),) * 3  # of tiles, where nothing is cut
-_UM = 1e6  # um a metre
+_NO_EDGES = (np.zeros(0, np.int64),) * 3  # edges of tiles for a step that cuts no object
+_UM = 1e6  # um per metre
 
 
 def object_steps(
     plan: Plan, located: Mapping[str, Located], survey: Survey
 ) -> dict[str, BuildObjects]:
-    """Return the step of the unit of each tile and label map, by `<tile>/<labels>`."""
+    """Return the step of each unit of the label maps, by `<tile>/<labels>`."""
     images = images_of(plan)
     step_um = lattice_step_um(plan, located)
     steps = {}
@@ -48,7 +48,7 @@ def object_steps(
 
 
 def _parts(found: Located, tile: Tile) -> dict[str, NDArray[np.uint64]]:
-    """Return the labels in a tile's window by how they are built; see `BuildObjects`."""
+    """Return the labels in a tile's window as the fields of `BuildObjects` that hold them."""
     window, numbers = found.window(tile.id), found.owned(tile.id)
     near = np.zeros(0, np.int64) if window is None else found.near(window)
     is_cut, names = found.owners == CUT, found.extents.labels
@@ -62,7 +62,7 @@ def _parts(found: Located, tile: Tile) -> dict[str, NDArray[np.uint64]]:
 
 
 def _of_units(options: ObjectOptions) -> ObjectOptions:
-    """Return the options that units depend on; those of tables and names have their defaults."""
+    """Return the options that units depend on; all others are reset to their defaults."""
     plain = ObjectOptions()
     names = ("table", "table_key", "columns", "color_by", "segment_labels", "background")
     return replace(options, **{name: getattr(plain, name) for name in names})
@@ -71,8 +71,8 @@ def _of_units(options: ObjectOptions) -> ObjectOptions:
 def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
     """Return the step of the lattice that objects' vertices lie on, um.
 
-    It is the bundle's, or a multiple of it: a power of two of metres, of tiles as large as they may
-    become. So that what is checked is what is written.
+    It is a power of two in metres, chosen for the largest tile with its objects. The bundle's own
+    lattice has this step or a fraction of it, so the checked vertices are the written ones.
     """
     longest = 0.0
     for tile in plan.tiles:
@@ -89,7 +89,7 @@ def lattice_step_um(plan: Plan, located: Mapping[str, Located]) -> float:
 
 
 def images_of(plan: Plan) -> tuple[Image, ...]:
-    """Return the image's channels, as they are built."""
+    """Return the channels of the image, one for all surfaces of the same voxels."""
     seen, found = set(), []
     for channel in plan.channels:
         if channel.voxels_id in seen:
@@ -100,7 +100,7 @@ def images_of(plan: Plan) -> tuple[Image, ...]:
 
 
 def _painted(plan: Plan, labels: Labels, survey: Survey) -> Painted | None:
-    """Return what is painted on the objects of a label map; None: nothing."""
+    """Return the channel that is painted on the objects of a label map; None: none is."""
     painter = plan.painter(labels)
     if painter is None:
         return None

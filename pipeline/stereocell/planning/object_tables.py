@@ -1,4 +1,4 @@
-"""The table of a label map's objects, put together from the units, the file's notes and a table."""
+"""Make the table of a label map's objects from its units, its file and the user's table."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,14 +23,14 @@ from stereocell.objects.table import (
 )
 from stereocell.planning.located_objects import CUT, Located
 from stereocell.planning.plan import Plan
-from stereocell.planning.stopped_levels import told_of_stopped
+from stereocell.planning.stopped_levels import notes_on_stopped_levels
 from stereocell.read.tables import Table, read_table
 from stereocell.read.tables.table import TableColumn, listed
 from stereocell.steps.labels import Labels
 from stereocell.usd.primvar_names import RESERVED
 
-_ENDS_IN_NUMBER = re.compile(r"_\d+$")  # an ID of which the second column of a name may be
-NAMES = "name"  # the column of the names that a label map's own file gives
+_ENDS_IN_NUMBER = re.compile(r"_\d+$")  # such an ID may belong to the second column of a name
+NAMES = "name"  # column with the names of objects in the label map's own file
 
 
 def make_table(
@@ -41,13 +41,13 @@ def make_table(
     notes: ObjectNotes,
     table: Table | None,
 ) -> tuple[ObjectTable, list[str]]:
-    """Return the objects of a label map with all columns, and remarks on the join.
+    """Return the table of a label map's objects with all columns, and remarks for the user.
 
-    facts  by tile ID
-    notes  what the label map's own file says
-    table  the user's; None: none is given, or it belongs to another label map
+    facts  measurements of the built objects, by tile ID
+    notes  names, colours and columns in the label map's own file
+    table  the user's table; None: there is none, or it belongs to another label map
 
-    Raises UsageError where a column that is asked for isn't there.
+    Raises UsageError if the column of `--color-by` does not exist.
     """
     order = _order(located, facts)
     thin = np.unique(np.concatenate([one.thin for one in facts.values()]))
@@ -68,14 +68,14 @@ def make_table(
         place, [(rows[tile], one) for tile, one in facts.items()], _measured(plan)
     )
     remarks: list[str] = []
-    noted = _noted(notes, names)
-    # the file's colours go before those that would be made up for its own words
-    behind = {column.name for column in noted if notes.colors} - {NAMES}
-    columns += noted
+    from_file = _columns_of_file(notes, names)
+    # columns of a file with colours are not coloured by default: its own colours are better
+    not_default = {column.name for column in from_file if notes.colors} - {NAMES}
+    columns += from_file
     if table is not None:
         joined, remarks = _joined(table, names)
         columns += joined
-        behind -= {column.name for column in joined}
+        not_default -= {column.name for column in joined}
     columns, renamed = _unique(columns)
     corners = np.stack([zyx_to_xyz(low), zyx_to_xyz(high)])
     return (
@@ -90,24 +90,28 @@ def make_table(
             _default(
                 columns,
                 plan.settings.objects.color_by,
-                behind,
+                not_default,
                 is_first=labels.id == plan.labels[0].id,
             ),
-            *_walls(facts, rows, names),
+            *_interfaces(facts, rows, names),
             _colors(notes, names),
         ),
-        _told_of_thin(labels, thin) + told_of_stopped(labels.name, facts) + remarks + renamed,
+        _notes_on_thin(labels, thin)
+        + notes_on_stopped_levels(labels.name, facts)
+        + remarks
+        + renamed,
     )
 
 
-def _walls(
+def _interfaces(
     facts: Mapping[str, ObjectFacts],
     rows: Mapping[str, NDArray[np.int32]],
     labels: NDArray[np.uint64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the rows of the objects that share a wall, int32 (m, 2), and its area, um^2 (m,).
+    """Return the interfaces between objects: their rows, int32 (m, 2), and area, um^2 (m,).
 
-    Each pair once. Both objects' tiles know the wall; of an object that is cut each knows a part.
+    Each pair of objects appears once. Both objects measure their interface, and each piece of a cut
+    object measures a part of it. The parts are summed, then the larger of the two sums is taken.
     """
     order = np.argsort(labels)
     found, areas = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
@@ -126,25 +130,25 @@ def _walls(
 
 
 def _order(located: Located, facts: Mapping[str, ObjectFacts]) -> NDArray[np.int64]:
-    """Return the numbers of all objects, those of each tile together, cut ones last."""
+    """Return the indices of all built objects, sorted by tile, cut ones last."""
     whole = [np.flatnonzero(located.owners == located.tiles.index(tile)) for tile in facts]
     order = np.concatenate([*whole, np.flatnonzero(located.owners == CUT)])
     built = np.concatenate([one.labels for one in facts.values()])
     return order[np.isin(located.extents.labels[order], built)]
 
 
-def _told_of_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
-    """Return what is said of objects that could not be built, or nothing."""
+def _notes_on_thin(labels: Labels, thin: NDArray[np.uint64]) -> list[str]:
+    """Return the note on objects that are too thin to be built, if there are any."""
     if not len(thin):
         return []
     return [
         f"{labels.name}: {counted(len(thin), 'object')} left out, too thin to be built, or full of "
-        f"holes: {listed(thin.tolist())}; where labels are finer they can be"
+        f"holes: {listed(thin.tolist())}; labels with finer voxels can hold them"
     ]
 
 
-def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
-    """Return the columns of what the label map's own file says."""
+def _columns_of_file(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
+    """Return the columns that the label map's own file holds."""
     found = []
     listed_labels = labels.tolist()
     if notes.names:
@@ -169,7 +173,7 @@ def _noted(notes: ObjectNotes, labels: NDArray[np.uint64]) -> list[Column]:
 
 
 def _colors(notes: ObjectNotes, labels: NDArray[np.uint64]) -> NDArray[np.float32] | None:
-    """Return the colours that the label map's own file has for its objects; None: for none."""
+    """Return the colours of objects in the label map's own file, (n, 3); None: it has none."""
     if not notes.colors:
         return None
     unknown = (np.nan,) * 3
@@ -178,18 +182,18 @@ def _colors(notes: ObjectNotes, labels: NDArray[np.uint64]) -> NDArray[np.float3
 
 
 def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], list[str]]:
-    """Return a table's columns in the order of the objects, and what did not fit."""
+    """Return a table's columns in the order of the objects, and remarks on rows without a match."""
     order = np.argsort(table.labels, kind="stable")
     sorted_labels = table.labels[order]
     at = np.searchsorted(sorted_labels, labels).clip(0, max(len(order) - 1, 0))
     has_row = sorted_labels[at] == labels if len(order) else np.zeros(len(labels), bool)
     row = order[at] if len(order) else np.zeros(len(labels), np.int64)
     remarks = []
-    strangers = np.setdiff1d(table.labels, labels)
-    if len(strangers):
+    unmatched = np.setdiff1d(table.labels, labels)
+    if len(unmatched):
         remarks.append(
-            f"{table.shown}: {counted(len(strangers), 'row')} without an object: {table.key} "
-            f"{listed(strangers.tolist())}"
+            f"{table.shown}: {counted(len(unmatched), 'row')} without an object: {table.key} "
+            f"{listed(unmatched.tolist())}"
         )
     if not has_row.all():
         lacking = labels[~has_row]
@@ -200,7 +204,7 @@ def _joined(table: Table, labels: NDArray[np.uint64]) -> tuple[list[Column], lis
     if table.left_out:
         remarks.append(
             f"{table.shown}: {counted(table.left_out, 'column')} beyond the first "
-            f"{len(table.columns)} left out: name those you want by --columns"
+            f"{len(table.columns)} left out: choose columns by --columns"
         )
     found = []
     for column in table.columns:
@@ -227,7 +231,7 @@ def _column(
 
 
 def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
-    """Return the columns under IDs of their own, which no primvar of a mesh has."""
+    """Return the columns with unique IDs that do not clash with the primvars of a mesh."""
     found: dict[str, Column] = {}
     remarks = []
     for column in columns:
@@ -235,28 +239,32 @@ def _unique(columns: Sequence[Column]) -> tuple[list[Column], list[str]]:
         while name in found or name in RESERVED:
             name, number = f"{column.id}_{number}", number + 1
         if column.id in found:
-            remarks.append(f"column {column.name!r} is there already: the second one is {name}")
+            remarks.append(f"column {column.name!r} exists twice: the second one is named {name}")
         found[name] = replace(column, id=name)
     return list(found.values()), remarks
 
 
-def _default(columns: Sequence[Column], wanted: str, behind: set[str], *, is_first: bool) -> str:
-    """Return the ID of the column that colours first: the one asked for, or of categories.
+def _default(
+    columns: Sequence[Column], wanted: str, not_default: set[str], *, is_first: bool
+) -> str:
+    """Return the ID of the column that colours objects at first; empty: none.
 
-    behind    names of columns that don't unless they are asked for
-    is_first  whether it is the label map that has the table: it needs the column that is asked for
+    It is the wanted column, or else the first column of categories.
+
+    not_default  names of columns that colour only if wanted
+    is_first     whether this is the first label map, which must have the wanted column
     """
     for column in columns:
         if wanted and wanted in (column.name, column.id):
             return column.id
     if wanted and is_first:
         raise _no_column(wanted, [column.name for column in columns])
-    categories = [one.id for one in columns if one.categories and one.name not in behind]
+    categories = [one.id for one in columns if one.categories and one.name not in not_default]
     return categories[0] if categories else ""
 
 
 def require_color_by(plan: Plan, labels: Labels, table: Table | None) -> None:
-    """Raise UsageError where no column is called as the one that shall colour first."""
+    """Raise UsageError if the column of `--color-by` does not exist."""
     wanted = plan.settings.objects.color_by
     if not wanted or labels.id != plan.labels[0].id:
         return
@@ -280,9 +288,9 @@ def _measured(plan: Plan) -> list[str]:
 
 
 def table_of(plan: Plan, labels: Labels) -> Table | None:
-    """Return the user's table of a label map: of several maps, the first one's.
+    """Return the user's table, if this is the first label map; None: there is no table for it.
 
-    Raises SourceError where it can't be read.
+    Raises SourceError if the table can't be read.
     """
     options = plan.settings.objects
     if not options.table or labels.id != plan.labels[0].id:
@@ -291,7 +299,7 @@ def table_of(plan: Plan, labels: Labels) -> Table | None:
 
 
 def appearance_of_labels(labels: Labels, *, painter: str = "") -> Appearance:
-    """Return how the objects of a label map are drawn: by their table, and without a volume.
+    """Return the appearance of a label map's objects, which have no volume.
 
     painter  ID of the channel that is painted on them; empty: none is
     """

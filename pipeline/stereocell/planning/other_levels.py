@@ -1,4 +1,4 @@
-"""The levels that a channel's surface could lie at instead, each with the setting that takes it."""
+"""Find other levels at which a channel's surface could lie, each with the flag that chooses it."""
 
 import shlex
 from collections.abc import Sequence
@@ -10,21 +10,21 @@ from stereocell.planning.channels import Channel
 from stereocell.planning.level_choice import given_level
 from stereocell.planning.plan import Plan
 
-MAX_TOLD = 3
-LIKELY = 0.2  # confidence from which a doubtful rung goes before a level that was only moved
-# Shares of the contrast by which a level is moved where the ladder has no other
-_ASIDE = {"a little lower": -0.25, "a little higher": 0.25, "lower": -0.4, "higher": 0.4}
-_ALIKE = 0.03  # share of the contrast: levels nearer to one another are one
+MAX_SHOWN = 3  # most other levels that are shown
+LIKELY = 0.2  # confidence; a doubtful level that has more is shown before a shifted level
+# Shifts of a level that are offered besides the found levels, as shares of its contrast.
+_SHIFTS = {"a little lower": -0.25, "a little higher": 0.25, "lower": -0.4, "higher": 0.4}
+_ALIKE = 0.03  # share of the contrast; levels nearer to each other count as the same
 
 
 @dataclass(frozen=True, slots=True)
 class OtherLevel:
-    """One level.
+    """Another level of a channel.
 
-    name        what it is: `inner`, `adaptive`, `a little lower`
-    value       of the denoised voxels, or of those above the background
-    above       whether it counts from the background
-    setting     the flag that takes it
+    name        for example `inner`, `adaptive` or `a little lower`
+    value       voxel value after denoising; see `above`
+    above       whether `value` counts from the background
+    setting     the flag that chooses this level
     confidence  0..1; None: not judged
     """
 
@@ -46,29 +46,31 @@ def find_other_levels(
     ends: tuple[float, float] | None,
     highest: float,
 ) -> list[OtherLevel]:
-    """Return the next-best levels, at most MAX_TOLD, best first; none where there is no ladder.
+    """Return the next-best levels, at most MAX_SHOWN, best first; empty if no levels were found.
 
-    ladder     all levels that were found; `subtracts`: above the background
+    ladder     all levels that were found, outermost first
+    subtracts  whether they count from the background
     taken      the surface's level; None: there is no surface
-    threshold  the adaptive one, voxel value; None: there is none
+    threshold  the adaptive threshold, voxel value; None: there is none
     highest    the display window's upper end; see `shown_of`
-    ends       of the values that the ladder was found in: beyond them a level parts nothing
+    ends       least and largest value of the histogram; a level beyond them encloses nothing or
+               everything
 
-    First the ladder's other rungs, clear ones before doubtful ones, then the adaptive threshold,
-    then levels a little lower and higher; last the rungs that hardly anything speaks for.
+    The order is: found levels, clear ones first; the adaptive threshold; shifted levels; found
+    levels with little confidence.
     """
     if not ladder:
         return []
-    # a channel that has no surface has no rung that could be named
+    # without a surface, no level can be chosen by its name
     clear = () if taken is None else shown_of(ladder, highest)
-    named, doubtful = _rungs(plan, channel, ladder, clear, subtracts)
+    named, doubtful = _found_levels(plan, channel, ladder, clear, subtracts)
     likely = [level for level in doubtful if (level.confidence or 0.0) >= LIKELY]
     levels = [*named, *likely]
     if threshold is not None and plan.settings.isovalue.criterion != ADAPTIVE:
-        # by its value, since the criterion is that of all channels
+        # by value, because the setting `criterion` applies to all channels
         flag = take(plan, channel, threshold, above=False)
         levels.append(OtherLevel(ADAPTIVE, threshold, False, flag, None))
-    levels += _aside(plan, channel, ladder, taken, subtracts)
+    levels += _shifted(plan, channel, ladder, taken, subtracts)
     levels += [level for level in doubtful if level not in likely]
     contrast = max(level.contrast for level in ladder)
     chosen: list[OtherLevel] = []
@@ -80,16 +82,16 @@ def find_other_levels(
             near.append(taken)
         if all(abs(level.value - value) > _ALIKE * contrast for value in near):
             chosen.append(level)
-    return chosen[:MAX_TOLD]
+    return chosen[:MAX_SHOWN]
 
 
 def ends_of(values: Sequence[float]) -> tuple[float, float] | None:
-    """Return the least and the largest of a channel's values, rising; None without any."""
+    """Return the first and last of a channel's ascending values; None: there are fewer than two."""
     return (values[0], values[-1]) if len(values) > 1 else None
 
 
 def take(plan: Plan, channel: Channel, value: float, *, above: bool) -> str:
-    """Return the flag that takes a level; `--surfaces` goes before `--iso-value` where both are."""
+    """Return the flag that chooses a level: --surfaces if the channel has it, else --iso-value."""
     level = f"{value:.5g}{'+b' if above else ''}"
     if channel.rung:
         return _surfaces(plan, channel, level)
@@ -97,27 +99,27 @@ def take(plan: Plan, channel: Channel, value: float, *, above: bool) -> str:
 
 
 def _surfaces(plan: Plan, channel: Channel, rung: str) -> str:
-    """Return the flag that builds another surface in place of the channel's, beside its others."""
+    """Return the flag that replaces this surface of a source channel and keeps its others."""
     base = channel.base or channel.name
-    rungs = [
+    surfaces = [
         rung if one == channel else one.rung
         for one in plan.channels
         if one == channel or (channel.base and one.base == base)
     ]
-    return "--surfaces " + shlex.quote(f"{base}={','.join(rungs)}")
+    return "--surfaces " + shlex.quote(f"{base}={','.join(surfaces)}")
 
 
-def _rungs(
+def _found_levels(
     plan: Plan,
     channel: Channel,
     ladder: Sequence[Level],
     clear: Sequence[Level],
     subtracts: bool,
 ) -> tuple[list[OtherLevel], list[OtherLevel]]:
-    """Return the clear rungs by their names, and the doubtful ones, best first.
+    """Return the clear levels by name, and the doubtful ones, best first.
 
-    Surfaces that are built already are no others. Where the level is given, or each tile's own, a
-    rung's name would take another level than the one here: it is taken by its value.
+    Levels of surfaces that are built already are left out. A level is chosen by its value if its
+    name would choose another one: if the settings state the level, or each tile has its own.
     """
     by_name = given_level(plan, channel) is None and plan.settings.isovalue.scope == "channel"
     built = {one.rung for one in plan.channels if channel.base and one.base == channel.base}
@@ -148,16 +150,16 @@ def _rungs(
     ]
 
 
-def _aside(
+def _shifted(
     plan: Plan, channel: Channel, ladder: Sequence[Level], taken: float | None, subtracts: bool
 ) -> list[OtherLevel]:
     if taken is None:
-        rung = max(ladder, key=lambda level: level.confidence)
-    else:  # the one that it is, or that is nearest to it
-        rung = min(ladder, key=lambda level: abs(level.value - taken))
-    start = rung.value if taken is None else taken
+        nearest = max(ladder, key=lambda level: level.confidence)
+    else:
+        nearest = min(ladder, key=lambda level: abs(level.value - taken))
+    start = nearest.value if taken is None else taken
     return [
         OtherLevel(name, value, subtracts, take(plan, channel, value, above=subtracts), None)
-        for name, share in _ASIDE.items()
-        for value in [start + share * rung.contrast]
+        for name, share in _SHIFTS.items()
+        for value in [start + share * nearest.contrast]
     ]

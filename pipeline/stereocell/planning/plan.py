@@ -1,7 +1,7 @@
-"""The plan of a build: the voxels, the tiles, the units. Pure: it reads and runs nothing.
+"""The plan of a build: its voxels, tiles and units.
 
-It holds everything that later phases need, with every `auto` resolved; plan.json is its file
-(schemas/plan.schema.json).
+The plan holds everything that later phases need, with every `auto` resolved. Its file is plan.json
+(schemas/plan.schema.json). Making a plan reads no file.
 """
 
 import math
@@ -30,11 +30,12 @@ from stereocell.planning.channels import (
 from stereocell.planning.settings import Settings
 from stereocell.steps.labels import Labels
 
-# Largest window of a unit, at about 30 bytes a voxel: UNIT_VOXELS, or UNIT_TILES times its tile.
+# The window that a unit reads may hold UNIT_VOXELS voxels, or UNIT_TILES times as many as its tile.
+# A unit needs about 30 bytes a voxel.
 UNIT_VOXELS = 1 << 27  # voxels
 UNIT_TILES = 8  # tiles
-MIN_PLACES = 8  # fewest places of caps that half a voxel is shared out to
-MIN_PLANES = 4  # smallest number of planes per axis of a tile that carry the surface
+MIN_PLACES = 8  # fewest equal parts of half a voxel at which the caps of channels lie
+MIN_PLANES = 4  # fewest planes along each axis of a tile that carry the surface
 
 
 class LevelLike(Protocol):
@@ -50,19 +51,21 @@ class LevelLike(Protocol):
 class Plan:
     """A build with all choices made. Boxes are voxels (z, y, x) of `level`.
 
-    spacing_um  (z, y, x), um
-    origin_um   centre of voxel (0, 0, 0), (z, y, x), um
-    halo        voxels (z, y, x) that a unit reads around its tile, so that neighbours agree
-    modality    DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
-    placement   rows of a (4, 4) matrix for columns, um: from the world of the voxels
-                (volume.zyx_to_xyz) to the specimen's place
-    slice_axis  of z, y, x: the source's images lie across it (model/image_plane.py)
-    has_sides   whether the source states where the patient's left, back and head are: then the
-                specimen's place is the patient's world (read/anatomical_axes.py)
-    labels      label maps whose objects are built, channels beside `channels`
-    formats     which formats the source and the label maps have, sorted (known_formats.format_of)
-    notes       what was chosen, assumed or left out in reading the source, a sentence each
-    is_hounsfield  whether values may be compared with Hounsfield units, if it is a CT
+    level           resolution level that is built, 0 is the finest
+    spacing_um      voxel spacing (z, y, x), um
+    origin_um       centre of voxel (0, 0, 0), (z, y, x) in um
+    halo            voxels (z, y, x) that a unit reads around its tile, so that neighbouring tiles
+                    compute the same field
+    modality        DICOM's code of the modality: `MR`, `CT`, ...; empty: not known
+    placement       rows of a (4, 4) matrix, um. It maps column vectors of voxel world coordinates
+                    (volume.zyx_to_xyz) to the specimen's place
+    slice_axis      axis across the source's images: 0, 1 or 2 for z, y, x (model/image_plane.py)
+    has_sides       whether the source states where the patient's left, back and head are. Then the
+                    specimen's place is the patient's world (read/anatomical_axes.py)
+    labels          label maps whose objects are built, besides `channels`
+    formats         names of the formats of source and label maps, sorted (known_formats.format_of)
+    notes           sentences on what was chosen, assumed or left out in reading the source
+    is_hounsfield   whether the values of a CT may be compared with Hounsfield units
     """
 
     source: str
@@ -88,16 +91,19 @@ class Plan:
 
     @property
     def repair(self) -> RepairOptions:
-        """The largest repair of any channel; the halo covers it (per channel: repair_rules.py)."""
+        """The farthest-reaching repair of any channel, which the halo covers.
+
+        Each channel's own repair is chosen in repair_rules.py.
+        """
         return _repair_options(self.settings)
 
     @property
     def step(self) -> tuple[int, int, int]:
-        """The step in voxels (z, y, x) between planes that carry the surface."""
+        """The distance in voxels (z, y, x) between planes that carry the surface."""
         return _step_of(self.settings.surface.grid_um, self.spacing_um)
 
     def with_grid(self, grid_um: float) -> "Plan":
-        """Return the plan for surfaces that planes `grid_um` apart carry."""
+        """Return the plan for surfaces whose planes lie `grid_um` apart."""
         if grid_um == self.settings.surface.grid_um:
             return self
         surface = replace(self.settings.surface, grid_um=grid_um)
@@ -105,16 +111,18 @@ class Plan:
         return replace(self, settings=settings, halo=_halo(settings, self.spacing_um, self.region))
 
     def grid_for(self, faces: int, thin: float) -> float:
-        """Return how far apart planes lie, um, that carry a surface of at most surface.max_faces.
+        """Return the distance between planes, um, at which the surface has few enough faces.
 
-        All planes do at first where more than surface.max_thin is too thin for surface.grid_um.
+        It starts from surface.grid_um. If more than surface.max_thin of the channel is too thin
+        for that, it starts from all planes.
 
-        Of a smooth surface every k-th plane along each axis leaves a k^2-th of the faces, of noise
-        less. Thinned are the axes whose planes lie nearest, as long as a tile keeps MIN_PLANES
-        and what a unit reads around it stays in proportion.
+        Keeping every k-th plane along each axis divides the faces of a smooth surface by k^2, and
+        those of noise by more. So planes are thinned along the axes where they lie closest, until
+        the surface has at most surface.max_faces. It stops before a tile keeps fewer than
+        MIN_PLANES, or a unit reads too much around its tile.
 
-        faces  of voxels, of the surface in one tile
-        thin   share of the channel's voxels above its level that are too thin for grid_um
+        faces  voxel faces of the surface in one tile
+        thin   share of the channel's voxels above its level in structures too thin for grid_um
         """
         surface = self.settings.surface
         grid = 0.0 if thin > surface.max_thin else surface.grid_um
@@ -131,7 +139,7 @@ class Plan:
 
     @property
     def shared_volumes(self) -> frozenset[str]:
-        """IDs of the channels whose volume is that of an earlier one: further surfaces of it."""
+        """IDs of further surfaces of a channel, whose volume is that of its first surface."""
         seen: set[str] = set()
         shared = set()
         for channel in self.channels:
@@ -147,41 +155,42 @@ class Plan:
 
     @property
     def opens_cut(self) -> bool:
-        """Whether the specimen opens cut through its middle.
+        """Whether the specimen opens with a cut through its middle.
 
-        An MR is looked at for what lies inside. Classes of a brain are that already, and a cut
-        through objects would open them.
+        People look at an MR to see the inside. Classes of a brain show the inside already, and a
+        cut would open the closed objects of label maps.
         """
         return self.modality == "MR" and not self.labels and not has_brain(self.channels)
 
     def cap_of(self, channel: Channel) -> float | None:
-        """Return how many spacings past the outermost voxels a channel is capped; None: it is not.
+        """Return how far past the outermost voxels a channel's caps lie; None: it has no caps.
 
-        The outermost, half a voxel past them, is the face of the block, on which the objects of
-        label maps end. Each channel's caps lie a hair inside of those before, so that no two ever
-        coincide: programs would show a confetti of both. At MIN_PLACES or fewer a hair is a 16th of
-        a voxel, more than the steps of places in a bundle, and channels may be added at the end.
+        The unit is the voxel spacing. The face of the block lies CAP, half a voxel, past the
+        outermost voxels; the objects of label maps end there. The caps of each channel lie a little
+        inside of those of the channel before it. Programs would show coinciding caps as confetti.
+        With fewer than MIN_PLACES channels the distance is a 16th of a voxel, more than the
+        lattice step of a bundle, and channels may be added at the end.
         """
         if not self.settings.surface.caps:
             return None
-        hair = CAP / max(MIN_PLACES, len(self.channels) + 1)
-        return CAP - hair * (self.channels.index(channel) + 1)
+        distance = CAP / max(MIN_PLACES, len(self.channels) + 1)
+        return CAP - distance * (self.channels.index(channel) + 1)
 
     def level_of(self, channel: Channel) -> int:
-        """Return the level of its source at which a channel is read."""
+        """Return the resolution level at which a channel's source is read."""
         return 0 if channel.source else self.level
 
     def painter(self, channel: Channel | Labels) -> Channel | None:
-        """Return the channel sampled onto a channel's surface, or objects'; None: none is."""
+        """Return the channel that is painted on a surface or on objects; None: none is."""
         painted = self.settings.paint.get(channel.name)
         return next((other for other in self.channels if other.name == painted), None)
 
     def tile(self, tile_id: str) -> Tile:
-        """Return the tile with this ID; the plan must hold it."""
+        """Return the tile with this ID. The plan must have such a tile."""
         return next(tile for tile in self.tiles if tile.id == tile_id)
 
     def position_um(self, index_zyx: Sequence[float]) -> Point:
-        """Return the place of a voxel's centre, (z, y, x) in um."""
+        """Return the position of a voxel's centre, (z, y, x) in um."""
         z, y, x = (
             float(o + i * s)
             for o, i, s in zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
@@ -190,18 +199,20 @@ class Plan:
 
 
 def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings) -> tuple[int, str]:
-    """Return the level to build and the reason: the requested one, else the finest within limits.
+    """Return the resolution level to build, and the reason for it.
 
-    The region counts voxels of the level that is built, so a level that is too small to hold it is
-    skipped. Raises UsageError where there is no such level.
+    It is the requested level, or the finest one with at most plan.max_voxels. The region is in
+    voxels of the level that is built, so levels too small to hold it are skipped.
+
+    Raises UsageError if there is no such level.
     """
     wanted = settings.plan.level
     if wanted != AUTO:
         if not isinstance(wanted, int) or not 0 <= wanted < len(levels):
             raise UsageError(
-                f"--level is {wanted}, expected 0 to {len(levels) - 1} (the source's levels)"
+                f"--level is {wanted}, expected 0 to {len(levels) - 1}, the source's levels"
             )
-        return wanted, "asked for"
+        return wanted, "from the settings"
     region, limit = settings.plan.region, settings.plan.max_voxels
     for index, level in enumerate(levels):
         whole = Box((0, 0, 0), level.shape)
@@ -213,14 +224,14 @@ def choose_level(levels: Sequence[LevelLike], channels: int, settings: Settings)
             break
         voxels = channels * math.prod(box.shape)
         if voxels <= limit:
-            what = "the finest" if index == 0 else "the finest within the limit"
+            reason = "the finest" if index == 0 else "the finest within the limit"
             if not channels:
-                return index, f"{what}, as label maps are built"
-            return index, f"{what}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
-    what = f"--region {region}" if region else "the coarsest level"
+                return index, f"{reason}, because only label maps are built"
+            return index, f"{reason}: {voxels:,} of at most {limit:,} voxels (plan.max_voxels)"
+    box_name = f"--region {region}" if region else "the coarsest level"
     remedy = "a smaller --region" if region else "a --level"
     raise UsageError(
-        f"{what} holds {voxels:,} voxels, more than plan.max_voxels = {limit:,}: "
+        f"{box_name} holds {voxels:,} voxels, more than plan.max_voxels = {limit:,}: "
         f"name {remedy}, or fewer --channels"
     )
 
@@ -242,24 +253,27 @@ def make_plan(
     has_sides: bool = False,
     labels: Sequence[Labels] = (),
 ) -> Plan:
-    """Return the plan for these channels at this level (index and reason).
+    """Return the plan for these channels at this level.
 
-    origin_um  centre of voxel (0, 0, 0) of the level, (z, y, x), um
+    level      index of the resolution level, and the reason for it
+    origin_um  centre of voxel (0, 0, 0) of the level, (z, y, x) in um
 
-    Raises UsageError for settings that don't fit the data, SourceError for data that can't be cut.
+    Raises UsageError for settings that don't fit the data, SourceError for a region that is too
+    small to be built.
     """
     chosen = levels[level[0]]
     whole = Box((0, 0, 0), chosen.shape)
     region = parse_region(settings.plan.region, whole)
     if min(region.shape) < 2:
         raise SourceError(
-            f"{source}: {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 each way"
+            f"{source}: found {_by(region.shape)} voxels (z, y, x) to build, expected at least 2 "
+            "along each axis"
         )
     tile_size, tiles = _tiles(settings, region)
     if settings.surface.wrap == "alpha-wrap" and len(tiles) > 1:
         raise UsageError(
-            f"surface.wrap is 'alpha-wrap', which closes each tile by itself, and there are "
-            f"{len(tiles)} tiles: expected one (--grid 1x1, or a --region of one tile)"
+            f"surface.wrap is 'alpha-wrap', which closes each tile by itself, and the plan has "
+            f"{len(tiles)} tiles, expected one tile: give --grid 1x1, or a --region of one tile"
         )
     settings = replace(
         settings,
@@ -295,14 +309,17 @@ def make_plan(
 
 
 def _longest_um(level: LevelLike) -> float:
-    """Return the longest edge of the field of view, whichever region of it is built."""
+    """Return the longest edge of the whole field of view, um, even if only a region is built."""
     return max(n * step for n, step in zip(level.shape, level.spacing_um, strict=True))
 
 
 def parse_region(text: str, whole: Box) -> Box:
-    """Return the box of `z0:z1,y0:y1,x0:x1` in voxels; an empty end means the data's own.
+    """Return the box of `z0:z1,y0:y1,x0:x1` in voxels; an empty end means the end of `whole`.
 
-    Raises UsageError where the text isn't a box inside `whole`.
+    Raises UsageError if the text isn't a box inside `whole`.
+
+    >>> parse_region("4:8,:,10:", Box((0, 0, 0), (16, 32, 64)))
+    Box(start=(4, 0, 10), stop=(8, 32, 64))
     """
     if not text:
         return whole
@@ -320,18 +337,18 @@ def parse_region(text: str, whole: Box) -> Box:
 
 
 def _tiles(settings: Settings, region: Box) -> tuple[tuple[int, int, int], tuple[Tile, ...]]:
-    """Return the tile size (z, y, x) in voxels, with a grid that of the largest, and the tiles."""
+    """Return the size of the largest tile, (z, y, x) in voxels, and the tiles."""
     options = settings.plan
     if options.grid:
         match = re.fullmatch(r"([1-9]\d*)x([1-9]\d*)", options.grid)
         if not match:
-            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, as 5x2")
+            raise UsageError(f"--grid is {options.grid!r}, expected columns x rows, such as 5x2")
         columns, rows = int(match[1]), int(match[2])
         depth, height, width = region.shape
         if height < 2 * rows or width < 2 * columns:
             raise UsageError(
                 f"--grid {options.grid} makes more tiles than {_by((height, width))} voxels (y, x) "
-                "can fill, expected at least 2 voxels a tile each way"
+                "can fill, expected at least 2 voxels of a tile along each axis"
             )
         size = (depth, -(-height // rows), -(-width // columns))
         return size, cut_evenly(region, columns, rows)
@@ -350,8 +367,8 @@ def _halo(
 ) -> tuple[int, int, int]:
     """Return the voxels (z, y, x) that a unit reads around its tile, at most the region's.
 
-    Raises UsageError where these, and the voxels that closing and smoothing add at the ends, are
-    out of proportion to the tile: such lengths are meant for other voxels.
+    Raises UsageError if these, and the voxels that closing and smoothing add at the ends, are too
+    many for the tile. The lengths in the settings are then meant for larger voxels.
     """
     surface = settings.surface
     smoothing = SMOOTHING_REACH * float(surface.smoothing_um)
@@ -379,8 +396,8 @@ def _halo(
             f"{_by(tile_size)}, expected at most {limit:,}: "
             "choose another --preset, smaller lengths or larger tiles"
         )
-    # four more: one voxel for the median, one for the gradient, one because the tile's last plane
-    # is its neighbour's, one past the plane (surface._least_on_plane)
+    # Four more planes: one for the median, one for the gradient, one because the last plane of a
+    # tile belongs to its neighbour, and one beyond that plane (surface._least_on_plane).
     depth, height, width = (
         math.ceil(min(reach / step, n)) + 4 * k
         for n, step, k in zip(region.shape, spacing_um, every, strict=True)
@@ -389,13 +406,13 @@ def _halo(
 
 
 def _step_of(grid_um: float, spacing_um: Sequence[float]) -> tuple[int, int, int]:
-    # 0.01 for rounding: 0.42 um are three times 0.14 um
+    # 0.01 absorbs rounding, so that 0.42 um is three times 0.14 um
     z, y, x = (max(1, int(grid_um / h + 0.01)) for h in spacing_um)
     return z, y, x
 
 
 def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
-    """Raise UsageError where planes lie so far apart that a tile keeps hardly any."""
+    """Raise UsageError if planes lie so far apart that a tile keeps fewer than MIN_PLANES."""
     size = settings.plan.tile_size
     steps = _step_of(settings.surface.grid_um, spacing_um)
     for axis, n, k, h in zip("zyx", size, steps, spacing_um, strict=True):
@@ -403,8 +420,8 @@ def _require_planes(settings: Settings, spacing_um: Sequence[float]) -> None:
         if k > 1 and planes < MIN_PLANES:
             raise UsageError(
                 f"surface.grid_um is {settings.surface.grid_um:g}, which leaves {planes} of the "
-                f"{n} planes along {axis} of a tile, {h:g} um apart: expected {MIN_PLANES} or "
-                "more of them: choose another --preset, or a smaller surface.grid_um"
+                f"{n} planes along {axis} of a tile, {h:g} um apart, expected {MIN_PLANES} or "
+                "more: choose another --preset, or a smaller surface.grid_um"
             )
 
 

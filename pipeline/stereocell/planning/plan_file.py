@@ -1,4 +1,4 @@
-"""The plan as plan.json holds it (plan.schema.json), and back."""
+"""Convert a plan to the content of plan.json (plan.schema.json) and back."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -22,7 +22,7 @@ def _adapter() -> TypeAdapter[Plan]:
 
 
 def to_json(plan: Plan) -> dict[str, Any]:
-    """Return the plan as plain values, as plan.json holds it: a tile and its box are one."""
+    """Return the plan as the content of plan.json. The box of a tile is written into the tile."""
     content = _adapter().dump_python(plan, mode="json")
     for tile in content["tiles"]:
         tile |= tile.pop("box")
@@ -37,9 +37,9 @@ def to_json(plan: Plan) -> dict[str, Any]:
 
 
 def from_json(content: Mapping[str, Any], remedy: str = _AGAIN) -> Plan:
-    """Return the plan that `to_json` was given; the content has passed its schema.
+    """Return the plan from the content of plan.json, which must have passed its schema.
 
-    Raises OutputError for what no plan of ours says.
+    Raises OutputError for content that no plan of StereoCell has.
     """
     tiles = [{"id": tile["id"], "box": tile} for tile in content["tiles"]]
     settings = from_dict(content["settings"])
@@ -55,13 +55,13 @@ def from_json(content: Mapping[str, Any], remedy: str = _AGAIN) -> Plan:
 
 
 def _find_fault(plan: Plan) -> str | None:
-    """Return what a schema can't say of a plan that was edited or damaged."""
+    """Return a fault of an edited or damaged plan that its schema can't find; None: it has none."""
     names = [*(one.name for one in plan.channels), *(one.name for one in plan.labels)]
     for name in (plan.name, *names):
         if not name.isprintable():
             return f"name: found {name!r:.80}, expected printable characters"
     if not _is_inside(plan.region, Box((0, 0, 0), plan.region.stop)):
-        return f"region: found {plan.region!s:.100}, expected voxels in it"
+        return f"region: found {plan.region!s:.100}, expected a box with at least one voxel"
     for tile in plan.tiles:
         if not _is_inside(tile.box, plan.region):
             return f"tile {tile.id}: found {tile.box!s:.100}, expected a box inside the region"

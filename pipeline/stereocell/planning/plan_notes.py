@@ -1,4 +1,4 @@
-"""Notes beside a plan: gaps in the data, ignored settings, changes since the plan before."""
+"""Notes on a plan: gaps in the data, ignored settings, changes since the previous plan."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -19,20 +19,20 @@ from stereocell.read.absent_chunks import count_absent
 from stereocell.steps.open_source import SourceRef
 from stereocell.transfer.joint_histogram import sample_boxes
 
-_MAX_CHANGES = 4  # most changed settings that a line names
-_BODY_UM = 100.0  # um: finest spacings from here on are told in mm
-_LOOKED_AT = 16_000_000  # voxels of all channels that are looked at for NaN
+_MAX_CHANGES = 4  # most changed settings in one line
+_BODY_UM = 100.0  # um; voxel spacings of at least this are printed in mm
+_SEARCHED = 16_000_000  # most voxels of all channels that are searched for NaN
 
 
-def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
-    """Return what is said of NaN and infinity; of much data some blocks are looked at.
+def notes_on_gaps(dataset: Dataset, plan: Plan) -> list[str]:
+    """Return a note on each channel with NaN or infinity, from blocks if there are many voxels.
 
-    Raises SourceError where a channel has nothing else.
+    Raises SourceError if a channel has no finite value.
     """
     indices = list(dict.fromkeys(channel.index for channel in plan.channels))
     if not indices:
         return []
-    boxes = sample_boxes(plan.region, max(1, _LOOKED_AT // len(indices)))
+    boxes = sample_boxes(plan.region, max(1, _SEARCHED // len(indices)))
     found = []
     for index in indices:
         share = dataset.share_of_gaps(index, boxes, plan.level)
@@ -46,10 +46,10 @@ def told_of_gaps(dataset: Dataset, plan: Plan) -> list[str]:
     return found
 
 
-def told_of_absent(dataset: Dataset, plan: Plan) -> list[str]:
+def notes_on_absent_chunks(dataset: Dataset, plan: Plan) -> list[str]:
     """Return a note on the chunks that are not stored, for the image and for each label map.
 
-    Raises SourceError where no chunk is stored.
+    Raises SourceError if no chunk is stored.
     """
     indices = list(dict.fromkeys(channel.index for channel in plan.channels if not channel.source))
     found = _absent(dataset, source_of(plan), indices, plan.region, plan.level) if indices else []
@@ -70,8 +70,8 @@ def _absent(
     nouns = f"{absent.noun}s"
     if absent.count == absent.total:
         raise SourceError(
-            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected those "
-            "that hold voxels: copy the volume again, or take another --level"
+            f"{dataset.shown}: level {level}: found none of {absent.total} {nouns}, expected the "
+            f"{nouns} that hold voxels: copy the volume again, or choose another --level"
         )
     share = max(absent.count / absent.total, 1e-4)
     return [
@@ -99,7 +99,11 @@ def print_notes(plan: Plan) -> None:
 
 
 def words_of_spacing(spacing_um: Spacing) -> str:
-    """Return a voxel spacing for a reader: `1 x 0.5 x 0.5 um`, or in mm where it is a body's."""
+    """Return a voxel spacing as text, in um, or in mm if it is at least _BODY_UM.
+
+    >>> words_of_spacing((1.0, 0.5, 0.5))
+    '1 x 0.5 x 0.5 um'
+    """
     unit_um, unit = (1000.0, "mm") if min(spacing_um) >= _BODY_UM else (1.0, "um")
     return " x ".join(f"{along / unit_um:.4g}" for along in spacing_um) + f" {unit}"
 
@@ -111,21 +115,21 @@ def ignored_notes(settings: Settings, channels: Sequence[Channel]) -> Iterator[s
         keys = (channel.name, str(channel.index), ALL)
         given = next((settings.iso_values[k] for k in keys if k in settings.iso_values), None)
         if channel.rung and given is not None and given != settings.iso_values.get(ALL):
-            yield f"{channel.name}: built where --surfaces says, not at the iso-value {given}"
+            yield f"{channel.name}: --surfaces chooses the level, so iso-value {given} is ignored"
         if channel.rung and options.criterion != LADDER:
-            yield f"{channel.name}: built where --surfaces says, not by {options.criterion}"
+            yield f"{channel.name}: --surfaces chooses the level, so {options.criterion} is ignored"
         is_number = channel.rung not in (*RUNGS, NO_SURFACE) if channel.rung else given is not None
         if is_number and options.scope == "tile":
             yield (
-                f"{channel.name}: its level is given, so the same in all tiles: --iso-scope tile "
-                "is for levels that are found"
+                f"{channel.name}: the settings state its level, so all tiles have the same one, "
+                "and --iso-scope tile is ignored"
             )
 
 
 def changes_of(there: Plan, plan: Plan) -> str:
-    """Return a line on the settings in which two plans of the same input differ; empty: none.
+    """Return a line on the settings in which two plans of the same input differ; empty: none do.
 
-    there  the plan in OUT, which `plan` replaces. Results that depend on the changes follow
+    there  the plan in OUT, which `plan` replaces
     """
     if replace(there, notes=plan.notes) == plan:
         return ""
@@ -143,5 +147,5 @@ def changes_of(there: Plan, plan: Plan) -> str:
     listed = "; ".join(changes[:_MAX_CHANGES]) + (f"; and {more} more" if more > 0 else "")
     return (
         f"OUT holds a build of this input with other settings, whose results are replaced: "
-        f"{listed or 'another path of the input'}"
+        f"{listed or 'the input has another path'}"
     )

@@ -1,4 +1,4 @@
-"""Choose the preset that suits a source, where the user names none."""
+"""Choose the preset that suits a source if the user names none."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,13 +23,15 @@ from stereocell.read.addresses.resolve import resolve
 from stereocell.steps.open_source import open_source
 
 _BY_MODALITY = {"MR": "mri", "CT": "ct", **dict.fromkeys(TRACER_MODALITIES, "pet")}
-_BODY_UM = 100.0  # um: a finest spacing from here on is that of a body, and not of a microscope
-# um: finest spacings above the first, up to the second, are those of light sheets and confocal
-# overviews of thick tissue. Cells are a few voxels wide there, and tissue fills the field.
+_BODY_UM = 100.0  # um; least voxel spacing of a body's scan. Finer voxels come from a microscope.
+# um, um: voxel spacings above the first and up to the second come from light sheets and confocal
+# overviews of thick tissue. There cells are a few voxels wide, and tissue fills the field of view.
 _OVERVIEW_UM = (1.0, 10.0)
-_PATIENT_UM = 300.0  # um: an MR of a patient has no finer voxels; micro-CT and small animals do
+_PATIENT_UM = (
+    300.0  # um; least voxel spacing of a patient's MR, micro-CT and animals have finer ones
+)
 _AS_HEAT = "for a PET or SPECT --preset pet, which shows heat"
-_PART_UM = 20_000.0  # um: of what is smaller across, presets of patients drop pieces half as large
+_PART_UM = 20_000.0  # um; in smaller volumes, presets of patients would drop half of the specimen
 
 
 def load_for(
@@ -40,17 +42,19 @@ def load_for(
     flags: Mapping[str, Any],
     where: str = "command line",
 ) -> tuple[Settings, tuple[str, ...]]:
-    """Return the settings of a build, by the preset that suits the source where none is given.
+    """Return the settings of a build, and notes for the plan.
 
-    As `settings.load` otherwise. A file of settings, `config`, leaves no choice. The notes for the
-    plan are the choice with its reason, or a doubt about a preset of CT; none where there was no
-    choice. A source that can't be read is left to the next reader.
+    If neither a preset nor a file of settings (`config`) is given, the preset that suits the source
+    is used. The notes state that choice and its reason, or why a named preset of CT does not fit
+    the voxels. An unreadable source raises no error here, because the next step reports it.
+
+    The arguments are those of `settings.load`.
     """
     if preset is not None or config is not None:
         settings = load(preset, config, flags=flags, where=where)
         has_level = set(settings.iso_values) - {ALL} or settings.surfaces
-        doubts = preset in LEVELS_HU and config is None and not has_level
-        return settings, _doubts_of(source, preset or "", settings) if doubts else ()
+        is_checked = preset in LEVELS_HU and config is None and not has_level
+        return settings, _notes_on_mismatch(source, preset or "", settings) if is_checked else ()
     settings = load(None, None, flags=flags, where=where)
     options = settings.plan
     try:
@@ -69,24 +73,24 @@ def load_for(
     return (load(chosen, None, flags=flags, where=where) if chosen else settings), notes
 
 
-def _doubts_of(source: str | Path, preset: str, settings: Settings) -> tuple[str, ...]:
-    """Return the note on a preset of CT that the user names and that the voxels do not fit."""
+def _notes_on_mismatch(source: str | Path, preset: str, settings: Settings) -> tuple[str, ...]:
+    """Return the note on a preset of CT that the user names but that does not fit the voxels."""
     try:
         if settings.plan.taken_as == HOUNSFIELD:
             return ()
         dataset = open_source(as_asked(resolve(source).source, settings.plan))
-        if dataset.modality and dataset.dtype.kind != "u":  # as the source states itself
+        if dataset.modality and dataset.dtype.kind != "u":  # a source that states this is trusted
             return ()
-        doubt = _doubt(dataset, preset)
+        mismatch = _explain_mismatch(dataset, preset)
     except StereoCellError:
         return ()
-    return (f"preset {preset}: {doubt}",) if doubt else ()
+    return (f"preset {preset}: {mismatch}",) if mismatch else ()
 
 
-def _doubt(dataset: Dataset, preset: str) -> str:
+def _explain_mismatch(dataset: Dataset, preset: str) -> str:
     """Return why a level in Hounsfield units does not fit the voxels; empty: it may fit.
 
-    A reader that knows the values to be no Hounsfield units has noted it already.
+    If a reader knows that the values are not Hounsfield units, it has noted so already.
     """
     if not dataset.has_hounsfield_units:
         return ""
@@ -95,15 +99,17 @@ def _doubt(dataset: Dataset, preset: str) -> str:
         return ""
     flags, level = evidence.flags, LEVELS_HU[preset]
     if preset == "ct-bone":
-        flags = evidence.bone_flags or "--iso-value 0=VALUE sets one, a voxel value"
-    meant = f"{evidence.words}, and its level of {level:g} is meant for Hounsfield units"
+        flags = evidence.bone_flags or "--iso-value 0=VALUE sets a level as a voxel value"
+    mismatch = f"{evidence.words}, and its level of {level:g} is meant for Hounsfield units"
     if is_other_scale(dataset, level):
-        return f"{meant}: the level and its window are not used, others are found (or {flags})"
-    return f"{meant} ({flags})"
+        return (
+            f"{mismatch}: its level and window are ignored, and the build finds others (or {flags})"
+        )
+    return f"{mismatch} ({flags})"
 
 
 def print_choice(choice: Sequence[str]) -> None:
-    """Print the choice of a preset, once the source proved to be one: errors stand alone."""
+    """Print the notes on the choice of a preset, once the source has been opened without error."""
     for note in choice:
         console.print(f"plan: {note}", markup=False)
 
@@ -111,10 +117,10 @@ def print_choice(choice: Sequence[str]) -> None:
 def choose_preset(
     dataset: Dataset, *, modality: str = "", tracer: str = ""
 ) -> tuple[str | None, tuple[str, ...]]:
-    """Return the name of a preset, or None for the defaults, and the reasons, a sentence each.
+    """Return the name of a preset, or None for the defaults, and sentences on the reasons.
 
-    modality  the settings', where the input says none
-    tracer    the word in the source's name that states PET or SPECT; empty: there is none
+    modality  modality in the settings; it counts if the input states none
+    tracer    word in the source's name that states PET or SPECT; empty: there is none
     """
     known = dataset.modality or modality
     level = dataset.levels[0]
@@ -126,18 +132,18 @@ def choose_preset(
         return None, _describe(None, f"{across / 1000:.3g} mm across, too small for a patient")
     if not dataset.has_hounsfield_units:
         chosen = _BY_MODALITY["CT"]
-        return chosen, _describe(chosen, "the input is CT, though without Hounsfield units")
+        return chosen, _describe(chosen, "the input is a CT, but not in Hounsfield units")
     if known:
         by_kind = _BY_MODALITY.get(known)
         is_unsigned_ct = by_kind == "ct" and dataset.dtype.kind == "u"
-        doubt = _doubt(dataset, "ct") if is_unsigned_ct else ""
+        mismatch = _explain_mismatch(dataset, "ct") if is_unsigned_ct else ""
         reasons = _describe(by_kind, f"the input is {known}")
-        return by_kind, (*reasons, f"preset {by_kind}: {doubt}") if doubt else reasons
+        return by_kind, (*reasons, f"preset {by_kind}: {mismatch}") if mismatch else reasons
     return _by_values(find_ct_evidence(dataset), finest, tracer)
 
 
 def _of_microscope(finest_um: float) -> tuple[str | None, tuple[str, ...]]:
-    """Return the preset of a volume that a microscope took, and the reasons."""
+    """Return the preset for a microscope's volume, and the reasons."""
     over, up_to = _OVERVIEW_UM
     voxels = f"voxels of {finest_um:.3g} um, as of a"
     if over < finest_um <= up_to:
@@ -150,9 +156,9 @@ def _of_microscope(finest_um: float) -> tuple[str | None, tuple[str, ...]]:
 def _by_values(
     evidence: CtEvidence, finest_um: float, tracer: str
 ) -> tuple[str | None, tuple[str, ...]]:
-    """Return the preset of a body whose modality is not stated, and the reasons.
+    """Return the preset for a body whose modality is not stated, and the reasons.
 
-    tracer  the word in the source's name that states PET or SPECT; empty: there is none
+    tracer  word in the source's name that states PET or SPECT; empty: there is none
     """
     size = f"voxels of {finest_um / 1000:.3g} mm"
     if evidence.is_hounsfield:
@@ -169,9 +175,9 @@ def _by_values(
 
 
 def _advice(evidence: CtEvidence) -> str:
-    """Return the flags that build a volume as a CT after all, and where their level comes from."""
+    """Return the flags that build the volume as a CT instead, and how their level was found."""
     if not evidence.basis:
-        return f"{evidence.words} would be those of a CT: for a CT {evidence.flags}"
+        return f"{evidence.words} are typical of a CT: for a CT {evidence.flags}"
     if evidence.basis == NO_SCALE:
         return f"for a CT {evidence.flags}"
     return f"for a CT {evidence.flags}; its level lies {evidence.basis}"
@@ -179,5 +185,5 @@ def _advice(evidence: CtEvidence) -> str:
 
 def _describe(chosen: str | None, reason: str) -> tuple[str, ...]:
     if chosen is None:
-        return (f"no preset: {reason}: lengths follow the voxel spacing (--preset names another)",)
-    return (f"preset {chosen}: {reason} (--preset {NO_PRESET}: the defaults)",)
+        return (f"no preset: {reason}: lengths follow the voxel spacing (--preset names one)",)
+    return (f"preset {chosen}: {reason} (--preset {NO_PRESET} takes the defaults)",)

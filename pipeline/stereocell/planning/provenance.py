@@ -1,4 +1,4 @@
-"""The provenance that results carry: settings and versions, no paths and no identities."""
+"""Collect the provenance of results: settings and versions, but no paths and no identities."""
 
 from typing import Any
 
@@ -17,17 +17,17 @@ from stereocell.textures.map_packages import (
     UNWRAPPER,
 )
 
-# the steps whose libraries stand in the provenance of a stage
+# Steps whose libraries are named in the provenance of a stage.
 _STEPS = tuple(
     step.__name__ for step in (FindWindow, GatherEvidence, SumComponents, BuildUnit, WriteStageTile)
 )
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
-    """Return the provenance that results carry: settings and versions, no paths, no identities."""
+    """Return the provenance for results: settings and versions, but no paths and no identities."""
     settings = _without_places(to_dict(plan.settings))
-    # by the plan's formats, since the sources may be gone when a stage is written; an added
-    # channel's source lies in OUT
+    # The plan's formats are used, because the sources may be gone when a stage is written. The
+    # source of an added channel lies in OUT.
     formats = {*plan.formats, *(format_of(c.source).name for c in plan.channels if c.source)}
     return {
         "generator": GENERATOR,
@@ -46,7 +46,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
 def provenance_record(plan: Plan) -> dict[str, Any]:
     """Return the content of provenance.json: the provenance, and the notes on reading the source.
 
-    The notes stay beside the plan, because some name the source's files.
+    Results leave the notes out, because some name the source's files.
     """
     return {**provenance(plan), "notes": list(plan.notes)}
 
@@ -59,6 +59,6 @@ def _without_places(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _added(plan: Plan) -> dict[str, Any]:
-    """Return the channels with a source of their own, and that source's fingerprint."""
+    """Return the fingerprints of sources that belong to one channel alone, by channel name."""
     added = {c.name: c.fingerprint for c in plan.channels if c.source}
     return {"added_channels": added} if added else {}

@@ -1,4 +1,4 @@
-"""Settings by the names that people read: flags at a prompt, sections and keys elsewhere."""
+"""Name settings in messages by flags for users of a shell, by section and key for all others."""
 
 import re
 from collections.abc import Collection, Iterator
@@ -23,9 +23,9 @@ def flagged_settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
 
 
 def in_flags(line: str, given: Collection[str]) -> str:
-    """Return a message with flags in place of the settings that were given by them.
+    """Return a message with flags in place of the settings that were given by flags.
 
-    given  flags' names
+    given  names of the flags
 
     >>> in_flags("command line: plan.grid is 3, expected text", ["--grid"])
     '--grid is 3, expected text'
@@ -40,7 +40,9 @@ def in_flags(line: str, given: Collection[str]) -> str:
 
 
 def in_settings(line: str, *, has_sections: bool = True) -> str:
-    """Return a message with settings in place of flags; without sections, as arguments are called.
+    """Return a message with settings in place of flags.
+
+    has_sections  whether settings are named with their section; False: as arguments of Python
 
     >>> in_settings("--grid is '3', expected columns x rows; --iso-value CD8: found -1")
     "plan.grid is '3', expected columns x rows; iso_values.CD8: found -1"
@@ -48,7 +50,7 @@ def in_settings(line: str, *, has_sections: bool = True) -> str:
     for flag, place, _ in flagged_settings():
         place = place if has_sections else place[-1:]
         named = rf"(?<![\w-]){flag.name}(?![\w-])"
-        if has_sections and len(place) == 1:  # by channel, which stands behind it
+        if has_sections and len(place) == 1:  # the channel's name follows the flag
             line = re.sub(rf"{named} (?!names |is |says )(?=\S)", f"{place[0]}.", line)
         line = re.sub(named, ".".join(place), line)
     return re.sub(r"(?<![\w-])--(preset|config|workers|scheduler)\b", r"\1", line)
@@ -56,7 +58,7 @@ def in_settings(line: str, *, has_sections: bool = True) -> str:
 
 @contextmanager
 def named_as_settings(*, has_sections: bool = True) -> Iterator[None]:
-    """Raise errors of the block as `in_settings` has them, for users of Python."""
+    """Rewrite the errors of the block by `in_settings`, for users of Python."""
     try:
         yield
     except StereoCellError as error:

@@ -1,4 +1,4 @@
-"""Plain values of settings, before they are read as their types."""
+"""Check the plain values of settings before they are converted to their types."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -9,19 +9,22 @@ from stereocell.model.utf8 import escaped_bytes
 
 
 def finite(value: Any) -> Any:
-    """Return plain values with nothing in the place of numbers that are not finite."""
+    """Return plain values with None in place of numbers that are not finite."""
     if isinstance(value, Mapping):
         return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, int | float):
         try:
             return value if isfinite(value) else None
-        except OverflowError:  # TOML's whole numbers have no end
+        except OverflowError:  # whole numbers in TOML may be larger than any float
             return None
     return [finite(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def require_utf8(values: Mapping[str, Any], where: str) -> None:
-    """Raise UsageError for a text that is not UTF-8 among {section: {key: value}}."""
+    """Raise UsageError if a key or text in {section: {key: value}} is not UTF-8.
+
+    where  name of the file or command line, for messages
+    """
     for section, content in values.items():
         for key, value in content.items():
             listed = value if isinstance(value, list | tuple) else [value]

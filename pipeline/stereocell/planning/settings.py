@@ -1,4 +1,4 @@
-"""All settings: their sections, how TOML files and flags fill them, and how they are written out.
+"""All settings: their sections, how TOML files and flags set them, and how they are written.
 
 Order of precedence: defaults < preset < configuration file < flags. Unknown keys are errors.
 """
@@ -38,151 +38,160 @@ from stereocell.transfer.windows import parse_window
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-MAX_INDEX = 2**31  # of levels, and of voxels along an axis
-# values of taken_as: voxels are intensities, even if they look like labels, or Hounsfield units,
-# even if neither the source nor air and fat among the voxels show it
+MAX_INDEX = 2**31  # largest index of a level, and of a voxel along an axis
+# Values of taken_as. The voxels are intensities even if they look like labels, or Hounsfield units
+# even if neither the source nor its voxels show it.
 INTENSITY, HOUNSFIELD = "intensity", "hounsfield"
-NO_PRESET = "none"  # names the defaults
+NO_PRESET = "none"  # stands for the defaults
 PRESETS = Path(__file__).parent / "presets"
-# of a file of settings; tomllib's time grows with the square of a dotted key's length
+# Bytes, characters: limits of a file of settings and of its lines. The time that tomllib needs for
+# a dotted key grows with the square of its length.
 _MAX_BYTES, _MAX_LINE = 1 << 17, 2000
-# What the first lines of a file of settings say about it.
+# First lines of a file of settings.
 TEMPLATE = "StereoCell settings. Every key may be left out; unknown keys are errors."
 RECORD = (
-    "The settings that this build used; each build writes them anew.\n"
-    "To change them, copy this file and pass the copy with --config."
+    "The settings that this build used. The next build overwrites this file.\n"
+    "To change settings, copy this file and pass the copy with --config."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class PlanOptions:
-    """What of the dataset is built, and how it is cut."""
+    """The part of the dataset that is built, and how it is cut into tiles."""
 
     level: int | str = setting(
         AUTO,
-        "resolution level, 0 is the finest; auto: see max_voxels",
+        "resolution level, 0 is the finest; auto: the finest within max_voxels",
         flag=Flag(
-            "--level", "resolution level, 0 is the finest (default auto: see plan.max_voxels)"
+            "--level",
+            "resolution level, 0 is the finest (default auto: the finest within plan.max_voxels)",
         ),
         bounds=Bounds(-MAX_INDEX, MAX_INDEX),
     )
     max_voxels: int = setting(
         2_000_000_000,
-        "auto takes the finest level within this: the region, all channels",
+        "largest number of voxels of the region, all channels together, for level = auto",
         bounds=COUNT,
     )
     channels: tuple[str, ...] = setting(
         (),
-        "names or indices; empty: all",
+        "channels to build, by name or index; empty: all",
         flag=Flag(
-            "--channels", "names or indices, as CD31,MART1", "names or indices, as CD31,MART1"
+            "--channels",
+            "channels to build, by name or index, such as CD31,MART1",
+            "names or indices, such as CD31,MART1",
         ),
     )
     region: str = setting(
         "",
-        "z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all",
+        "part to build, as z0:z1,y0:y1,x0:x1 in voxels of the level that is built; empty: all",
         flag=Flag(
             "--region",
-            "z0:z1,y0:y1,x0:x1 in voxels of the level that is built: without --level the finest "
-            "whose region stays within plan.max_voxels",
+            "part to build, as z0:z1,y0:y1,x0:x1 in voxels of the level that is built (without "
+            "--level the finest one whose region has at most plan.max_voxels)",
         ),
     )
     tile_size: tuple[int, ...] = setting(
         (194, 512, 512),
-        "voxels z, y, x, clipped to the data",
-        flag=Flag("--tile-size", "z,y,x in voxels", "three numbers z,y,x"),
+        "size of a tile z, y, x in voxels, at most that of the data",
+        flag=Flag("--tile-size", "size of a tile z,y,x in voxels", "three numbers z,y,x"),
         bounds=Bounds(-MAX_INDEX, MAX_INDEX),
     )
     grid: str = setting(
         "",
-        "columns x rows of equal tiles, as 5x2; instead of tile_size",
-        flag=Flag("--grid", "columns x rows of equal tiles, as 5x2; not with --tile-size"),
+        "columns x rows of equal tiles, such as 5x2; instead of tile_size",
+        flag=Flag("--grid", "columns x rows of equal tiles, such as 5x2; not with --tile-size"),
     )
-    time: int = setting(0, "index into a time series", flag=Flag("--time"), bounds=COUNT_OR_NONE)
+    time: int = setting(
+        0,
+        "point in time of a series, counted from 0",
+        flag=Flag("--time"),
+        bounds=COUNT_OR_NONE,
+    )
     series: int = setting(
         0,
-        "which of several images of a source, from 1 as --series list counts; 0: the largest",
+        "number of the image in a source of several, as --series list counts; 0: the largest",
         flag=Flag(
             "--series",
-            "which of several images of a source: series of DICOM or planes, segments, scenes of "
-            "CZI, LIF, ND2, tiles and angles of BigDataViewer, angles of OME-TIFF (default: the "
-            "largest); `list` shows them and does nothing else",
+            "number of the image in a source of several (default: the largest), or `list` to print "
+            "them; an image is a series of DICOM or of planes, a segment, a scene of CZI, LIF or "
+            "ND2, a tile or angle of BigDataViewer, or an angle of OME-TIFF",
             "N|list",
         ),
         bounds=COUNT_OR_NONE,
     )
     pattern: str = setting(
         "",
-        "how the files of a folder of planes are named, as img_c{c}_z{z}.tif; empty: guessed",
+        "names of the files in a folder of planes, such as img_c{c}_z{z}.tif; empty: guessed",
         flag=Flag(
             "--pattern",
-            "how the files of a folder of planes are named: {z} for the plane's number, {c} for "
-            "the channel, {t} for the time, * for anything else, as img_c{c}_z{z}.tif (default: "
-            "guessed)",
+            "names of the files in a folder of planes, such as img_c{c}_z{z}.tif (default: "
+            "guessed); {z} stands for the plane's number, {c} for the channel, {t} for the time, * "
+            "for anything",
         ),
     )
     axes: str = setting(
         "",
-        "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, as czyx; empty: what the file says",
+        "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, such as czyx; empty: the file's",
         flag=Flag(
             "--axes",
-            "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, slowest first, as zyx or czyx: "
-            "where the file names none, or a TIFF's are wrong",
+            "axes of a TIFF, HDF5, Zarr or N5 array longer than 1, slowest first, such as zyx or "
+            "czyx, if the file names none or a TIFF names wrong ones",
         ),
     )
     dark: bool = setting(
         False,
-        "structures are darker than their surroundings, as in electron microscopy: values are "
-        "inverted",
+        "invert all values, for structures darker than their surroundings (electron microscopy)",
         flag=Flag(
             "--dark",
-            "structures are darker than their surroundings, as membranes in electron microscopy: "
-            "all values are inverted",
+            "invert all values, for structures that are darker than their surroundings, such as "
+            "membranes in electron microscopy",
         ),
     )
     spacing_um: tuple[float, ...] = setting(
         (),
-        "voxel spacing z, y, x, instead of the file's",
+        "voxel spacing z, y, x in um, instead of the file's",
         flag=Flag(
             "--spacing-um",
-            "z,y,x voxel spacing in um, instead of the file's",
+            "voxel spacing z,y,x in um, instead of the file's",
             "three numbers z,y,x",
         ),
         bounds=LENGTH_UM,
     )
     taken_as: str = setting(
         "",
-        "intensity: build what looks like a label map all the same; hounsfield: values of a CT are "
-        "Hounsfield units",
+        "intensity: build an image even if it looks like a label map; hounsfield: take the values "
+        "of a CT for Hounsfield units",
         flag=Flag(
             "--as",
-            "intensity: build what looks like a label map all the same; hounsfield: the values of "
-            "a CT are Hounsfield units, though the source does not show it",
+            "intensity: build an image even if it looks like a label map; hounsfield: take the "
+            "values of a CT for Hounsfield units, even if the source does not show it",
         ),
     )
     neurological: bool = setting(
         False,
-        "pictures of a patient have right on the right, and not as radiologists do",
-        flag=Flag("--neurological", "pictures of a patient with right on the right"),
+        "images of a patient show the patient's right on the right, unlike radiologists' images",
+        flag=Flag("--neurological", "show the patient's right on the right in images"),
     )
     modality: str = setting(
         "",
-        "where the input states none: DICOM's Modality; MR and CT open path-traced, PT as heat",
+        "DICOM's Modality, if the input states none; MR and CT open path-traced, PT as heat",
         flag=Flag(
             "--modality",
-            "what took a volume that does not say so: MR, CT, PT, ..., GM for a microscope",
+            "DICOM's code for the scanner, if the input states none: MR, CT, PT, ..., GM for a "
+            "microscope",
         ),
     )
 
     def __post_init__(self) -> None:
         if self.axes and not is_axes(axes_of(self.axes)):
             raise UsageError(
-                f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c where there are "
-                "any, each once, as czyx"
+                f"plan.axes is {self.axes!r:.40}, expected z, y and x, and t and c if the array "
+                "has them, each once, such as czyx"
             )
         if self.spacing_um and not (len(self.spacing_um) == 3 and min(self.spacing_um) > 0):
             found = ",".join(f"{value:g}" for value in self.spacing_um)
-            raise UsageError(f"plan.spacing_um: found {found}, expected z,y,x in um, each above 0")
+            raise UsageError(f"plan.spacing_um is {found}, expected z,y,x in um, each above 0")
         require_bounds("plan", self)
         if self.taken_as not in ("", INTENSITY, HOUNSFIELD):
             raise UsageError(
@@ -198,26 +207,26 @@ class PlanOptions:
 
 @dataclass(frozen=True, slots=True)
 class VolumeOptions:
-    """What the stage keeps of the voxels, beside the surfaces."""
+    """The voxels that the stage keeps besides the surfaces."""
 
     bits: int = setting(
         16,
-        "16: the stage has the voxels as measured beside those of 8 bits; 8: these alone",
+        "16: the stage keeps the voxels as measured and in 8 bits; 8: only in 8 bits",
         flag=Flag(
             "--bits",
-            "16 (default): the stage keeps the voxels as measured, so that another window loses "
-            "nothing; 8: those of 8 bits alone, about half the size",
+            "16 (default): the stage keeps the voxels as measured and in 8 bits, so that another "
+            "window loses nothing; 8: only in 8 bits, about half the size",
         ),
         bounds=COUNT_OR_NONE,
     )
     without_vdb: bool = setting(
         False,
-        "the stage has no .vdb files: other programs draw no volumes, and another window is "
-        "applied to the voxels of 8 bits",
+        "write no .vdb files: other programs draw no volumes, and another window starts from the "
+        "voxels in 8 bits",
         flag=Flag(
             "--without-vdb",
-            "a small stage without .vdb files: bundle and viewer keep their volumes, other "
-            "programs draw surfaces alone; implies --bits 8",
+            "write a small stage without .vdb files: bundle and viewer keep their volumes, other "
+            "programs draw only surfaces; implies --bits 8",
         ),
     )
 
@@ -240,32 +249,35 @@ class Settings:
     objects: ObjectOptions = field(default_factory=ObjectOptions)
     iso_values: Mapping[str, float | str] = setting(
         {},
-        "channel = voxel value, or one above the background as 162+b, instead of what is found",
+        "channel = iso-value of its surface: a voxel value, or one above the background such as "
+        "162+b; without: found by the build",
         flag=Flag(
             "--iso-value",
-            "use this iso-value (a voxel value, or one above the background as 162+b) for a "
-            "channel, by name or index, or * for all others; may be repeated",
+            "iso-value of a channel's surface: a voxel value, or one above the background such as "
+            "162+b; the channel is a name, an index, or * for all others; may be repeated",
             "CHANNEL=VALUE",
         ),
     )
     surfaces: Mapping[str, str] = setting(
         {},
-        "channel = the surfaces built of it: outer, inner, third, or voxel values, between "
-        "commas; a value above the background as 162+b; or none",
+        "channel = surfaces to build: outer, inner, third, or voxel values, separated by commas; a "
+        "value above the background such as 162+b; or none",
         flag=Flag(
             "--surfaces",
-            "which surfaces are built of a channel: outer, inner, third, or voxel values, between "
+            "surfaces to build of a channel: outer, inner, third, or voxel values, separated by "
             "commas; or none; may be repeated",
             "CHANNEL=SURFACE,...",
         ),
     )
     windows: Mapping[str, str] = setting(
         {},
-        "channel = LOW:HIGH, voxel values that become 0 and 255, or brain, bone, lung, soft (CT)",
+        "channel = LOW:HIGH, voxel values that are drawn darkest and brightest, or brain, bone, "
+        "lung, soft (CT)",
         flag=Flag(
             "--window",
-            "the voxel values of a channel that become 0 and 255, as CT=-160:240, or a CT's window "
-            "by name: brain, bone, lung, soft; * names all others; may be repeated",
+            "voxel values of a channel that are drawn darkest and brightest, such as CT=-160:240, "
+            "or a CT's window by name: brain, bone, lung, soft; * stands for all other channels; "
+            "may be repeated",
             "CHANNEL=LOW:HIGH",
         ),
     )
@@ -274,7 +286,7 @@ class Settings:
         "channel or label map = channel whose intensity is painted on its surface",
         flag=Flag(
             "--paint",
-            "paint the second channel's intensity on the first one's surface, as CD31=MART1; "
+            "paint the second channel's intensity on the first one's surface, such as CD31=MART1; "
             "may be repeated",
             "CHANNEL=CHANNEL",
         ),
@@ -282,12 +294,12 @@ class Settings:
 
     labels: Mapping[str, str] = setting(
         {},
-        "label maps whose objects are built: name = path; empty: one of the input's own labels; .: "
-        "the input itself",
+        "label maps whose objects are built: name = path; an empty path means one of the input's "
+        "own labels, . the input itself",
         flag=Flag(
             "--labels",
-            "build the objects of a label map: one of the input's own by name, or NAME=PATH; "
-            "--labels . takes the input itself for one; may be repeated",
+            "build the objects of a label map: NAME of one of the input's own, NAME=PATH, or . if "
+            "the input itself is one; may be repeated",
             "NAME[=PATH]",
         ),
     )
@@ -299,7 +311,7 @@ class Settings:
             parse_window(f"windows.{channel}", window)
 
 
-# What is expected where pydantic finds another type
+# Words for the type that a setting needs, by pydantic's type of error
 _EXPECTED = {
     "float_type": "a number",
     "int_type": "a whole number",
@@ -317,9 +329,17 @@ def load(
     flags: Mapping[str, Any],
     where: str = "command line",
 ) -> Settings:
-    """Return the settings of a preset (name, TOML file or none), a TOML file and flags, in order.
+    """Return the settings of a preset, a TOML file and flags; later ones override earlier ones.
 
-    `flags` is nested as the TOML is: {"plan": {"level": 1}}; `where` they stand. Raises UsageError.
+    preset  name or TOML file of a preset; None: the defaults
+    config  TOML file; None: none
+    flags   values nested like the TOML: {"plan": {"level": 1}}
+    where   name for the flags in messages
+
+    Raises UsageError for unknown keys and wrong values.
+
+    >>> load("ct", None, flags={"plan": {"level": 1}}).iso_values
+    {'*': -300.0}
     """
     settings = Settings()
     if preset not in (None, NO_PRESET):
@@ -330,7 +350,7 @@ def load(
 
 
 def _apply_file(settings: Settings, path: Path, where: str) -> Settings:
-    """Return the settings with those of a file put in. Raises UsageError, which names the file."""
+    """Return the settings overridden by a file's. Raises UsageError, which names the file."""
     values = _read(path)
     try:
         return apply(settings, values, where)
@@ -345,7 +365,7 @@ def preset_names() -> list[str]:
 
 
 def preset_path(preset: str) -> Path:
-    """Return the file of a preset: one of ours by name, or the user's own TOML file."""
+    """Return the file of a preset: one of StereoCell's by name, or the user's own TOML file."""
     if preset.endswith(".toml"):
         return Path(preset)
     if preset not in preset_names():
@@ -355,7 +375,12 @@ def preset_path(preset: str) -> Path:
 
 
 def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings:
-    """Return the settings with `values` ({section: {key: value}}) put in. Raises UsageError."""
+    """Return the settings overridden by `values` ({section: {key: value}}).
+
+    where  name for the values in messages
+
+    Raises UsageError for unknown keys and wrong values.
+    """
     merged = to_dict(settings)
     by_channel = {section for section in merged if not is_dataclass(getattr(settings, section))}
     for section, content in values.items():
@@ -366,16 +391,16 @@ def apply(settings: Settings, values: Mapping[str, Any], where: str) -> Settings
             for key in content:
                 _known(key, list(merged[section]), f"{where}: {section}", "key")
         if section == "plan" and "tile_size" in content:
-            merged["plan"]["grid"] = ""  # later settings win over an earlier grid
+            merged["plan"]["grid"] = ""  # a later tile size replaces an earlier grid
         merged[section] |= content
     return _validate(merged, where)
 
 
 def _validate(content: Mapping[str, Any], where: str) -> Settings:
-    """Return the settings that plain values are, each of its field's type; or raise UsageError.
+    """Return settings from plain values, each with its field's type. Raises UsageError.
 
-    In JSON's strictness a whole number is a number, a list a tuple, a table a dataclass, and
-    nothing else is taken for another.
+    pydantic's strict mode for JSON accepts a whole number as a number, a list as a tuple and a
+    table as a dataclass, and converts nothing else.
     """
     from pydantic import ValidationError  # slow to import
 
@@ -388,7 +413,7 @@ def _validate(content: Mapping[str, Any], where: str) -> Settings:
     value: Any = content
     for key in place:
         value = value[key]
-    # a list's fault may lie in one of its values; of a union each type has a fault of its own
+    # The fault may lie in one value of a list. A union has one fault for each of its types.
     inner = [fault["loc"][2] for fault in faults if len(fault["loc"]) > 2]
     if inner and isinstance(inner[0], int):
         value = value[inner[0]]
@@ -417,12 +442,12 @@ def to_dict(settings: Settings) -> dict[str, Any]:
 
 
 def from_dict(values: Mapping[str, Any]) -> Settings:
-    """Return the settings that `to_dict` was given."""
+    """Return settings from the output of `to_dict`."""
     return apply(Settings(), values, "plan.json: settings")
 
 
 def to_toml(settings: Settings, *, header: str = RECORD) -> str:
-    """Return every setting as TOML, each with its comment, below the header's lines."""
+    """Return all settings as TOML, each with its comment, below a header in comments."""
     lines = [f"# {line}" for line in header.splitlines()]
     for section in fields(settings):
         value = getattr(settings, section.name)
@@ -437,18 +462,18 @@ def to_toml(settings: Settings, *, header: str = RECORD) -> str:
 
 
 def to_readable_toml(settings: Settings) -> str:
-    """Return the settings as `to_toml` does. Raises UsageError where `load` would read others."""
+    """Return the settings as TOML. Raises UsageError if `load` would read them differently."""
     text = to_toml(settings)
     if apply(Settings(), tomllib.loads(text), SETTINGS) != settings:
         raise UsageError(
-            f"{SETTINGS}: these settings can't be written to it: they would be read as other ones"
+            f"{SETTINGS}: these settings can't be written, because they would be read as others"
         )
     return text
 
 
 def _toml(value: Any) -> str:
     if isinstance(value, str):
-        # a TOML string is a JSON string, but for DEL
+        # a TOML string is a JSON string, except that DEL must be escaped
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):
         return str(value).lower()
@@ -464,8 +489,8 @@ def _read(path: Path) -> dict[str, Any]:
         longest = max(map(len, content.splitlines()), default=0)
         if len(content) > _MAX_BYTES or longest > _MAX_LINE:
             raise UsageError(
-                f"{path}: found {len(content)} bytes or more, {longest} in a line, expected "
-                f"settings of at most {_MAX_BYTES}, {_MAX_LINE} in a line"
+                f"{path}: found {len(content)} bytes or more, and a line of {longest}, expected "
+                f"settings of at most {_MAX_BYTES} bytes, with lines of at most {_MAX_LINE}"
             )
         return tomllib.loads(content.decode())
     except OSError as error:
@@ -474,10 +499,10 @@ def _read(path: Path) -> dict[str, Any]:
         line = content.count(b"\n", 0, error.start) + 1
         raise UsageError(
             f"{path}: line {line}: found byte 0x{content[error.start]:02x}, expected UTF-8: save "
-            "the file in this encoding"
+            "the file as UTF-8"
         ) from None
-    except (ValueError, RecursionError) as error:  # tomllib's own, no UTF-8, endless numbers
-        raise UsageError(f"{path}: not TOML: {error!s:.200}") from None
+    except (ValueError, RecursionError) as error:  # also numbers too large for Python
+        raise UsageError(f"{path}: this is not TOML: {error!s:.200}") from None
 
 
 def _known(key: str, known: list[str], where: str, what: str) -> None:

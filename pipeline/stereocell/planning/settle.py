@@ -1,4 +1,4 @@
-"""Settle the plan of a build from its source and settings. Nothing is written or printed."""
+"""Make the plan of a build from its source and settings, without writing or printing anything."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,9 +8,9 @@ from stereocell.model.errors import UsageError
 from stereocell.model.tiling import Box
 from stereocell.planning.channel_colors import choose_colors, is_lone, lies_at_bone, shows_stain
 from stereocell.planning.channels import PALETTE, Channel, with_surfaces
-from stereocell.planning.hounsfield import believe, settle_modality
-from stereocell.planning.input_files import as_asked, open_anew, watch_table
-from stereocell.planning.intensities import doubt_of, require_intensities
+from stereocell.planning.hounsfield import assert_hounsfield, settle_modality
+from stereocell.planning.input_files import as_asked, reopen, watch_table
+from stereocell.planning.intensities import note_on_intensities, require_intensities
 from stereocell.planning.label_maps import are_alone, find_labels
 from stereocell.planning.label_numbers import notes_before_units
 from stereocell.planning.object_tables import (
@@ -20,8 +20,8 @@ from stereocell.planning.object_tables import (
 from stereocell.planning.plan import Plan, choose_level, make_plan, parse_region
 from stereocell.planning.plan_notes import (
     ignored_notes,
-    told_of_absent,
-    told_of_gaps,
+    notes_on_absent_chunks,
+    notes_on_gaps,
 )
 from stereocell.planning.settings import INTENSITY, Settings
 from stereocell.read.addresses.resolve import resolve
@@ -34,12 +34,12 @@ from stereocell.textures.map_packages import (
 
 
 def settle(source: str, settings: Settings, choice: Sequence[str] = (), *, title: str = "") -> Plan:
-    """Return the plan of a build, with its notes. Nothing is written or printed.
+    """Return the plan of a build, with its notes, without writing or printing anything.
 
-    choice  notes on how the settings were chosen; see `load_for`
-    title   the name of the specimen; empty: the one that the source gives it
+    choice  notes on how the preset was chosen; see `load_for`
+    title   name of the specimen; empty: the source's name for it
 
-    Raises StereoCellError where the source can't be read, or the settings don't fit it.
+    Raises StereoCellError if the source can't be read, or the settings don't fit it.
     """
     resolved = resolve(source)
     location = resolved.source
@@ -49,7 +49,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = (), *, title
     if settings.unwrap.maps:
         require_map_packages()
     _require_labels(settings)
-    dataset = believe(open_anew(as_asked(location, options)), options.taken_as)
+    dataset = assert_hounsfield(reopen(as_asked(location, options)), options.taken_as)
     alone = are_alone(settings.labels)
     settings, modality = settle_modality(dataset, settings, are_labels=alone)
     indices = dataset.find_channels(options.channels) if options.channels else None
@@ -103,16 +103,16 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = (), *, title
         watch_table(settings.objects.table)
     objects = list(found.notes)
     for one in plan.labels:
-        # a table that can't be read, or lacks a column, ends the command before the build
+        # an unreadable table or a missing column should end the command before the build
         table = table_of(plan, one)
         require_color_by(plan, one, table)
         objects += [f"table: {note}" for note in table.notes] if table else []
-    gaps = told_of_absent(dataset, plan) + told_of_gaps(dataset, plan)
+    gaps = notes_on_absent_chunks(dataset, plan) + notes_on_gaps(dataset, plan)
     objects += notes_before_units(plan)
-    objects += filter(None, map(doubt_of, plan.labels))
+    objects += filter(None, map(note_on_intensities, plan.labels))
     if settings.objects.table and len(plan.labels) > 1:
-        objects.append(f"the table is joined to {plan.labels[0].name} alone, the first label map")
-    # numbers of objects are read as they are
+        objects.append(f"the table is joined only to the first label map, {plan.labels[0].name}")
+    # labels are read without a cast, so a note on one does not apply
     read = (note for note in dataset.notes if not (alone and note.startswith(CAST)))
     kind = [modality.note] if modality.note else []
     notes = (
@@ -128,7 +128,7 @@ def settle(source: str, settings: Settings, choice: Sequence[str] = (), *, title
 
 
 def _require_labels(settings: Settings) -> None:
-    """Raise UsageError where something is said of objects that nobody asked for."""
+    """Raise UsageError if settings of objects or of a table are given without either."""
     options = settings.objects
     for flag, value in {
         "--table": options.table,
@@ -138,6 +138,12 @@ def _require_labels(settings: Settings) -> None:
         "--background": str(options.background or ""),
     }.items():
         if value and not settings.labels:
-            raise UsageError(f"{flag} is {value!r:.60}: of no objects, expected --labels with it")
+            raise UsageError(
+                f"{flag} is {value!r:.60}, expected --labels with it, because it is about the "
+                "objects of a label map"
+            )
         if value and not options.table and flag in ("--table-key", "--columns"):
-            raise UsageError(f"{flag} is {value!r:.60}: of no table, expected --table with it")
+            raise UsageError(
+                f"{flag} is {value!r:.60}, expected --table with it, because it is about the "
+                "columns of a table"
+            )

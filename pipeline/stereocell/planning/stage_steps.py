@@ -1,4 +1,4 @@
-"""The steps that write a plan's stage, with all that they depend on."""
+"""Make the steps that write a plan's stage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -23,12 +23,11 @@ def stage_tile_step(
     tables: Mapping[str, ObjectTable],
     stage_dir: Path,
 ) -> WriteStageTile:
-    """Return the step of one tile.
+    """Return the step that writes one tile.
 
-    units   the folder of each unit, by `<tile>/<channel>`
-    tables  of all objects, by the ID of their label map
+    units   folder of each unit, by `<tile>/<channel>`
+    tables  tables of all objects, by the ID of their label map
     """
-
     parts = [
         UnitPart(
             channel.id,
@@ -71,7 +70,7 @@ def stage_step(
     tiles: Sequence[WriteStageTile],
     tables: Mapping[str, ObjectTable],
 ) -> WriteStage:
-    """Return the step of the stage over its tiles."""
+    """Return the step that writes the stage over its tiles."""
     appearances = [survey[channel.id].appearance for channel in plan.channels]
     for labels in plan.labels:
         painter = plan.painter(labels)

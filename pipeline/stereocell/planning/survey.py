@@ -17,19 +17,19 @@ from stereocell.model.channel import Appearance
 from stereocell.planning.plan import Plan
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
-# Least share of the voxels above the level in a body that opens cut. Two trees of vessels had 1 and
-# 1.7 percent, three heads and a brain 19 to 38.
+# Least share of a body's voxels above its level, 0..1. In two trees of vessels it was .01 and .017,
+# in three heads and a brain .19 to .38.
 BODY_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class TileIso:
-    """One tile's part of its channel's level.
+    """The level of a channel in one tile.
 
-    value       above the background, voxel values; None: the channel has none
+    value       level above the background, in voxel values; None: the channel has no surface
     background  mean over the tile, voxel values; 0: none is subtracted
-    confidence  0..1, of the tile by itself; None: nothing is there, or nobody asked
-    files       the tile's own results, relative to OUT, by what they hold
+    confidence  confidence of this tile alone, 0..1; None: it has too few voxels, or was not judged
+    files       files of the tile's results, relative to OUT, by kind of result
     """
 
     value: float | None
@@ -40,7 +40,7 @@ class TileIso:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A channel's histogram for a chart: voxel values, and heights up to 1."""
+    """A channel's histogram for a chart: voxel values, and heights in 0..1."""
 
     values: tuple[float, ...]
     heights: tuple[float, ...]
@@ -48,16 +48,17 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class ChannelSurvey:
-    """The first passes' results for one channel.
+    """The results of the survey for one channel.
 
-    statistics_file  the file of the window, relative to OUT
-    iso              by tile ID
-    ladder           all levels that were found, outermost first; empty where one was given
-    curve            what they were found on; None where one was given
+    statistics_file  file of the window, relative to OUT
+    iso              level in each tile, by tile ID
+    ladder           all levels that were found, outermost first; empty if the level was given
+    curve            the histogram in which they were found; None if the level was given
     holder           a CT's table or head holder, which is left out; None: there is none
-    grid_um          how far apart the planes lie that carry its surface; 0: all do
-    most_faces       most voxel faces of its surface in a tile, before planes are left out
-    thin_share       of its voxels above the level, those too thin for planes surface.grid_um apart
+    grid_um          distance between the planes that carry the surface, um; 0: all planes do
+    most_faces       most voxel faces of the surface in one tile, before planes are left out
+    thin_share       share of the voxels above the level that lie in structures too thin for planes
+                     surface.grid_um apart
     """
 
     statistics: ChannelStatistics
@@ -74,12 +75,12 @@ class ChannelSurvey:
 
     @property
     def is_body(self) -> bool:
-        """Whether the surface encloses so much that a cut through the middle shows an inside."""
+        """Whether the surface encloses so much that a cut through its middle shows the inside."""
         return is_body(self.appearance, self.statistics)
 
     @property
     def near_levels(self) -> str:
-        """The levels beside the surface's own that are clear or nearly so, as text; empty: none."""
+        """The other levels that are clear or nearly clear, as text; empty: there are none."""
         level, surface = self.appearance.level, self.appearance.surface
         near = find_near_levels(
             self.ladder, None if level is None else level.iso, is_unsure=surface == "unsure"
@@ -89,7 +90,7 @@ class ChannelSurvey:
         return words_of(near, MARK) + ABOVE_BACKGROUND
 
     def thinning(self, plan: Plan) -> str:
-        """Return what is said of a surface that other planes carry than asked for; empty: none."""
+        """Return the note on a surface whose planes differ from surface.grid_um; empty: none do."""
         surface = plan.settings.surface
         if self.grid_um == surface.grid_um:
             return ""
@@ -102,13 +103,13 @@ class ChannelSurvey:
             )
         return (
             f"up to {self.most_faces:,} voxel faces of its surface lie in a tile, more than "
-            f"{plan.settings.surface.max_faces:,} (surface.max_faces): of the planes along z, y, x "
-            f"one in {z}, {y}, {x} carries it"
+            f"{plan.settings.surface.max_faces:,} (surface.max_faces): one plane in {z}, {y}, {x} "
+            "along z, y, x carries its surface"
         )
 
 
 def is_body(appearance: Appearance, statistics: ChannelStatistics) -> bool:
-    """Return whether a surface encloses so much that a cut through the middle shows an inside."""
+    """Return whether a surface encloses so much that a cut through its middle shows the inside."""
     level = appearance.iso_normalized
     if level is None:
         return True

@@ -1,4 +1,4 @@
-"""The survey's steps: the window of a channel, and what each of its tiles shows of its level."""
+"""Make the steps of the survey: a channel's window, and the evidence for its level in each tile."""
 
 from stereocell.isosurface.options import CONNECTED, CRITERIA, LADDER
 from stereocell.model.lattice_field import LatticeField
@@ -16,7 +16,8 @@ from stereocell.transfer.windows import parse_window
 def window_step(plan: Plan, channel: Channel) -> FindWindow:
     """Return the step that finds a channel's window and background."""
     settings, given = plan.settings, given_level(plan, channel)
-    # CT and MR have values that mean something; so has a value that is given of voxels as they are
+    # The background is not subtracted from CT and MR, nor if the user gives a plain voxel value:
+    # there the values themselves have a meaning.
     subtracts = plan.modality not in ("CT", "MR") if given is None else given[1]
     window = (0.0, 255.0) if channel.source else None
     if channel.name in settings.windows:
@@ -28,7 +29,7 @@ def window_step(plan: Plan, channel: Channel) -> FindWindow:
         settings.window,
         smoothing_um=float(settings.surface.smoothing_um),
         background_um=float(settings.surface.background_um) if subtracts else 0.0,
-        # shares of tissue have no noise that was measured
+        # shares of tissue are computed, so they have no measurement noise
         max_shift=0.0 if channel.source else settings.surface.max_shift,
         finds_holder=is_in_hu and not settings.surface.keep_holder,
         window=window,
@@ -36,7 +37,7 @@ def window_step(plan: Plan, channel: Channel) -> FindWindow:
 
 
 def evidence_step(plan: Plan, box: Box, *, channel: Channel, window: Window) -> GatherEvidence:
-    """Return the step that gathers the evidence of one tile, or of another box of the region."""
+    """Return the step that gathers the evidence for levels in a tile or another box."""
     criterion = LADDER if channel.rung else plan.settings.isovalue.criterion
     return GatherEvidence(
         voxels_of(plan, channel),
@@ -50,18 +51,20 @@ def evidence_step(plan: Plan, box: Box, *, channel: Channel, window: Window) -> 
 
 
 def components_step(
-    plan: Plan, tile: Tile, channel: Channel, found: Found, rung: int
+    plan: Plan, tile: Tile, channel: Channel, found: Found, index: int
 ) -> SumComponents | None:
-    """Return the step that sums up a tile's components at a level of the ladder.
+    """Return the step that sums up a tile's components at one of the channel's levels.
 
-    None: the channel has no such level, or the tile has none.
+    index  index of the level in `found.candidates`
+
+    None: the channel has no such level, or the tile has no surface.
     """
-    if rung >= len(found.rungs):
+    if index >= len(found.candidates):
         return None
-    iso = level_of_tile(plan, tile, found, rung, {}).value
+    iso = level_of_tile(plan, tile, found, index, {}).value
     if iso is None:
         return None
-    compares = rung > 0 and plan.settings.isovalue.rung == CONNECTED
+    compares = index > 0 and plan.settings.isovalue.rung == CONNECTED
     surface = plan.settings.surface
     return SumComponents(
         voxels_of(plan, channel),
@@ -72,10 +75,10 @@ def components_step(
         float(surface.min_diagonal_um),
         found.window.max_shift,
         plan.step,
-        level_of_tile(plan, tile, found, rung - 1, {}).value if compares else None,
+        level_of_tile(plan, tile, found, index - 1, {}).value if compares else None,
     )
 
 
 def around(field: LatticeField | None, box: Box) -> LatticeField | None:
-    """Return the knots of a field near a box; None where there is no field."""
+    """Return the part of a field near a box; None if there is no field."""
     return None if field is None else field.around(box)

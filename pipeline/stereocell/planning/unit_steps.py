@@ -1,4 +1,4 @@
-"""The steps that build the units of a plan's channels, with all that they depend on."""
+"""Make the steps that build the units of a plan's channels."""
 
 from itertools import product
 
@@ -51,7 +51,12 @@ def _unit_step(plan: Plan, tile: Tile, channel: Channel, survey: Survey) -> Buil
 
 
 def choose_units(plan: Plan, only: str | None) -> dict[str, str]:
-    """Return the title of each unit, by `<tile>/<channel>`, or of `only` one. Raises UsageError."""
+    """Return the titles of units, by `<tile>/<channel>`.
+
+    only  `TILE/CHANNEL`, by name or ID, to choose one unit; None: all units
+
+    Raises UsageError if there is no such unit.
+    """
     every: list[Channel | Labels] = [*plan.channels, *plan.labels]
     wanted = [(tile.id, channel) for tile in plan.tiles for channel in every]
     if only is not None:
@@ -65,14 +70,14 @@ def choose_units(plan: Plan, only: str | None) -> dict[str, str]:
 
 
 def _names(channel: Channel | Labels) -> tuple[str | int, ...]:
-    """Return what a channel may be called; an index is one of the input's."""
+    """Return the names by which a user may call a channel; an index counts the input's channels."""
     if isinstance(channel, Labels):
         return channel.name, channel.id
     return (channel.name, channel.id) + (() if channel.source else (channel.index,))
 
 
 def unit_options(settings: Settings) -> UnitOptions:
-    """Return a unit's part of the settings. Raises UsageError where a package is missing."""
+    """Return the settings that units depend on. Raises UsageError if a package is missing."""
     surface = settings.surface
     return UnitOptions(
         float(surface.smoothing_um),

@@ -1,8 +1,8 @@
-"""The colour of vessels in an MR: red, where a body has the greys of its slices.
+"""Colour the vessels of an MR angiogram red; other MR images keep the grey of their slices.
 
-An angiogram is not told from other images of MR by its header in NIfTI, and by its level alone it
-is: vessels fill little of the volume (see `ChannelSurvey.is_body`). So the colour is known after
-the first pass, and not when the plan is made.
+The header of a NIfTI file does not state an angiogram. Its level shows one, because vessels fill
+little of the volume (see `ChannelSurvey.is_body`). So the colour is known only after the survey,
+and not when the plan is made.
 """
 
 from dataclasses import replace
@@ -14,13 +14,13 @@ VESSEL_RED = (0.74, 0.12, 0.08)  # linear RGB, of blood
 
 
 def color_vessels(survey: ChannelSurvey, *, modality: str) -> ChannelSurvey:
-    """Return the survey of a channel, whose colour is red if it shows the vessels of an MR.
+    """Return the survey of a channel, in red if it shows the vessels of an MR.
 
-    modality  DICOM's code, of what took the volume
+    modality  DICOM's code of the volume's modality
 
-    A colour that the file states stays.
+    A colour that the file states is kept.
     """
-    look = survey.appearance
-    if modality != "MR" or look.color != MR_GREY or survey.is_body:
+    appearance = survey.appearance
+    if modality != "MR" or appearance.color != MR_GREY or survey.is_body:
         return survey
-    return replace(survey, appearance=replace(look, color=VESSEL_RED))
+    return replace(survey, appearance=replace(appearance, color=VESSEL_RED))

@@ -15,7 +15,7 @@ from stereocell.planning.level_choice import (
     Components,
     Found,
     choose_by_components,
-    find_doubt,
+    explain_uncertainty,
     level_of_tile,
 )
 from stereocell.planning.plan import Plan
@@ -48,15 +48,17 @@ def choose_level(
     tiles  those that `found` rests on
     field  float32 (z, y, x), denoised voxels of `tile`; above the background if `found` subtracts
     """
-    if not found.rungs:
+    if not found.candidates:
         return Chosen(None)
     place = _place_of_rung(plan, found, field)
-    rung = found.rungs[place]
+    rung = found.candidates[place]
     if found.levels is None or not isinstance(rung, Level):
         return Chosen(rung.value if isinstance(rung, Level) else rung)
     if found.is_given:
         return Chosen(rung.value)
-    unsure = find_doubt(found, place, [level_of_tile(plan, one, found, place, {}) for one in tiles])
+    unsure = explain_uncertainty(
+        found, place, [level_of_tile(plan, one, found, place, {}) for one in tiles]
+    )
     if not unsure and rung.confidence < LOW_CONFIDENCE:
         unsure = f"below a confidence of {LOW_CONFIDENCE:g} about half of such surfaces are right"
     value = rung.value
@@ -68,7 +70,7 @@ def choose_level(
 def _place_of_rung(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
     """Return the index of the rung that the pieces in one tile speak for."""
     least = float(plan.settings.surface.min_diagonal_um)
-    rungs = [rung.value for rung in found.rungs if isinstance(rung, Level)]
+    rungs = [rung.value for rung in found.candidates if isinstance(rung, Level)]
     compares = plan.settings.isovalue.rung == CONNECTED
     components: list[Components] = []
     for place, value in enumerate(rungs if len(rungs) > 1 else []):

@@ -144,7 +144,7 @@ def preview(
         basis += "; a build takes all"
     if window.holder is not None:
         basis += f"; a build leaves out {', '.join(window.holder.pieces)}, {window.holder.WORDS}"
-    result = Preview(candidates, found.doubt, basis, chosen.unsure)
+    result = Preview(candidates, found.reason, basis, chosen.unsure)
     picture = _compose(
         paint_slices(
             _slices(volume.voxels, field, under, candidates, window, plan),
@@ -273,7 +273,7 @@ def _candidates(
         ladder,
         subtracts=False if found.levels is None else found.levels.subtracts,
         taken=value,
-        threshold=None if threshold is None or found.doubt else threshold.value,
+        threshold=None if threshold is None or found.reason else threshold.value,
         ends=None if found.levels is None else ends_of(found.levels.curve()[0]),
         highest=highest_of(
             found.window.statistics, found.levels is not None and found.levels.subtracts

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from stereocell.building.out_folder import OutFolder
 from stereocell.planning.plan import Plan
-from stereocell.planning.stopped_levels import told_of_stopped
+from stereocell.planning.stopped_levels import notes_on_stopped_levels
 from stereocell.steps.unit_files import load_objects, load_record
 
 
@@ -83,7 +83,7 @@ def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
                 len(set(numbers)),
                 len(numbers) - len(set(numbers)),
                 sum(one.changed for one in facts.values()),
-                tuple(told_of_stopped(labels.name, facts)),
+                tuple(notes_on_stopped_levels(labels.name, facts)),
                 tuple(levels),
                 tuple(folders[tile] for tile, one in records.items() if one),
             )

@@ -1,1 +1,1 @@
-"""Steps of a build: each is computed once, and kept under a key of its inputs."""
+"""Steps of a build: each runs once, and its result is kept under a key of its inputs."""

@@ -27,7 +27,10 @@ from stereocell.textures.sample_channel import sample_channel
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """An image channel that is measured over objects; `region`: its voxels that are built."""
+    """An image channel that is measured over objects.
+
+    region  voxels of the channel that are built
+    """
 
     voxels: Voxels
     region: Box
@@ -38,7 +41,7 @@ class Painted:
     """An image channel that is painted on objects.
 
     window    voxel values that become 0 and 1
-    depth_um  below the surface, within which the largest counts
+    depth_um  depth below the surface within which the largest intensity is taken
     """
 
     image: Image
@@ -50,15 +53,18 @@ class Painted:
 class BuildObjects(Step[Unit]):
     """Build the objects of one tile of a label map.
 
-    window   voxels of the label map
-    tile     those of the tile itself
-    whole    uint64 (n,), ascending: labels that are built as a whole
-    cut      the same, of those cut at the tiles' planes: their part inside the tile is built
-    others   the same, of further labels in the window that are built by other tiles; all else is
-             left out. Those of them that are cut are among `others_cut`
-    edges    by axis (z, y, x): indices of voxels where tiles begin
-    step_um  of the lattice
-    painted  on the objects; None: nothing
+    window      voxels of the label map to read; None: the tile has no object
+    tile        voxels of the label map that belong to the tile
+    whole       uint64 (n,), ascending: labels of objects that are built as a whole
+    cut         uint64 (n,), ascending: labels of objects that are cut at the planes between tiles;
+                their part inside the tile is built
+    others      uint64 (n,), ascending: labels in the window that other tiles build. Labels that are
+                not listed are left out
+    others_cut  uint64 (n,), ascending: the labels of `others` that are cut
+    edges       for each axis (z, y, x), indices of voxels where tiles begin
+    step_um     step of the lattice that vertices lie on
+    images      channels that are measured over the objects
+    painted     channel that is painted on the objects; None: none is
     """
 
     VERSION: ClassVar[int] = 1
@@ -124,11 +130,12 @@ def _build(task: BuildObjects) -> Unit:
 
 @dataclass(frozen=True, slots=True)
 class _Names:
-    """What the compact numbers of a window stand for; entry 0 is nothing.
+    """The labels and tiles that the compact numbers of a window stand for. 0 means no object.
 
-    labels    uint64 (n + 1,)
-    tiles     int64 (n + 1,): of a piece, the tile that it lies in, in C order of places; else -1
-    own_tile  the tile that is built
+    labels    uint64 (n + 1,): label of each number
+    tiles     int64 (n + 1,): for the piece of a cut object, the tile that it lies in, counted in C
+              order of the tiles' places; -1: not a piece
+    own_tile  the tile that is built, counted in the same way
     """
 
     labels: NDArray[np.uint64]
@@ -139,7 +146,7 @@ class _Names:
 def _numbered(
     task: BuildObjects, voxels: NDArray[np.unsignedinteger]
 ) -> tuple[NDArray[np.int32], _Names]:
-    """Return the window with numbers from 1 in place of labels, pieces each their own."""
+    """Return the window with numbers from 1 in place of labels. Each piece has its own number."""
     assert task.window is not None
     kept = np.sort(np.concatenate([task.whole, task.cut, task.others]))
     runs = Runs.of(voxels)
@@ -197,7 +204,7 @@ def read_on_labels(labels: Labels, window: Box, image: Image) -> NDArray[Any]:
 
 
 def _paint(lods: Sequence[Lod], painted: Painted) -> tuple[Lod, ...]:
-    """Return levels with the intensity of a channel at their vertices."""
+    """Return the levels of detail with the intensity of a channel at their vertices."""
     if not lods:
         return ()
     image, own = painted.image, painted.image.voxels
@@ -240,7 +247,7 @@ def _facts(
 ) -> ObjectFacts:
     labels = names.labels[owned]
     beside = names.labels[built.walls[:, 1]]
-    own = labels[built.walls[:, 0]] == beside  # planes that cut an object into pieces
+    own = labels[built.walls[:, 0]] == beside  # interfaces between pieces of the same object
     cut_um2 = np.bincount(built.walls[own, 0], built.wall_um2[own], len(owned))
     pairs = np.stack([built.walls[:, 0].astype(np.uint64), beside], axis=1)[~own]
     found, which = np.unique(pairs, axis=0, return_inverse=True)

@@ -15,7 +15,7 @@ from stereocell.steps.unit_files import UNIT_FOLDER, UnitFolder
 class BuildUnit(Step[Unit]):
     """Build one unit.
 
-    painted  the channel that is sampled onto the surface; None: none is
+    painted  channel that is painted on the surface; None: none is
     """
 
     VERSION: ClassVar[int] = 2

@@ -1,9 +1,9 @@
-"""Closed copies of tiles, for 3D printing and for boolean operations.
+"""Make closed copies of tiles, for 3D printing and for boolean operations.
 
-A tile's drawn mesh is open at its neighbours. The copy ends there in a cap, less than a voxel past
-the cut: neighbours overlap by that, so that a union has no coincident faces.
+The drawn mesh of a tile is open towards its neighbours. The copy ends there in a cap, less than a
+voxel past the cut. Neighbours overlap by that, so that their union has no coincident faces.
 
-A copy is validated like every mesh; where simplification leaves defects, it stays unsimplified.
+A copy is checked like every mesh. If simplification leaves defects, the copy is not simplified.
 """
 
 import numpy as np
@@ -21,10 +21,10 @@ def close_tile(
 ) -> Closed | None:
     """Return the closed surface of the tile's solid, simplified without defects, in world um.
 
-    distance      (z, y, x), float32, um, positive inside; covers `lattice.window`
+    distance      float32 (z, y, x), um, positive inside; covers `lattice.window`
     max_error_um  largest distance between the simplified and the original surface
 
-    Returns None where nothing is inside.
+    Returns None if nothing lies inside.
     """
     own = distance[lattice.own.slices_in(lattice.window)]
     fine = extract_surface(own, lattice.alone())

@@ -1,4 +1,4 @@
-"""Cut the voxels of a tile's volume out of those that were read. Pure."""
+"""Cut the voxels of a tile's volume out of the voxels that were read."""
 
 from typing import Any
 
@@ -12,10 +12,11 @@ from stereocell.model.tiling import Box
 
 
 def cut_voxels(voxels: NDArray[Any], lattice: Lattice, holder: Holder | None) -> NDArray[Any]:
-    """Return the lattice's voxels and an apron (z, y, x); the region's ends repeat.
+    """Return the lattice's voxels with an apron, (z, y, x). It repeats voxels at the region's ends.
 
-    voxels  (z, y, x), of the lattice's window
-    holder  what the surface leaves out, as a table: it is air, so that volume and surface agree
+    voxels  voxels (z, y, x) of the lattice's window
+    holder  a CT's table or head holder, which the surface leaves out. It becomes air, so that
+            volume and surface agree; None: there is none
     """
     own, region, start = lattice.own, lattice.region, lattice.window.start
     inside, beyond, firsts, ends = [], [], [], []

@@ -17,7 +17,7 @@ _DTYPES = {"labels": "<u8", "voxels": "<i8", "low": "<i8", "high": "<i8", "sums"
 
 
 def extents_to_json(found: Extents) -> dict[str, str]:
-    """Return the objects of a tile as texts: little-endian numbers in base64."""
+    """Return the extents of a tile's objects as texts: little-endian numbers in base64."""
     return {
         name: base64.b64encode(getattr(found, name).astype(dtype).tobytes()).decode()
         for name, dtype in _DTYPES.items()
@@ -25,7 +25,7 @@ def extents_to_json(found: Extents) -> dict[str, str]:
 
 
 def extents_from_json(content: Mapping[str, Any]) -> Extents:
-    """Return the objects of a tile; `content` has passed its schema."""
+    """Return the extents of a tile's objects from JSON that has passed its schema."""
     arrays = {
         field.name: np.frombuffer(base64.b64decode(content[field.name]), _DTYPES[field.name])
         for field in fields(Extents)
@@ -37,7 +37,10 @@ def extents_from_json(content: Mapping[str, Any]) -> Extents:
 
 @dataclass(frozen=True, slots=True)
 class FindExtents(Step[Extents]):
-    """Find the objects of one tile; `box`: its voxels of the label map, which may be none."""
+    """Find the objects of one tile.
+
+    box  voxels of the label map that belong to the tile; it may be empty
+    """
 
     VERSION: ClassVar[int] = 1
     FORM: ClassVar[Document[Extents]] = Document(

@@ -40,22 +40,22 @@ from stereocell.transfer.joint_histogram import (
 )
 from stereocell.transfer.options import WindowOptions
 
-SURVEY_VOXELS = 16_000_000  # about the largest number of voxels that a channel's window is found on
-# Voxels counted for the histogram. Their number decides whether a peak exceeds chance: in a head of
-# 384 x 384 x 274 voxels the second-highest is 6.5 deviations high with all, 3.7 with every third
-# plane
+SURVEY_VOXELS = 16_000_000  # about the most voxels from which a channel's window is found
+# Most voxels that are counted for the histogram. More voxels make a peak more certain. In a head of
+# 384 x 384 x 274 voxels the second-highest peak rose 6.5 deviations above chance with all voxels,
+# and 3.7 with every third plane.
 COUNTED_VOXELS = 64_000_000
-COUNTED_PLANES = 16  # planes read at once
-JOINT_VOXELS = 8_000_000  # voxels at full resolution for the channel's boundaries
+COUNTED_PLANES = 16  # planes that are read at once
+JOINT_VOXELS = 8_000_000  # most voxels at full resolution from which boundaries are found
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """What the first pass finds of a channel.
+    """The first pass's results for a channel.
 
-    counting   how its tiles are counted
+    counting   scale and padding with which the histograms of its tiles are counted
     holder     a CT's table or head holder, which is left out; None: there is none
-    max_shift  by how much smoothing may move a value of its surface, voxel values; None: by any
+    max_shift  most that smoothing may move the value of a voxel, in voxel values; None: no bound
     """
 
     statistics: ChannelStatistics
@@ -75,7 +75,7 @@ def window_to_json(window: Window) -> dict[str, Any]:
 
 
 def window_from_json(content: Mapping[str, Any]) -> Window:
-    """Return the window that `window_to_json` was given; `content` has passed its schema."""
+    """Return the window from the output of `window_to_json`, which must have passed its schema."""
     return _adapter().validate_python(
         {key: content[key] for key in ("statistics", "counting", "holder", "max_shift")}
     )
@@ -89,10 +89,10 @@ class FindWindow(Step[Window]):
     """Find a channel's window and histogram, from a coarse level or from some of the planes.
 
     smoothing_um   standard deviation of the surface's smoothing
-    background_um  size of the structures that a background lies around; 0: none is looked for
-    max_shift      deviations of the noise that smoothing may move a value by; 0: by any
-    finds_holder   whether it is a CT whose table is looked for
-    window         voxel values that are given; None: they are found
+    background_um  size of the largest structures in front of the background; 0: none is subtracted
+    max_shift      most that smoothing may move a value, in deviations of the noise; 0: no bound
+    finds_holder   whether to look for a CT's table or head holder
+    window         display window in voxel values, if the settings state it; None: it is found
     """
 
     VERSION: ClassVar[int] = 1
@@ -115,7 +115,7 @@ class FindWindow(Step[Window]):
 def _measure(task: FindWindow) -> Window:
     dataset = open_source(task.voxels.ref)
     level = task.voxels.level
-    # the finest level that is small enough; a source without one gives every k-th plane
+    # the finest resolution level that is small enough, or every k-th plane of the coarsest
     while level + 1 < len(dataset.levels) and _voxels(task, dataset, level) > SURVEY_VOXELS:
         level += 1
     box = _region_at(task, dataset, level)
@@ -130,7 +130,7 @@ def _measure(task: FindWindow) -> Window:
         [dataset.read(task.voxels.channel, each, level).voxels for each in slices], axis
     )
     mask = _mask_of([voxels] if level == task.voxels.level else _blocks(task, dataset))
-    # a mask's ground is even, and no padding
+    # the dark value of a mask is not padding
     least = darkest = float(voxels.min()) if mask is None else None
     across, rows, columns = first_of_three(denoising_reach(task.smoothing_um, spacing, axis), axis)
     reach = (0 if step > 1 else across, rows, columns)
@@ -139,8 +139,8 @@ def _measure(task: FindWindow) -> Window:
         padding[...], darkest = False, None
     scale, background = Scale.of(voxels, padding), None
     if task.background_um > 0 and mask is None:
-        # sharp hot voxels and noise don't reach a percentile of whole blocks, so planes are not
-        # denoised: a median before it changed the mean Dice over 48 tiles of known solids by .0006
+        # Planes are not denoised, because hot voxels and noise don't affect a percentile of whole
+        # blocks. A median changed the mean Dice over 48 tiles of known solids by only .0006.
         background = find_background(
             voxels,
             task.region,
@@ -168,7 +168,7 @@ def _measure(task: FindWindow) -> Window:
 
 
 def _count_values(task: FindWindow, window: tuple[float, float]) -> Histogram:
-    """Return the histogram of all voxels of the region within the window (voxel values)."""
+    """Return the histogram of all voxels of the region within a window (low, high)."""
     (z0, *start), (z1, *stop) = task.region.start, task.region.stop
     counts: list[NDArray[np.int64]] = []
     for z in range(z0, z1, COUNTED_PLANES):
@@ -181,11 +181,12 @@ def _count_values(task: FindWindow, window: tuple[float, float]) -> Histogram:
 def _look_closely(
     task: FindWindow, dataset: Dataset, window: tuple[float, float], darkest: float | None
 ) -> tuple[SuggestedShapes, float]:
-    """Return a 2D function and the noise's deviation, from blocks of the level that is built.
+    """Return a suggested 2D function and the noise's deviation.
 
-    Coarser levels have softer edges and less noise.
+    They come from blocks of the level that is built, because coarser levels have softer edges and
+    less noise.
 
-    darkest  the least value, whose even runs have no noise to measure; None: nothing is left out
+    darkest  value of padding, in which no noise can be measured; None: there is no padding
     """
     axis = dataset.slice_axis(task.voxels.level)
     spacing = first_of_three(dataset.levels[task.voxels.level].spacing_um, axis)
@@ -203,7 +204,7 @@ def _look_closely(
 
 
 def _blocks(task: FindWindow, dataset: Dataset) -> Iterator[NDArray[Any]]:
-    """Yield blocks (z, y, x) spread over the region, of the level that is built."""
+    """Yield blocks (z, y, x) of the level that is built, spread over the region."""
     largest = back_of_three(SAMPLE_EDGE, dataset.slice_axis(task.voxels.level))
     for box in sample_boxes(task.region, JOINT_VOXELS, largest):
         around = box.grown((1, 1, 1), task.region)
@@ -211,7 +212,7 @@ def _blocks(task: FindWindow, dataset: Dataset) -> Iterator[NDArray[Any]]:
 
 
 def _mask_of(blocks: Iterable[NDArray[Any]]) -> tuple[float, float] | None:
-    """Return the two values that all voxels have; None: they have more, or one alone."""
+    """Return the two values of a mask, ascending; None: there are more values, or only one."""
     low, high = np.inf, -np.inf
     for voxels in blocks:
         least, most = float(voxels.min()), float(voxels.max())
@@ -229,7 +230,7 @@ def _voxels(task: FindWindow, dataset: Dataset, level: int) -> int:
 
 
 def _region_at(task: FindWindow, dataset: Dataset, level: int) -> Box:
-    """Return the region in voxels of a coarser level."""
+    """Return the region in voxels of another resolution level."""
     fine, coarse = dataset.levels[task.voxels.level].shape, dataset.levels[level].shape
     start = [a * n // m for a, n, m in zip(task.region.start, coarse, fine, strict=True)]
     stop = [-(-b * n // m) for b, n, m in zip(task.region.stop, coarse, fine, strict=True)]

@@ -1,4 +1,4 @@
-"""The step that gathers what one (tile, channel) shows of its channel's level."""
+"""The step that gathers the evidence for a channel's level in one tile."""
 
 import base64
 import zlib
@@ -33,7 +33,7 @@ from stereocell.steps.units_again import AGAIN
 
 
 def evidence_of(task: "GatherEvidence", volume: Volume, window: Box) -> TileEvidence:
-    """Return a tile's evidence, of the volume that was read in a window around it."""
+    """Return a tile's evidence from the volume that was read in a window around it."""
     spacing, axis = volume.spacing_um, volume.slice_axis
     reach = denoising_reach(task.smoothing_um, spacing, axis)
     own = task.box.slices_in(window)
@@ -88,7 +88,7 @@ def evidence_to_json(evidence: TileEvidence) -> dict[str, Any]:
 
 
 def evidence_from_json(content: Mapping[str, Any]) -> TileEvidence:
-    """Return the evidence that `evidence_to_json` was given; `content` has passed its schema."""
+    """Return the evidence from the output of `evidence_to_json`, after its schema was checked."""
     edges = content["edges"]
     plain, above = (
         None if one is None else EdgeSums(_unpack(one["areas"]), _unpack(one["totals"]))
@@ -132,7 +132,7 @@ def _sums_from_json(content: Mapping[str, str]) -> Sums:
 
 
 def _pack(values: NDArray[Any]) -> str:
-    """Return numbers as text: little-endian float64 by zlib, in base64. Counts are exact in it."""
+    """Return numbers as text: little-endian float64, zlib, base64. Counts stay exact."""
     return base64.b64encode(zlib.compress(values.astype("<f8").tobytes(), 6)).decode()
 
 
@@ -144,9 +144,10 @@ def _unpack(text: str) -> NDArray[np.float64]:
 class GatherEvidence(Step[TileEvidence]):
     """Gather the evidence of one tile, or of another box of the region.
 
-    box, region  voxels of the level: the tile, and what is built
-    background   near the tile, voxel values; None: none is tried
-    criterion    the name of one that scores edges; empty: none does
+    box         voxels of the tile
+    region      voxels that are built
+    background  background near the tile, voxel values; None: none is subtracted
+    criterion   name of the criterion that scores edges; empty: none does
     """
 
     VERSION: ClassVar[int] = 1

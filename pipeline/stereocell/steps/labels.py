@@ -16,7 +16,7 @@ class LabelVoxels:
     """The voxels of a label map.
 
     channel     index in the source
-    background  number of the voxels that are no object, beside 0; 0: there is no other
+    background  label of voxels without an object, besides 0; 0: there is no other
     """
 
     ref: SourceRef
@@ -30,15 +30,15 @@ class LabelVoxels:
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """A label map of a build, a channel beside the image's. Its finest level is what is built.
+    """A label map of a build, which is a channel besides the image's. Its finest level is built.
 
-    ref         how it is opened, with the fingerprint that it had
+    ref         how it is opened, with its fingerprint when the plan was made
     channel     index in the source
-    spacing_um  (z, y, x), um
-    origin_um   (z, y, x), um: centre of its voxel (0, 0, 0), from that of the image's
+    spacing_um  voxel spacing (z, y, x), um
+    origin_um   centre of its voxel (0, 0, 0) from that of the image's, (z, y, x) in um
     shape       voxels (z, y, x)
-    color       linear RGB 0..1, of objects without one of their own
-    background  number of the voxels that are no object, beside 0; 0: there is no other
+    color       linear RGB, 0..1, of objects without a colour of their own
+    background  label of voxels without an object, besides 0; 0: there is no other
     """
 
     name: str
@@ -57,11 +57,11 @@ class Labels:
 
     @property
     def voxels(self) -> LabelVoxels:
-        """The voxels, which lie nowhere by themselves."""
+        """The voxels without their place on the image."""
         return LabelVoxels(self.ref, self.channel, self.background)
 
     def key_content(self) -> list[object]:
-        """Return what counts in a key: the voxels and their place, neither name nor colour."""
+        """Return the content for a key: the voxels and their place, but not name and colour."""
         return [content_of(self.voxels), self.spacing_um, self.origin_um]
 
     def open(self) -> LabelMap:
@@ -69,7 +69,7 @@ class Labels:
         return self.voxels.open()
 
     def position_um(self, index_zyx: Sequence[float]) -> Triple:
-        """Return the place of a voxel's centre, (z, y, x) in um, as a plan's `position_um`."""
+        """Return the position of a voxel's centre, (z, y, x) in um, like a plan's `position_um`."""
         places = zip(self.origin_um, index_zyx, self.spacing_um, strict=True)
         z, y, x = (float(o + i * s) for o, i, s in places)
         return z, y, x

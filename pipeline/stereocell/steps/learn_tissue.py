@@ -32,8 +32,8 @@ class Learned:
     """The classes that were found.
 
     probabilities  float32 (n, z, y, x), 0..1
-    intensities    mean of each class, bias removed; None: a network does not know it
-    names          of the classes
+    intensities    mean of each class after bias correction; None for the classes of a network
+    names          names of the classes
     bic            Bayesian information criterion by number of classes; empty for a network
     """
 
@@ -47,12 +47,15 @@ class Learned:
 class LearnTissue(Step[TissueClasses]):
     """Learn the classes of a channel in the planned region.
 
-    OUT/tissue is a place that users know, so no key names it, and the record holds the key. The
-    command runs this step in its own process (building/tissue.py): its network has a child process
-    there, and the classes are compared with the plan before they replace earlier ones.
+    The result lies in OUT/tissue, which users know, so its name is not the key. The record holds
+    the key instead.
 
-    channel  its name, which the record states
-    method   how the classes are learned, or the network that knows them, which counts by its digest
+    The command runs this step in its own process (building/tissue.py). The network's child process
+    belongs to it, and the classes are compared with the plan before they replace earlier ones.
+
+    channel  name of the channel, for the record
+    method   options for learning the classes, or the network that knows them. A network counts in
+             the key by its digest
     palette  colours (linear RGB) of classes without a colour of their own, in this order
     """
 
@@ -66,7 +69,7 @@ class LearnTissue(Step[TissueClasses]):
     palette: tuple[tuple[float, float, float], ...]
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether the folder is of this step, and all its files are as written."""
+        """Return whether the folder holds the result of this step, undamaged."""
         try:
             is_own = read_record(place)["key"] == self.key
         except OutputError:
@@ -128,7 +131,7 @@ class LearnTissue(Step[TissueClasses]):
         return Learned(found[kept], (None,) * len(kept), names, {})
 
     def _described(self, one: TissueClass) -> dict[str, Any]:
-        """Return a class as the record describes it."""
+        """Return the entry of a class in the record."""
         voxel_mm3 = math.prod(length / 1000 for length in self.voxels.spacing_um)
         return {
             "name": one.name,

@@ -1,4 +1,4 @@
-"""Open the source in a worker again: by its address, once per process."""
+"""Open a source by its address, once in each process."""
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -16,12 +16,14 @@ from stereocell.storage.workspace import fetch
 class SourceRef:
     """An address and the options of `read.open`.
 
-    spacing_um   (z, y, x), um, or empty for the file's own
-    series       of a source of several images, from 1; 0: the largest
-    pattern      of the names of planes, or empty
-    axes         letters of an array whose format leaves them open, as `czyx`, or empty
+    spacing_um   voxel spacing (z, y, x), um; empty: the file's own
+    series       number of the image in a source of several, from 1; 0: the largest
+    pattern      pattern of the file names of planes; empty: guessed
+    axes         letters of an array whose format does not name its axes, such as `czyx`; empty: the
+                 file's own
     dark         whether structures are dark, so that values are inverted
-    fingerprint  the planned one, since the address may hold another volume now; empty: any volume
+    fingerprint  fingerprint in the plan, because the address may hold another volume now; empty:
+                 any volume is accepted
     """
 
     source: str
@@ -34,7 +36,7 @@ class SourceRef:
     dark: bool = False
 
     def key_content(self) -> list[object]:
-        """Return what counts in a key: the volume and its reader, never the address."""
+        """Return the content for a key: the volume and its reader, but never the address."""
         own = [getattr(self, one.name) for one in fields(self) if one.name != "source"]
         format = format_of(self.source)
         return [*own, format.name, format.version]
@@ -42,10 +44,10 @@ class SourceRef:
 
 @dataclass(frozen=True, slots=True)
 class Voxels:
-    """One channel of a source, at one level of its pyramid.
+    """One channel of a source, at one resolution level.
 
-    spacing_um  (z, y, x), um, between voxels of that level, as the plan says
-    origin_um   (z, y, x), um: centre of that level's voxel (0, 0, 0)
+    spacing_um  voxel spacing of that level (z, y, x) in um, from the plan
+    origin_um   centre of that level's voxel (0, 0, 0), (z, y, x) in um
     """
 
     ref: SourceRef
@@ -66,7 +68,7 @@ def open_source(ref: SourceRef) -> read.Dataset:
 
 
 def open_afresh(ref: SourceRef) -> read.Dataset:
-    """Return the dataset as the files are now, even if this process opened it before."""
+    """Return the dataset from the files as they are now, even if it was opened before."""
     fetch(Path(ref.source))  # an added channel's source lies in OUT
     given = None
     if ref.spacing_um:

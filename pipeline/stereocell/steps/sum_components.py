@@ -22,12 +22,12 @@ Sums = Mapping[str, Any]  # the fields of `ComponentSums`
 class SumComponents(Step[Sums]):
     """Sum up the components of one tile of a channel.
 
-    iso              the tile's level, above the background, voxel values
-    background       near the tile, voxel values; None: none is subtracted
-    min_diagonal_um  smaller components are left out
-    max_shift        by how much smoothing may move a value, voxel values; None: by any
-    step             voxels (z, y, x) between planes that carry the surface
-    higher           a higher level that `iso` is compared with, in the same values; None: none
+    iso              level of the tile above the background, voxel values
+    background       background near the tile, voxel values; None: none is subtracted
+    min_diagonal_um  smaller components are left out, um
+    max_shift        most that smoothing may move a value, in voxel values; None: no bound
+    step             distance in voxels (z, y, x) between planes that carry the surface
+    higher           higher level with which `iso` is compared, in the same values; None: none
     """
 
     VERSION: ClassVar[int] = 1

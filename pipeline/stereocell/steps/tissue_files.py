@@ -1,7 +1,8 @@
-"""OUT/tissue: probabilities of the classes and their record, and a check that both are whole.
+"""Write OUT/tissue, the probabilities of the classes and their record, and check it for damage.
 
-The record lists the SHA-256 of every file, since the fingerprint covers a sample of the voxels
-only: Zarr reads a lost chunk as zeros, and zstd decodes some damage to other voxels without error.
+The record lists the SHA-256 of every file. The fingerprint is not enough, because it covers a
+sample of the voxels. Readers don't notice either: Zarr reads a lost chunk as zeros, and zstd
+decodes some damaged data to other voxels without an error.
 """
 
 from collections.abc import Mapping
@@ -30,7 +31,7 @@ class TissueClass:
     """A class that becomes a channel.
 
     color          linear RGB, 0..1
-    intensity      mean of its voxels, bias removed; None: a network does not know it
+    intensity      mean of its voxels after bias correction; None for a class of a network
     probabilities  uint8 (z, y, x), 0..255
     """
 
@@ -44,11 +45,11 @@ class TissueClass:
 class TissueClasses:
     """The classes of a region.
 
-    record      the content of tissue.json, without its files
-    start       voxel (z, y, x) of the source at which the region begins
+    record      content of tissue.json without the list of files
+    start       first voxel (z, y, x) of the region in the source
     shape       voxels (z, y, x) of the whole source
-    spacing_um  (z, y, x), um
-    origin_um   (z, y, x), um: centre of the source's voxel (0, 0, 0)
+    spacing_um  voxel spacing (z, y, x), um
+    origin_um   centre of the source's voxel (0, 0, 0), (z, y, x) in um
     """
 
     classes: tuple[TissueClass, ...]
@@ -60,14 +61,14 @@ class TissueClasses:
 
 
 class TissueFolder:
-    """The form of the classes in OUT: a volume that other programs open, and its record."""
+    """The form of the classes in OUT: a volume that other programs can open, and its record."""
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether all files of the folder are as written."""
+        """Return whether all files of the folder are there and undamaged."""
         return find_fault(place) is None
 
     def write(self, place: Path, result: TissueClasses) -> None:
-        """Write the folder, whole or not at all. Raises OutputError."""
+        """Write the folder completely or not at all. Raises OutputError."""
         with replacing_folder(place) as folder:
             write_probabilities(
                 folder / VOXELS,
@@ -85,12 +86,12 @@ TISSUE_FOLDER = TissueFolder()
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """Return the record in OUT/tissue. Raises OutputError where it is missing or invalid."""
+    """Return the record in OUT/tissue. Raises OutputError if it is missing or invalid."""
     return dict(read_json(folder / RECORD, _SCHEMA, _AGAIN))
 
 
 def find_fault(folder: Path) -> str | None:
-    """Return a line on the first file that is missing or damaged; None: all are as written."""
+    """Return a line on the first file that is missing or damaged; None: all are intact."""
     try:
         read_whole(folder)
     except OutputError as fault:
@@ -99,9 +100,9 @@ def find_fault(folder: Path) -> str | None:
 
 
 def read_whole(folder: Path) -> dict[str, Any]:
-    """Return the record in OUT/tissue after a check that all its files are as written.
+    """Return the record in OUT/tissue, after checking the hashes of all files.
 
-    Raises OutputError for the first file that isn't.
+    Raises OutputError for the first file that is missing, damaged or not listed.
     """
     record = read_record(folder)
     fetch(folder)
@@ -116,7 +117,7 @@ def read_whole(folder: Path) -> dict[str, Any]:
 
 
 def _digests_of(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file of the probabilities in `folder`, by relative path."""
+    """Return the SHA-256 of each file with probabilities in `folder`, by relative path."""
     return {
         file.relative_to(folder).as_posix(): measure(file)["sha256"]
         for file in sorted((folder / VOXELS).rglob("*"))

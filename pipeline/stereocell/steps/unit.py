@@ -1,4 +1,7 @@
-"""The unit of work: one (tile, channel), from voxels to meshes and an 8-bit volume. Pure."""
+"""Build the unit of work, one (tile, channel): from voxels to meshes and an 8-bit volume.
+
+No file is read or written here.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,19 +35,19 @@ from stereocell.textures.sample_channel import sample_channel
 from stereocell.textures.texture_lod import Texturer, VertexValues
 from stereocell.transfer.joint_histogram import to_eight_bits
 
-RIM_ERROR = 0.3  # finest spacings; largest error of a surface's curve where tiles meet
-PAST = 3  # voxels beyond a cut that maps are baked from; the halo is larger, texels smaller
+RIM_ERROR = 0.3  # finest voxel spacings; largest error of the surface's rim where tiles meet
+PAST = 3  # voxels beyond a cut from which maps are baked; less than the halo, more than a texel
 
 
 @dataclass(frozen=True, slots=True)
 class UnitOptions:
-    """The settings that a unit depends on by itself.
+    """The settings that every unit depends on.
 
     smoothing_um  standard deviation of the smoothing before the surface is found
-    closed_tiles  whether the tile's solid is kept as well, as a closed mesh
-    bits          EIGHT_BITS, or those of the source
-    wrapper       version of the package that wraps triangles; empty: none does
-    unwrapper     version of the package that lays out maps; empty: there are none
+    closed_tiles  whether the tile's solid is kept as a closed mesh, too
+    bits          EIGHT_BITS, or more if the voxels as measured are kept, too
+    wrapper       version of the package for alpha wrapping; empty: it is not used
+    unwrapper     version of the package that lays out maps; empty: there are no maps
     """
 
     smoothing_um: float
@@ -60,15 +63,15 @@ class UnitOptions:
 class UnitInput:
     """The inputs of a unit, besides its voxels.
 
-    lattice     the places of its voxels; the volumes cover its window
-    iso         the iso-value near the tile, above the background, voxel values; None: no surface
-    background  in voxel values; None: nothing is subtracted
+    lattice     places of its samples; the volumes cover its window
+    iso         iso-value near the tile, above the background, voxel values; None: no surface
+    background  background in voxel values; None: nothing is subtracted
     repair      cleaning of the channel's surface
-    step        voxels (z, y, x) between planes that carry the surface
+    step        distance in voxels (z, y, x) between planes that carry the surface
     intensity_window  voxel values that become 0 and 255
-    holder      what is left out of surface and volume; None: nothing is
-    max_shift   by how much smoothing may move a value, voxel values; None: by any
-    painted     the same of the channel that is sampled onto the surface; None: none is
+    painted     voxel values of the painted channel that become 0 and 1; None: none is painted
+    holder      a CT's table or head holder, left out of surface and volume; None: there is none
+    max_shift   most that smoothing may move a value, in voxel values; None: no bound
     """
 
     lattice: Lattice
@@ -86,10 +89,10 @@ class UnitInput:
 def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = None) -> Unit:
     """Return meshes and volume of one unit.
 
-    volume   voxels (z, y, x) of any dtype; they cover the lattice's window
-    painted  those of the channel that is sampled onto the surface
+    volume   voxels (z, y, x) of any dtype, which cover the lattice's window
+    painted  voxels of the channel that is painted on the surface; None: none is
 
-    A unit whose field never crosses the iso-value has no surface; the result gives the reason.
+    If the field never crosses the iso-value, the unit has no surface and states the reason.
     """
     clock = Clock()
     with clock("volume"):
@@ -132,10 +135,10 @@ def build_unit(volume: Volume, given: UnitInput, *, painted: Volume | None = Non
 
 
 def find_surface(volume: Volume, given: UnitInput) -> tuple[Mesh, Cover | None]:
-    """Return a unit's iso-surface, repaired, before levels of detail are made; it may be empty.
+    """Return a unit's repaired iso-surface before levels of detail, and its cover.
 
-    The other value is how it covers the source's voxels; None: the channel has no level. Both have
-    the same numbers as in `build_unit`.
+    The surface may be empty. The cover states how many of the source's voxels the solid encloses;
+    None: the channel has no level. Both are the same as in `build_unit`.
     """
     if given.iso is None:
         nothing = np.zeros((0, 3), np.float32)
@@ -147,7 +150,7 @@ def find_surface(volume: Volume, given: UnitInput) -> tuple[Mesh, Cover | None]:
 
 
 def find_cover(volume: Volume, given: UnitInput, repaired: Repaired) -> Cover | None:
-    """Return how a unit's solid covers the source's voxels; None: the channel has no level."""
+    """Return how many of the source's voxels a unit's solid encloses; None: there is no level."""
     if given.iso is None:
         return None
     return measure_cover(
@@ -164,10 +167,10 @@ def find_cover(volume: Volume, given: UnitInput, repaired: Repaired) -> Cover | 
 def _repaired(
     volume: Volume, given: UnitInput, lattice: Lattice, iso: LatticeField, clock: Clock
 ) -> tuple[Repaired, bool]:
-    """Return the repaired distance, and whether triangles must still close gaps.
+    """Return the repaired distance field, and whether gaps are still to be closed by triangles.
 
-    A function of its own, so that its float32 copies of the window are freed before levels are
-    made.
+    When this function returns, its float32 copies of the window are freed, before the levels of
+    detail are made.
     """
     options, spacing = given.options, lattice.spacing_um
     with clock("distance"):
@@ -202,9 +205,10 @@ def _extract(
 
 
 class _Shading:
-    """Ambient occlusion and the sampled channel: what levels of a unit get their values from.
+    """Ambient occlusion and the painted channel, at the vertices and in the maps of all levels.
 
-    It keeps the distance field only where maps are asked for: the solid takes a quarter of it.
+    The distance field is kept only if there are maps. Otherwise the solid is enough, which takes a
+    quarter of its memory.
     """
 
     def __init__(
@@ -217,18 +221,18 @@ class _Shading:
     ) -> None:
         self._given, self._lattice, self._painted, self._clock = given, lattice, painted, clock
         self._options = given.options.unwrap.resolved(given.lattice.spacing_um)
-        # slightly smaller, so that rays start outside of it
+        # slightly smaller than the surface, so that rays from the surface start outside
         self._solid = distance > 0.25 * max(lattice.spacing_um)
         self._distance = distance if self._options.maps else None
 
     def texturer(self, mesh: Mesh, number: NDArray[np.int64]) -> Texturer:
-        """Return what gives values to levels, by the finest level; see `make_levels`."""
+        """Return the Texturer for the levels of detail of a finest mesh; see `make_levels`."""
         with self._clock("occlude"):
             values = VertexValues(self._openness(mesh), self._paint(mesh))
         return Texturer(self._options, values, self._source, self._clock)
 
     def _source(self) -> FineSurface:
-        """Return the fine surface, some voxels beyond the cut, with its values."""
+        """Return the fine surface with its values; it reaches PAST voxels beyond the cut."""
         assert self._distance is not None
         past = self._lattice.grown(PAST)
         mesh = extract_surface(self._distance, past, cut_as=self._lattice)
@@ -253,9 +257,9 @@ class _Shading:
 
 
 def find_measured(kept: NDArray[Any], given: UnitInput) -> NDArray[Any] | None:
-    """Return the voxels that the stage keeps as they were measured; None where it does not.
+    """Return the voxels as measured, for the stage; None: it keeps only the 8-bit volume.
 
-    kept  as `cut_voxels` returns them
+    kept  voxels as `cut_voxels` returns them
     """
     if given.options.bits == EIGHT_BITS:
         return None

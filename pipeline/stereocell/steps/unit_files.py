@@ -1,8 +1,8 @@
-"""A unit as a folder: unit.json, volume.npy and a lodK.npz for each level of detail.
+"""Save and load a unit as a folder: unit.json, volume.npy, and lodK.npz for each level of detail.
 
-The same input gives the same bytes, except in seconds.json, which nothing is built from. unit.json
-lists the other files with their hashes, and holds a hash of itself: each file is compared with its
-own hash before it is read.
+The same input gives the same bytes, except in seconds.json, which no other result depends on.
+unit.json lists the other files with their hashes, and holds a hash of itself. Each file is compared
+with its hash before it is read.
 """
 
 import io
@@ -36,7 +36,7 @@ _VOLUME, _MEASURED, _OBJECTS = "volume.npy", "measured.npy", "objects.npz"
 
 
 def save_unit(directory: Path, unit: Unit) -> None:
-    """Write a unit as a folder under its final name. Raises OutputError where it can't."""
+    """Write a unit as a folder, completely or not at all. Raises OutputError."""
     lods = [
         {
             "triangles": len(lod.mesh.triangles),
@@ -51,7 +51,7 @@ def save_unit(directory: Path, unit: Unit) -> None:
     with replacing_folder(directory) as folder:
         for name, voxels in ((_VOLUME, unit.volume), (_MEASURED, unit.measured)):
             if voxels is not None:
-                # numpy's own file writer reports no full disk
+                # numpy's own writer does not report a full disk
                 buffer = io.BytesIO()
                 np.save(buffer, voxels)
                 (folder / name).write_bytes(buffer.getvalue())
@@ -72,14 +72,14 @@ def save_unit(directory: Path, unit: Unit) -> None:
             "files": {file.name: measure(file) for file in sorted(folder.iterdir())},
         }
         write_sealed(folder / _RECORD, record)
-        # after the list of files: a unit is whole without it
+        # written after the list of files, because a unit is complete without it
         write_json(folder / _SECONDS, {step: round(s, 3) for step, s in unit.seconds.items()})
 
 
 def is_whole(directory: Path) -> bool:
-    """Return whether a unit's folder holds all files of its record, as written.
+    """Return whether a unit's folder holds all files of its record, undamaged.
 
-    Files whose size and time are unchanged are not read: see file_list.py.
+    Files whose size and time are unchanged are not read (see file_list.py).
     """
     record = find_sealed(directory / _RECORD, SCHEMA)
     if record is None:
@@ -88,14 +88,14 @@ def is_whole(directory: Path) -> bool:
 
 
 class UnitFolder:
-    """The form of a unit's result in OUT: see `save_unit`."""
+    """The form of a unit in OUT: the folder that `save_unit` writes."""
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether the folder holds all files of its record, as written."""
+        """Return whether the folder holds all files of its record, undamaged."""
         return is_whole(place)
 
     def write(self, place: Path, result: Unit) -> None:
-        """Write the folder, whole or not at all. Raises OutputError."""
+        """Write the folder completely or not at all. Raises OutputError."""
         save_unit(place, result)
 
 
@@ -103,7 +103,7 @@ UNIT_FOLDER = UnitFolder()
 
 
 def find_damage(directory: Path) -> dict[str, str]:
-    """Return the fault of each damaged file of a unit, by name; all are hashed."""
+    """Return the fault of each damaged file of a unit, by name. All files are read."""
     if _RECORD not in sizes_of(directory):
         return {_RECORD: MISSING}
     record = find_sealed(directory / _RECORD, SCHEMA)
@@ -118,7 +118,7 @@ def load_record(directory: Path) -> dict[str, Any]:
 
 
 def cover_of(record: Mapping[str, Any]) -> Cover | None:
-    """Return how a unit's surface covers the source's voxels, from the content of unit.json."""
+    """Return how many of the source's voxels a unit's solid encloses, from unit.json's content."""
     return None if record["cover"] is None else Cover(**record["cover"])
 
 
@@ -137,7 +137,7 @@ def _as_written(directory: Path, file: Path) -> Path:
 
 
 def find_seconds(directory: Path) -> dict[str, float]:
-    """Return the seconds of each step of a unit; empty where their file is lost."""
+    """Return the seconds of each step of a unit; empty: their file is missing."""
     return dict(find_json(directory / _SECONDS, _SECONDS_SCHEMA) or {})
 
 
@@ -147,7 +147,7 @@ def lod_file(directory: Path, level: int) -> Path:
 
 
 def find_closed(directory: Path) -> Path | None:
-    """Return the file of the unit's closed copy; None if it has none. Raises OutputError."""
+    """Return the file of the unit's closed copy; None: there is none. Raises OutputError."""
     has_one = load_record(directory)["closed"] is not None
     return _as_written(directory, directory / _CLOSED) if has_one else None
 
@@ -168,18 +168,21 @@ def load_quality(stored: Mapping[str, Any]) -> Quality:
 
 
 def load_volume(directory: Path) -> NDArray[np.uint8]:
-    """Return the 8-bit voxels (z, y, x), uint8, mapped from the file. Raises OutputError."""
+    """Return the 8-bit voxels, uint8 (z, y, x), memory-mapped. Raises OutputError."""
     return _load_voxels(directory, _VOLUME)
 
 
 def load_measured(directory: Path) -> NDArray[Any] | None:
-    """Return the same voxels as they were read, mapped; None: not kept. Raises OutputError."""
+    """Return the voxels as measured (z, y, x), memory-mapped; None: not kept.
+
+    Raises OutputError for a damaged file.
+    """
     has_any = _MEASURED in load_record(directory)["files"]
     return _load_voxels(directory, _MEASURED) if has_any else None
 
 
 def load_objects(directory: Path) -> ObjectFacts:
-    """Return what a label map's unit knows of its objects. Raises OutputError."""
+    """Return the measurements of the objects in a label map's unit. Raises OutputError."""
     try:
         with (
             _as_written(directory, directory / _OBJECTS).open("rb") as file,
@@ -207,7 +210,7 @@ def _load_voxels(directory: Path, name: str) -> NDArray[Any]:
 
 
 def _load_lod(directory: Path, level: int, stored: Mapping[str, Any]) -> Lod:
-    # opened here: numpy leaves a damaged file open
+    # opened here, because numpy would leave a damaged file open
     with (
         _as_written(directory, lod_file(directory, level)).open("rb") as file,
         np.load(file) as arrays,
@@ -274,7 +277,7 @@ def _arrays(lod: Lod) -> dict[str, Any]:
 
 
 def _share(stored: NDArray[np.uint8] | None) -> NDArray[np.float32] | None:
-    """Return bytes as 0..1."""
+    """Return 0..255 as 0..1; None for None."""
     return None if stored is None else np.divide(stored, 255, dtype=np.float32)
 
 

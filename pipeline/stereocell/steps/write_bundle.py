@@ -1,4 +1,4 @@
-"""The steps that write the bundle from the composed stage: its tiles, then the whole."""
+"""The steps that write the bundle from the composed stage: first its tiles, then the rest."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,9 +22,9 @@ from stereocell.usd.typed_values import usd_boundary
 class WriteBundle(Keyed):
     """Write the bundle.
 
-    stage    path, size and time of each file that the stage consists of; of one on object storage
-             key, bytes and mark of each object
-    page     the same of the viewer's files
+    stage    path, size and time of each file of the stage; on object storage key, bytes and mark of
+             each object
+    page     path, size and time of each file of the viewer
     encoder  version of the package that encodes images; None: there is no image to encode
     """
 
@@ -37,12 +37,12 @@ class WriteBundle(Keyed):
 
 @dataclass(frozen=True, slots=True)
 class WriteBundleTile(Work):
-    """Write the part of a bundle that one tile brings: the work of workers for `WriteBundle`.
+    """Write one tile's part of a bundle. Workers do this for `WriteBundle`.
 
-    A part has no key of its own. It lies in a folder that the bundle's key names, and is removed
-    with it when the bundle is whole.
+    A part has no key of its own. It lies in a folder named by the bundle's key, which is removed
+    when the bundle is complete.
 
-    stage        the layer to export
+    stage        layer to export
     appearances  see `Composed`
     step_m       see `Composed`
     """
@@ -66,17 +66,17 @@ class WriteBundleTile(Work):
 
 @contextmanager
 def opened_stage(stage: Path) -> Iterator[Composed]:
-    """Yield a stage, or a layer over it, opened to be exported.
+    """Yield a stage, or a layer over it, opened for export.
 
-    Raises StageError where the stage lacks something or a file of it is damaged, naming prim and
-    file, and in place of an error that USD raises inside the block.
+    Raises StageError, which names prim and file, if the stage lacks something or a file of it is
+    damaged. Errors that USD raises inside the block become StageErrors.
     """
     with usd_boundary(stage):
         yield Composed.open(stage)
 
 
 def bundle_tile_tasks(composed: Composed, parts: Path) -> list[Task]:
-    """Return the task of each tile, which writes its part into a folder in `parts`."""
+    """Return a task for each tile, which writes the tile's part into a folder in `parts`."""
     step = WriteBundleTile(composed.path, composed.appearances, composed.step_m)
     return [Task(tile_id, step, parts / tile_id) for tile_id in composed.tile_ids]
 
@@ -84,15 +84,15 @@ def bundle_tile_tasks(composed: Composed, parts: Path) -> list[Task]:
 def write_bundle(
     composed: Composed, parts: Sequence[Path], bundle_dir: Path, viewer_dist: Path | None
 ) -> Iterator[str]:
-    """Write the bundle over its finished tiles, in place of an older one; yield notes meanwhile.
+    """Write the bundle over its finished tiles, in place of an older one, and yield notes.
 
-    viewer_dist  the built viewer, copied into the bundle; None: no viewer
+    parts        folders of the tiles' parts; see `fill_bundle`
+    viewer_dist  folder of the built viewer, which is copied into the bundle; None: no viewer
 
-    For the parts and the notes see `fill_bundle`. Raises OutputError where `bundle_dir` can't be
-    written, or is something else.
+    Raises OutputError if `bundle_dir` can't be written, or holds something other than a bundle.
     """
     require_bundle(bundle_dir)
     if viewer_dist is not None and not (viewer_dist / "index.html").is_file():
-        raise OutputError(f"{viewer_dist}: no index.html, expected the built viewer")
+        raise OutputError(f"{viewer_dist}: found no index.html, expected the built viewer")
     with replacing_folder(bundle_dir) as folder:
         yield from fill_bundle(composed, parts, folder, viewer_dist)

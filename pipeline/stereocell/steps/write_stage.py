@@ -1,4 +1,4 @@
-"""The step that writes the stage over its tiles. The stage's phase runs it: see phases.py."""
+"""The step that writes the stage over its tiles. The stage's phase runs it (see phases.py)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,13 +31,16 @@ class Tables:
     of_labels: Mapping[str, ObjectTable]
 
     def key_content(self) -> dict[str, str]:
-        """Return what counts in a key: a digest of each."""
+        """Return the content for a key: a digest of each table."""
         return {id_: digest_of_table(table) for id_, table in self.of_labels.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class WriteStage(Keyed):
-    """Write what the tiles of a stage share; the fields are those of `usd.write_stage`."""
+    """Write the layers that all tiles of a stage share.
+
+    The fields are those of `usd.write_stage`.
+    """
 
     VERSION: ClassVar[int] = 5
 
@@ -55,7 +58,7 @@ class WriteStage(Keyed):
     def write(self, stage_dir: Path) -> str:
         """Write the layers of the stage and looks/ beside the tiles.
 
-        Returns a line about the specimen's physical size.
+        Returns a line on the specimen's physical size.
         """
         extents = [
             TileExtent(tile.id, tile.first_um, tile.last_um, self.spacing_um)
@@ -75,9 +78,9 @@ class WriteStage(Keyed):
         )
 
     def write_list(self, stage_dir: Path, tiles: FileList) -> None:
-        """Write specimen.usdz and the previews, and last the list of all files.
+        """Write specimen.usdz and the previews, and at last the list of all files.
 
-        tiles  the files of the tiles
+        tiles  list of the tiles' files
         """
         stage, small = stage_dir / STAGE_NAME, stage_dir / USDZ_NAME
         as_written = AsWritten({stage_dir.resolve(): tiles})

@@ -26,8 +26,8 @@ from stereocell.usd import written_files
 class UnitPart:
     """The unit of one channel in a tile.
 
-    color  of the channel, linear RGB
-    paint  the colours of its surface; None: it is not painted
+    color  colour of the channel, linear RGB, 0..1
+    paint  colours of its painted surface; None: it is not painted
     """
 
     channel_id: str
@@ -36,7 +36,7 @@ class UnitPart:
     paint: PaintColors | None = None
 
     def key_content(self) -> list[object]:
-        """Return what counts in a key: a unit's folder is named by its key."""
+        """Return the content for a key. The unit counts by its folder's name, which is its key."""
         return [self.channel_id, self.folder.name, self.color, content_of(self.paint)]
 
 
@@ -49,7 +49,7 @@ class TableOfTile:
     touching: SharedWalls
 
     def key_content(self) -> list[object]:
-        """Return what counts in a key: digests of both."""
+        """Return the content for a key: digests of the table and of the interfaces."""
         return [self.labels_id, digest_of_table(self.table), _digest(self.touching)]
 
 
@@ -57,9 +57,9 @@ class TableOfTile:
 class StageTile:
     """The record of one tile of the stage.
 
-    key             of its step
-    files           as they were written, by their paths from the tile's folder
-    measured_bytes  those of its voxels as measured
+    key             key of its step
+    files           list of its files, by path relative to the tile's folder
+    measured_bytes  bytes of its voxels as measured
     """
 
     key: str
@@ -77,8 +77,8 @@ class WriteStageTile(Step[StageTile]):
 
     content    the tile without its channels
     has_vdb    whether the volumes are written for other programs, too
-    shared     IDs of the channels whose volume is another channel's: they have surfaces alone
-    stage_dir  the folder with the tile's files, where an artist may edit them
+    shared     IDs of channels that only have a surface, because their volume is another channel's
+    stage_dir  folder of the stage, where an artist may edit the tile's files
     """
 
     VERSION: ClassVar[int] = 3
@@ -99,7 +99,7 @@ class WriteStageTile(Step[StageTile]):
         return tuple(unit.folder for unit in self.units)
 
     def is_whole(self, place: Path) -> bool:
-        """Return whether the tile and its units are whole, and its inputs are unchanged."""
+        """Return whether the tile and its units are undamaged, and its inputs have not changed."""
         found = self.FORM.find(place)
         if found is None or found.key != self.key:
             return False
@@ -108,7 +108,7 @@ class WriteStageTile(Step[StageTile]):
         return are_whole and written_files.is_kept(folder, found.files, since=place)
 
     def run(self) -> StageTile:
-        """Write the tile. Raises OutputError where a unit is damaged."""
+        """Write the tile. Raises OutputError if a unit is damaged."""
         tables = {one.labels_id: one for one in self.tables}
         channels = tuple(self._content_of(unit, tables.get(unit.channel_id)) for unit in self.units)
         content = replace(self.content, channels=channels)
@@ -136,7 +136,7 @@ def _digest(walls: SharedWalls) -> str:
 
 
 def digest_of_table(table: ObjectTable) -> str:
-    """Return a digest of all that a table holds."""
+    """Return a digest of the whole content of a table."""
     digest = hashlib.sha256(table.labels.tobytes() + table.boxes.tobytes())
     for rows in table.rows.values():
         digest.update(rows.tobytes())

@@ -1,1 +1,1 @@
-"""Files and objects, whole or not at all: writes, locks, addresses, cache keys."""
+"""Read, write, lock and recognise files, on this machine and on object storage."""

@@ -1,9 +1,8 @@
-"""Find the files that ship beside the code: JSON Schemas, the USD schema, hand-written layers,
-the viewer.
+"""Find the files that ship with the code: JSON Schemas, the USD schema, layers and the viewer.
 
 A checkout has `schemas/`, `usd_assets/` and `viewer_gltf/` at its top, two levels above the
-package; a wheel has them inside the package. The package is searched first: in a checkout it holds
-none of them, while two levels above an installed package lies a foreign folder.
+package. A wheel has them inside the package. The package is searched first, because the folder two
+levels above an installed package belongs to something else.
 """
 
 from pathlib import Path
@@ -15,7 +14,7 @@ _HOMES = (_PACKAGE, _PACKAGE.parents[1])
 def find_asset(relative: str) -> Path:
     """Return the path of a shipped file or folder, such as `usd_assets/lights.usda`.
 
-    Raises FileNotFoundError where the installation lacks it.
+    Raises FileNotFoundError if the installation lacks it.
     """
     for home in _HOMES:
         if (home / relative).exists():
@@ -29,6 +28,6 @@ def schema_path(name: str) -> Path:
 
 
 def viewer_dist() -> Path | None:
-    """Return the folder of the built viewer, or None where it has not been built."""
+    """Return the folder of the built viewer; None: it has not been built."""
     folders = (home / "viewer_gltf" / "dist" for home in _HOMES)
     return next((folder for folder in folders if (folder / "index.html").is_file()), None)

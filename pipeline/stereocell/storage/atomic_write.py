@@ -1,11 +1,11 @@
-"""Write a file under a temporary name beside it, flush it, rename it: the whole file or none.
+"""Write a file completely or not at all: under a temporary name beside it, then renamed.
 
-Temporary names are never used twice, and a worker of a command that has ended renames nothing. So a
+Temporary names are never used twice, and workers of a command that has ended rename nothing. So a
 worker that was cut off, for example because its scheduler was killed, can't damage a build that
 went on without it. The next writer removes its temporary files.
 
-A document of a build is parsed before it takes its place, by the code that reads it: documents.py.
-With OUT on object storage, the file is then uploaded: see workspace.py.
+Before a document of a build takes its place, it is parsed by the code that reads it (documents.py).
+If OUT is on object storage, the file is then uploaded (workspace.py).
 """
 
 import os
@@ -24,17 +24,17 @@ from stereocell.storage.workspace import making, upload
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path with the suffix of `path`; at the end, it takes the place of `path`.
+    """Yield a temporary path with the suffix of `path`. At the end, it takes the place of `path`.
 
-    If the body raises, nothing is left behind. Raises OutputError where the system refuses
-    (rights, space), and for a document that no command could read.
+    If the block raises, nothing is left behind. Raises OutputError if the system refuses (rights,
+    space), and for a document that no command could read.
     """
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     require_asked()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         clear_beside(path)
-        try:  # from here on an interruption removes it
+        try:  # from here on, an interruption removes the temporary file
             temporary.touch()
             yield temporary
             with temporary.open("rb+") as file:
@@ -50,17 +50,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file of these bytes at `path`, whole or not at all. Raises OutputError."""
+    """Write a file completely or not at all. Raises OutputError."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
-    """Yield an empty folder beside `path`; at the end, it takes the place of `path`.
+    """Yield an empty folder beside `path`. At the end, it takes the place of `path`.
 
-    If the body raises, `path` stays as it was. Remains of a killed run are removed first. Raises
-    OutputError where the system refuses (rights, space).
+    If the block raises, `path` does not change. Remains of a killed run are removed first. Raises
+    OutputError if the system refuses (rights, space).
     """
     require_asked()
     token = secrets.token_hex(4)
@@ -68,7 +68,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     try:
         clear_beside(path)
         with making(new, path):
-            try:  # from here on an interruption removes it
+            try:  # from here on, an interruption removes the new folder
                 new.mkdir(parents=True)
                 yield new
                 for file in new.rglob("*"):
@@ -84,15 +84,16 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
 
 def put_in_place(new: Path, path: Path, old: Path) -> None:
-    """Rename a file or a folder to `path`; what lies there stays until the new one is there.
+    """Rename a file or a folder to `path`. If that fails, the old file or folder stays.
 
-    old  an unused path, to which a folder goes first: no folder with files can be replaced at once
+    old  an unused path. A folder at `path` is moved there first, because a folder with files can't
+         be replaced in one step
     """
     try:
         if path.is_dir() or (new.is_dir() and path.exists()):
             os.replace(path, old)
         os.replace(new, path)
     finally:
-        if old.exists() and not path.exists():  # failed, or interrupted between the two
+        if old.exists() and not path.exists():  # failed or interrupted between the two steps
             os.replace(old, path)
         remove_remains(old)

@@ -1,24 +1,24 @@
-"""Work of a library that can end its whole process, in a process of its own.
+"""Run a library that may end its whole process in a child process.
 
-libarrow aborts on some damaged Parquet files, a network can allocate without end, and libCZI and
-HDF5's plugins decode in C++ that trusts its input. No `except` catches an abort. So such a library
-runs in a child process, and a child that dies is one line. Considered:
+libarrow aborts on some damaged Parquet files, a network can allocate memory without end, and libCZI
+and HDF5's plugins decode in C++ that trusts its input. No `except` catches an abort. So such a
+library runs in a child process, and its death becomes an error of one line. Rejected alternatives:
 
-- A child that only tries the file first. It must decode every chunk to prove anything, which
-  doubles the reading, and the next damaged byte on a bad disk still ends the command.
+- A child that only tests the file first. It must decode every chunk, which doubles the reading, and
+  a byte on a bad disk that fails later still ends the command.
 - The engine's workers. They turn a death into a line already, but `plan`, `slices`, `iso` and
   `--workers 0` read in the command's own process.
-- multiprocessing. Its children import the caller's script again (`spawn`), which asks for a main
-  guard in the scripts of users, and workers of Dask are daemons, which may have no children.
-- The readers of all formats in a child. Voxels would pass a pipe, and each command would start
+- multiprocessing. Its children import the caller's script again (`spawn`), so users' scripts would
+  need a main guard. Workers of Dask are daemons, which may have no children.
+- Readers of all formats in a child. Voxels would pass through a pipe, and each command would start
   0.3 s later, for libraries that have not aborted on a damaged file so far.
 
-So a child is an interpreter that runs `main` below. It makes one object by a function that the
-parent names, then calls its methods as the parent asks, with pickles through pipes. It starts in
-0.1 s and the time of its imports. It works alike on Linux, macOS and Windows.
+A child is an interpreter that runs `main` below. It makes one object by a function that the parent
+names, and calls the object's methods on request, with pickles through pipes. It starts in 0.1 s
+plus the time of its imports, on Linux, macOS and Windows.
 
-The parent watches the child's time and resident memory where a call has bounds, and kills it beyond
-them. A child whose parent dies ends by itself. What its libraries print is discarded.
+If a call has bounds, the parent watches the child's time and resident memory, and kills a child
+that exceeds them. A child whose parent dies ends by itself. Output of its libraries is discarded.
 """
 
 import importlib
@@ -39,32 +39,32 @@ from typing import IO, Any
 
 from stereocell.model.errors import StereoCellError
 
-_LOOK_S = 0.05  # seconds between two looks at a child's time and memory
-_NUMBER = struct.Struct("<Q")  # of parts, and of bytes of a part
-_PROTOCOL = 5  # of pickle: the first one with arrays beside the pickle
+_LOOK_S = 0.05  # s between two checks of a child's time and memory
+_NUMBER = struct.Struct("<Q")  # format of the number of parts, and of a part's size in bytes
+_PROTOCOL = 5  # first protocol of pickle that can keep arrays outside of the pickle
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The most that a call may take; None: no bound."""
+    """Largest time and resident memory of a call; None: no bound."""
 
     seconds: float | None = None
     memory_bytes: int | None = None
 
 
 class ChildError(StereoCellError):
-    """A child ended, or took more than its bounds; the text says which, without a subject."""
+    """A child has ended or exceeded its bounds. The text is the end of a sentence."""
 
 
 class Child:
-    """An object that lives in a process of its own, made by `factory(*arguments)`.
+    """An object in a process of its own, made by `factory(*arguments)`.
 
-    factory    a function or class of a module, of the package or of a test
+    factory    function or class of an importable module
     arguments  values that can be pickled
 
-    An exception that the factory or a method raises is raised here as well; a bug's traceback is a
-    note of it. Raises ChildError where the process dies or exceeds `bounds`.
-    One call runs at a time.
+    An exception that the factory or a method raises is raised here, too. If it is a bug, its
+    traceback is attached as a note. Raises ChildError if the process dies or exceeds `bounds`. One
+    call runs at a time.
     """
 
     def __init__(
@@ -93,7 +93,10 @@ class Child:
         self.close()
 
     def call(self, method: str, *arguments: Any, bounds: Bounds | None = None) -> Any:
-        """Return what a method of the object returns; `bounds` of this call replace the usual."""
+        """Return the result of a method of the object.
+
+        bounds  bounds of this call; None: those of the object
+        """
         return self._ask(method, arguments, bounds)
 
     def close(self) -> None:
@@ -111,7 +114,7 @@ class Child:
             except (OSError, EOFError, ValueError):
                 pipes.kill()
                 raise ChildError(watch.excess or _end(pipes.wait())) from None
-            except BaseException:  # Ctrl+C: half an answer may be in the pipe
+            except BaseException:  # after Ctrl+C, half an answer may be in the pipe
                 pipes.kill()
                 raise
         is_sound, answer = _unpickled(parts)
@@ -123,13 +126,13 @@ class Child:
 def run_in_child(
     function: Callable[..., Any], *arguments: Any, bounds: Bounds | None = None
 ) -> Any:
-    """Return what a function returns in a process of its own. Raises as `Child` does."""
+    """Run a function in a process of its own and return its result. Raises as `Child` does."""
     with Child(_Call, function, arguments, bounds=bounds) as child:
         return child.call("result")
 
 
 class _Call:
-    """A function's result, as an object whose one method returns it."""
+    """An object that holds the result of a function, for `run_in_child`."""
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
         self._result = function(*arguments)
@@ -139,7 +142,10 @@ class _Call:
 
 
 class _Watch:
-    """Kills a process that exceeds its bounds inside the block; `excess` says so, else empty."""
+    """Kills a process that exceeds its bounds inside the block.
+
+    excess  words on the bound that was exceeded; empty: none was
+    """
 
     def __init__(self, process: subprocess.Popen[bytes], bounds: Bounds) -> None:
         self.excess = ""
@@ -166,7 +172,7 @@ class _Watch:
             seconds, memory = self._bounds.seconds, self._bounds.memory_bytes
             try:
                 resident = psutil.Process(self._process.pid).memory_info().rss
-            except psutil.Error:  # it has ended
+            except psutil.Error:  # the process has ended
                 return
             if memory is not None and resident > memory:
                 self.excess = f"it took more than {memory / 1e9:g} GB of memory"
@@ -181,7 +187,7 @@ def _finish(process: subprocess.Popen[bytes]) -> None:
     process.kill()
     process.wait()
     for pipe in (process.stdin, process.stdout):
-        with suppress(OSError):  # bytes that the dead process did not take
+        with suppress(OSError):  # the dead process has left bytes unread
             if pipe is not None:
                 pipe.close()
 
@@ -191,14 +197,14 @@ def _end(code: int) -> str:
     if code >= 0:
         return f"its process ended with exit code {code}"
     name = signal.Signals(-code).name if -code in list(signal.Signals) else f"signal {-code}"
-    meaning = " (killed, as for lack of memory)" if name == "SIGKILL" else ""
+    meaning = " (killed, probably for lack of memory)" if name == "SIGKILL" else ""
     return f"its process ended by {name}{meaning}"
 
 
 def _send(pipe: IO[bytes], message: Any) -> None:
-    """Write a message: the number of its parts, then each part behind its size in bytes.
+    """Write a message: the number of its parts, then the size in bytes and content of each part.
 
-    The first part is the pickle, and the others are the arrays in it, which are not copied.
+    The first part is the pickle. The others are the arrays in it, which are not copied.
     """
     arrays: list[pickle.PickleBuffer] = []
     content = pickle.dumps(message, protocol=_PROTOCOL, buffer_callback=arrays.append)
@@ -211,7 +217,7 @@ def _send(pipe: IO[bytes], message: Any) -> None:
 
 
 def _receive(pipe: IO[bytes]) -> list[bytearray]:
-    """Return the parts of the next message. Raises EOFError where the other side is gone."""
+    """Return the parts of the next message. Raises EOFError if the other side is gone."""
     (count,) = _NUMBER.unpack(_exactly(pipe, _NUMBER.size))
     parts = []
     for _ in range(count):
@@ -237,33 +243,36 @@ def _exactly(pipe: IO[bytes], size: int) -> bytearray:
 
 def main() -> None:
     """Make the object, then call its methods, until the parent ends or closes the pipe."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the parent, which ends the child
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent reacts to Ctrl+C and ends the child
     answers = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)  # so that a library which prints does not disturb the answers
+    os.dup2(nowhere, 1)  # keeps the output of libraries out of the answers
     requests: SimpleQueue[list[bytearray]] = SimpleQueue()
     threading.Thread(target=_await_requests, args=(requests,), daemon=True).start()
     made: list[Any] = []
     while True:
         parts = requests.get()
         try:
-            answer = (True, _obey(made, *_unpickled(parts)))
+            answer = (True, _answer(made, *_unpickled(parts)))
         except Exception as error:
-            answer = (False, _carried(error))
+            answer = (False, _picklable(error))
         del parts
         _send(answers, answer)
 
 
-def _obey(made: list[Any], what: Any, arguments: tuple[Any, ...]) -> Any:
-    """Make the object, which is then the only one of the list, or call its method."""
+def _answer(made: list[Any], name: Any, arguments: tuple[Any, ...]) -> Any:
+    """Make the object if the list is empty and put it there, or call its method.
+
+    name  module and name of the function that makes the object; later the name of a method
+    """
     if made:
-        return getattr(made[0], what)(*arguments)
-    made.append(_named(*what)(*arguments))
+        return getattr(made[0], name)(*arguments)
+    made.append(_named(*name)(*arguments))
     return None
 
 
 def _await_requests(requests: "SimpleQueue[list[bytearray]]") -> None:
-    """Fill the queue; end the process where the parent is gone, even inside a library's call."""
+    """Fill the queue. If the parent is gone, end the process, even inside a library's call."""
     try:
         while True:
             requests.put(_receive(sys.stdin.buffer))
@@ -278,8 +287,8 @@ def _named(module: str, name: str) -> Any:
     return found
 
 
-def _carried(error: Exception) -> Exception:
-    """Return an exception as it can be pickled, with its traceback as a note if it is a bug."""
+def _picklable(error: Exception) -> Exception:
+    """Return an exception that can be pickled. If it is a bug, its traceback becomes a note."""
     import traceback
 
     if not isinstance(error, StereoCellError):

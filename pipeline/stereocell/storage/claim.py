@@ -1,13 +1,12 @@
-"""A command's claim on OUT: it and its workers may write as long as the command runs.
+"""The claim of a command on OUT: the command and its workers may write while the command runs.
 
-A command's workers may outlive it, as those of a cluster do. Before they put a result in its place,
-they check that OUT's lock still has the content of the time of the request.
+Workers of a cluster may outlive their command. Before they put a result in its place, they check
+that the content of OUT's lock has not changed since the command sent them the task.
 """
 
 import json
 import os
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -20,21 +19,18 @@ from uuid import uuid4
 from stereocell.model.errors import OutputError
 from stereocell.storage.processes import machine, start_of
 
-if sys.platform != "win32":
-    pass
-
 LOCK = ".lock"
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The content of OUT/.lock while one command works there, for its workers. Picklable."""
+    """The content of OUT/.lock while a command works there, for its workers. Picklable."""
 
     file: Path
     content: bytes
 
     def require(self) -> None:
-        """Raise OutputError once that command has ended."""
+        """Raise OutputError if that command has ended."""
         with suppress(OSError):
             if self.file.read_bytes() == self.content:
                 return
@@ -43,7 +39,7 @@ class Claim:
 
 def has_ended(out: str) -> OutputError:
     """Return the error of a task whose command has ended."""
-    return OutputError(f"{out}: the command that asked for this has ended")
+    return OutputError(f"{out}: the command that sent this task has ended")
 
 
 _held: ContextVar[Claim | None] = ContextVar("held", default=None)
@@ -57,7 +53,7 @@ def held() -> Claim | None:
 
 @contextmanager
 def holding(claim: Claim) -> Iterator[None]:
-    """Set this command's claim within the block, for its workers."""
+    """Within the block, set this command's claim for its workers."""
     before = _held.set(claim)
     try:
         yield
@@ -67,7 +63,7 @@ def holding(claim: Claim) -> Iterator[None]:
 
 @contextmanager
 def working_for(claim: Claim) -> Iterator[None]:
-    """Within the block, write only as long as the command with this claim runs."""
+    """Within the block, allow writing only while the command with this claim runs."""
     before = _worked_for.set(claim)
     try:
         yield
@@ -76,14 +72,14 @@ def working_for(claim: Claim) -> Iterator[None]:
 
 
 def require_asked() -> None:
-    """Raise OutputError if this is work for a command that has ended."""
+    """Raise OutputError if this process works for a command that has ended."""
     claim = _worked_for.get()
     if claim is not None:
         claim.require()
 
 
 def describe(command: str) -> dict[str, Any]:
-    """Return the content of a lock: the command that holds it, for people and for `Claim`."""
+    """Return the content of a lock, which describes the command that holds it."""
     return {
         "id": str(uuid4()),
         "process": os.getpid(),
@@ -96,12 +92,12 @@ def describe(command: str) -> dict[str, Any]:
 
 
 def in_words(content: bytes) -> str:
-    """Return the command in a lock's content as a phrase."""
+    """Return words for the command that a lock describes."""
     try:
         owner = json.loads(content)
         return (
             f"`stereocell {owner['command']}` (process {owner['process']} on {owner['host']}, "
             f"since {owner['since']})"
         )
-    except (ValueError, KeyError, TypeError):  # that command has just begun
+    except (ValueError, KeyError, TypeError):  # the command has not written its description yet
         return "another command"

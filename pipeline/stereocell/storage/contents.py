@@ -1,8 +1,8 @@
 """Recognise the contents of a path: a build, a part of a build, a published page, ...
 
-All commands use this module. Commands that read refuse folders of another kind, and commands that
-write replace no foreign files. A damaged result is still recognised, by the names of its files, so
-that the command which reads it can name the fault and the remedy.
+All commands use this module. Commands that read refuse folders of the wrong kind, and commands that
+write do not replace foreign files. A damaged result is still recognised by the names of its files,
+so that the command that reads it can name the fault and the remedy.
 """
 
 import json
@@ -22,7 +22,7 @@ from stereocell.storage.workspace import fetch, names_in
 
 PUBLISHED = "stereocell-published.json"
 _PLAN, _MANIFEST, _STAGE, _SLICES = "plan.json", "manifest.json", "stage.usda", "slices.json"
-# parts of a build by their folders' names, in words
+# Words for the parts of a build, by the names of their folders
 _PARTS = {
     "units": "the units of a build",
     "stage": "the stage of a build",
@@ -30,15 +30,15 @@ _PARTS = {
     "report": "the report of a build",
     "tissue": "the tissue classes of a build",
     "bundle_parts": "unfinished tiles of a build's bundle",
-    "bricks": "bricks that `stereocell serve` keeps",
+    "bricks": "bricks cached by `stereocell serve`",
 }
-# endings of files that hold surfaces -> words; the first bytes of most are not their own
+# Words for files of surfaces, by their endings; most of these formats have no mark of their own
 _BY_ENDING = {
     (".glb", ".gltf"): "a glTF file of surfaces",
     (".stl", ".3mf", ".ply", ".obj"): "a file of surfaces",
     (".usda", ".usdc", ".usdz", ".usd"): "a USD file",
 }
-# endings of surface files whose format has a mark -> the mark, or several, at their first byte
+# First bytes of formats of surfaces that have a mark, by the endings of their files
 _USDA, _USDC, _ZIP = b"#usda", b"PXR-USDC", b"PK\x03\x04"
 _MARKS: dict[str, bytes | tuple[bytes, ...]] = {
     ".glb": b"glTF",
@@ -49,21 +49,21 @@ _MARKS: dict[str, bytes | tuple[bytes, ...]] = {
     ".usdz": _ZIP,
     ".usd": (_USDA, _USDC, _ZIP),
 }
-# files that belong to no one: locks and temporary files of StereoCell, and files of file managers
 _OTHER = "a file that StereoCell did not write"
+# Locks and temporary files of StereoCell, and files that file managers write
 _IGNORED = re.compile(r"\.lock|\.writable\..*|\..+\.[0-9a-f]{8}\b.*|\.DS_Store|Thumbs\.db")
 _MAX_BYTES = 64 << 20  # bytes; StereoCell writes no larger JSON file
-_MAX_NAMED = 3  # most files of a folder that a message names
+_MAX_NAMED = 3  # most files that a message names
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
     """The contents of a path.
 
-    words        the contents for messages, with an article
+    words        words for the contents, with an article, for messages
     name         name of the specimen; empty: unknown
     fingerprint  fingerprint of the specimen's source; empty: unknown
-    build        the build that contains the path; None: it is in no build
+    build        the build that contains the path; None: it is not in a build
     """
 
     kind: Kind
@@ -91,18 +91,18 @@ def contents_of(path: Path) -> Contents:
 
 
 def words_for(names: Sequence[str]) -> str:
-    """Return words for files that StereoCell did not write, with the names of a few."""
+    """Return words for files that StereoCell did not write, with the names of some."""
     more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
     return f"something else ({', '.join(names[:_MAX_NAMED])}{more})"
 
 
 def is_ignored(name: str) -> bool:
-    """Return whether a name is that of a lock, a temporary file or a file manager's own file."""
+    """Return whether a file is a lock, a temporary file or a file manager's own, by its name."""
     return _IGNORED.fullmatch(name) is not None
 
 
 def _file_words(path: Path) -> str:
-    """Return words for a file: by its seal, its ending or its first bytes."""
+    """Return words for a file by its seal, its ending or its first bytes."""
     if path.suffix == ".html" and is_sealed_text(path):
         return "the report of a build"
     head, ending = first_bytes(str(path)), path.suffix.lower()
@@ -118,7 +118,7 @@ def _file_words(path: Path) -> str:
 def require_kind(path: Path, kinds: Collection[Kind]) -> Contents:
     """Return the contents of a path. Raises OutputError unless its kind is one of `kinds`.
 
-    An empty or missing folder passes: the command itself names the missing file and the remedy.
+    An empty or missing folder is accepted, because the command itself reports the missing file.
     """
     found = contents_of(path)
     if found.kind is Kind.NOTHING or found.kind in kinds:
@@ -145,7 +145,7 @@ def _site(path: Path, names: set[str]) -> Contents | None:
 
 def _bundle(path: Path, names: set[str]) -> Contents | None:
     """Recognise a bundle, in a build or by itself."""
-    is_ours = {"files.json", "channels"} <= names or (  # its manifest may be lost
+    is_ours = {"files.json", "channels"} <= names or (  # the manifest may be missing
         _MANIFEST in names and _read(path / _MANIFEST).get("format") == "stereocell-bundle"
     )
     if not is_ours:
@@ -183,7 +183,7 @@ def _stage(path: Path, names: set[str]) -> Contents | None:
 
 
 def _slices(path: Path, names: set[str]) -> Contents | None:
-    """Recognise the pictures of `stereocell slices`."""
+    """Recognise the images of `stereocell slices`."""
     content = _read(path / _SLICES) if _SLICES in names else {}
     if content.get("format") != "stereocell-slices":
         return None
@@ -212,7 +212,7 @@ def _build_around(path: Path) -> Path | None:
 
 
 def _specimen(path: Path) -> Mapping[str, Any]:
-    """Return the specimen in a bundle's manifest; empty: it states none."""
+    """Return the specimen in a bundle's manifest; empty: the manifest states none."""
     return _table(_read(path / _MANIFEST).get("specimen"))
 
 

@@ -1,8 +1,8 @@
-"""The documents of a build: the schema of each JSON file, and the check of its content.
+"""Check the documents of a build, each JSON file by its schema, when they are written and read.
 
 `atomic_write` calls `require_readable` before a document takes its place, and `read_json` parses
 with the same code. So a command that would write an unreadable document fails in one line, and the
-earlier document stays. plan.json has rules beyond its schema, which its writer checks as well.
+earlier document stays. plan.json has rules beyond its schema, which its writer checks, too.
 """
 
 import hashlib
@@ -47,25 +47,27 @@ SCHEMAS: dict[str, str | None] = {
     r"(files|tile|tileset|finer.*|.*_level|stereocell-published)\.json": None,
 }
 SETTINGS = "stereocell.toml"
-# references to other schemas by their `$id`
+# Finds references to other schemas by their `$id`.
 _OTHERS = re.compile(r'"\$ref": "urn:stereocell:schema:(\w+):1#')
 NOT_WRITTEN = "not written, because no command could read it"
-# Schemas, and hashes of documents that passed them. A unit's record is read with each of its files,
-# and the check took up to 20 ms each time, a fifth of a small build.
+# Schemas, with hashes of documents that fit them, so that a document is checked only once. A unit's
+# record is read with each of its files, and checking it each time took a fifth of a small build.
 _fitting: set[tuple[str, bytes]] = set()
-_MAX_FITTING = 100_000
+_MAX_FITTING = 100_000  # most entries of `_fitting`
 
 
 def require_readable(path: Path, written: Path) -> None:
-    """Raise OutputError where the content of `written` can't be read once it lies at `path`.
+    """Raise OutputError if a document could not be read once it lies at its place.
 
-    Only documents of a build are checked. They are known by the name of `path`.
+    path     place of the document. Its name tells whether it is a document of a build; other files
+             are not checked
+    written  file that holds its content
     """
     if path.name == SETTINGS:
         try:
             tomllib.loads(written.read_bytes().decode())
         except ValueError as error:
-            raise OutputError(f"{path}: no TOML ({error}): {NOT_WRITTEN}") from None
+            raise OutputError(f"{path}: this is not TOML ({error}): {NOT_WRITTEN}") from None
     elif _is_document(path.name):
         parse(path, written.read_bytes(), schema_of(path.name), NOT_WRITTEN)
 
@@ -83,16 +85,16 @@ def schema_of(name: str) -> str | None:
 def parse(path: Path, data: bytes, schema: str | None, remedy: str) -> Any:
     """Return the content of a JSON document.
 
-    path    the document's place, for messages
-    schema  the schema that it must fit; None: any JSON is accepted
-    remedy  the user's next step, for messages
+    path    place of the document, for messages
+    schema  schema that it must fit; None: any JSON is accepted
+    remedy  what the user should do, for messages
 
-    Raises OutputError; its text names file, field and remedy.
+    Raises OutputError, which names file, field and remedy.
     """
     try:
         content = json.loads(data, parse_constant=_refuse, parse_float=_finite)
-    except (ValueError, RecursionError) as error:  # of deeply nested lists
-        raise OutputError(f"{path}: damaged, no JSON ({error}): {remedy}") from None
+    except (ValueError, RecursionError) as error:  # RecursionError: deeply nested lists
+        raise OutputError(f"{path}: damaged, this is not JSON ({error}): {remedy}") from None
     if schema is None:
         return content
     document = (schema, hashlib.sha256(data).digest())
@@ -111,13 +113,13 @@ def parse(path: Path, data: bytes, schema: str | None, remedy: str) -> Any:
 
 
 def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a number in JSON")
 
 
 def _finite(text: str) -> float:
     number = float(text)
     if not isfinite(number):
-        raise ValueError(f"{text:.20} is beyond all numbers")
+        raise ValueError(f"{text:.20} is too large for a number")
     return number
 
 
@@ -128,7 +130,7 @@ def _validator(schema: str) -> "Draft202012Validator":
     name, _, definition = schema.partition("#")
     text = schema_path(name).read_text("utf-8")
     content = json.loads(text)
-    # a schema among the definitions is found by its `$id`
+    # other schemas are put among the definitions, where a reference finds them by their `$id`
     others = {other: schema_path(f"{other}.schema.json") for other in _OTHERS.findall(text)}
     own = {other: json.loads(file.read_bytes()) for other, file in others.items()}
     content["$defs"] = {**content.get("$defs", {}), **own}

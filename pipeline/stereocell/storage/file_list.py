@@ -1,9 +1,9 @@
-"""Lists of written files with the size and SHA-256 of each, to compare them with later.
+"""List written files with their size and SHA-256, so that damage can be found later.
 
-A unit, the stage and the bundle each have one. A reader hashes a file before it reads it
-(`is_same`); `stereocell check` hashes all files. A check whether there is work to do hashes no file
-that is no newer than its list: there it compares sizes only. SHA-256 hashes 1 GB/s here, BLAKE2b no
-more.
+A unit, the stage and the bundle each have such a list. A reader hashes a file before it reads it
+(`is_same`), and `stereocell check` hashes all files. To decide whether there is work to do, only
+files newer than their list are hashed; of all others the size is enough. SHA-256 processes 1 GB/s,
+and BLAKE2b is not faster.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.json_files import read_json
 from stereocell.storage.workspace import cached, is_mirrored, sizes_below
 
-# path relative to the list's folder, with forward slashes -> {"bytes": ..., "sha256": ...}
+# {"bytes": ..., "sha256": ...} by path relative to the list's folder, with forward slashes
 FileList = Mapping[str, Mapping[str, Any]]
 MISSING, DAMAGED = "missing", "damaged"
 
@@ -31,7 +31,7 @@ def measure(file: Path) -> dict[str, Any]:
 
 
 def list_files(*paths: Path, root: Path) -> dict[str, dict[str, Any]]:
-    """Return the list of files, and of all files below folders, by their paths from `root`."""
+    """Return the list of files, and of all files below folders, by path relative to `root`."""
     listed = {}
     for path in paths:
         with cached(path):
@@ -41,23 +41,23 @@ def list_files(*paths: Path, root: Path) -> dict[str, dict[str, Any]]:
 
 
 def encode(listed: FileList) -> bytes:
-    """Return a list as the JSON of a file, in the order of the paths."""
+    """Return a list as JSON, sorted by path."""
     return to_json(dict(sorted(listed.items())))
 
 
 def to_json(content: object) -> bytes:
-    """Return a document as UTF-8, indented, with a newline at its end."""
+    """Return a document as indented JSON in UTF-8, with a newline at its end."""
     return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def read_list(path: Path, remedy: str) -> dict[str, Any]:
-    """Return the list in a file. Raises OutputError where it is missing or damaged.
+    """Return the list in a file. Raises OutputError if it is missing or damaged.
 
-    Only the form of its entries is checked: a schema takes hundreds of times as long.
+    Only the form of its entries is checked, because a schema takes hundreds of times as long.
     """
     listed = read_json(path, None, remedy)
     if not isinstance(listed, dict) or not listed or not all(map(_is_entry, listed.values())):
-        raise OutputError(f"{path}: damaged, no list of files: {remedy}")
+        raise OutputError(f"{path}: damaged, this is not a list of files: {remedy}")
     return listed
 
 
@@ -66,21 +66,21 @@ def _is_entry(entry: Any) -> bool:
 
 
 def is_same(file: Path, entry: Mapping[str, Any]) -> bool:
-    """Return whether a fetched file is the one of the list."""
+    """Return whether a fetched file matches its entry in a list."""
     return file.stat().st_size == entry["bytes"] and measure(file) == entry
 
 
 def sizes_of(root: Path) -> dict[str, int]:
-    """Return the bytes of all files below a folder, local or stored, by their paths from there."""
+    """Return the sizes in bytes of all files below a folder, local or stored, by relative path."""
     found = sizes_below(root).items()
     return {file.relative_to(root).as_posix(): size for file, size in found if file != root}
 
 
 def find_faults(root: Path, listed: FileList, *, since: Path | None = None) -> dict[str, str]:
-    """Return the fault of each file of a list that has one, by path: MISSING or DAMAGED.
+    """Return the fault of each faulty file of a list, by path: MISSING or DAMAGED.
 
-    since  the file that holds the list: a file of the right size passes where it is no newer than
-           this, and always on object storage. None: all files are hashed
+    since  the file that holds the list. Files that are not newer are compared by size only, and so
+           are all files on object storage. None: all files are hashed
     """
     return dict(_faults(root, listed, since))
 
@@ -106,5 +106,5 @@ def _faults(root: Path, listed: FileList, since: Path | None) -> Iterator[tuple[
         faults += 1
         yield path, fault
     if since is not None and hashed and not faults:
-        with suppress(OSError):  # copied files have the times of copying: they are hashed once
+        with suppress(OSError):  # copied files are newer than the list; so they are hashed once
             os.utime(since)

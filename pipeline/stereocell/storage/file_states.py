@@ -1,8 +1,8 @@
 """Record the states of an input's files, and find the files that changed since then.
 
-A state is size and modification time of a file, or size and ETag of an object. The bytes of small
-inputs are compared as well, so a file that was written again with the same bytes counts as
-unchanged. An address of `http` can't be listed: its states are only complete if the source is one
+The state of a file is its size and modification time, that of an object its size and ETag. The
+bytes of small inputs are compared, too, so a file that was written again with the same bytes counts
+as unchanged. An `http` address can't be listed. Its states are complete only if the source is one
 file and the server states an ETag or a date.
 """
 
@@ -20,10 +20,10 @@ from stereocell.model.errors import SourceError
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import Location
 
-MAX_READ_BYTES = 64_000_000  # largest size of all files together whose bytes are compared
-MAX_READ_FILES = 2_000  # most files whose bytes are compared
+MAX_READ_BYTES = 64_000_000  # bytes; in total at most this much is compared by content
+MAX_READ_FILES = 2_000  # most files that are compared by content
 _UNLISTED = ("http", "https")
-# names in fsspec's file systems for a value that changes with an object's content
+# Fields of fsspec's file systems whose value changes with an object's content
 _MARKS = (
     "ETag",
     "etag",
@@ -44,7 +44,7 @@ class FileStates:
 
     paths        files, and folders with all files below them; addresses of a remote source
     states       states by path; a missing file has none
-    digests      SHA-256 by path; empty where the files are too many or too large
+    digests      SHA-256 by path; empty if the files are too many or too large
     is_complete  whether all files could be listed
     """
 
@@ -56,7 +56,7 @@ class FileStates:
 
     @classmethod
     def look(cls, location: Location, paths: Sequence[str]) -> "FileStates":
-        """Return the present states; without any where a store permits no listing."""
+        """Return the present states. There are none if the store does not allow listing."""
         try:
             states = dict(_listed(location, paths))
         except SourceError:
@@ -122,9 +122,9 @@ def _listed(location: Location, paths: Sequence[str]) -> Iterator[tuple[str, Sta
 
 
 def _on_disk(path: str, *, is_inner: bool = False) -> Iterator[tuple[str, State]]:
-    """Yield a file, or the files below a folder. Files that vanish meanwhile are left out.
+    """Yield a file, or the files below a folder. Files that vanish in the meantime are left out.
 
-    is_inner  whether the path lies in a listed folder: links to folders are not followed there
+    is_inner  whether the path lies in a listed folder, where links to folders are not followed
     """
     try:
         found = os.stat(path)
@@ -143,7 +143,7 @@ def _on_disk(path: str, *, is_inner: bool = False) -> Iterator[tuple[str, State]
 def _stored(
     files: Any, address: str, location: Location
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield each object at or below an address, with the store's details of it."""
+    """Yield each object at or below an address, with the details that the store states."""
     path = files._strip_protocol(address)
     if location.source.startswith(_UNLISTED):
         try:
@@ -156,9 +156,9 @@ def _stored(
 
 @contextmanager
 def unchanged_while_read(location: Location, again: str) -> Iterator[None]:
-    """Raise SourceError where a file or a folder changed while the block read all of it.
+    """Raise SourceError if a file or a folder changed while the block read all of it.
 
-    again  the user's next step, for the message
+    again  what the user should do, for the message
     """
     before = FileStates.look(location, [location.path if location.is_local else location.source])
     yield

@@ -1,9 +1,10 @@
-"""Words for a file by its first bytes, for messages about files of another kind than expected.
+"""Describe a file by its first bytes, for messages about files of an unexpected kind.
 
-This module knows containers and formats that are not read. A caller adds the marks of those that
-are. The tables lie below the readers because two modules of `storage` use them for the files of all
-commands: contents.py names a foreign file that a command would replace, or that was given in place
-of a build, and library_errors.py names a file that a library can't read.
+This module knows containers, and formats that StereoCell does not read. Callers add the marks of
+formats that it reads.
+
+Two modules of `storage` need it. contents.py names a foreign file that a command would replace, or
+that was given in place of a build. library_errors.py names a file that a library can't read.
 """
 
 import re
@@ -25,13 +26,13 @@ _OLE, XML, TEXT = (
 )
 _ZIP = "a zip archive (unzip it, and name the file or folder in it)"
 _GUNZIP = "a gzip file (gunzip it)"
-SHARED = (_OLE, XML, TEXT, _ZIP, _GUNZIP)  # containers of many formats, which names tell apart
-# words for a page that holds a bundle, which `stereocell check` takes
+SHARED = (_OLE, XML, TEXT, _ZIP, _GUNZIP)  # containers of many formats; the file's name decides
+# Words for a page that holds a bundle, which `stereocell check` accepts
 SCENE = "a scene in one file, written by `stereocell export` (name the OUT that it was made from)"
 _FRAMES = "extract its frames as PNG, as `ffmpeg -i FILE %05d.png` does"
 _TO_TIFF = "tifffile.imwrite makes a TIFF of the array"
 _CDF = (b"\x01", b"\x02", b"\x05")  # versions of netCDF-3
-# the first bytes of formats that are not read -> words, with the way out where there is one
+# First bytes of formats that are not read, and words for them, with a remedy if there is one
 _MAGIC = (
     *_POINTERS,
     (b"\0\x05\x16\x07", "a record of macOS beside a file (the file's own name has no `._`)"),
@@ -61,7 +62,7 @@ _MAGIC = (
     (b"SQLite format 3", "an SQLite database"),
     (b"\x1a\x45\xdf\xa3", f"a video ({_FRAMES})"),
 )
-# the same for formats whose mark has gaps or choices
+# Patterns of first bytes for formats whose mark has gaps or alternatives, and words for them
 _PATTERNS = (
     (rb"BM.{4}\x00{4}", "a BMP image"),
     (rb"RIFF.{4}AVI ", f"a video ({_FRAMES})"),
@@ -92,8 +93,8 @@ HEAD_BYTES = 512  # bytes that `identify` needs
 class Mark:
     """Bytes by which files of a format are recognised.
 
-    words    words for such a file, with an article
-    pattern  a regular expression that matches the file's content from byte `at` on
+    words    words for the file, with an article
+    pattern  regular expression that matches the file's content from byte `at`
     """
 
     words: str
@@ -112,9 +113,9 @@ Marks = Sequence[tuple[str, Mark]]  # names of formats with their marks, in orde
 class Content:
     """The content of a file.
 
-    words     as `a zip archive (unzip it)`, with a remedy where there is one
-    format    the format whose mark it has; empty: it has no mark that was given
-    is_known  False: the words only quote the first bytes
+    words     words such as `a zip archive (unzip it)`, with a remedy if there is one
+    format    format whose mark the file has; empty: it has none of the given marks
+    is_known  whether the content was recognised; False: the words only quote the first bytes
     """
 
     words: str
@@ -125,7 +126,10 @@ class Content:
 def identify(head: bytes, marks: Marks = ()) -> Content:
     """Return the content of a file that begins with these bytes.
 
-    marks  marks that go before those of this module
+    marks  marks that take precedence over those of this module
+
+    >>> identify(b"GIF89a").words.partition(" (")[0]
+    'a GIF image'
     """
     if not head:
         return Content(f"an empty file ({_AGAIN})")
@@ -148,7 +152,7 @@ def identify(head: bytes, marks: Marks = ()) -> Content:
 
 
 def pointer_words(head: bytes) -> str:
-    """Return words for a file that stands for another one; empty: it is its own content."""
+    """Return words for a pointer of Git LFS or git-annex; empty: the file is no pointer."""
     return next((words for magic, words in _POINTERS if head.startswith(magic)), "")
 
 
@@ -173,7 +177,7 @@ def _text(head: bytes) -> Content:
 
 
 def _packed(head: bytes, marks: Marks) -> Content:
-    """Return the content of a gzip file, by the first bytes of what is packed in it."""
+    """Return the content of a gzip file, recognised by its first unpacked bytes."""
     inside = unpacked(head)
     if inside is None:
         return Content(f"a gzip file that is damaged ({_AGAIN})")
@@ -188,7 +192,7 @@ def _packed(head: bytes, marks: Marks) -> Content:
 
 
 def unpacked(head: bytes) -> bytes | None:
-    """Return the first bytes that are packed in a gzip file; None: it is damaged."""
+    """Return the first unpacked bytes of a gzip file; None: it is damaged."""
     try:
         return zlib.decompressobj(16 + zlib.MAX_WBITS).decompress(head, HEAD_BYTES)
     except zlib.error:

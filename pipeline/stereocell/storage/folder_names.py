@@ -1,4 +1,4 @@
-"""The names in a folder of this machine."""
+"""List the names in a local folder."""
 
 import os
 from pathlib import Path
@@ -7,9 +7,9 @@ from stereocell.model.errors import OutputError
 
 
 def names_in_folder(folder: Path) -> list[str]:
-    """Return the names in a folder, in order; empty if it is no folder.
+    """Return the sorted names in a folder; empty: it is missing or not a folder.
 
-    Raises OutputError where it can't be listed.
+    Raises OutputError if it can't be listed.
     """
     try:
         return sorted(os.listdir(folder))

@@ -1,4 +1,7 @@
-"""Check the hosts to which fsspec connects by aiohttp: redirects, and for strangers each one."""
+"""Check the hosts to which fsspec connects by aiohttp.
+
+Redirects are always checked. In a process that reads for a stranger, each connection is checked.
+"""
 
 import asyncio
 import socket
@@ -14,7 +17,10 @@ from stereocell.storage.public_hosts import require_public_numbers, require_publ
 
 @cache
 def checks() -> list[TraceConfig]:
-    """Return the checks of a session, the same ones each time: fsspec keeps a session by them."""
+    """Return the checks of a session.
+
+    It is the same object each time, because fsspec reuses a session if its options are the same.
+    """
     config = TraceConfig()
     config.on_request_redirect.append(_check)
     return [config]
@@ -23,20 +29,20 @@ def checks() -> list[TraceConfig]:
 async def _check(
     _session: ClientSession, _context: SimpleNamespace, found: TraceRequestRedirectParams
 ) -> None:
-    """Raise SourceError where a redirect leads from a public host into a private network."""
+    """Raise SourceError if a redirect leads from a public host into a private network."""
     headers = found.response.headers
     target = headers.get("Location") or headers.get("URI") or ""
-    # it looks names up, which may take seconds
+    # in a thread, because looking up names may take seconds
     await asyncio.to_thread(require_public_redirect, str(found.url), target)
 
 
 async def public_client(**options: Any) -> ClientSession:
-    """Return a session whose connections go to public IP addresses alone."""
+    """Return a session that only connects to public IP addresses."""
     return ClientSession(connector=TCPConnector(socket_factory=_public_socket), **options)
 
 
 def _public_socket(found: AddrInfoType) -> socket.socket:
-    """Return the socket for an IP address. Raises SourceError where that is not public."""
+    """Return the socket for an IP address. Raises SourceError if the address is not public."""
     family, kind, protocol, _, address = found
     number = str(address[0])
     require_public_numbers(number, [number])

@@ -1,9 +1,9 @@
-"""JSON files of ours: checked against their schema, with errors of one line; written whole.
+"""Read and write StereoCell's JSON files, checked by their schemas, with errors of one line.
 
-A document is checked by the same code when it is written and when it is read: see documents.py.
+A document is checked by the same code when it is written and when it is read (documents.py).
 
-A sealed file has a hash of its other content, `sha256`: a schema can't detect a changed digit of a
-number, and the build would go on with it.
+A sealed file has a hash of its other content, `sha256`. A schema alone can't detect a changed digit
+of a number.
 """
 
 import hashlib
@@ -23,16 +23,16 @@ _SEAL = "sha256"
 def read_json(path: Path, schema: str | None, remedy: str) -> Any:
     """Return the content of a JSON file that fits `schema`.
 
-    schema  a file of schemas/, with `#Name` for one of its definitions; None: any JSON
-    remedy  the user's next step where the file is missing or damaged, for messages
+    schema  file in schemas/, with `#Name` for one of its definitions; None: any JSON
+    remedy  what the user should do if the file is missing or damaged, for messages
 
-    Raises OutputError; its text names file, field and remedy.
+    Raises OutputError, which names file, field and remedy.
     """
     return parse(path, read_record(path, remedy), schema, remedy)
 
 
 def find_json(path: Path, schema: str) -> Any:
-    """Return the content of a JSON file, or None where there is none that fits the schema."""
+    """Return the content of a JSON file; None: it is missing or does not fit the schema."""
     try:
         return read_json(path, schema, "")
     except OutputError:
@@ -40,13 +40,14 @@ def find_json(path: Path, schema: str) -> Any:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write `content` to `path` as JSON, whole or not at all.
+    """Write content as JSON, completely or not at all.
 
-    Raises OutputError, also where it breaks the schema of a document of that name.
+    Raises OutputError if that fails, or if the content breaks the schema of a document of that
+    name.
     """
     try:
         text = json.dumps(content, indent=1, allow_nan=False)
-    except ValueError as error:  # numbers that JSON has not
+    except ValueError as error:  # JSON has no NaN and no infinity
         raise OutputError(f"{path}: {error}: {NOT_WRITTEN}") from None
     write_bytes(path, f"{text}\n".encode())
 
@@ -57,13 +58,14 @@ def sealed(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_sealed(path: Path, content: Mapping[str, Any]) -> None:
-    """Write `content` to `path` as sealed JSON. Raises OutputError as `write_json` does."""
+    """Write content as sealed JSON. Raises OutputError as `write_json` does."""
     write_json(path, sealed(content))
 
 
 def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
-    """Return the content of sealed JSON, without its hash. Raises OutputError as `read_json` does,
-    and where the hash differs or is missing.
+    """Return the content of sealed JSON, without its hash.
+
+    Raises OutputError as `read_json` does, and if the hash differs or is missing.
     """
     data = read_record(path, remedy)
     found = parse(path, data, None, remedy)
@@ -77,7 +79,7 @@ def read_sealed(path: Path, schema: str, remedy: str) -> dict[str, Any]:
 
 
 def find_sealed(path: Path, schema: str) -> dict[str, Any] | None:
-    """Return the content of sealed JSON, or None where it is missing, invalid or changed."""
+    """Return the content of sealed JSON; None: it is missing, invalid or changed."""
     try:
         return read_sealed(path, schema, "")
     except OutputError:
@@ -89,5 +91,5 @@ def _digest_of(content: Mapping[str, Any]) -> str:
 
 
 def compact_json(content: Any) -> bytes:
-    """Return JSON without spaces, half the bytes, for files that a phone downloads."""
+    """Return JSON without spaces, in UTF-8, for files that a phone downloads."""
     return (json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n").encode()

@@ -1,10 +1,10 @@
-"""The kinds of contents of a path that commands distinguish: see contents.py."""
+"""The kinds of contents of a path that commands distinguish (contents.py)."""
 
 from enum import StrEnum
 
 
 class Kind(StrEnum):
-    """The kinds of contents that commands distinguish; the values are words for messages."""
+    """A kind of contents. The values are words for messages."""
 
     NOTHING = "nothing"
     BUILD = "a build"

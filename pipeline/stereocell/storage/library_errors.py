@@ -1,15 +1,15 @@
-"""Errors of the format libraries on damaged, unusual or unreachable sources, as one line.
+"""Turn errors of format libraries on damaged, unusual or unreachable sources into one line.
 
-A library can raise any exception on a damaged file: tifffile an AssertionError, a parser a
-RecursionError. So an exception of any class becomes one line if a library raised it. Our own code
-around such a call parses values of the file, too. An exception that it raises becomes one line if
-its class is in _FAULTS. All other exceptions are bugs, and keep their traceback.
+On a damaged file a library can raise any exception: tifffile an AssertionError, a parser a
+RecursionError. So every exception that a library raised becomes one line. StereoCell's code around
+such a call parses values of the file, too. Its exceptions become one line if their class is in
+_FAULTS. All other exceptions are bugs and keep their traceback.
 
-`one_line` surrounds the calls of one library, and quotes its text. `library_boundary` surrounds a
-whole reader as the last resort. It catches only exceptions that were raised inside a library, and
-quotes no text, because that could hold a patient's name. A library that can end its process runs in
-a child process (child_process.py); `one_line` turns the child's death into a line, too. Both keep
-the warnings of libraries from the terminal (library_noise.py).
+`one_line` surrounds calls of one library, and quotes its text. `library_boundary` surrounds a whole
+reader as the last resort. It catches only exceptions that were raised inside a library, and quotes
+no text, which could hold a patient's name. Both keep warnings of libraries from the terminal
+(library_noise.py). A library that can end its process runs in a child process (child_process.py),
+and `one_line` turns the child's death into a line, too.
 """
 
 import logging
@@ -39,10 +39,12 @@ from stereocell.storage.processes import address_limit, shortage
 _PACKAGE = Path(__file__).parents[1]
 _AGAIN = "copy or download it again"
 _REMEDY = f": it may be damaged, {_AGAIN}"
-# Classes that a damaged file raises in our own parsing, or in C code, which has no frame. numpy and
-# numcodecs raise ValueError, TypeError and RuntimeError; packed bytes that end early zlib.error and
-# EOFError; a short header struct.error; metadata of another form AttributeError or, of XML,
-# ParseError; sizes beyond this machine MemoryError, OverflowError and SystemError.
+# Classes of errors that a damaged file causes in StereoCell's own parsing, or in C code, which has
+# no frame:
+# - ValueError, TypeError and RuntimeError in numpy and numcodecs
+# - zlib.error and EOFError for packed bytes that end early, struct.error for a short header
+# - AttributeError for metadata of another form, ParseError for XML
+# - MemoryError, OverflowError and SystemError for sizes that exceed this machine
 _FAULTS = (
     OSError,
     EOFError,
@@ -66,9 +68,9 @@ class DamagedError(ValueError):
     """A decoder can't decode a part of a source. The text names the part and the reason."""
 
 
-# Errors of decoders, by class and by the module that raised them: they mean damaged bytes. Most of
-# these libraries unpack the bytes of several formats, so no format's row has them. An OSError with
-# an errno comes from the system and is no damage.
+# Classes of decoders' errors, and the modules that raise them: such an error means damaged bytes.
+# Most of these libraries decode several formats, so the formats' own rows do not list them. An
+# OSError with an errno comes from the system and does not mean damage.
 _UNDECODED = (DamagedError, zlib.error, lzma.LZMAError, ZstdError, EOFError, struct.error)
 _DECODERS = re.compile(
     r"imagecodecs\b.*|numcodecs\.(?!registry|errors).*|zarr\.codecs\.crc32c_|pyarrow\b.*|gzip|bz2|lzma"
@@ -80,11 +82,13 @@ _DECODERS = re.compile(
 def one_line(
     where: str, expected: str, *, raised: type[StereoCellError] = SourceError
 ) -> Iterator[None]:
-    """Turn an error of a library inside the block into `raised` with a text of one line.
+    """Turn an error of a library inside the block into an error of one line.
 
-    expected  the expected state of the source, for the text
+    where     file or address, for the text
+    expected  expected state of the source, for the text
+    raised    class of the error
 
-    Only calls into format libraries belong inside: the caught classes are broad.
+    Only calls of format libraries belong inside, because the caught classes are broad.
     """
     try:
         with quiet_libraries():
@@ -108,9 +112,10 @@ def one_line(
 def library_boundary(where: str, expected: str) -> Iterator[None]:
     """Turn an error that a library raised inside the block into a SourceError of one line.
 
-    expected  the expected state of the source, for the text
+    where     file or address, for the text
+    expected  expected state of the source, for the text
 
-    Errors that our own code raised pass: they are bugs, or already lines for the user.
+    Errors of StereoCell's own code are not caught: they are bugs, or lines for the user already.
     """
     try:
         with quiet_libraries():
@@ -128,7 +133,7 @@ def library_boundary(where: str, expected: str) -> Iterator[None]:
 
 
 def is_undecoded(error: BaseException) -> bool:
-    """Return whether a decoder raised the error because it can't decode the bytes."""
+    """Return whether a decoder raised the error because the bytes can't be decoded."""
     if isinstance(error, _UNDECODED):
         return True
     if not isinstance(error, ValueError | RuntimeError | OSError) or getattr(error, "errno", None):
@@ -142,14 +147,14 @@ def is_undecoded(error: BaseException) -> bool:
 
 
 def damage_words(error: BaseException) -> str:
-    """Return the fault of a source that a decoder failed on, in the decoder's own words."""
+    """Return words for a source that a decoder failed on, with the decoder's own text."""
     if isinstance(error, DamagedError):
         return str(error)
     return f"damaged (the library says: {_shortened(str(error) or type(error).__name__)})"
 
 
 def _library_of(error: BaseException) -> str:
-    """Return the library that our code called and that raised the error; empty: our code did."""
+    """Return the library that raised the error; empty: StereoCell's own code raised it."""
     frames: list[FrameType] = []
     trace = error.__traceback__
     while trace is not None:
@@ -166,9 +171,10 @@ def _library_of(error: BaseException) -> str:
 def raise_if_short(
     error: BaseException, where: str, *, raised: type[StereoCellError] = SourceError
 ) -> None:
-    """Raise `raised` with one line where a library's error comes from a lack of memory here.
+    """Raise an error of one line if a library's error comes from a lack of memory.
 
-    Without a limit of address space a MemoryError comes from the file, which may state any size.
+    Without a limit of address space a MemoryError does not count, because it comes from the file,
+    which may state any size.
     """
     is_ours = not isinstance(error, MemoryError) or address_limit() < math.inf
     if is_ours and (words := shortage(error)):
@@ -187,7 +193,7 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, AttributeError):
         return f"metadata of another form ({_shortened(str(error))})"
     if isinstance(error, MemoryError | OverflowError | SystemError):
-        return "it asks for more memory than there can be"
+        return "it states a size that no memory can hold"
     if isinstance(error, RecursionError):
         return "metadata: nested too deeply"
     if isinstance(error, JSONDecodeError):
@@ -196,12 +202,12 @@ def _reason(error: BaseException) -> str:
         return f"metadata: {error}" if is_json else f"metadata: found {content.words}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
-    if "support range requests" in str(error):  # fsspec's words, which are for programmers
+    if "support range requests" in str(error):  # fsspec's text is for programmers
         return (
-            "the host sends no parts of files: ask whoever runs it to turn on range requests, or "
+            "the host does not send parts of files: ask its operator to turn on range requests, or "
             "download the file first"
         )
-    if isinstance(error, TimeoutError):  # aiohttp's text is longer for silence than for other waits
+    if isinstance(error, TimeoutError):  # aiohttp's error has a text only for a silent host
         is_silence = bool(str(error))
         return f"did not answer {f'within {location.SILENCE_S:g} s' if is_silence else 'in time'}"
     if not str(error):
@@ -226,7 +232,7 @@ class _Collector(logging.Filter):
 
 @contextmanager
 def collected_log(logger_name: str) -> Iterator[list[str]]:
-    """Hide a library's log lines from the user inside the block; yield their list."""
+    """Inside the block, hide a library's log lines from the user. Yield the list of them."""
     collector = _Collector()
     logger = logging.getLogger(logger_name)
     logger.addFilter(collector)
@@ -238,7 +244,10 @@ def collected_log(logger_name: str) -> Iterator[list[str]]:
 
 @contextmanager
 def without_warning(message: str, category: type[Warning]) -> Iterator[None]:
-    """Silence one known warning of a library; `message` is a regular expression of its start."""
+    """Inside the block, silence one known warning of a library.
+
+    message  regular expression for the start of its text
+    """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=message, category=category)
         yield

@@ -2,8 +2,10 @@
 
 A library warns of things that a user can't change, such as a field of another version, or that a
 reader reports in a sentence of its own. So its warnings are not shown while it reads. Warnings of
-our own code are shown: they are bugs. Log lines reach the handlers that a program has set up. Lines
-without a handler would be printed by Python's "last resort" handler, which is replaced meanwhile.
+StereoCell's own code are shown, because they are bugs.
+
+Log lines reach the handlers that a program has set up. Lines without a handler would be printed by
+Python's "last resort" handler, which is replaced inside the block.
 """
 
 import logging
@@ -13,15 +15,15 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-_LIBRARIES = r"(?!stereocell(\.|$))"  # names of all modules outside of this package
+_LIBRARIES = r"(?!stereocell(\.|$))"  # matches the names of all modules outside of this package
 _lock = Lock()
-_depth = 0  # blocks that threads are inside of
-_saved: tuple[Any, logging.Handler | None] | None = None  # filters, and the last-resort handler
+_depth = 0  # number of blocks that threads are inside of
+_saved: tuple[Any, logging.Handler | None] | None = None  # warning filters and last-resort handler
 
 
 @contextmanager
 def quiet_libraries() -> Iterator[None]:
-    """Show no warning and no log line of a library while a thread is inside such a block.
+    """Hide warnings and log lines of libraries while any thread is inside such a block.
 
     Both settings of Python are shared by all threads. The first thread that enters changes them,
     and the last one that leaves restores them.

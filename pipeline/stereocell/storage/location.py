@@ -1,4 +1,4 @@
-"""The place of a source: a local path or an address that fsspec opens."""
+"""The location of a source: a local path, or an address that fsspec opens."""
 
 import os
 import re
@@ -18,9 +18,9 @@ from stereocell.model.errors import SourceError, StereoCellError, UsageError
 from stereocell.storage.first_bytes import HEAD_BYTES
 from stereocell.storage.public_hosts import connects_to_public_alone
 
-_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a colon alone may be part of a file's name
-ANSWER_S = 25.0  # below SILENCE_S, since fsspec's http turns a timeout into "does not exist"
-_CONNECT_S, SILENCE_S = 15.0, 30.0  # limits of one request; s3fs repeats it
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://")  # a single colon may belong to a file's name
+ANSWER_S = 25.0  # s; less than SILENCE_S, after which fsspec's http reports "does not exist"
+_CONNECT_S, SILENCE_S = 15.0, 30.0  # s; limits of one request, which s3fs repeats
 _AWS_CREDENTIALS = (
     "AWS_ACCESS_KEY_ID",
     "AWS_PROFILE",
@@ -32,11 +32,11 @@ _AWS_CREDENTIALS = (
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """One source.
+    """The location of one source.
 
-    source    an absolute local path or an address, in the form of the format libraries; with
-              `:/KEY` where it names a dataset in a file
-    is_local  a path on this machine
+    source    absolute local path, or an address that format libraries understand; it ends in
+              `:/KEY` if it names a dataset in a file
+    is_local  whether it is a path on this machine
     """
 
     source: str
@@ -46,12 +46,14 @@ class Location:
     def of(cls, source: str | Path) -> "Location":
         """Return the location of a path or of an address such as `https://...` or `s3://...`.
 
-        Raises UsageError for an invalid address, and for an empty name: it would be the folder in
-        which the program runs.
+        Raises UsageError for an invalid address, and for an empty text, which would mean the
+        current folder.
         """
         text = str(source)
         if not text:
-            raise UsageError("an empty name, expected a path or an address (. is this folder)")
+            raise UsageError(
+                "found an empty name, expected a path or an address (. is the current folder)"
+            )
         if not _ADDRESS.match(text):
             path, inside = _split(os.path.expanduser(text))
             return cls(os.path.abspath(path) + inside, True)
@@ -67,32 +69,32 @@ class Location:
 
     @property
     def path(self) -> str:
-        """The file or folder on this machine, without `inside`."""
+        """The file or folder on this machine without the part in `inside`; else the address."""
         return _split(self.source)[0] if self.is_local else self.source
 
     @property
     def inside(self) -> str:
-        """The part of a file on this machine that is named; empty: all of it.
+        """The part of the source that names something inside a local file; empty: the whole file.
 
-        It is `:/KEY`, or the rest of a path that leads into the file, as `/0`.
+        It is `:/KEY`, or the rest of a path that leads into the file, such as `/0`.
         """
         return _split(self.source)[1] if self.is_local else ""
 
     @property
     def key(self) -> str:
-        """The dataset in a file, as `/a/b`; empty where none is named."""
+        """The dataset in a file, such as `/a/b`; empty: none is named."""
         inside = self.inside
         return inside[1:] if inside.startswith(":") else ""
 
     @property
     def folder(self) -> Path:
-        """The source's own folder, links followed: its files must lie there or below."""
+        """The source's own folder with links followed. Its files must lie there or below."""
         path = Path(os.path.realpath(self.path))
         return path if path.is_dir() else path.parent
 
     @property
     def shown(self) -> str:
-        """The source without secrets of an address (user, password, signature)."""
+        """The source for messages, without an address's secrets (user, password, signature)."""
         if self.is_local:
             return self.source
         parts = urlsplit(self.source)
@@ -112,12 +114,13 @@ class Location:
     def storage_options(self) -> dict[str, Any]:
         """The options of fsspec for this address.
 
-        s3: signed requests where this machine's environment holds credentials or `FSSPEC_S3`
-        requests it, else anonymous ones, which public buckets accept. The endpoint comes from the
-        usual environment (`AWS_ENDPOINT_URL`); timeouts of `FSSPEC_S3` take precedence.
-        http: a timeout for silence only; else aiohttp stops any transfer after 5 minutes. Redirects
-        of public hosts into a private network are refused, and so is each connection into one in a
-        process that reads for a stranger.
+        s3: Requests are signed if this machine's environment holds credentials or `FSSPEC_S3`
+        requires it; otherwise they are anonymous, which public buckets accept. The endpoint comes
+        from the usual environment (`AWS_ENDPOINT_URL`). Timeouts of `FSSPEC_S3` take precedence.
+
+        http: Only silence has a timeout; by default aiohttp stops any transfer after 5 minutes.
+        Redirects of public hosts into a private network are refused. A process that reads for a
+        stranger refuses all connections into a private network.
         """
         scheme = urlsplit(self.source).scheme
         if scheme in ("http", "https"):
@@ -140,7 +143,7 @@ class Location:
 
 
 def _http_options() -> dict[str, Any]:
-    """Return aiohttp's settings: ours, overridden by the user's for fsspec."""
+    """Return settings for aiohttp; the user's settings for fsspec override StereoCell's."""
     from aiohttp import ClientTimeout  # slow to import, and only the network needs it
 
     from stereocell.storage.http_hosts import checks, public_client
@@ -154,9 +157,9 @@ def _http_options() -> dict[str, Any]:
 
 
 def does_answer(files: AbstractFileSystem, path: str) -> bool:
-    """Return whether a store answers within ANSWER_S; an error is an answer, too.
+    """Return whether a store answers within ANSWER_S. An error is an answer, too.
 
-    Each request is repeated, with its own timeout: without this limit, a silent host that accepts
+    Requests are repeated, each with its own timeout. Without this limit a silent host that accepts
     connections would block for minutes.
     """
     if isinstance(files, AsyncFileSystem):
@@ -164,13 +167,13 @@ def does_answer(files: AbstractFileSystem, path: str) -> bool:
             sync(files.loop, files._exists, path, timeout=ANSWER_S)
         except FSTimeoutError:
             return False
-        except Exception:  # the reader reports it, better
+        except Exception:  # the reader reports it with better words
             pass
     return True
 
 
 def is_own(path: str | Path, folders: Sequence[Path]) -> bool:
-    """Return whether a path, its links followed, lies in one of some folders or below."""
+    """Return whether a path lies in one of the folders or below, after following its links."""
     real = Path(os.path.realpath(path))
     return any(real.is_relative_to(folder) for folder in folders)
 
@@ -182,12 +185,15 @@ def require_own(
     named: str,
     raised: type[StereoCellError] = SourceError,
 ) -> os.stat_result | None:
-    """Return the state of a file that a source refers to, or None where there is none.
+    """Return the state of a file that a source refers to; None: it does not exist.
 
-    Sources come from strangers, and results are published. So every file that a source refers to,
-    by a path in its metadata or by a link, must be a regular file in one of `folders` (links
-    followed) or below. Else `raised` is raised, with `named` and the reason, and the file is not
-    opened (a pipe would block).
+    Sources come from strangers, and results are published. A source may refer to a file by a path
+    in its metadata or by a link. With links followed, it must be a regular file in one of the
+    folders or below. Otherwise an error is raised and the file is not opened, because a pipe would
+    block.
+
+    named   words for the reference, for the message
+    raised  class of the error
     """
     real = os.path.realpath(path)
     if not is_own(real, folders):
@@ -196,15 +202,15 @@ def require_own(
         )
     try:
         status = os.stat(real)
-    except OSError:  # the reader reports it
+    except OSError:  # the reader reports the missing file
         return None
     if not stat.S_ISREG(status.st_mode):
-        raise raised(f"{named}: is no regular file, expected one")
+        raise raised(f"{named}: found a folder, device or pipe, expected a regular file")
     return status
 
 
 def require_own_key(key: str, named: str) -> None:
-    """Raise SourceError where a key leaves the address that it is joined to.
+    """Raise SourceError if a key leads out of the address that it is appended to.
 
     Stores of http accept `%2e%2e` for `..`, escaped any number of times.
     """
@@ -218,7 +224,7 @@ def require_own_key(key: str, named: str) -> None:
 def _split(text: str) -> tuple[str, str]:
     """Return the file to which a local path leads, and the rest: `:/KEY`, or `/PATH` in the file.
 
-    A path that exists as a whole has no rest. Neither has one that leads to no file.
+    The rest is empty if the path exists as a whole, or does not lead to a file.
     """
     if not os.path.exists(text):
         for at in (place.start() for place in reversed([*re.finditer("[:/]", text)])):
@@ -229,7 +235,7 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def first_bytes(path: str, *, count: int = HEAD_BYTES) -> bytes:
-    """Return the head of a regular file; nothing where it can't be read."""
+    """Return the first bytes of a regular file; empty: it can't be read."""
     if not os.path.isfile(path):
         return b""
     try:

@@ -1,9 +1,9 @@
-"""One command at a time writes into an OUT; a second one gets an error that names the first.
+"""Let only one command at a time write into an OUT; a second one gets an error.
 
-OUT/.lock is held by the system's own lock (flock), which ends with its process in any case: the
-next command takes over a stale file, and a reused process ID can't mislead. The file's content is
-for people only. On NFS the lock works between machines (Linux 2.6.12 on). Windows has no flock:
-there the file tells people alone, and refuses nobody.
+OUT/.lock is held by the system's own lock (flock), which always ends with its process. So the next
+command takes over a stale file, and a reused process ID can't mislead it. The file's content is for
+people only. On NFS the lock works between machines (since Linux 2.6.12). Windows has no flock:
+there the file only informs people, and no command is refused.
 """
 
 import json
@@ -23,13 +23,12 @@ from stereocell.storage.temporary_names import clear_remains
 
 @contextmanager
 def alone_in(out: Path, command: str) -> Iterator[None]:
-    """Hold OUT for a command that writes into it; a folder that stays empty is removed.
+    """Hold OUT for a command that writes into it. A folder that stays empty is removed.
 
-    If the block fails or is interrupted, or the previous holder was killed, half-written files are
-    removed: Ctrl+C ends workers at once, in the middle of a file. Finished results stay.
+    Partial files are removed if the block fails or is interrupted, or if the previous holder was
+    killed: Ctrl+C ends workers at once, in the middle of a file. Finished results stay.
 
-    Raises OutputError where another process holds OUT (the text names it), or where OUT can't be
-    written.
+    Raises OutputError if another process holds OUT (the text names it), or if OUT can't be written.
     """
     made = _missing_folders(out)
     try:
@@ -46,19 +45,19 @@ def alone_in(out: Path, command: str) -> Iterator[None]:
             with holding(Claim((out / LOCK).absolute(), (out / LOCK).read_bytes())):
                 yield
         except BaseException:
-            with suppress(OSError):  # the error of the block is the one to show
+            with suppress(OSError):  # the error of the block matters more
                 clear_remains(out)
             raise
         finally:
-            if sys.platform == "win32":  # it removes no open file
+            if sys.platform == "win32":  # Windows can't remove an open file
                 os.close(file)
-            with suppress(OSError):  # OUT isn't writable any more: the next command takes it over
-                (out / LOCK).unlink(missing_ok=True)  # while held: no command waits for it
+            with suppress(OSError):  # if OUT isn't writable, the next command takes the lock over
+                (out / LOCK).unlink(missing_ok=True)  # while held, so that nobody else gets it
             if sys.platform != "win32":
                 os.close(file)
     finally:
         for folder in made:
-            with suppress(OSError):  # it has content
+            with suppress(OSError):  # the folder has content
                 folder.rmdir()
 
 
@@ -80,13 +79,13 @@ def _hold(path: Path, command: str) -> tuple[int, bool]:
             raise OutputError(
                 f"{path.parent}: {owner} is writing here: wait until it has ended"
             ) from None
-        # the previous holder may have removed the file in between
+        # if the previous holder has removed the file in the meantime, try again
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file), path.stat()):
                 break
         os.close(file)
     was_killed = os.fstat(file).st_size > 0
-    with suppress(OSError):  # a full disk: the content is only for people
+    with suppress(OSError):  # on a full disk the content is missing, but it is only for people
         os.ftruncate(file, 0)
         os.write(file, json.dumps(describe(command)).encode())
     return file, was_killed

@@ -1,14 +1,14 @@
-"""One command at a time writes into an OUT on object storage.
+"""Let only one command at a time write into an OUT on object storage.
 
-On object storage no lock ends by itself. The holder writes the object anew every BEAT_S seconds; a
+On object storage no lock ends by itself. The holder writes the object again every BEAT_S seconds. A
 command takes over a lock that is older than STALE_S, or whose process on this machine is gone. The
-clocks of machine and storage may differ by minutes. Where the storage supports conditional writes
-(AWS since 2024), only one command can create the lock; elsewhere two that begin within a second may
-both succeed.
+clocks of machine and storage may differ by minutes.
+
+If the storage supports conditional writes (AWS since 2024), only one command can create the lock.
+Elsewhere two commands that begin within a second may both succeed.
 """
 
 import json
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,23 +17,25 @@ from datetime import UTC, datetime
 from typing import Any
 
 from stereocell.model.errors import OutputError
+from stereocell.storage.claim import describe, in_words
 from stereocell.storage.processes import is_alive, machine
 
-if sys.platform != "win32":
-    pass
-from stereocell.storage.claim import describe, in_words
-
-BEAT_S, STALE_S = 60.0, 600.0  # s between writes; age in s at which a lock is stale
-_SETTLE_S = 1.0  # s to wait after a takeover: another command may have done the same
+BEAT_S, STALE_S = 60.0, 600.0  # s between writes of the holder; s after which a lock is stale
+_SETTLE_S = 1.0  # s to wait after a takeover, in case another command does the same
 
 
 @contextmanager
 def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[[], None]]:
-    """Hold an OUT on object storage; `path` is the lock's path in a file system of fsspec.
+    """Hold an OUT on object storage.
 
-    Yields a function that raises OutputError once another command holds the lock: a process that
-    sleeps longer than STALE_S, as on a suspended laptop, loses it. Raises OutputError where another
-    process holds it (the text names it). Errors of the storage pass through.
+    fs       file system of fsspec
+    path     path of the lock in it
+    shown    OUT's address, for messages
+    command  the command, for the lock's content
+
+    Yields a function that raises OutputError once another command holds the lock. A process that
+    sleeps longer than STALE_S, for example on a suspended laptop, loses it. Raises OutputError if
+    another process holds the lock (the text names it). Errors of the storage are not caught.
     """
     content = json.dumps(describe(command)).encode()
     _create(fs, path, shown, content)
@@ -43,7 +45,7 @@ def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[
 
     def renew() -> None:
         nonlocal renewed
-        with suppress(Exception):  # a failure of the storage is reported at the next read or write
+        with suppress(Exception):  # the next read or write reports a failure of the storage
             there = _read(fs, path)
             if there is not None and there[0] == content:
                 fs.pipe_file(path, content)
@@ -56,12 +58,12 @@ def alone_at(fs: Any, path: str, shown: str, command: str) -> Iterator[Callable[
             renew()
 
     def require() -> None:
-        if not lost and time.time() - renewed > 2 * BEAT_S:  # the process has slept
+        if not lost and time.time() - renewed > 2 * BEAT_S:  # the machine was suspended
             renew()
         if lost:
             raise OutputError(
-                f"{shown}: was taken over by {lost[0]}, as this command had not been heard of for "
-                "long: start it again when that one has ended"
+                f"{shown}: {lost[0]} has taken over, because this command was silent for too long: "
+                "start it again when the other command has ended"
             )
 
     thread = threading.Thread(target=beat, daemon=True)
@@ -86,7 +88,7 @@ def _create(fs: Any, path: str, shown: str, content: bytes) -> None:
                 break
             there = _read(fs, path)
         if there is not None and there[0] == content:
-            break  # the write succeeded, only the storage's answer was lost
+            break  # the write succeeded, and only the storage's answer was lost
         if there is not None:
             if not _is_stale(*there):
                 raise OutputError(

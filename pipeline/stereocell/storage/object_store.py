@@ -1,4 +1,4 @@
-"""One OUT on object storage: its objects, fetched and uploaded as files."""
+"""Fetch and upload the objects of an OUT on object storage as files."""
 
 import os
 import re
@@ -13,10 +13,10 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.claim import LOCK, has_ended
 from stereocell.storage.object_lock import alone_at
 
-Size = int | None  # of an object in bytes; None: it was removed
+Size = int | None  # bytes of an object; None: it was removed
 
-_SMALL_BYTES = 1 << 16  # largest object that counts as small
-# files that list or describe others; they are uploaded after those, in this order
+_SMALL_BYTES = 1 << 16  # bytes of the largest object that counts as small
+# Files that list or describe other files. They are uploaded after those, in this order.
 _LAST = (
     "tile.usdc",
     "contents.usda",
@@ -26,7 +26,7 @@ _LAST = (
     "unit.json",
     "tile.json",
 )
-# the objects that steer a build: a few for each unit, all small
+# Keys of the objects that steer a build; there are a few for each unit, and all are small.
 STEERING = re.compile(
     r"[^/]+\.(json|toml)|units/[^/]+|units/[^/]+/[^/]+/(iso-[^/]+|[^/]+/unit\.json)"
     r"|units/[^/]+/stage\.json|stage/(contents|stage)\.usda|stage/(looks|previews)/.+|tissue/[^/]+\.json"
@@ -35,26 +35,26 @@ STEERING = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The address of OUT, and the local working folder. Picklable."""
+    """The address of OUT, and the local folder that stands for it. Picklable."""
 
     address: str
     root: Path
 
     @property
     def shown(self) -> str:
-        """The address without secrets."""
+        """The address for messages, without secrets."""
         from stereocell.storage.location import Location
 
         return Location.of(self.address).shown.rstrip("/")
 
 
 class Mirror:
-    """One OUT on object storage, as this process knows it.
+    """An OUT on object storage, as this process knows it.
 
-    sizes  of all objects by key, bytes, where known (in the process of the command, which alone
-           writes into OUT); None: the storage is asked each time
-    claim  the content of OUT's lock while the command runs that this process works for
-    news   the objects that this process has uploaded and removed since the last reset
+    sizes  bytes of all objects by key; None: the storage is asked each time. The process of a
+           command knows them, because only the command writes into OUT
+    claim  content of OUT's lock, while the command that this process works for runs
+    news   objects that this process has uploaded or removed since the last reset
     """
 
     def __init__(self, place: Place, claim: bytes = b"") -> None:
@@ -62,8 +62,8 @@ class Mirror:
         self.claim = claim
         self.sizes: dict[str, int] | None = None
         self.news: dict[str, Size] = {}
-        self.making: set[Path] = set()  # folders that this process will upload as a whole
-        self.moves: dict[str, str] = {}  # key in one of them -> key of the object to move there
+        self.making: set[Path] = set()  # folders that this process will upload completely
+        self.moves: dict[str, str] = {}  # for keys in these folders, the key of the object to move
         self._folders: dict[str, set[str]] = {}
         self._require_alone: Callable[[], None] = self._require_claim
 
@@ -76,7 +76,7 @@ class Mirror:
 
         address = self.place.address
         options = Location.of(address).storage_options
-        with self._telling("", "read"):
+        with self._one_line("", "read"):
             fs, path = fsspec.core.url_to_fs(address, use_listings_cache=False, **options)
         if not does_answer(fs, path):
             raise OutputError(
@@ -89,7 +89,7 @@ class Mirror:
         """Hold OUT for a command that writes into it. Raises OutputError."""
         fs, base = self._storage
         with ExitStack() as stack:
-            with self._telling(LOCK, "written"):
+            with self._one_line(LOCK, "written"):
                 self._require_alone = stack.enter_context(
                     alone_at(fs, f"{base}/{LOCK}", self.place.shown, command)
                 )
@@ -101,7 +101,7 @@ class Mirror:
         if self.claim:
             fs, base = self._storage
             there = b""
-            with self._telling(LOCK, "read"), suppress(FileNotFoundError):
+            with self._one_line(LOCK, "read"), suppress(FileNotFoundError):
                 there = fs.cat_file(f"{base}/{LOCK}")
             if there != self.claim:
                 raise has_ended(self.place.shown)
@@ -109,7 +109,7 @@ class Mirror:
     # --- listing
 
     def list_all(self) -> None:
-        """List every object; the holder of OUT removes temporary objects of killed commands."""
+        """List all objects. The holder of OUT removes temporary objects of killed commands."""
         self.sizes = {}
         found = self._find("")
         for key, size in found.items():
@@ -118,7 +118,7 @@ class Mirror:
             self._remove([key for key in found if "/." in f"/{key}" and key != LOCK])
 
     def keys_of(self, path: Path) -> dict[str, int]:
-        """Return the objects of a file, or of all files below a folder, with their bytes."""
+        """Return the sizes in bytes of a file, or of all files below a folder, by key."""
         key = self._key(path)
         if self.sizes is None:
             return self._find(key)
@@ -131,7 +131,7 @@ class Mirror:
 
     def _list(self, key: str) -> dict[str, dict[str, Any]]:
         fs, base = self._storage
-        with self._telling(key, "read"):
+        with self._one_line(key, "read"):
             found = fs.find(f"{base}/{key}" if key else base, detail=True)
         return {name[len(base) + 1 :]: entry for name, entry in found.items()}
 
@@ -178,17 +178,17 @@ class Mirror:
     # --- download
 
     def fetch(self, keys: Iterable[str]) -> list[Path]:
-        """Fetch the objects that aren't here yet; return their files."""
+        """Fetch the objects that aren't local yet, and return their files."""
         fs, base = self._storage
         files = {key: self.place.root / key for key in keys}
         missing = {key: file for key, file in files.items() if not file.exists()}
         if not missing:
             return []
-        # under another name first: another worker of this machine may fetch the same object
+        # under a temporary name, because another worker may fetch the same object
         parts = {key: f.with_name(f".{f.name}.{os.getpid()}") for key, f in missing.items()}
         for file in missing.values():
             file.parent.mkdir(parents=True, exist_ok=True)
-        with self._telling(next(iter(missing)), "read"):
+        with self._one_line(next(iter(missing)), "read"):
             fs.get([f"{base}/{key}" for key in missing], [str(part) for part in parts.values()])
         for key, part in parts.items():
             os.replace(part, missing[key])
@@ -199,7 +199,7 @@ class Mirror:
     def upload(self, path: Path, *, there: Mapping[str, str] | None = None) -> None:
         """Upload a file, or a folder in place of the old one.
 
-        there  objects to move into the folder: new key -> old key
+        there  old keys of objects to move into the folder, by their new keys
         """
         there = there or {}
         files = [path] if path.is_file() else [f for f in path.rglob("*") if f.is_file()]
@@ -220,7 +220,7 @@ class Mirror:
             self._require_alone()
             keys = sorted(key for r, key in ranks if r == rank)
             own, moved = [k for k in keys if k in here], [k for k in keys if k in there]
-            with self._telling(keys[0], "written"):
+            with self._one_line(keys[0], "written"):
                 if own:
                     fs.put([str(here[k]) for k in own], [f"{base}/{k}" for k in own])
                 if moved:
@@ -235,17 +235,21 @@ class Mirror:
         if not keys:
             return
         fs, base = self._storage
-        with self._telling(keys[0], "removed"):
+        with self._one_line(keys[0], "removed"):
             fs.rm([f"{base}/{key}" for key in keys])
         for key in keys:
             self._learn(key, None)
 
     @contextmanager
-    def _telling(self, key: str, what: str) -> Iterator[None]:
+    def _one_line(self, key: str, done: str) -> Iterator[None]:
+        """Turn errors of the storage inside the block into OutputErrors.
+
+        done  `read`, `written` or `removed`, for the message
+        """
         from stereocell.storage.library_errors import one_line
 
         where = f"{self.place.shown}/{key}".rstrip("/")
-        with one_line(where, f"an object that can be {what}", raised=OutputError):
+        with one_line(where, f"an object that can be {done}", raised=OutputError):
             yield
 
 

@@ -1,6 +1,6 @@
-"""An open HDF5 file in a child process (read/hdf5_file/texts.py).
+"""Open an HDF5 file in a child process (read/hdf5_file/texts.py).
 
-It is not in `read`, whose imports would double the time in which a child starts.
+This module is not in `read`, because the imports of `read` would double the start of a child.
 """
 
 from typing import Any

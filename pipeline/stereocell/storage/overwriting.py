@@ -1,7 +1,7 @@
-"""The guard of all writers: nothing of somebody else is removed or replaced unless it is forced.
+"""Keep commands from replacing files that are not StereoCell's results, except with --force.
 
-A command may replace results of StereoCell of the same specimen. Other content at the place of a
-result ends the command before it writes, with a line that names the content.
+A command may replace StereoCell's results of the same specimen. If it finds anything else at the
+place of a result, it stops before it writes, with a line that names the content.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from stereocell.storage.kinds import Kind
 
 AT_A_PROMPT, IN_PYTHON = "--force", "force=True"
 _forced: ContextVar[bool] = ContextVar("forced", default=False)
-_force_words: ContextVar[str] = ContextVar("force_words", default="")  # empty: there is no way
+_force_words: ContextVar[str] = ContextVar("force_words", default="")  # empty: no way to force
 
 
 @contextmanager
 def forcing(is_forced: bool, words: str = "") -> Iterator[None]:
-    """Within the block, allow that results replace whatever lies at their place, if it is forced.
+    """Within the block, allow results to replace any content at their place, if it is forced.
 
-    words  the caller's way to force it, for remedies: AT_A_PROMPT or IN_PYTHON; empty: none
+    words  how the caller can force it, for messages: AT_A_PROMPT or IN_PYTHON; empty: not at all
     """
     before, words_before = _forced.set(is_forced), _force_words.set(words)
     try:
@@ -33,16 +33,16 @@ def forcing(is_forced: bool, words: str = "") -> Iterator[None]:
 
 
 def is_forced() -> bool:
-    """Return whether --force is given."""
+    """Return whether replacing foreign content is forced."""
     return _forced.get()
 
 
 def require_free(place: Path, *, expected: str, is_ours: bool = False, found: str = "") -> None:
-    """Raise OutputError where a result would replace content that is not its own earlier result.
+    """Raise OutputError if a result would replace content that is not its own earlier result.
 
-    expected  the allowed content, for the message
+    expected  allowed content, for the message
     is_ours   whether the caller has recognised an earlier result of the same specimen
-    found     the content in words; empty: `contents_of` recognises it
+    found     words for the content; empty: those of `contents_of`
     """
     if is_ours or is_forced():
         return
@@ -52,13 +52,13 @@ def require_free(place: Path, *, expected: str, is_ours: bool = False, found: st
 
 
 def refused(place: Path | str, found: str, expected: str) -> OutputError:
-    """Return the error of a place that holds something else."""
+    """Return the error for a place that holds foreign content."""
     return OutputError(
         f"{place}: holds {found}, expected {expected}: {or_force('choose another place')}"
     )
 
 
 def or_force(remedy: str) -> str:
-    """Return a remedy, followed by the caller's way to replace what is there, if it has one."""
+    """Return a remedy, followed by the way to replace the content by force, if there is one."""
     words = _force_words.get()
     return f"{remedy}, or {words} replaces it" if words else remedy

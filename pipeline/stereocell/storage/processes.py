@@ -1,4 +1,4 @@
-"""Other processes of this machine, and its resources for this one."""
+"""Look up other processes of this machine, and the resources that this process may use."""
 
 import errno
 import hashlib
@@ -11,7 +11,8 @@ from pathlib import Path
 
 from stereocell.model.errors import StereoCellError
 
-# bytes of address space; measured on 2 cores: below, OpenBLAS gives up, and USD (stage) crashes
+# Bytes of address space, measured on 2 cores. With less, OpenBLAS stops, and USD crashes while it
+# writes a stage.
 _MIN_FREE, _MIN_FOR_STAGE, _MIN_PER_CORE = 1.5e9, 2.9e9, 0.15e9
 _STAGE_WRITERS = ("build", "stage", "tissue")
 _SIGNS = re.compile(
@@ -24,7 +25,7 @@ _SIGNS = re.compile(
 
 def cores() -> int:
     """Return the number of cores for this process, by its affinity and its container's quota."""
-    # as `dask.system.cpu_count` counts, whose import takes a fifth of a second of a first view
+    # counts like `dask.system.cpu_count`, whose import takes 0.2 s
     if hasattr(os, "sched_getaffinity"):
         found = len(os.sched_getaffinity(0))
     else:
@@ -37,12 +38,12 @@ def cores() -> int:
 
 
 def container_cores(root: Path = Path("/")) -> float:
-    """Return the cores whose time the container may use, or infinity; a part of one counts as such.
+    """Return the cores that the container may use, which may be a fraction; infinity: no limit.
 
-    root  of the file system
+    root  root of the file system
 
-    References: https://docs.kernel.org/admin-guide/cgroup-v2.html, `cpu.max`; of version 1
-    `cpu.cfs_quota_us`, below 0 without a limit.
+    References: https://docs.kernel.org/admin-guide/cgroup-v2.html, `cpu.max`. Version 1 has
+    `cpu.cfs_quota_us`, which is negative without a limit.
     """
     for folder in ("cpuacct,cpu", "cpu,cpuacct"):
         first = root / "sys/fs/cgroup" / folder
@@ -53,7 +54,7 @@ def container_cores(root: Path = Path("/")) -> float:
     with suppress(OSError, ValueError, ZeroDivisionError):
         group = (root / "proc/self/cgroup").read_text("ascii").strip().rpartition(":")[2].strip("/")
         words = (root / "sys/fs/cgroup" / group / "cpu.max").read_text("ascii").split()
-        quota, period = map(int, words)  # `max` in place of a number: no limit
+        quota, period = map(int, words)  # ValueError for `max`, which means no limit
         return quota / period if quota > 0 else math.inf
     return math.inf
 
@@ -77,23 +78,25 @@ def address_limit() -> float:
 
 
 def require_address_space(command: str) -> None:
-    """Raise StereoCellError where libraries would crash for lack of address space.
+    """Raise StereoCellError if libraries would crash for lack of address space.
 
-    The need is that before any voxel: their code, and a stack and a heap for a thread of each core.
+    They need it for their code, and for a stack and a heap of one thread for each core. Voxels come
+    on top.
     """
     least = _MIN_FOR_STAGE if command in _STAGE_WRITERS else _MIN_FREE
     least += _MIN_PER_CORE * (os.cpu_count() or 1)
     if address_limit() < least:
         raise StereoCellError(
             f"memory: {_allowed()}; `{command}` needs at least {least / 1e9:.1f} GB, and more for "
-            "voxels: raise the limit, as by `ulimit -v unlimited`"
+            "voxels: raise the limit, for example by `ulimit -v unlimited`"
         )
 
 
 def shortage(error: BaseException) -> str:
-    """Return a line for an error that a lack of memory caused, itself or by its cause; else "".
+    """Return a line for an error that a lack of memory caused; empty: it has another cause.
 
-    A lack of memory for threads, processes and shared libraries has errors of its own.
+    The causes of the error are searched, too. Threads, processes and shared libraries that lack
+    memory raise errors of their own.
     """
     seen: BaseException | None = error
     while seen is not None:
@@ -115,8 +118,11 @@ def _allowed() -> str:
 
 
 def machine() -> str:
-    """Return 8 hexadecimal digits that identify the scope of process IDs: this machine or container
-    since its start. Another machine may have the same host name, a container its host's boot ID."""
+    """Return 8 hexadecimal digits that identify this machine or container since its start.
+
+    Process IDs are unique within it. The host name is not enough, because another machine may have
+    the same. The boot ID is not enough, because a container has that of its host.
+    """
     place = socket.gethostname()
     with suppress(OSError):  # Linux has both files
         place += Path("/proc/sys/kernel/random/boot_id").read_text("utf-8")
@@ -127,22 +133,25 @@ def machine() -> str:
 def start_of(process: int) -> str:
     """Return a mark that distinguishes a process of this machine from others with the same ID.
 
-    Empty: it can't be read, or there is no such process.
+    Empty: the mark can't be read, or there is no such process.
     """
     import psutil
 
     with suppress(OSError, psutil.Error):
         if not Path("/proc/self/stat").exists():
             return str(psutil.Process(process).create_time())
-        # on Linux psutil's value shifts with the clock; ticks since the machine's start don't
-        stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")  # with its name
+        # On Linux psutil's value shifts with the clock. Ticks since the machine's start don't.
+        stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")
         state, *fields = stat.rpartition(")")[2].split()
         return "ended" if state in "ZX" else fields[18]
     return ""
 
 
 def is_alive(process: int, *, start: str = "") -> bool:
-    """Return whether a process with this ID runs and, where its start is known, is the same."""
+    """Return whether a process with this ID runs.
+
+    start  mark of its start, to tell it from a later process with the same ID; empty: not known
+    """
     import psutil
 
     now = start_of(process)

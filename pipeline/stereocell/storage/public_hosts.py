@@ -1,13 +1,13 @@
-"""Which hosts a server's answer may lead to: public ones alone.
+"""Refuse addresses in private networks if a server's answer leads to them.
 
-A person may name any host, also one in the own network. An answer of a server is another matter: a
-redirect or a link in it could point at a machine that only this one reaches (a router, the metadata
-service of a cloud). Such an address is refused. The message shows it, so that a person who trusts
-it can name it.
+Users may name any host, even one in their own network. But a redirect or a link in a server's
+answer could point at a machine that only this one can reach. Examples are a router, and the
+metadata service of a cloud. Such an address is refused. The message shows it, so that users who
+trust it can name it themselves.
 
-A process that reads for a stranger connects to public hosts alone: see `connect_to_public_alone`.
-There each connection is checked by the IP address that it goes to, since a name may have another
-one each time it is looked up.
+A process that reads for a stranger only connects to public hosts (`connect_to_public_alone`). There
+each connection is checked by its IP address, because a name may lead to another address each time
+it is looked up.
 """
 
 import ipaddress
@@ -18,10 +18,10 @@ from urllib.parse import SplitResult, urljoin, urlsplit
 
 from stereocell.model.errors import SourceError
 
-# addresses that hold one of IPv4: a gateway translates the former, and old systems the latter
+# Networks of IPv6 whose addresses hold one of IPv4, for gateways and for old systems
 _OF_IPV4 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("::/96"))
 _PORTS = {"http": 80, "https": 443}
-_ALONE = "STEREOCELL_PUBLIC_HOSTS"  # in the environment, which a process hands on to its workers
+_ALONE = "STEREOCELL_PUBLIC_HOSTS"  # environment variable, which workers inherit
 
 
 def split_address(address: str) -> SplitResult:
@@ -31,7 +31,7 @@ def split_address(address: str) -> SplitResult:
         port, host = parts.port, parts.hostname
     except ValueError as error:
         raise SourceError(
-            f"{address:.200}: found no address ({error}), expected https://"
+            f"{address:.200}: found no valid address ({error}), expected https://"
         ) from None
     if parts.scheme not in _PORTS or not host or port == 0:
         raise SourceError(f"{address:.200}: found no http address, expected https://")
@@ -64,13 +64,13 @@ def is_public(number: str) -> bool:
 
 
 def numbers_of(address: str) -> list[str]:
-    """Return the IP addresses of an address's host. Raises SourceError where it has none."""
+    """Return the IP addresses of an address's host. Raises SourceError if it has none."""
     _, host, port = origin_of(address)
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
         raise SourceError(
-            f"{host:.200}: no such host, or no network, expected a host that is up"
+            f"{host:.200}: found no such host, or no network, expected a host that is running"
         ) from None
     numbers = [str(one[4][0]) for one in found]
     if connects_to_public_alone():
@@ -79,17 +79,17 @@ def numbers_of(address: str) -> list[str]:
 
 
 def connect_to_public_alone() -> None:
-    """Let this process, and those that it starts, open no address in a private network."""
+    """Keep this process, and those that it starts, from opening addresses in private networks."""
     os.environ[_ALONE] = "alone"
 
 
 def connects_to_public_alone() -> bool:
-    """Return whether this process opens public addresses alone."""
+    """Return whether this process only opens public addresses."""
     return os.environ.get(_ALONE) == "alone"
 
 
 def require_public_numbers(host: str, numbers: Iterable[str]) -> None:
-    """Raise SourceError where one of a host's IP addresses is not public."""
+    """Raise SourceError if one of a host's IP addresses is not public."""
     if not all(map(is_public, numbers)):
         raise SourceError(f"{host:.200}: leads into a private network, expected a public address")
 
@@ -97,29 +97,27 @@ def require_public_numbers(host: str, numbers: Iterable[str]) -> None:
 def public_numbers_of(address: str) -> list[str]:
     """Return the IP addresses of the host that a server's answer names.
 
-    Raises SourceError where one of them is not public.
+    Raises SourceError if one of them is not public.
     """
     numbers = numbers_of(address)
     if not all(map(is_public, numbers)):
         raise SourceError(
             f"{address:.200}: a server's answer leads into a private network, expected a public "
-            "address: if you trust it, name this address yourself"
+            "address: if you trust this address, name it yourself"
         )
     return numbers
 
 
 def require_public(address: str) -> None:
-    """Raise SourceError for a data address from an answer that is neither http(s) nor s3, or whose
-    host is in a private network.
-    """
+    """Raise SourceError unless an address from an answer is s3, or http(s) of a public host."""
     if not address.startswith("s3://"):
         public_numbers_of(address)
 
 
 def require_public_redirect(address: str, target: str) -> None:
-    """Raise SourceError where a public host redirects into a private network.
+    """Raise SourceError if a public host redirects into a private network.
 
-    A host in a private network that a person has named may redirect within it.
+    A host in a private network, which the user has named, may redirect within it.
     """
     target = urljoin(address, target)
     if origin_of(target)[:2] != origin_of(address)[:2] and all(map(is_public, numbers_of(address))):

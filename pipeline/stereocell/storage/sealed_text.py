@@ -1,7 +1,7 @@
-"""Texts of a build that hold a hash of themselves, in a comment on their last line.
+"""Write and check texts of a build that hold their own hash, in a comment on the last line.
 
-They are settings in TOML and pages in HTML. Nothing is built from them, but a person who reads them
-must know that they are as they were written; and a file with another last line is somebody's own.
+They are settings in TOML and pages in HTML. No result depends on them, but readers must know that
+they have not been changed. A file with another last line is a user's own file.
 """
 
 import hashlib
@@ -12,14 +12,14 @@ from stereocell.model.errors import OutputError
 from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.seals import read_record, require_seal
 
-# ending of the name -> how a comment begins and ends
+# Begin and end of a comment, by the ending of the file's name
 _COMMENTS = {".toml": ("# ", ""), ".html": ("<!-- ", " -->")}
 _WORDS = "SHA-256 of the lines above, as StereoCell wrote them: "
 _SEAL = re.compile(re.escape(_WORDS) + r"([0-9a-f]{64})( -->)?\Z")
 
 
 def write_sealed_text(path: Path, text: str) -> None:
-    """Write a text and its hash, whole or not at all. Raises OutputError."""
+    """Write a text and its hash, completely or not at all. Raises OutputError."""
     begin, end = _COMMENTS[path.suffix]
     lines = text if text.endswith("\n") else text + "\n"
     digest = hashlib.sha256(lines.encode()).hexdigest()
@@ -27,7 +27,7 @@ def write_sealed_text(path: Path, text: str) -> None:
 
 
 def require_sealed_text(path: Path, remedy: str) -> None:
-    """Raise OutputError where a text is missing, changed, or was not written by StereoCell."""
+    """Raise OutputError if a text is missing, changed, or was not written by StereoCell."""
     lines, last = _split(read_record(path, remedy))
     found = _SEAL.search(last)
     require_seal(
@@ -40,7 +40,7 @@ def require_sealed_text(path: Path, remedy: str) -> None:
 
 
 def is_sealed_text(path: Path) -> bool:
-    """Return whether a text is as StereoCell wrote it."""
+    """Return whether StereoCell wrote a text, and nobody has changed it."""
     try:
         require_sealed_text(path, "")
     except OutputError:
@@ -49,6 +49,6 @@ def is_sealed_text(path: Path) -> bool:
 
 
 def _split(data: bytes) -> tuple[bytes, str]:
-    """Return all lines but the last, and the last one."""
+    """Return all lines except the last, and the last line."""
     lines, mark, last = data.removesuffix(b"\n").rpartition(b"\n")
     return lines + mark, last.decode("utf-8", "replace")

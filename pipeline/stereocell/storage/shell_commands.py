@@ -1,11 +1,11 @@
-"""Commands in messages become lines that can be pasted into a shell.
+"""Put real paths into the commands that messages name, so that they can be pasted into a shell.
 
-Most remedies are worded where OUT is not known: in a worker, or for a part of OUT. They name a
-command as `stereocell units OUT` in backticks. The command line and the Python API know the real
-places, and put them in before a message is shown.
+Most messages are written where OUT is not known, for example in a worker. They name a command as
+`stereocell units OUT` in backticks. The command line and the Python API know the real paths, and
+put them in before a message is shown.
 
-INPUT becomes the path that was given to the same command or function. A path that an earlier
-command recorded in the plan may name a patient, so it is not printed.
+INPUT becomes the path that was given to the same command or function. The path in the plan is not
+printed, because it may name a patient.
 """
 
 import re
@@ -23,9 +23,9 @@ _PLACE = re.compile(r"\b(?:OUT|INPUT|TARGET)\b")
 
 
 def fill_in(message: str, places: Mapping[str, str]) -> str:
-    """Return a message with real paths in its commands, quoted for a shell where they need it.
+    """Return a message with real paths in its commands, quoted for a shell if necessary.
 
-    places  paths or addresses by the words that stand for them: OUT, INPUT, TARGET
+    places  paths or addresses, by the words that stand for them: OUT, INPUT, TARGET
 
     >>> fill_in("run `stereocell units OUT` first", {"OUT": "my build"})
     "run `stereocell units 'my build'` first"
@@ -39,7 +39,7 @@ def fill_in(message: str, places: Mapping[str, str]) -> str:
 
 @contextmanager
 def filling_in(places: Mapping[str, str]) -> Iterator[None]:
-    """Put real paths into the commands that errors of the block name."""
+    """Put real paths into the commands in the messages of the block's errors."""
     try:
         yield
     except StereoCellError as error:
@@ -48,14 +48,15 @@ def filling_in(places: Mapping[str, str]) -> Iterator[None]:
 
 
 def as_shown(place: str) -> str:
-    """Return a path as it is, and an address without its secrets (user, password, signature)."""
+    """Return a path unchanged, or an address without its secrets (user, password, signature)."""
     return Location.of(place).shown if "://" in place else place
 
 
 def places_of(found: Contents, shown: str) -> dict[str, str]:
-    """Return the places that are known from what lies at the path that a command was given.
+    """Return the places for `fill_in` that follow from the path that a command was given.
 
-    shown  the path or address, as messages show it
+    found  contents of that path
+    shown  the path or address as messages show it
     """
     if found.kind is Kind.SITE:
         return {"TARGET": shown}

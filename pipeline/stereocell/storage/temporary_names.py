@@ -1,11 +1,11 @@
-"""The temporary names of files and folders before they are renamed."""
+"""Recognise and remove temporary files and folders by their names."""
 
 import os
 import re
 import shutil
 from pathlib import Path
 
-# file: .STEM.TOKEN.SUFFIX; folder: .NAME.TOKEN.partial and .NAME.TOKEN.old
+# A file is named .STEM.TOKEN.SUFFIX, a folder .NAME.TOKEN.partial or .NAME.TOKEN.old.
 _TEMPORARY = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}(?P<suffix>\.partial|\.old|\.\w+|)")
 
 

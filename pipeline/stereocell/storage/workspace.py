@@ -1,20 +1,21 @@
-"""An OUT on object storage: written and read here as files, stored there as objects.
+"""Read and write an OUT on object storage as if it were a local folder.
 
-pxr, numpy and PIL need files. So where OUT is an address (`s3://...`), a command works in a
-temporary folder of this machine, and each worker of a cluster in one of the same name on its own
-machine:
+pxr, numpy and PIL need files. So if OUT is an address (`s3://...`), a command works in a temporary
+folder of this machine. Each worker of a cluster works in a folder of the same name on its machine.
 
-- `upload` stores a written file or folder under its final name, whole, files that describe others
-  last. It then removes a large file here: the disk holds the work in progress, never the build.
-- `fetch` gets a file before it is read; small files that steer a build are fetched at the start.
+- `upload` stores a written file or folder completely, under its final name, and files that describe
+  others last. Then it removes large local files, so that the disk holds only the work in progress.
+- `fetch` gets a file before it is read. Small files that steer a build are fetched at the start.
 
-For any other folder these functions do nothing. Few modules call them: the functions that read and
-write all documents (seals.py, atomic_write.py, file_list.py), the runner of steps for the inputs of
-each task, and `OutFolder` for phases and checks. Four more know which one of many large files they
-need, so that the disk never holds all: `usd` for a layer or a tile of a stage,
-`steps/unit_files.py` for a file of a unit, `steps/open_source.py` for the voxels of an added
-channel, `steps/tissue_files.py` for those of all classes. `bundle/write.py` moves the files of
-finished tiles.
+For a local OUT these functions do nothing. Few modules call them:
+
+- seals.py, atomic_write.py and file_list.py, which read and write all documents
+- the runner of steps, for the inputs of each task
+- `OutFolder`, for phases and checks
+- modules that need one of many large files: `usd` (a layer or a tile of a stage),
+  `steps/unit_files.py` (a file of a unit), `steps/open_source.py` (an added channel),
+  `steps/tissue_files.py` (all classes)
+- `bundle/write.py`, which moves the files of finished tiles
 """
 
 import os
@@ -31,20 +32,20 @@ from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.object_store import STEERING, Mirror, Place
 from stereocell.storage.processes import is_alive, machine
 
-# folder of a command: its machine, its process
+# Name of a command's folder, with its machine and process
 _SCRATCH = re.compile(r"stereocell\.([0-9a-f]{8})\.(\d+)\.\w+")
-_LONGEST_S = 7 * 24 * 3600.0  # longest work of another machine's command in one folder
+_LONGEST_S = 7 * 24 * 3600.0  # s; older folders of other machines are abandoned
 
-_open: list[Mirror] = []  # of this process: none or one
+_open: list[Mirror] = []  # the mirror of this process, if it has one
 
 
 def _of(path: Path) -> Mirror | None:
-    """Return the mirror that a path lies in; None: the path is local."""
+    """Return the mirror to which a path belongs; None: OUT is local."""
     return next((mirror for mirror in _open if path.is_relative_to(mirror.place.root)), None)
 
 
 def fetch(*paths: Path) -> None:
-    """Fetch files, or all files of folders. Raises OutputError where the storage fails."""
+    """Fetch files, or all files of folders. Raises OutputError if the storage fails."""
     for path in paths:
         mirror = _of(path)
         if mirror is not None and not path.is_file():
@@ -53,9 +54,9 @@ def fetch(*paths: Path) -> None:
 
 @contextmanager
 def cached(*paths: Path) -> Iterator[None]:
-    """Fetch files, or all files of folders, for the block; fetched files are removed at its end.
+    """Fetch files, or all files of folders, for the block, and remove them at its end.
 
-    Raises OutputError where the storage fails.
+    Raises OutputError if the storage fails.
     """
     fetched: list[Path] = []
     try:
@@ -72,7 +73,7 @@ def cached(*paths: Path) -> Iterator[None]:
 def upload(path: Path) -> None:
     """Upload a file that was written under its final name. Raises OutputError.
 
-    A file of a folder that this process is making is uploaded with the folder.
+    A file in a folder that this process is making is uploaded later, with the folder.
     """
     mirror = _of(path)
     if mirror is not None and not any(path.is_relative_to(folder) for folder in mirror.making):
@@ -81,7 +82,7 @@ def upload(path: Path) -> None:
 
 @contextmanager
 def making(folder: Path, final: Path) -> Iterator[None]:
-    """Upload a folder as a whole: the block writes it at `folder` and renames it to `final`."""
+    """Upload a folder completely, which the block writes at `folder` and renames to `final`."""
     mirror = _of(folder)
     if mirror is None or any(folder.is_relative_to(outer) for outer in mirror.making):
         yield
@@ -99,7 +100,7 @@ def making(folder: Path, final: Path) -> Iterator[None]:
 
 
 def move(file: Path, to: Path) -> None:
-    """Move or link a stored file into a folder that is being made; its old path may vanish."""
+    """Move or link a file into a folder that is being made. Its old path may vanish."""
     mirror = _of(file)
     if mirror is not None and not file.is_file():
         mirror.moves[mirror._key(to)] = mirror._key(file)
@@ -123,7 +124,7 @@ def remove(path: Path) -> None:
 
 
 def sizes_below(path: Path) -> dict[Path, int]:
-    """Return every file at or below a path, local or stored, in order, with its bytes."""
+    """Return the sizes in bytes of all files at or below a path, local or stored, sorted."""
     mirror = _of(path)
     if mirror is not None:
         return {mirror.place.root / key: n for key, n in sorted(mirror.keys_of(path).items())}
@@ -132,9 +133,9 @@ def sizes_below(path: Path) -> dict[Path, int]:
 
 
 def names_in(folder: Path) -> list[str]:
-    """Return the names in a folder, local or on object storage; empty if it is no folder.
+    """Return the names in a folder, local or on object storage; empty: it is not a folder.
 
-    Raises OutputError where it can't be listed.
+    Raises OutputError if it can't be listed.
     """
     mirror = _of(folder)
     if mirror is not None:
@@ -144,9 +145,9 @@ def names_in(folder: Path) -> list[str]:
 
 
 def objects_below(folder: Path) -> list[tuple[str, int, str]] | None:
-    """Return key, bytes and mark of all objects below a folder: an edit changes them.
+    """Return key, bytes and mark of all objects below a folder, to notice edits.
 
-    None for a folder that is on no object storage.
+    None: the folder is not on object storage.
     """
     mirror = _of(folder)
     return None if mirror is None else mirror.marks(folder)
@@ -158,25 +159,29 @@ def is_file(path: Path) -> bool:
 
 
 def is_mirrored(path: Path) -> bool:
-    """Return whether a path belongs to an OUT on object storage: local copies have later times."""
+    """Return whether a path belongs to an OUT on object storage.
+
+    The times of its local copies then mean nothing, because they are those of fetching.
+    """
     return _of(path) is not None
 
 
 @contextmanager
 def opened(address: str, *, command: str = "", only: str = "") -> Iterator[Path]:
-    """Yield the folder of this machine that stands for an OUT at an address.
+    """Yield the local folder that stands for an OUT at an address.
 
-    command  writes into OUT, which is held for it; empty: all of OUT is fetched
-    only     without a command: fetch only the objects below this folder of OUT
+    command  command that writes into OUT, for which OUT is held; empty: OUT is only read, and
+             fetched
+    only     folder of OUT to fetch if there is no command; empty: all of OUT
 
-    In errors from inside the block, the address replaces the folder. Raises OutputError where the
+    In errors from inside the block, the address replaces the folder. Raises OutputError if the
     storage fails or another command writes there, UsageError for an address that can't be written.
     """
     if address.partition("://")[0] in ("http", "https"):
         from stereocell.storage.location import Location
 
         raise UsageError(
-            f"OUT is {Location.of(address).shown}: expected a folder or an s3:// address"
+            f"OUT is {Location.of(address).shown}, expected a folder or an s3:// address"
         )
     _clear_scratch()
     root = Path(tempfile.mkdtemp(prefix=f"stereocell.{machine()}.{os.getpid()}.")).resolve()
@@ -197,12 +202,12 @@ def opened(address: str, *, command: str = "", only: str = "") -> Iterator[Path]
 
 
 def _clear_scratch() -> None:
-    """Remove folders that killed commands left here: this machine's, and old ones of others."""
+    """Remove the temporary folders of killed commands: this machine's, and old ones of others."""
     for folder in Path(tempfile.gettempdir()).glob("stereocell.*"):
         name = _SCRATCH.fullmatch(folder.name)
         if name is None:
             continue
-        with suppress(OSError):  # another command removes it, too
+        with suppress(OSError):  # another command may remove the folder at the same time
             is_ours = name[1] == machine()
             age_s = time.time() - folder.stat().st_mtime
             if not is_alive(int(name[2])) if is_ours else age_s > _LONGEST_S:
@@ -210,7 +215,7 @@ def _clear_scratch() -> None:
 
 
 def joined(place: Place, claim: bytes) -> Mirror:
-    """Return the mirror of an OUT on which this process works for a command elsewhere."""
+    """Return the mirror of an OUT on which this worker works for a command on another machine."""
     mirror = next((mirror for mirror in _open if mirror.place == place), None)
     if mirror is None:
         _clear_scratch()
@@ -221,7 +226,7 @@ def joined(place: Place, claim: bytes) -> Mirror:
 
 
 def opened_here() -> Mirror | None:
-    """Return the mirror that this process works on; None: OUT is a folder."""
+    """Return the mirror on which this process works; None: OUT is a local folder."""
     return _open[0] if _open else None
 
 

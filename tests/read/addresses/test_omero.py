@@ -62,7 +62,7 @@ def test_an_address_in_a_bucket_is_accepted() -> None:
     ],
 )
 def test_an_image_in_the_network_is_refused(inner: str) -> None:
-    with pytest.raises(SourceError, match=r"private network.*name this address yourself"):
+    with pytest.raises(SourceError, match=r"private network.*name it yourself"):
         resolve(f"https://hms-dbmi.github.io/vizarr/?source={inner}")
 
 
