@@ -98,7 +98,7 @@ def survey_channel(plan: Plan, channel: Channel, chosen: Chosen, window_file: st
             spacing_um=plan.spacing_um,
         ),
         appearance_of(plan, channel, chosen),
-        () if found.levels is None else found.levels.ladder,
+        () if found.levels is None else found.levels.all_levels,
         None if found.levels is None else Curve(*found.levels.curve()),
         found.window.holder,
         plan.grid_for(most_faces, thin_share),

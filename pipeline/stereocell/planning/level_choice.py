@@ -105,7 +105,7 @@ def find_level(
     if mask is not None and criterion not in CRITERIA:
         # blurred, a mask has its own edge half-way; peaks of its blur are no levels
         half = levels.judge(sum(mask) / 2)
-        levels = replace(levels, ladder=(half,) if levels.has_both_sides(half.value) else ())
+        levels = replace(levels, all_levels=(half,) if levels.has_both_sides(half.value) else ())
     if given is not None:
         value, subtracts = given
         # where there is no background to be above, nothing can be said of such a level
@@ -121,7 +121,7 @@ def find_level(
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
     clear = levels.shown(highest)
-    doubt = f"no clear surface: {levels.doubt}" if levels.doubt else ""
+    doubt = f"no clear surface: {levels.why_unclear}" if levels.why_unclear else ""
     if criterion == ADAPTIVE and clear:
         threshold = window.statistics.threshold
         if threshold is None:
@@ -161,9 +161,9 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
     if not isinstance(level, Level):
         return ""
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
-    if level in found.levels.ladder and level not in clear and clear:
+    if level in found.levels.all_levels and level not in clear and clear:
         return (
-            f"it falls short of a clear level by a little ({level.doubt}), and the next one, "
+            f"it falls short of a clear level by a little ({level.why_unclear}), and the next one, "
             f"{clear[0].value:.5g}, leaves {clear[0].share:.3%} of the voxels inside"
         )
     if level.value > highest:
@@ -172,7 +172,7 @@ def find_doubt(found: Found, chosen: int, tiles: Sequence[TileIso]) -> str:
         return "no tile by itself has enough voxels on both sides of it"
     if uneven := _uneven_light(found, level):
         return uneven
-    if bodies := bodies_in_haze(level, found.levels.ladder):
+    if bodies := bodies_in_haze(level, found.levels.all_levels):
         return (
             f"it may be a haze around brighter bodies, whose level, {bodies.value:.5g}, has "
             f"{bodies.contrast / level.contrast:.0f} times its contrast and {bodies.share:.2%} of "

@@ -47,7 +47,7 @@ def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
     if len(rungs) > 1:
         choice = _CHOICES[plan.settings.isovalue.rung]
         return f"the build takes one of {about}{words_of(rungs, mark, digits)}: {choice}{tail}"
-    ladder = () if found.levels is None else found.levels.ladder
+    ladder = () if found.levels is None else found.levels.all_levels
     if not rungs:
         near = find_near_levels(ladder, None, is_unsure=False)
         doubt = found.doubt.removeprefix("no clear surface: ")

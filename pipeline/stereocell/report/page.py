@@ -226,7 +226,7 @@ def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
         "rows": [
             {
                 "level": one,
-                "doubt": one.doubt,
+                "doubt": one.why_unclear,
                 "taken": level is not None and one.value == level.iso,
             }
             for one in found.ladder
