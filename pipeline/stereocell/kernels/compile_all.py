@@ -35,6 +35,14 @@ from stereocell.kernels.half_edges import (
     sum_normals,
 )
 from stereocell.kernels.interface_rings import find_orders
+from stereocell.kernels.interfaces import (
+    bound_objects,
+    couple,
+    least_of_objects,
+    press,
+    slope_volumes,
+    smooth_interfaces,
+)
 from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
@@ -44,14 +52,6 @@ from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.visibility import cast_rays
-from stereocell.kernels.walls import (
-    bound_objects,
-    couple,
-    least_of_objects,
-    press,
-    slope_volumes,
-    smooth_walls,
-)
 from stereocell.kernels.xxhash import xxh32
 
 OF_MESHES = "of-meshes"  # argument of the process that compiles the kernels of meshes
@@ -115,7 +115,7 @@ def compile_others() -> None:
     press(*entries, own, np.ones(1))
     bound_objects(at, triangles, sides, 2)
     least_of_objects(triangles, sides, own, 1.0, 4)
-    smooth_walls(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
+    smooth_interfaces(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
     spread = find_spread(at, triangles)
     find_candidates(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)

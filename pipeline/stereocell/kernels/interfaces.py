@@ -8,7 +8,7 @@ from stereocell.kernels.triangles import Points, doubled_area
 
 
 @kernel
-def smooth_walls(
+def smooth_interfaces(
     centres: Points, first: Ints, beside: Ints, shares: Points, reach: float
 ) -> Points:
     """Move vertices by a share of the way to the mean of their neighbours, in turns; return (n, 3).
