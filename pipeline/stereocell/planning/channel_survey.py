@@ -122,7 +122,7 @@ def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
         statistics=replace(found.window.statistics, background=found.background),
         level=_surface_level(plan, chosen),
         confidence=confidence,
-        doubt=found.doubt or find_doubt(found, chosen.rung, list(chosen.iso.values())),
+        why_unclear=found.doubt or find_doubt(found, chosen.rung, list(chosen.iso.values())),
         modality=SEGMENTATION if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
         unevenness=max(plan.spacing_um) / min(plan.spacing_um),
