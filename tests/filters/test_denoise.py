@@ -90,7 +90,7 @@ def test_no_median_reaches_across_a_coarse_axis_of_the_plane() -> None:
 @pytest.mark.parametrize("shape", [(11, 17, 23), (2, 3, 40), (1, 1, 1)])
 @pytest.mark.parametrize("sigma_um", [0.1, 0.28, 1.1])
 def test_the_gaussian_equals_that_of_scipy(shape: tuple[int, int, int], sigma_um: float) -> None:
-    """They are equal up to the last digits of float32, because sums run in another order."""
+    """Results are equal up to the last digits of float32, because sums run in another order."""
     spacing = (0.56, 0.28, 0.14)
     voxels = np.random.default_rng(0).integers(0, 60_000, shape).astype(np.uint16)
     wanted = ndimage.gaussian_filter(
@@ -112,7 +112,7 @@ def test_an_even_volume_and_the_argument_do_not_change() -> None:
 
 @pytest.mark.parametrize("max_shift", [None, 500.0])
 def test_each_result_depends_only_on_the_voxel_s_neighbours(max_shift: float | None) -> None:
-    """They are equal bit by bit, because neighbouring tiles read different windows."""
+    """Results are equal bit by bit, because neighbouring tiles read different windows."""
     voxels = np.random.default_rng(0).integers(0, 60_000, (20, 40, 50)).astype(np.uint16)
     spacing = (0.28, 0.14, 0.14)
     whole = denoise(Volume(voxels, spacing), 0.2, max_shift)

@@ -58,7 +58,7 @@ def test_three_half_planes_keep_their_line_and_their_borders() -> None:
     assert len(left) < 0.6 * len(triangles)
     on_line = np.unique(left[np.isin(left, np.arange(9))])
     assert {0, 8} <= set(on_line.tolist())  # the ends lie on borders
-    assert len(on_line) < 9  # those between the ends have moved along the line
+    assert len(on_line) < 9  # vertices between the ends have moved along the line
     borders = np.isclose(np.hypot(at[:, 0], at[:, 1]), 8)
     assert set(np.flatnonzero(borders)) <= set(left.ravel().tolist())
     # No sheet has gained or lost area, and each triangle still belongs to its sheet.

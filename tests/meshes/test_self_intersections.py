@@ -109,7 +109,7 @@ def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
 @pytest.mark.slow
 @pytest.mark.parametrize("shared", sweep([0, 1, 2], kept=[1]))
 def test_random_triangles_on_a_coarse_grid_meet_as_in_rational_arithmetic(shared: int) -> None:
-    """Of 4 x 4 x 3 points, most pairs of triangles are special: coplanar, collinear, touching."""
+    """On 4 x 4 x 3 points most pairs of triangles are special: coplanar, collinear, touching."""
     rng = np.random.default_rng(shared)
     met = 0
     for _ in range(200):
@@ -266,7 +266,7 @@ def test_triangles_around_a_vertex_give_the_same_pairs_together_and_two_by_two(k
         assert find_crossings(positions, triangles).tolist() == [list(pair) for pair in alone]
         met += bool(alone)
         is_spread = find_spread(positions, triangles.astype(np.int32))
-        assert not is_spread[1:].any()  # those of the ring have two triangles each
+        assert not is_spread[1:].any()  # vertices of the ring have two triangles each
         spread += bool(is_spread[0])
     assert 150 * met >= tries * {"round twice": 100, "anyhow": 40, "in a plane": 5}.get(kind, 0)
     assert 150 * spread >= tries * {"a star": 120, "in a plane": 20}.get(kind, 0)

@@ -67,7 +67,7 @@ def test_each_object_is_closed_and_keeps_its_volume(halves) -> None:
 
 @pytest.mark.slow
 def test_two_tiles_have_the_same_interface_at_the_finest_level(halves) -> None:
-    """They are equal bit by bit: each cell is closed, and there is no gap between two cells."""
+    """Corners are equal bit by bit: each cell is closed, and the two of a pair leave no gap."""
     _, _, owned, built = halves
 
     def corners(one: BuiltObjects) -> set[tuple[tuple[float, ...], ...]]:

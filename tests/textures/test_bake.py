@@ -165,7 +165,7 @@ HALO = (24, 24, 24)
 
 @pytest.fixture(scope="module")
 def neighbours() -> tuple[tuple[Lod, ...], ...]:
-    """Return two units whose common plane cuts bodies at all angles, some of them close together."""
+    """Return two units whose common plane cuts bodies at all angles, some of them near others."""
     rng = np.random.default_rng(3)
     grid = np.indices(REGION.shape).transpose(1, 2, 3, 0)
     inside = np.zeros(REGION.shape, bool)

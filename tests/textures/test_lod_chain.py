@@ -158,7 +158,7 @@ def test_each_level_has_the_fine_volume(sponge: Mesh) -> None:
     settings = _settings((0.1, 0.5, 1.0))
     for fine, planes in ((ball(4.0, 60), ()), (sponge, PLANES)):
         whole = enclosed_volume(fine)
-        solid = whole if not planes else 0.38 * 39 * 39 * 30  # of the noise above .3 sigma
+        solid = whole if not planes else 0.38 * 39 * 39 * 30  # volume of the noise above .3 sigma
         for lod in _levels(fine, planes, settings):
             assert abs(enclosed_volume(lod.mesh) - whole) < 0.005 * solid
             assert _rim(lod.mesh) == _rim(fine)

@@ -90,7 +90,7 @@ class IsoValueOptions:
     )
     rung: str = setting(
         "outer",
-        f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the one with the most "
+        f"clear level that has the surface: {', '.join(RUNGS)}; {APART}: the one with the most "
         "components, if the largest hold under a quarter of its voxels (two thirds where many "
         f"cells touch); {CONNECTED}: the lowest at which vessels are connected and nothing else "
         f"is inside; {NO_SURFACE}: no level",

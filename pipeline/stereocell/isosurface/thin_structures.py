@@ -4,8 +4,8 @@ A wall thinner than the distance between two such planes falls between them, and
 gets holes. A box of k + 1 voxels holds such a plane wherever it lies, and its corners cover a cell
 of the coarser grid. So voxels that lie in such a box within the solid are kept, and all others
 count as thin. This is an opening by that box. In phantoms in voxels of .6 mm with k = 2, all of a
-shell of 1.5 voxels and 93 % of a shell of 2 voxels are thin. Of a ball .01 % is thin, and of the
-bones in a head's CT scan 2 %.
+shell of 1.5 voxels and 93 % of a shell of 2 voxels are thin. In a ball .01 % is thin, and in the
+bones of a head's CT scan 2 %.
 """
 
 import numpy as np

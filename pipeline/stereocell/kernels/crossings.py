@@ -239,7 +239,7 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     for v in range(count):
         first[v + 1] += first[v]
         place[v] = first[v]
-    # Of the side opposite to the vertex in each of its triangles
+    # Ends of the side opposite to the vertex in each of its triangles
     ends = np.empty((3 * len(triangles), 2), np.int32)
     for t in range(len(triangles)):
         for k in range(3):

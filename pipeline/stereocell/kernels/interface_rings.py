@@ -22,7 +22,7 @@ from stereocell.kernels.rings import (
 )
 from stereocell.kernels.surface_rings import VALENCE
 
-WITHIN, ON_LINE, CORNER = 0, 1, 2  # of a vertex: within one interface, on a line, in a corner
+WITHIN, ON_LINE, CORNER = 0, 1, 2  # kinds of vertices: within one interface, on a line, in a corner
 
 
 def find_orders(triangles: Ints, n: int) -> NDArray[np.int8]:

@@ -2,6 +2,7 @@
 
 The order follows a curve through cells of space (Z-order). A loop over part of the order then finds
 the neighbours in the cache.
+
 References
 G. M. Morton, "A computer oriented geodetic data base and a new technique in file sequencing",
 IBM, 1966.

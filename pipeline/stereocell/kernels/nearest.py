@@ -30,8 +30,8 @@ def find_nearest(
     tick                 number of the first point, larger than all in `seen`. Triangles that are
                          left out have numbers that no point reaches.
 
-    Cells are searched in shells around the point, until no triangle beyond can be nearer. Of
-    several triangles at the same distance the first one found is returned.
+    Cells are searched in shells around the point, until no triangle beyond can be nearer. The
+    first of several triangles at the same distance is returned.
     """
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     parts = np.empty(len(points), np.int8)

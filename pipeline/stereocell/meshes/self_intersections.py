@@ -178,7 +178,7 @@ def _fans_meet(v: Points, a: Points, b: Points, c: Points, d: Points) -> NDArray
     """Return which triangles (v, a, b) and (v, c, d) meet away from v.
 
     Such a point lies on a ray from v. The ray leaves one triangle, through the side opposite v,
-    while it is still within the other triangle. So that side meets the other triangle.
+    while it is still within the other triangle. Therefore that side meets the other triangle.
     """
     of_a, of_b = orient_3d(v, c, d, a), orient_3d(v, c, d, b)
     meet = np.zeros(len(v), bool)

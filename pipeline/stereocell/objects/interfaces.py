@@ -142,7 +142,7 @@ def _faces(
         start = (where + ahead) @ strides
         quad = np.stack([start, start + right @ strides, start, start + up @ strides], axis=1)
         quad[:, 2] += (right + up) @ strides
-        quad[a > b] = quad[a > b][:, ::-1]  # so that the normal leaves the lower label
+        quad[a > b] = quad[a > b][:, ::-1]  # makes the normal leave the lower label
         corners.append(quad)
         sides.append(np.stack([np.minimum(a, b), np.maximum(a, b)], axis=1))
     used, quads = np.unique(np.concatenate(corners), return_inverse=True)

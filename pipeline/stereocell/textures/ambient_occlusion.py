@@ -95,7 +95,7 @@ def _cast(
     distances = np.arange(offset, radius_um + offset, step)
     up = xyz_to_zyx(normals.astype(np.float64))
     start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin) / spacing
-    start += 0.5 - np.asarray(lattice.window.start)  # so that truncation gives the nearest voxel
+    start += 0.5 - np.asarray(lattice.window.start)  # makes truncation give the nearest voxel
     directions = sphere(DIRECTIONS)
     return cast_rays(
         solid,

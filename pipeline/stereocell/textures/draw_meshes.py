@@ -198,7 +198,7 @@ def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> Non
                 here = depth[0] + share[:, 0] * (depth[1] - depth[0])
                 inside = (row >= 0) & (row < height - 1) & (column >= 0) & (column < width - 1)
                 row, column, here = row[inside], column[inside], here[inside]
-                # So that lines are one pixel wide after averaging
+                # Two pixels are one pixel wide after averaging.
                 for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):
                     seen = here >= nearest[row + down, column + on]
                     picture[(row[seen] + down) * width + column[seen] + on] = _LINES

@@ -99,7 +99,7 @@ def bases_of(curve: NDArray[np.float64], peak: int) -> tuple[int, int]:
 
     curve  float64 (columns,)
 
-    Of equally low places the nearest is returned, as by `scipy.signal.peak_prominences`.
+    The nearest of equally low places is returned, as by `scipy.signal.peak_prominences`.
     """
     higher = np.flatnonzero(curve > curve[peak])
     start = higher[higher < peak].max(initial=-1) + 1

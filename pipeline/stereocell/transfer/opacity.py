@@ -18,7 +18,7 @@ SHARP = "sharp"  # name of the function of an opaque body that ends at the level
 # Light then crosses the volume, and bodies show within others, for any number of voxels. Chosen by
 # eye on stained cells, nuclei, an ovule and a cleared brain, of 15 to 270 voxels.
 SOFT_DEPTH = 0.6
-LEAST_SHARE = 0.2  # of the soft absorption; with less, steps of 8 bits would show as bands
+LEAST_SHARE = 0.2  # share of the soft absorption; with less, steps of 8 bits would show as bands
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
 FOOT = 0.95  # largest share of the level at which opacity starts; a step would look jagged
@@ -198,8 +198,7 @@ def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:
 
 
 def invisible_below(opacities: NDArray[np.uint8]) -> int:
-    """Return the largest intensity, 0..254, up to which all 256 opacities are 0; -1 if there is
-    none.
+    """Return the intensity, 0..254, up to which a table of 256 opacities is 0; -1: nowhere.
 
     Texel k is intensity k. Opacity is linear between texels, so everything up to the last texel
     before the first visible one is invisible.
