@@ -11,7 +11,7 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
-from stereocell.objects.intensities import Measured
+from stereocell.objects.intensities import Intensities
 from stereocell.objects.interfaces import Interfaces
 from stereocell.samples.cells import make_tissue
 from stereocell.steps import build_objects as objects_maker
@@ -93,7 +93,7 @@ def test_the_deep_check_measures_the_image_anew(
     assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
     right = objects_maker.measure_intensities
 
-    def measure(*given: Any, **named: Any) -> Measured:
+    def measure(*given: Any, **named: Any) -> Intensities:
         found = right(*given, **named)
         getattr(found, measure_of)[-1] += 30
         return found

@@ -38,7 +38,7 @@ def test_components_equal_those_of_scipy(connectivity: Literal[6, 26], share: fl
 
 
 @pytest.mark.parametrize("value", [False, True])
-def test_empty_and_full_masks_have_no_component_and_one(value: bool) -> None:
+def test_an_empty_mask_has_no_component_and_a_full_one_has_one(value: bool) -> None:
     found = find_components(np.full((3, 4, 5), value), SPACING, 26)
     assert found.voxels.tolist() == ([60] if value else [])
     assert found.whole.tolist() == ([False] if value else [])

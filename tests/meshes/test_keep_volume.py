@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import keep_volume
-from stereocell.meshes.keep_volume import Earlier, FineVolumes
+from stereocell.meshes.keep_volume import EarlierLevel, FineVolumes
 from stereocell.meshes.simplify_valid import Simplifier, simplify_without_defects
 from stereocell.meshes.validity import Defects, border, find_defects, label_components
 from stereocell.model.lattice import Lattice
@@ -59,7 +59,7 @@ def test_vertices_of_a_cut_stay_bit_by_bit_and_no_other_passes_it() -> None:
     assert abs(enclosed_volume(simple) - enclosed_volume(half)) > 0.02 * whole
 
 
-def test_no_vertex_leaves_both_the_tile_s_box_and_the_fine_mesh_s() -> None:
+def test_no_vertex_leaves_the_common_box_of_tile_and_fine_mesh() -> None:
     fine = ball(5.0, 60)
     simple = simplify_without_defects(fine, (), max_error_um=ERROR)
     box = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 4.0, 9.0])
@@ -142,7 +142,7 @@ def test_unchanged_bodies_keep_their_moves_and_are_not_checked_again(
         return find_defects(*given, fresh=fresh, **named)
 
     monkeypatch.setattr(keep_volume, "find_defects", count_fresh)
-    earlier = Earlier(first, before.vertices, after.changed)
+    earlier = EarlierLevel(first, before.vertices, after.changed)
     second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
     assert looked_at[0] == is_far[after.mesh.triangles[:, 0]].sum()
     assert len(looked_at) == 1
@@ -160,7 +160,7 @@ def test_defects_of_unchanged_bodies_are_reported_again() -> None:
     before = simplifier.simplify(ERROR)
     first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
     after = simplifier.simplify(ERROR / 4, np.array([False, False, True]))
-    earlier = Earlier(first, before.vertices, after.changed)
+    earlier = EarlierLevel(first, before.vertices, after.changed)
     second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
     assert first.defects.total > 0
     assert second.defects.counts == first.defects.counts

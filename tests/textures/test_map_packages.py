@@ -67,9 +67,9 @@ def test_a_build_without_maps_does_not_depend_on_packages_for_maps(
     monkeypatch.setattr(map_packages, "version_of", lambda package: "")
     assert main(command) == 0
     assert keys(out) == there
-    assert main([*command[:3], str(tmp_path / "anew"), "--workers", "0"]) == 0
-    assert keys(tmp_path / "anew")[0] == there[0]
-    assert main(["check", "--deep", "--workers", "0", str(tmp_path / "anew")]) == 0
+    assert main([*command[:3], str(tmp_path / "again"), "--workers", "0"]) == 0
+    assert keys(tmp_path / "again")[0] == there[0]
+    assert main(["check", "--deep", "--workers", "0", str(tmp_path / "again")]) == 0
 
 
 @pytest.mark.slow
@@ -96,5 +96,5 @@ def test_another_version_of_a_package_for_maps_makes_results_with_maps_again(
         assert main([phase, str(out), "--workers", "0"]) == 2
         assert capsys.readouterr().err.endswith("pip install 'stereocell[maps]'\n")
     assert main(["check", "--deep", "--workers", "0", str(out)]) == 1
-    told = capsys.readouterr()
-    assert "a surface with baked maps takes the package alktx2" in told.out + told.err
+    output = capsys.readouterr()
+    assert "a surface with baked maps takes the package alktx2" in output.out + output.err

@@ -27,7 +27,7 @@ _CHUNK = struct.Struct("<I4s")
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class DecodedMesh:
     """The mesh and material of a file as a viewer draws them.
 
     positions_m  float32 (n, 3), world space, metres (x, y, z)
@@ -58,7 +58,7 @@ class Drawn:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def read_glb(path: Path) -> Drawn:
+def read_glb(path: Path) -> DecodedMesh:
     """Return the only mesh of a file. Raises CheckError for a file of another kind."""
     try:
         return _drawn(*_open(path.read_bytes()))
@@ -78,7 +78,7 @@ def _open(data: bytes) -> tuple[dict[str, Any], bytes]:
     return document, data[start + text_length + _CHUNK.size :]
 
 
-def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
+def _drawn(document: dict[str, Any], binary: bytes) -> DecodedMesh:
     (node,) = document["nodes"]
     (mesh,) = document["meshes"]
     (primitive,) = mesh["primitives"]
@@ -103,7 +103,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     shading = material["pbrMetallicRoughness"]
     red, green, blue, opacity = shading["baseColorFactor"]
     emission = material.get("emissiveFactor", (0.0, 0.0, 0.0))
-    return Drawn(
+    return DecodedMesh(
         offsets * scale + translation,
         _decode(document, binary, primitive["indices"]).reshape(-1, 3).astype(np.int64),
         directions / float(np.iinfo(directions.dtype).max),

@@ -320,12 +320,12 @@ class _FieldLevels:
         whole = self.histogram
         if not whole.total:
             return ()
-        beneath = modality not in ("CT", "MR")
+        finds_dim = modality not in ("CT", "MR")
         valleys = whole.find_valleys(self.noise)
         span = whole.quantile(0.999) - whole.quantile(0.05)
         found: list[Level] = []
-        if valleys and beneath:
-            found += self._beneath(whole.below(valleys[0].value))
+        if valleys and finds_dim:
+            found += self._find_dim_bodies(whole.below(valleys[0].value))
         ends = [-np.inf, *(valley.value for valley in valleys), np.inf]
         for valley, low, high in zip(valleys, ends, ends[2:], strict=False):
             outside = whole.between(low, valley.value).quantile(0.5)
@@ -336,7 +336,7 @@ class _FieldLevels:
                 inside = min(inside, whole.above(valley.value).quantile(DIM))
             value = float(np.clip((inside + outside) / 2, valley.low, valley.high))
             level = (self.judge if is_air else self._refined)(value, part, valley.dip)
-            is_high = level.contrast >= MIN_CONTRAST * span or (beneath and level.is_edge)
+            is_high = level.contrast >= MIN_CONTRAST * span or (finds_dim and level.is_edge)
             is_large = level.share * whole.total >= self._least_voxels
             if is_high and is_large and level.sharpness <= FLANK:
                 found.append(level)
@@ -391,7 +391,7 @@ class _FieldLevels:
         score = np.where(area > 0, total / np.sqrt(np.maximum(area, 1e-30)), 0.0)
         return self.judge(float(low + (int(score.argmax()) + 0.5) * step), part, dip)
 
-    def _beneath(self, part: LevelHistogram) -> list[Level]:
+    def _find_dim_bodies(self, part: LevelHistogram) -> list[Level]:
         """Return the level of dim bodies, if there are any that are too few for a peak."""
         for level in self._half_heights(part):
             if level.is_edge:

@@ -109,7 +109,7 @@ def add_attached(
     *,
     depth_voxels: float,
 ) -> NDArray[np.bool_]:
-    """Return a holder with everything that hangs on it, so that no half of it stays.
+    """Return a holder with everything attached to it, so that no half of it stays.
 
     A pad is as faint as the level of skin, which cuts it into pieces. Voxels that are fainter still
     connect them. Pieces without flesh and small crumbs are removed with the holder. An ear in a
@@ -129,9 +129,9 @@ def add_attached(
         stays[number] = has_flesh and counts[number] > _CRUMB * depth_voxels
     blocked = ndimage.binary_dilation(body, np.ones((3, 3, 3), bool)) | stays[labels]
     faint = cc3d.connected_components(found | ((voxels > _FOAM_HU) & ~blocked), connectivity=26)
-    hangs = np.zeros(int(faint.max()) + 1, bool)
-    hangs[np.unique(faint[found])] = True
-    whole = np.asarray(hangs[faint])
+    is_attached = np.zeros(int(faint.max()) + 1, bool)
+    is_attached[np.unique(faint[found])] = True
+    whole = np.asarray(is_attached[faint])
     clips = _clips(whole, voxels, body, depth_voxels)
     body &= ~clips
     return whole | clips

@@ -9,7 +9,7 @@ from stereocell.isosurface.level_histogram import DIP
 MIN_SNR = 3.0  # least contrast over noise of a clear level
 MIN_SHARPNESS = 0.04  # share of a clear level's contrast crossed by one finest spacing, at least
 MIN_SEPARATION = 0.70  # least share of the variance between the groups, for a level in no valley
-# Steepness from which a level in no valley is clear whatever its separation: texture has less
+# Steepness from which a level in no valley is clear with any separation; texture has less
 MIN_STEEPNESS = 0.95
 # Least measures of a level within a clear one, where it is certain that something is there. Bone
 # within a head's skin, in planes 5 mm apart, has .67, .11 and 157.

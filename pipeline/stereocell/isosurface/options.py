@@ -232,7 +232,7 @@ class SurfaceOptions:
     )
     keep_holder: bool = setting(
         False,
-        "whether a CT scan's table, head holder, pads and cables are built like the body",
+        "whether a CT scan's table, head holder, pads and cables are built with the body",
         flag=Flag(
             "--keep-holder",
             "build a CT scan's table, holder, pads and cables too (default: they are left out)",

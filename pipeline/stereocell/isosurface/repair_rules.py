@@ -127,9 +127,9 @@ def _added(
     labels, count = cc3d.connected_components(main, connectivity=26, return_N=True)
     touches = np.zeros(count + 1, bool)
     touches[labels[before & main]] = True
-    hangs = touches[labels]
+    is_connected = touches[labels]
     around = ndimage.binary_dilation(before, np.ones((3, 3, 3), bool), REACH)
-    return int((hangs & ~around).sum()), int((main & ~hangs).sum())
+    return int((is_connected & ~around).sum()), int((main & ~is_connected).sum())
 
 
 def choose_repair(

@@ -57,7 +57,7 @@ Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class RestoredLevel:
     """A level whose bodies have their volumes back, as far as possible.
 
     defects  remaining defects
@@ -75,14 +75,14 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class Earlier:
+class EarlierLevel:
     """A level with its volumes, some bodies of which have been simplified differently since.
 
     vertices  int64 (n,), index of each vertex in the fine mesh, rising
     changed   bool (k,), vertices of the new level that belong to bodies that changed
     """
 
-    kept: Kept
+    kept: RestoredLevel
     vertices: NDArray[np.int64]
     changed: NDArray[np.bool_]
 
@@ -139,8 +139,8 @@ class FineVolumes:
         *,
         max_move_um: float,
         topology: Topology | None = None,
-        earlier: Earlier | None = None,
-    ) -> Kept:
+        earlier: EarlierLevel | None = None,
+    ) -> RestoredLevel:
         """Return a level with the volumes of the fine bodies.
 
         vertices     int64 (n,), index of each vertex in the fine mesh
@@ -199,7 +199,7 @@ class FineVolumes:
         assert placed is not None
         missing = wanted - self._measure(start + moves, triangles, label, count)
         lacks = (np.abs(missing) > MAX_VOLUME_ERROR * self._solid[of_fine]) & (not are_many)
-        return Kept(placed, defects, lacks[label], moves, share)
+        return RestoredLevel(placed, defects, lacks[label], moves, share)
 
     def _find_moves(
         self,

@@ -78,8 +78,8 @@ def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
     _, found, _ = predicates.find_self_intersections(
         positions, np.ascontiguousarray(triangles[part])
     )
-    met = part[found.reshape(-1, 2)]
-    numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, met))
+    crossing = part[found.reshape(-1, 2)]
+    numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, crossing))
     asked, hit = numbers
     return pairs[np.isin(asked, hit)]
 

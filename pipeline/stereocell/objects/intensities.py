@@ -13,7 +13,7 @@ QUANTILES = 1001
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class Intensities:
     """Measurements of n objects, in the voxels' unit.
 
     mean, p95  float64 (n,), mean and 95th percentile
@@ -31,7 +31,7 @@ def measure_intensities(
     numbers: NDArray[np.int32],
     *,
     pieces: NDArray[np.int32] = NO_PIECES,
-) -> Measured:
+) -> Intensities:
     """Return the mean and the percentile of the voxels of each object.
 
     labels   int32 (z, y, x)
@@ -60,7 +60,7 @@ def measure_intensities(
     cut = np.searchsorted(numbers, pieces)
     shares = np.linspace(0, 1, QUANTILES)
     found = [_quantile(values, firsts[cut], counts[cut], share) for share in shares]
-    return Measured(mean, p95, np.stack(found, axis=1).astype(np.float32))
+    return Intensities(mean, p95, np.stack(found, axis=1).astype(np.float32))
 
 
 def _quantile(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
-from stereocell.meshes.keep_volume import Box, Earlier, FineVolumes, Kept
+from stereocell.meshes.keep_volume import Box, EarlierLevel, FineVolumes, RestoredLevel
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import Simplified, Simplifier
@@ -125,7 +125,7 @@ def _simplify(
     volumes: FineVolumes,
     error_um: float,
     clock: Clock,
-) -> tuple[Simplified, Kept]:
+) -> tuple[Simplified, RestoredLevel]:
     """Return a simplified level, and the same level with its volumes.
 
     simplifier  of the level before
@@ -136,7 +136,7 @@ def _simplify(
         simplified = simplifier.simplify(error_um)
     count = len(simplified.mesh.triangles)
     most, earlier = max(MAX_HEAVIER * count, count + MAX_MORE), None
-    best: tuple[Simplified, Kept] | None = None
+    best: tuple[Simplified, RestoredLevel] | None = None
     for finer in (*FINER, None):
         with clock("volume kept"):
             own = number[simplified.vertices]
@@ -156,7 +156,7 @@ def _simplify(
             simplified = simplifier.simplify(finer * error_um, lacking)
         if len(simplified.mesh.triangles) > most:
             break
-        earlier = Earlier(kept, own, simplified.changed)
+        earlier = EarlierLevel(kept, own, simplified.changed)
     assert best is not None
     return best
 

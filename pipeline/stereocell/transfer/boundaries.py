@@ -182,7 +182,7 @@ def suggest_shapes(found: Boundaries) -> Shapes:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sum:
+class _EdgeSum:
     """The voxels above the noise, as a sum whose terms are to be found.
 
     matrix  (cells, terms): voxels from each boundary, and then each material; weighted
@@ -265,7 +265,7 @@ def _make_terms(
     materials: tuple[float, ...],
     pairs: list[tuple[float, float]],
     grid: HistogramGrid,
-) -> _Sum | None:
+) -> _EdgeSum | None:
     """Return the sum for all pairs and blurs, or None if no boundary rises above the noise."""
     cells = counts.reshape(grid.rows, grid.columns, COARSER).sum(axis=2).astype(np.float64)
     level = noise.reshape(grid.columns, COARSER).max(axis=1)
@@ -288,7 +288,7 @@ def _make_terms(
             sigma = wider * value_noise(_noise_at(noise, value), grid.gradient_max)
             terms.append(count_material(value, sigma, grid)[is_steep] * weight)
     numbers, blurs, seen_of = (np.array(column) for column in zip(*edges, strict=True))
-    return _Sum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
+    return _EdgeSum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
 
 
 def _noise_at(noise: NDArray[np.float64], value: float) -> float:

@@ -4,7 +4,7 @@ This is a 2D function of bands of Hounsfield units. Fat is yellow. Soft tissue i
 if it is denser, so that organs differ on a cut. Bone has the channel's own light colour, and
 vessels with contrast medium are light red.
 
-An edge to air is skin, whatever its values are: half-way from air to muscle lies the value of fat.
+An edge to air is skin with any values: half-way from air to muscle lies the value of fat.
 So the bands of fat and soft tissue cover only small gradients. Skin, in the channel's colour like
 the surface, covers large ones.
 """

@@ -13,7 +13,7 @@ class Preset:
     """One transfer function as users see it."""
 
     title: str  # in the list of functions
-    sentence: str  # how the channel looks with it
+    sentence: str  # appearance of the channel with the function
 
 
 PRESETS = {
