@@ -1,9 +1,11 @@
-# StereoCell. Make drives the phases, each a real file; the engine inside drives the units.
+# Targets of StereoCell. Make runs the phases of a build, whose results are files of OUT. Inside a phase,
+# the program runs the tasks of all tiles and channels by itself.
 .DEFAULT_GOAL := help
 SHELL := /bin/bash
 
-# What a person sets is data: taken as it stands, no dollar expanded, and given to commands by the
-# environment, where no shell reads it: "$$OUT" in a recipe, never $(OUT)
+# Values of these variables come from users and may hold any characters. Make does not expand them and
+# hands them to commands through the environment. Recipes write "$$OUT", never $(OUT), so that no shell
+# interprets the value.
 SET := INPUT OUT SAMPLE WORKERS ARGS T PYTHON CHROMIUM BLENDER_BASE STEREOCELL_DATA CI
 $(foreach name,$(SET),$(if $(filter-out undefined,$(origin $(name))),$(eval override export $(name) := $$(value $(name)))))
 
@@ -33,16 +35,16 @@ else
 $(error SAMPLE is $(SAMPLE), expected cycif, brain-cells, mri or cells)
 endif
 
-# Quotes a value as one word of bash, for shells that make starts while it reads this file: their
-# environment has no variable of make
+# Quotes a value as one word of bash. Shells that make starts while it reads this file need this, since
+# make's variables are not in their environment.
 define newline
 
 
 endef
 quoted = $$'$(subst $(newline),\n,$(subst ',\',$(subst \,\\,$(1))))'
 
-# .venv belongs to the version of Python that made it. A PYTHON of another version gets a folder of
-# its own, such as .venv-3.13, so the two environments never overwrite each other
+# .venv belongs to the version of Python that made it. A PYTHON of another version gets its own folder,
+# such as .venv-3.13, so that the two environments never overwrite each other.
 VENV := .venv
 ifneq ($(PYTHON),python3)
 ifeq ($(origin VENV),file)
@@ -66,10 +68,10 @@ VIEWER_SOURCES := $(shell find $(VIEWER)/src $(VIEWER)/public $(VIEWER)/scripts/
 ifndef CHROMIUM
 export CHROMIUM := $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
 endif
-# Bytecode is kept, wherever Python is told not to: each process would compile what it imports, and
-# to compile all of .venv once, most of which nobody imports, takes 30 s
+# Turns on Python's cache of bytecode, which some systems turn off. Without it, each process compiles the
+# modules that it imports. Compiling all of .venv in advance takes 30 s, and most of it is never imported.
 export PYTHONDONTWRITEBYTECODE :=
-# real volumes, where they are at hand; tests that want them skip without
+# Folder of real volumes. Tests that need one are skipped where the folder is missing.
 ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
@@ -87,7 +89,7 @@ $(READY): requirements.lock pyproject.toml
 	  { found=$$("$$PYTHON" --version 2>/dev/null); \
 	    echo "setup: $$PYTHON is $${found:-not installed}, expected 3.11 or newer (PYTHON=... names another)" >&2; exit 1; }
 	test -x $(BIN)/python || "$$PYTHON" -m venv $(VENV)
-	@# uv takes a fifth of pip's time; pip does it where uv can't, as behind an index that only pip knows
+	@# uv takes a fifth of pip's time. pip is the fallback, for example behind an index that only pip is configured for.
 	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.lock
 	$(PIP) --require-hashes -r $(VENV)/uv.lock
 	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock || \
@@ -95,7 +97,7 @@ $(READY): requirements.lock pyproject.toml
 	$(PIP) --no-deps --no-build-isolation -e .
 	@touch $@
 
-# loops over voxels and triangles, compiled so that no build waits for it: 20 s
+# Compiles the loops over voxels and triangles (20 s), so that no build has to wait for it.
 $(KERNELS_READY): $(READY)
 	@$(BIN)/python -m stereocell.kernels
 	@touch $@
@@ -110,7 +112,7 @@ $(VIEWER_DIST): $(VIEWER_READY) $(VIEWER_SOURCES)
 	cd $(VIEWER) && npm run --silent build
 	@touch $@
 
-browser: ## Install Debian's chromium and Mesa's drawing by software for the browser tests, if chromium is missing and we may
+browser: ## Install Debian's Chromium and Mesa's software renderer for the browser tests, if Chromium is missing (needs root)
 	@if [ -n "$$CHROMIUM" ]; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
@@ -118,8 +120,8 @@ browser: ## Install Debian's chromium and Mesa's drawing by software for the bro
 	elif [ -n "$$CI" ]; then echo "browser: no chromium, and CI needs one: apt-get install chromium" >&2; exit 1; \
 	else echo "browser: no chromium, so the browser tests are skipped; get it by: sudo apt-get install chromium"; fi
 
-# after the browser: dpkg lets one install at a time
-mono: browser ## Install Debian's Mono and shader compilers for the Unity package's tests, if we may
+# Runs after `browser`, because dpkg allows one installation at a time.
+mono: browser ## Install Debian's Mono and shader compilers for the tests of the Unity package (needs root)
 	@if [ -e /usr/lib/cli/Newtonsoft.Json-5.0 ] && [ -e /usr/lib/mono/4.5/System.IO.Compression.FileSystem.dll ] && (for each in mcs mono glslangValidator spirv-cross; do command -v $$each >/dev/null || exit 1; done); then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
@@ -128,7 +130,7 @@ mono: browser ## Install Debian's Mono and shader compilers for the Unity packag
 	  || echo "mono: can't be installed here, so tests of the Unity package are skipped" >&2; \
 	else echo "mono: no Mono or shader compilers, so tests of the Unity package are skipped; on Debian get them by: sudo make mono"; fi
 
-demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri or cells)
+demo: setup ## Build and check a sample that comes with StereoCell (SAMPLE=cycif, brain-cells, mri or cells)
 	@mkdir -p out/samples
 	test -e $(DEMO_INPUT) || $(RUN) sample "$$SAMPLE" $(DEMO_INPUT)
 	$(WITH_ARGS) $(RUN) build $(DEMO_INPUT) --out="$$OUT" --workers="$$WORKERS" $(DEMO_ARGS) ARGS
@@ -137,8 +139,9 @@ demo: setup ## Run it all on an embedded sample (SAMPLE=cycif, brain-cells, mri 
 	$(RUN) check --deep --workers="$$WORKERS" -- "$$OUT"
 	@printf 'look at it:  make view OUT=%q\n' "$$OUT"
 
-# Make can't have a space, `%` or `:` in the name of a file. So it finds a phase's file through a link
-# to OUT, in a folder by a checksum of OUT's name; there are a link to INPUT and what was asked for, too
+# Make accepts no space, `%` or `:` in the name of a file. It therefore finds the files of a phase through
+# a link to OUT. The link lies in a folder named by a checksum of OUT, together with a link to INPUT and a
+# file of the arguments.
 PLACE := out/.make/$(firstword $(shell printf %s $(call quoted,$(OUT)) | sha256sum))
 ifneq ($(filter plan units stage bundle report,$(MAKECMDGOALS)),)
 ifeq ($(INPUT),)
@@ -152,13 +155,13 @@ $(shell mkdir -p $(PLACE); out=$(call quoted,$(OUT)) input=$(call quoted,$(INPUT
   printf '%q ' "$$input" "$$args" | cmp -s - $(PLACE)/asked || printf '%q ' "$$input" "$$args" > $(PLACE)/asked)
 endif
 
-plan: $(PLACE)/out/plan.json ## Settle what is built:  INPUT=... OUT=... [ARGS="--grid 5x2"]
-units: $(PLACE)/out/units/done.json ## ... then meshes and volumes of every tile and channel
-stage: $(PLACE)/out/stage/stage.usda ## ... then the USD stage
-bundle: $(PLACE)/out/bundle/manifest.json ## ... then the web bundle
-report: $(PLACE)/out/report/index.html ## ... then the page with pictures
+plan: $(PLACE)/out/plan.json ## Plan the build (channels, levels, tiles):  INPUT=... OUT=... [ARGS="--grid 5x2"]
+units: $(PLACE)/out/units/done.json ## Plan, and build the meshes and volumes of every tile and channel
+stage: $(PLACE)/out/stage/stage.usda ## All of the above, and the USD stage
+bundle: $(PLACE)/out/bundle/manifest.json ## All of the above, and the web bundle
+report: $(PLACE)/out/report/index.html ## All of the above, and a page with pictures
 
-# another INPUT or other ARGS make the plan anew
+# A changed INPUT or changed ARGS make the plan again.
 $(PLACE)/out/plan.json: $(PLACE)/asked $(wildcard $(PLACE)/input) | setup
 	$(WITH_ARGS) $(RUN) plan --out="$$OUT" ARGS -- "$$INPUT"
 	@touch -c $@
@@ -175,18 +178,18 @@ $(PLACE)/out/report/index.html: $(PLACE)/out/bundle/manifest.json
 	$(RUN) report -- "$$OUT"
 	@touch -c $@
 
-check: setup ## Hold OUT against schemas, USD, glTF and KTX2 rules
+check: setup ## Check OUT by its schemas and by the rules of USD, glTF and KTX2
 	$(RUN) check -- "$$OUT"
 
-view: setup ## Serve OUT's bundle on localhost and open a browser
+view: setup ## Serve the bundle of OUT on this machine and open a browser
 	$(RUN) view -- "$$OUT"
 
-serve: setup ## Serve OUT and stream its volumes by view:  OUT=... [ARGS=--lan]
+serve: setup ## Serve OUT and stream the voxels that the viewer looks at:  OUT=... [ARGS=--lan]
 	$(WITH_ARGS) $(RUN) serve ARGS -- "$$OUT"
 
-lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, code of steps, biome, tsc
+lint: $(READY) $(VIEWER_READY) ## Check style, types, imports between packages and versions of steps: ruff, mypy, biome, tsc
 	$(BIN)/ruff check pipeline tests docs
-	@# text without an encoding is read by that of the system, on Windows none of ours
+	@# Files opened without an encoding use the system's, which is not UTF-8 on Windows.
 	$(BIN)/ruff check --quiet --preview --select PLW1514 pipeline
 	$(BIN)/ruff format --check pipeline tests docs
 	$(BIN)/mypy
@@ -194,15 +197,15 @@ lint: $(READY) $(VIEWER_READY) ## ruff, mypy, layers of imports, code of steps, 
 	$(SUPPORT).step_record
 	cd $(VIEWER) && npm run --silent lint && npm run --silent typecheck
 
-record-steps: $(READY) ## Record the code that each step reaches, once you know that its VERSION is right
+record-steps: $(READY) ## Record the code that each step uses, after you have decided whether its VERSION changes
 	$(SUPPORT).step_record --write
 
-# a process for each core, and of each one thread: others would wait for one another, busily
+# One process for each core, and one thread in each. More threads would compete for the cores.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n "$$WORKERS"
 SUPPORT := PYTHONPATH=tests $(BIN)/python -m support
 VITEST := cd $(VIEWER) && npm exec --silent -- vitest run
 
-test-here: setup ## A package's tests, not the slow ones:  T=meshes; of the viewer: T=panel
+test-here: setup ## Quick tests of one package (T=meshes) or of one folder of the viewer (T=panel)
 	@found=; \
 	if [ -n "$$T" ] && [ -e "tests/$$T" ]; then found=1; code=0; $(PYTEST) -m "not slow" "tests/$$T" || code=$$?; \
 	  [ $$code != 5 ] || printf 'all tests of %s are slow: %s tests/%s runs them\n' "$$T" $(BIN)/pytest "$$T"; \
@@ -210,47 +213,49 @@ test-here: setup ## A package's tests, not the slow ones:  T=meshes; of the view
 	if [ -n "$$T" ] && [ -e "$(VIEWER)/src/$$T" ]; then found=1; $(VITEST) --project unit "src/$$T" || exit; fi; \
 	[ -n "$$found" ] || { printf 'T is %s, expected a folder of tests or of %s, as T=meshes\n' "$$T" $(VIEWER)/src >&2; exit 2; }
 
-test-fast: setup ## What takes no while: no whole builds, no malformed inputs, no browser
+test-fast: setup ## Quick tests: no whole builds, no malformed inputs, no browser
 	$(PYTEST) -m "not slow" --ignore tests/system --ignore tests/malformed
 	$(VITEST) --project unit
 
-# Side by side: browsers often wait, and then Python has the cores
-test: setup browser mono ## All tests, in headless Chromium too
+# Tests of Python and of the viewer run side by side. While a browser waits, Python uses the cores.
+test: setup browser mono ## All tests, also those in headless Chromium
 	$(MAKE) --no-print-directory -j2 test-python test-viewer
 
-# A browser is a session of its own, and Linux shares the cores between sessions before it looks at
-# who is nice in one: in CI, where nobody presses Ctrl+C, pytest gets one too, and that is nice
+# Linux shares the cores between sessions first, and applies `nice` only within a session. Browsers have a
+# session of their own. In CI pytest gets one as well, and that session yields to the browsers'. Elsewhere
+# it stays in the terminal's session, so that Ctrl+C reaches it.
 BEHIND := $(if $(CI),setsid --wait sh -c 'echo 10 > /proc/self/autogroup 2>/dev/null; exec "$$@"' behind) nice -n 10
-# Beside a browser, and behind it, a server of a test may wait longer than its client does: in CI what has
-# failed is tried once more, by itself and not behind. What is wrong is wrong twice
+# While browsers have priority, the server of a test can answer later than its client waits for. CI
+# therefore runs failed tests a second time, alone and at normal priority. A real fault fails both times.
 AGAIN := $(if $(CI),|| $(BIN)/pytest --last-failed --last-failed-no-failures none)
-# Three processes for two cores: builds, servers and clusters wait for one another, and each process
-# reads all tests first. A file's tests share what it has built, so they stay together. In a fresh clone
-# one process compiles all for the three, which would each do it, side by side
+# Three processes share two cores, because tests of builds, servers and clusters often wait. The tests of
+# one file stay in one process, because they share what they have built. In a fresh clone one process
+# compiles all test modules first. Otherwise each of the three would compile them.
 test-python: setup
 	[ -d tests/__pycache__ ] || $(BEHIND) $(BIN)/pytest --collect-only -qq > /dev/null
-	OPENBLAS_NUM_THREADS=1 $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
+	OPENBLAS_NUM_THREADS=1 STEREOCELL_MESSAGES=out/messages.md $(BEHIND) $(BIN)/pytest -n $$((WORKERS + (WORKERS + 1) / 2)) --dist loadfile --no-loadscope-reorder --durations 25 $(AGAIN)
 
-# CI has no time for all tests with two versions of Python, so the newest one gets a few: the files
-# that libraries read and write, a full disk, and the wheel by itself from a build to a .glb. pyenv's
-# Python is found even if pyenv has not activated it
+# CI has no time to run all tests with two versions of Python. The newest version therefore gets a
+# selection: files read and written by libraries, a full disk, and a build and an export to .glb by the
+# installed wheel. pyenv's Python is found even if pyenv has not activated it.
 NEWEST := 3.13
 test-newest: setup ## A few tests with Python 3.13, where it is installed (all: make test PYTHON=python3.13)
 	@for each in python$(NEWEST) "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/$(NEWEST).*/bin/python$(NEWEST); do \
 	  if "$$each" -c '' 2>/dev/null; then exec $(MAKE) --no-print-directory test-newest-here PYTHON="$$each"; fi; \
 	done; echo "test-newest: skipped: python$(NEWEST) is not installed"
 
-# These tests run beside those of another Python, so they leave its list of failed tests alone
+# These tests may run at the same time as those of another Python, so they do not write pytest's list of
+# failed tests.
 test-newest-here: setup
 	$(BEHIND) $(BIN)/pytest -p no:cacheprovider $(addprefix tests/,$(NEWEST_TESTS))
 NEWEST_TESTS := $(patsubst %,read/test_%.py,tiff bare_zarr zarr_collections number_types n5) \
   storage/test_full_disk.py system/test_empty_environment.py
 
-test-exhaustive: setup browser ## All tests, and the sweeps that `make test` takes one of each kind of
+test-exhaustive: setup browser ## All tests, with all cases of the sweeps of which `make test` runs a few
 	STEREOCELL_EXHAUSTIVE=1 $(MAKE) --no-print-directory test
 	$(MAKE) --no-print-directory torture
 
-# the demo's bundle, or of half its tiles
+# These bundles are the demo's, and one of half of its tiles.
 ifdef STEREOCELL_EXHAUSTIVE
 SHOWN := demo
 DEEP := --deep
@@ -258,7 +263,7 @@ else
 SHOWN := half
 endif
 
-# What needs no bundle of a build runs beside what does, and beside their building
+# Tests that need no built bundle run while the bundles of the other tests are built.
 test-viewer: setup browser
 	$(VITEST) --project unit
 	$(MAKE) --no-print-directory -j2 test-pages test-built
@@ -282,7 +287,7 @@ endif
 	$(SUPPORT).viewer_bundles out $(DEEP)
 	$(MAKE) --no-print-directory demo SAMPLE=mri OUT=out/mri
 
-# Blender's Python can't share .venv: it wants Python 3.11 and numpy 1
+# Blender's Python module needs Python 3.11 and numpy 1, so it gets an environment of its own.
 BLENDER := $(VENV)/blender
 export BLENDER_BASE ?= python3.11
 blender: setup
@@ -297,10 +302,10 @@ test-blender: blender browser ## The Blender add-on in headless Blender (bpy 5.0
 	  STEREOCELL_BLENDER=$(BLENDER)/bin/python $(BIN)/pytest tests/blender; \
 	else echo "test-blender: skipped: no Blender to run the add-on in"; fi
 
-# The last of the samples is real data, which isn't everywhere
+# The last sample is real data. It is left out where the folder of real volumes is missing.
 DCC_SAMPLES := cycif brain-cells mri cells
 DCC_REAL := $(wildcard $(STEREOCELL_DATA)/brain_cells_2ch/brain_cells_2ch.ome.tif)
-test-dcc: blender browser ## The samples in Storm, Blender, the add-on, three.js and Cesium; contact sheet: out/dcc/sheet.png
+test-dcc: blender browser ## Render the samples in Storm, Blender, the add-on, three.js and Cesium; pictures in out/dcc/sheet.png
 	@for sample in $(DCC_SAMPLES); do \
 	  $(MAKE) --no-print-directory demo SAMPLE=$$sample OUT=out/dcc/$$sample || exit; done
 	@[ -z "$(DCC_REAL)" ] || $(RUN) build "$(DCC_REAL)" --out=out/dcc/brain-cells-2ch --workers="$$WORKERS"
@@ -308,77 +313,78 @@ test-dcc: blender browser ## The samples in Storm, Blender, the add-on, three.js
 	  STEREOCELL_DCC="$(foreach one,$(DCC_SAMPLES) $(if $(DCC_REAL),brain-cells-2ch),$(one)=out/dcc/$(one))" \
 	  $(BIN)/pytest tests/blender/test_programs.py
 
-object-store: setup ## versitygw for the tests, by Go, which keep to moto's server without
+object-store: setup ## Install versitygw by Go, an object store for the tests (they use moto's server without it)
 	GOBIN="$$PWD/$(BIN)" go install github.com/versity/versitygw/cmd/versitygw@latest
 
-torture: setup ## 50 builds killed, evenly over their phases; all malformed inputs; 2640 changed ones
+torture: setup ## Kill 50 builds, spread over all phases, and build all malformed inputs and 2640 altered files
 	$(SUPPORT).torture 50
 	$(BIN)/python tests/malformed
 	$(BIN)/python tests/malformed/sweep.py
 
-careless: setup browser ## Ten minutes of scripted, careless use of a built bundle's page:  [OUT=out/demo] (figures in out/careless.json)
+careless: setup browser ## Use a bundle's page carelessly by script for ten minutes:  [OUT=out/demo] (figures in out/careless.json)
 	out="$$(realpath -- "$$OUT")" && report="$$PWD/out/careless.json" && cd $(VIEWER) && \
 	  STEREOCELL_TEST_BUNDLE="$$out/bundle" STEREOCELL_CARELESS_S=600 STEREOCELL_CARELESS_REPORT="$$report" \
 	  npm exec --silent -- vitest run --project built test/page/careless.built.test.ts -t asked
 
-bench: setup ## Ratios of two things in one run, medians
+bench: setup ## Compare pairs of alternatives in one run (ratios of medians)
 	$(BIN)/python tests/bench/bench.py
 
-bench-live: setup ## How soon `stereocell view SOURCE` shows a source, in which colours, and how it answers beside a build
+bench-live: setup ## Time `stereocell view SOURCE`: first picture, its colours, and answers while a build runs
 	$(BIN)/python tests/bench/live_view.py
 	$(BIN)/python tests/bench/live_color.py
 
-bench-start: setup ## How long `import stereocell` and `stereocell --help` take
+bench-start: setup ## Time `import stereocell` and `stereocell --help`
 	$(BIN)/python tests/bench/start.py
 
-bench-size: setup ## What each requirement costs on disk
+bench-size: setup ## Measure the disk space of each requirement
 	$(BIN)/python tests/bench/install_size.py
 
-bench-scale: setup ## Units a second, memory and bytes read by 4 to 32 units; the whole dataset
+bench-scale: setup ## Measure units per second, memory and bytes read for 4 to 32 units, and a whole dataset
 	$(BIN)/python tests/bench/scale.py out/bench-scale
 
-bench-scene: setup ## The paper's scene whole, 5 x 2 tiles of 194 x 512 x 512 x 3, by 1 and 2 workers and a cluster
+bench-scene: setup ## Time the paper's scene (5 x 2 tiles of 194 x 512 x 512, 3 channels) on 1 and 2 workers and a cluster
 	$(BIN)/python tests/bench/scene.py out/bench-scene
 
-bench-breadth: setup ## Many small units whole: up to 22 x 11 tiles of 64^3 x 4
+bench-breadth: setup ## Time builds of many small units: up to 22 x 11 tiles of 64^3, 4 channels
 	$(BIN)/python tests/bench/breadth.py out/bench-breadth
 
-bench-iso: setup ## Levels for a surface over the corpus, and peers; volumes of nothing
+bench-iso: setup ## Score the iso-values found on a corpus of volumes, and those of other programs; also on empty volumes
 	$(BIN)/python tests/bench/iso.py
 
-bench-level-score: setup ## A scored choice of the level beside the tests in a row, sources held out
+bench-level-score: setup ## Compare a scored choice of the iso-value with the sequence of tests, by cross-validation over sources
 	$(BIN)/python tests/bench/level_score.py
 
-bench-threshold: setup ## The adaptive threshold, Otsu's and Li's on the head phantom
+bench-threshold: setup ## Compare the adaptive threshold with Otsu's and Li's on the head phantom
 	$(BIN)/python tests/bench/threshold.py
 
-bench-tissue: setup ## Tissue classes and multi-Otsu on the head phantom
+bench-tissue: setup ## Compare tissue classes with multi-Otsu on the head phantom
 	$(BIN)/python tests/bench/tissue.py
 
-# peers have folders of their own: nothing else needs them; without them benchmarks say so
+# The other programs that benchmarks compare with have folders of their own. Benchmarks report which are
+# missing.
 PEERS := out/bench-peers
 ZMESH = test -d $(PEERS)/python || { mkdir -p $(PEERS) && $(BIN)/uv pip install --quiet --no-deps \
   --python $(BIN)/python --target $(PEERS)/python zmesh==1.15.0; } || rm -rf $(PEERS)/python
 GLTFPACK = test -d $(PEERS)/node_modules || { mkdir -p $(PEERS) \
   && npm install --silent --prefix $(PEERS) gltfpack@1.3.0; } || rm -rf $(PEERS)/node_modules
-bench-unit: setup ## A whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
+bench-unit: setup ## Time a whole unit, and meshes of the same solids by the paper's chain, VTK, gltfpack and zmesh
 	@$(ZMESH)
 	@$(GLTFPACK)
 	PYTHONPATH=$(PEERS)/python GLTFPACK=$(PEERS)/node_modules/.bin $(BIN)/python tests/bench/unit.py
 
-bench-cells: setup ## Closed surfaces of touching cells, ours and zmesh's  (ARGS=--large: some 1500 cells)
+bench-cells: setup ## Compare closed surfaces of touching cells with zmesh's  (ARGS=--large: about 1500 cells)
 	@$(ZMESH)
 	PYTHONPATH=$(PEERS)/python $(WITH_ARGS) $(BIN)/python tests/bench/cells.py out/bench-cells ARGS
 
-bench-wrap: setup ## Closing on voxels against the first paper's chain on triangles (CGAL, g++)
+bench-wrap: setup ## Compare closing holes on voxels with the first paper's chain on triangles (needs CGAL and g++)
 	$(BIN)/python tests/bench/wrap.py
 
-bench-serve: setup ## The tree of bricks, its picture by bytes, and 50 clients for a minute
+bench-serve: setup ## Measure the tree of bricks, picture quality by bytes loaded, and 50 clients for a minute
 	$(BIN)/python tests/bench/brick_curve.py
 	$(BIN)/python tests/bench/serve_load.py
 
 BENCH_VIEWER := tests/bench/viewer
-bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, and against float64
+bench-viewer: $(READY) ## Compare the ray march with vtk.js, NiiVue, three's example and a float64 reference
 	@if ! command -v npm >/dev/null; then echo "bench-viewer: skipped: no node and npm"; \
 	elif [ -z "$$CHROMIUM" ]; then echo "bench-viewer: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else \
@@ -387,29 +393,29 @@ bench-viewer: $(READY) ## The march against vtk.js, NiiVue and three's example, 
 	  && "$$OLDPWD/$(BIN)/python" bench.py "$$OLDPWD/out/bench-viewer"; \
 	fi
 
-bench-fps: setup ## Frames a second of the viewer in headless Chromium, volumes of 64^3 to 512^3, mono and stereo
+bench-fps: setup ## Measure the viewer's frames per second in headless Chromium, 64^3 to 512^3, mono and stereo
 	@mkdir -p out/samples
 	test -e out/samples/head-512.ome.tif || $(BIN)/python tests/bench/fps_volume.py out/samples/head-512.ome.tif 512
 	$(RUN) build out/samples/head-512.ome.tif --out=out/head-512 --workers="$$WORKERS" --preset mri --grid 1x1
 	@if [ -z "$$CHROMIUM" ]; then echo "bench-fps: skipped: no Chromium: make browser, or set CHROMIUM"; \
 	else out="$$PWD/out" && cd $(VIEWER) && npm run --silent bench-fps -- "$$out/bench-fps" "$$out/head-512/bundle"; fi
 
-wheel: setup out/wheel/constraints.txt ## A wheel and an sdist with the built viewer in them: out/wheel
+wheel: setup out/wheel/constraints.txt ## Make a wheel and a source distribution that contain the built viewer: out/wheel
 	$(BIN)/hatchling build -t wheel -t sdist -d out/wheel
 
-# The versions that the tests run with, for `pip install --constraint`. The hashes are left out: pip
-# would then require a hash of the wheel itself, too
+# The versions that the tests run with, for `pip install --constraint`. Hashes are left out, because pip
+# would then require a hash of the wheel as well.
 out/wheel/constraints.txt: requirements.lock
 	@mkdir -p $(@D)
 	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
 
-docs: $(READY) ## The documentation as a site: out/docs
+docs: $(READY) ## Make the documentation as a site: out/docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 notebook: setup ## Run docs/jupyter.ipynb and store it with its pictures
 	$(BIN)/python docs/run_jupyter.py
 
-lock: setup ## Resolve requirements.lock anew from pyproject.toml
+lock: setup ## Write requirements.lock again from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
 

@@ -28,6 +28,8 @@ from support.small_viewer import write_small_viewer
 # of the time; what has been read is never looked through again
 gc.disable()
 
+pytest_plugins = ["support.message_catalogue"]
+
 CHANNELS = [{"label": "Hoechst", "color": "0000FF"}, {"label": "CD31", "color": "00FF80"}]
 
 

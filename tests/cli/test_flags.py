@@ -132,5 +132,5 @@ def test_what_is_no_setting_is_told_by_its_flag(words: list[str], message: str) 
 )
 def test_an_empty_name_is_not_the_folder_in_which_one_is(words: list[str]) -> None:
     """It is a variable that a script has not set."""
-    with pytest.raises(UsageError, match="is empty, as a variable that is not set"):
+    with pytest.raises(UsageError, match="is empty, perhaps because a variable is not set"):
         _parser().parse_args(words)

@@ -74,10 +74,7 @@ def test_bytes_of_a_shell_are_named() -> None:
     words = [sys.executable, "-m", "stereocell.cli", "plan", b"\xff", "-o", "out"]
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 2
-    assert done.stderr == (
-        "stereocell: argument 2 is '\\xff', expected UTF-8: give a file with such a name another "
-        "one\n"
-    )
+    assert done.stderr == ("stereocell: argument 2 is '\\xff', expected UTF-8: rename the file\n")
 
 
 def test_settings_that_are_not_utf8_name_the_line(
@@ -118,7 +115,7 @@ def test_an_address_without_a_place_is_refused(
     address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for words in (["publish", "out", address], ["check", address], ["plan", address, "-o", "out"]):
-        assert f"is '{address}': expected a place behind it" in refusal(capsys, words)
+        assert f"is '{address}', expected more behind it" in refusal(capsys, words)
 
 
 @pytest.mark.parametrize("scale", ["1e300", "1e-300", "1e10", "1e-10"])

@@ -15,14 +15,23 @@ from stereocell.cli.__main__ import main
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "`stereocell serve` needs OUT, a source, or --inbox FOLDER"),
-        (["out", "--inbox", "box"], "found --inbox and out, expected one of them"),
-        (["out", "--inbox-gb", "2"], "--inbox-gb is for an inbox: expected --inbox FOLDER with it"),
-        (["--inbox", "box", "--preset", "ct"], "--preset is not for an inbox: leave it out"),
-        (["--inbox", "box", "--title", "Knee"], "--title is not for an inbox: leave it out"),
+        (
+            [],
+            "`stereocell serve` has nothing to show, expected a build, a volume or --inbox FOLDER",
+        ),
+        (["out", "--inbox", "box"], "--inbox and out are both given, expected one of them"),
+        (["out", "--inbox-gb", "2"], "--inbox-gb is given without --inbox FOLDER, expected both"),
+        (
+            ["--inbox", "box", "--preset", "ct"],
+            "--preset does not apply to an inbox, whose users choose in the page: leave it out",
+        ),
+        (
+            ["--inbox", "box", "--title", "Knee"],
+            "--title does not apply to an inbox, whose users choose in the page: leave it out",
+        ),
         (
             ["--inbox", "box", "--allow-frame", "https://a.example"],
-            "--allow-frame is not for an inbox: leave it out",
+            "--allow-frame does not apply to an inbox, whose users choose in the page",
         ),
     ],
 )

@@ -150,6 +150,6 @@ def test_flags_of_a_source_are_refused_for_a_build(
         assert main([command, str(tmp_path), "--channels", "CD31"]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert line == (
-            f"stereocell: --channels says how a source is read, and {tmp_path} is a build: "
-            "leave it out, or name the source"
+            f"stereocell: --channels sets how a volume is read, but {tmp_path} is a build: "
+            "leave it out, or name the volume"
         )

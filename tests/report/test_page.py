@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from stereocell.building.out_folder import OutFolder
+from stereocell.building.surface_cover import SurfaceCover
 from stereocell.cli.__main__ import main
 from stereocell.model.channel import SurfaceLevel
 from stereocell.model.errors import OutputError
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box, Tile
+from stereocell.model.unit import Cover
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.planning.channels import Channel
 from stereocell.preview.draw_slices import (
@@ -34,7 +36,8 @@ from stereocell.preview.draw_slices import (
 )
 from stereocell.report import charts, page, select_units, write_report
 from stereocell.report.facts import LodFacts, StepFacts, UnitFacts, gather, sum_up
-from stereocell.report.remarks import find_remarks
+from stereocell.report.opening import find_opening
+from stereocell.report.remarks import find_covers, find_remarks
 from stereocell.steps.unit_files import is_whole
 from support import phantoms
 
@@ -153,7 +156,7 @@ def test_field_minus_iso_value_is_zero_on_a_ramps_own_level() -> None:
 
 
 @given(st.integers(1, 400), st.integers(1, 90), st.integers(1, 80))
-def test_chosen_units_exist_once_and_stay_within_the_cap(
+def test_chosen_units_are_distinct_and_no_more_than_asked_for(
     tiles: int, channels: int, most: int
 ) -> None:
     chosen = select_units.choose_units(tiles, channels, most)
@@ -191,12 +194,12 @@ def test_thinning_out_keeps_the_share_and_all_channels() -> None:
 # --- curves
 
 
-def test_ladder_marks_what_was_taken_and_what_else_was_found() -> None:
-    svg = charts.ladder([0.0, 1.0, 0.0], taken=[0.75], others=[0.25, 2.0])
+def test_chart_marks_the_surface_s_iso_value_and_the_others() -> None:
+    svg = charts.candidates([0.0, 1.0, 0.0], taken=[0.75], others=[0.25, 2.0])
     assert svg.count('class="mark" d="M240.0,') == 1
     assert 'class="found" d="M80.0,' in svg
     assert 'class="found" d="M320.0,' in svg  # beyond the axis: at its end
-    assert "mark" not in charts.ladder([0.0, 1.0], taken=[], others=[0.5])
+    assert "mark" not in charts.candidates([0.0, 1.0], taken=[], others=[0.5])
 
 
 def test_histogram_draws_every_transfer_function() -> None:
@@ -285,7 +288,7 @@ def _write(out: Path) -> tuple[str, _Page]:
 
 @pytest.fixture(scope="module")
 def written(built: Path) -> tuple[str, _Page]:
-    """The page of it, as text and taken apart."""
+    """The page of the build, as text and as parsed HTML."""
     return _write(built)
 
 
@@ -301,7 +304,7 @@ def test_page_holds_its_pictures(written: tuple[str, _Page]) -> None:
 
 
 @pytest.mark.slow
-def test_page_tells_of_each_unit(written: tuple[str, _Page]) -> None:
+def test_page_has_slices_and_levels_of_each_unit(written: tuple[str, _Page]) -> None:
     html, parsed = written
     for channel in (NASTY, "twin", "empty"):
         for tile in ("r0_c0", "r0_c1"):
@@ -318,7 +321,7 @@ def test_page_tells_of_each_unit(written: tuple[str, _Page]) -> None:
 
 
 @pytest.mark.slow
-def test_page_says_of_each_channel_why_its_2d_function_is_empty(
+def test_page_gives_the_reason_where_a_channel_has_no_2d_function(
     built: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
@@ -348,11 +351,13 @@ def test_page_says_of_each_channel_why_its_2d_function_is_empty(
     ]
 
 
-def test_distances_are_called_as_in_stage_and_bundle(written: tuple[str, _Page]) -> None:
-    """Both of them, wherever the page goes by one."""
+def test_notes_on_distances_name_attributes_of_the_stage(
+    written: tuple[str, _Page],
+) -> None:
+    """Each note names both distances, since the page shows one and viewers use the other."""
     text, _ = written
     notes = re.findall(r'<p class="note">(.*?)</p>', text, re.DOTALL)
-    for start in ("µm off: ", "Likeness: "):
+    for start in ("Distance: ", "Similarity: "):
         [note] = [note for note in notes if note.startswith(start)]
         for word in ("stereocell:distance", "p99_um", "stereocell:largestDistance", "largest_um"):
             assert word in note
@@ -373,7 +378,7 @@ def test_same_results_give_the_same_page(built: Path) -> None:
 
 
 @pytest.mark.slow
-def test_page_with_too_many_units_shows_some_and_says_so(
+def test_page_of_many_units_shows_some_and_says_how_many(
     built: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(page, "MAX_PICTURED", 4)
@@ -381,8 +386,8 @@ def test_page_with_too_many_units_shows_some_and_says_so(
     html, parsed = _write(built)
     shown = sum(alt.startswith("Slices") for alt in parsed.alts)
     assert 0 < shown <= 4
-    assert f"Pictures of {shown} of 6 units, evenly chosen" in html
-    assert "(5 of 6 units, evenly chosen)" in html
+    assert f"{shown} of 6 pairs of a tile and a channel have pictures here, evenly chosen" in html
+    assert "(5 of 6 pairs, evenly chosen)" in html
 
 
 def test_report_before_units_names_the_command(tmp_path: Path) -> None:
@@ -391,7 +396,7 @@ def test_report_before_units_names_the_command(tmp_path: Path) -> None:
     assert not (tmp_path / "report").exists()
 
 
-def test_doubtful_units_are_remarked(built: Path) -> None:
+def test_channels_without_a_clear_surface_have_remarks(built: Path) -> None:
     facts = gather(OutFolder(built))
     assert [step.name for step in facts.steps][:2] == ["read", "volume"]
     assert all(isinstance(step, StepFacts) for step in facts.steps)
@@ -410,8 +415,8 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
             level=level,
         )
         for name, confidence, reason, level in (
-            ("CD31", "unsure", "unsure surface: so too", SurfaceLevel(100.0, None, 1.0)),
-            ("dim", "none", "no clear surface: as the test has it", None),
+            ("CD31", "unsure", "unsure surface: it is noisy", SurfaceLevel(100.0, None, 1.0)),
+            ("dim", "none", "no clear surface: nothing stands out", None),
         )
     }
     survey = {name: replace(facts.survey["empty"], appearance=look) for name, look in looks.items()}
@@ -421,17 +426,53 @@ def test_doubtful_units_are_remarked(built: Path) -> None:
         for r in find_remarks(replace(facts, units=units, survey=survey, plan=plan))
     }
     assert titles == {
-        "1 channel without a surface": ("dim: no clear surface: as the test has it",),
-        "1 channel with an unsure surface": ("CD31: unsure surface: so too",),
-        "1 unit without a surface, in channels that have some": (
+        "1 channel without a surface": ("dim: no clear surface: nothing stands out",),
+        "1 channel with an unsure surface": ("CD31: unsure surface: it is noisy",),
+        "1 tile without a surface of a channel that has one elsewhere": (
             "r0_c0/CD31: no voxel crosses the iso-value",
         ),
-        "1,200 fragments dropped": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
+        "1,200 fragments removed": ("CD31: 1,200 in 1 tile, most in r0_c0 (1,200)",),
         "3 cavities filled": ("CD31: 3 in 1 tile, most in r0_c0 (3)",),
     }
 
 
-def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
+def test_opening_says_what_was_built_how_sure_it_is_and_where_to_look(built: Path) -> None:
+    facts = gather(OutFolder(built))
+    opening = find_opening(facts, find_covers(facts.units), ())
+    name = facts.plan.name
+    assert opening.built == (
+        f"StereoCell built volumes of 3 channels and surfaces of 2 of them from {name}, in 2 tiles."
+    )
+    assert opening.certainty.startswith("The surface of twin is clear: its confidence is 0.")
+    assert opening.look_first == "Look first at empty, which has no surface."
+    assert opening.anchor == "channels"
+
+
+def test_opening_names_unsure_surfaces_and_leads_to_other_iso_values(built: Path) -> None:
+    facts = gather(OutFolder(built))
+    twin = facts.survey["twin"]
+    unsure = replace(twin, appearance=replace(twin.appearance, surface="unsure"))
+    facts = replace(facts, survey={**facts.survey, "twin": unsure})
+    opening = find_opening(facts, find_covers(facts.units), ())
+    assert opening.certainty == "1 of 1 surface is unsure: twin."
+    assert opening.look_first == (
+        "Look first at the other iso-values of twin, which may fit better."
+    )
+    assert opening.anchor == "wrong"
+
+
+def test_opening_leads_to_a_surface_that_leaves_out_voxels(built: Path) -> None:
+    facts = gather(OutFolder(built))
+    covers = {"twin": SurfaceCover(Cover(1000, 600, 700), 0)}
+    opening = find_opening(facts, covers, ())
+    assert opening.look_first == (
+        "Look first at the slices of twin, whose surface leaves out 40% of the voxels above its "
+        "iso-value."
+    )
+    assert opening.anchor == "tiles"
+
+
+def test_thin_triangles_at_the_finest_level_have_a_note(built: Path) -> None:
     angles = (13.0, 11.0, 9.5)
     units = tuple(
         _unit(
@@ -446,8 +487,8 @@ def test_thin_triangles_of_lod0_are_noted(built: Path) -> None:
     facts = replace(facts, plan=replace(facts.plan, channels=(named,), notes=()), survey=survey)
     (remark,) = find_remarks(replace(facts, units=units))
     assert remark.is_note
-    assert remark.title.startswith("1 channel with thin triangles in lod0")
-    assert remark.lines == ("CD31: 9.5° in r0_c2, 2 tiles below",)
+    assert remark.title.startswith("1 channel with thin triangles at the finest level")
+    assert remark.lines == ("CD31: 9.5° in r0_c2, and 2 tiles in all",)
     assert not find_remarks(replace(facts, units=units[:1]))
 
 
@@ -461,7 +502,7 @@ def test_each_unit_s_slowest_step_is_named(built: Path, written: tuple[str, _Pag
 
 
 @pytest.mark.slow
-def test_report_goes_without_seconds_that_were_lost(built: Path, tmp_path: Path) -> None:
+def test_report_is_written_where_times_are_missing(built: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(built, out)
     for file in (out / "units").rglob("seconds.json"):
@@ -480,10 +521,10 @@ def test_totals_take_the_worst_distance_and_angle_and_add_up_faults() -> None:
 
 
 @pytest.mark.slow
-def test_other_levels_are_shown_where_the_surface_is_or_said_to_be_out_of_sight(
+def test_iso_values_outside_the_window_are_named_without_a_contour(
     tmp_path: Path,
 ) -> None:
-    """A body in the first of three tiles, and a window that ends far below its level."""
+    """The body lies in the first of three tiles, and the window ends far below its level."""
     z, y, x = np.mgrid[:24, :24, :96]
     body = (z - 12) ** 2 + (y - 12) ** 2 + (x - 14) ** 2 < 80
     rng = np.random.default_rng(0)
@@ -497,4 +538,4 @@ def test_other_levels_are_shown_where_the_surface_is_or_said_to_be_out_of_sight(
     levels = html[html.index("What to do if this is wrong") : html.index('id="tiles"')]
     assert "tile r0_c0" in levels
     assert "tile r0_c1" not in levels
-    assert "beyond the window of 0 to 200, so without its line here" in levels
+    assert "outside the display window of 0 to 200, so its contour" in levels

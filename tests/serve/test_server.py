@@ -307,7 +307,7 @@ def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> N
 @pytest.mark.parametrize("origin", ["lab.example", "https://lab.example/page", "*", "https://a;b"])
 def test_what_is_no_origin_may_not_frame(origin: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["serve", "out", "--allow-frame", origin]) == 2
-    assert "is no origin, expected a scheme and a host" in capsys.readouterr().err
+    assert "is not an origin, expected a scheme and a host" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,13 @@
-"""Check that comments, docstrings, messages, labels and docs are in plain English.
+"""Check that comments, docstrings, messages, labels, test names and docs are in plain English.
 
     python -m tests.support.prose [--count] [FILE ...]
 
-Without files, every file of the repository is checked. A hit is printed as FILE:LINE, the rule and the
-sentence, and ends the check with exit code 1. `--count` prints the texts and hits of each folder.
+Without files, every file of the repository is checked. A hit is printed as FILE:LINE, the rule and
+the sentence, and ends the check with exit code 1. `--count` prints texts and hits of each folder.
 
-The rules are those that a program can hold: how a sentence begins, words of the glossary that have a
-better one, and how long a sentence is. The prose linter vale has the same kinds of rule. It is not used
-because its package fetches a program from the web when it first runs, and because it reads neither the
-messages of Python and TypeScript nor GLSL.
+A program can judge how a sentence begins, which words it has and how long it is. The linter vale
+has the same kinds of rule. It is not used: its package fetches a program from the web when it
+first runs, and it reads neither messages in Python and TypeScript nor GLSL.
 """
 
 import ast
@@ -23,162 +22,149 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-Text = tuple[int, str]  # line in the file, counted from 1; text without its marks
-
-MAX_WORDS = 30  # of a sentence of a comment, docstring or message
+MAX_WORDS = 30  # of a sentence
 MAX_AVERAGE_WORDS = 18.0  # of the sentences of a page of docs
+SHORTEST_MESSAGE = 4  # words; shorter strings of code are names and keys
 NO_SUBJECT = re.compile(
-    r"^(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of|so that|as said)\b"
+    r"(what|whatever|who|whoever|whose|whom|which|of|those|one more|none of|the same of)\b"
     r"(?!.*\?$)",
     re.IGNORECASE,
 )
 NO_NOUN = re.compile(
-    r"^(it|they|them|these|both|neither|either)\b(?! (of|the|a|an)\b)", re.IGNORECASE
+    r"(it|they|them)\b|(these|both|neither|either)(,| (is|are|was|were|have|has|do|can|would)\b)",
+    re.IGNORECASE,
 )
-WORDS = {  # word that a reader stumbles over: word to write
-    r"anew": "again",
-    r"once more": "again",
+WORDS = {  # words that readers stumble over, and what to write
+    r"anew|once more": "again",
     r"by turns": "alternately",
     r"at hand": "available",
     r"(told|said) in vain": "ignored",
     r"(held|holds?|holding) against": "compare with",
-    r"(is|are|was|were) (told|bidden)": "is reported, is printed, is passed",
+    r"(is|are|was|were|be) (told|bidden)": "report, print, pass",
     r"frayed|frays": "noisy",
     r"given up|gives? up|gave up": "abandoned, stopped",
     r"spoil(t|s|ed)?": "damaged",
     r"rungs?|ladders?": "level, levels",
     r"strands?": "segment",
-    r"thereof|therein|whereof|wherein|hither|thither|henceforth|else's": "plain words",
-    r"ere|nought|naught|lest|amid|betwixt|unto": "plain words",
+    r"thereof|therein|whereof|wherein|hither|thither|henceforth": "plain words",
+    r"nought|naught|lest|amid|betwixt|unto": "plain words",
     r"no more of|nothing of it|none of it": "plain words",
 }
 STUMBLES = [(re.compile(rf"\b({old})\b", re.IGNORECASE), new) for old, new in WORDS.items()]
-ALLOWED = {  # path: words of the sentence that may stay, at most ten lines
-}
+ALLOWED: dict[str, str] = {}  # file: start of a sentence that may stay; at most ten
+# A sentence ends at a full stop, a blank line, a colon at the end of a line, before an item of a
+# list, and before the row of an argument such as "bins  number of bins"
+ENDS = re.compile(
+    r"(?<=[.!?])\s+(?=[A-Z`])|\n\s*\n|:\s*\n|\n(?=\s*([-*]|\d+\.) |\s*@|\s*[\w.`,*/= -]+? {2,}\w)"
+)
+QUOTED = r"\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`"
+COMMENT_OR_STRING = re.compile(rf"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/|{QUOTED}", re.DOTALL)
 
 
-def _python(source: str) -> Iterator[Text]:
-    lines: list[Text] = []
+def _python(source: str) -> Iterator[tuple[int, str]]:
+    blocks: list[tuple[int, str]] = []
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT and not re.match(r"#( type:| noqa|!)", token.string):
-            text = token.string.lstrip("#: ")
-            is_whole_line = not token.line[: token.start[1]].strip()
-            if (
-                lines
-                and is_whole_line
-                and lines[-1][0] + lines[-1][1].count("\n") + 1 == token.start[0]
-            ):
-                lines[-1] = (lines[-1][0], f"{lines[-1][1]}\n{text}")
-            else:
-                lines.append((token.start[0], text))
-    yield from lines
-    for node in ast.walk(ast.parse(source)):
+            line, text = token.start[0], token.string.lstrip("#: ")
+            is_alone = not token.line[: token.start[1]].strip()
+            if is_alone and blocks and blocks[-1][0] + blocks[-1][1].count("\n") + 1 == line:
+                line, text = blocks[-1][0], f"{blocks.pop()[1]}\n{text}"
+            blocks.append((line, text))
+    yield from blocks
+    tree = ast.parse(source)
+    inside = {id(p) for n in ast.walk(tree) if isinstance(n, ast.JoinedStr) for p in n.values}
+    for node in (node for node in ast.walk(tree) if id(node) not in inside):
         match node:
             case ast.FunctionDef(name=name) if name.startswith("test_"):
                 yield node.lineno, name.removeprefix("test_").replace("_", " ")
-            case ast.Constant(value=str(text)) if text.count(" ") >= 3:
+            case ast.Constant(value=str(text)) if text.count(" ") >= SHORTEST_MESSAGE - 1:
                 yield node.lineno, text
             case ast.JoinedStr(values=parts):
-                text = "".join(str(p.value) if isinstance(p, ast.Constant) else "X" for p in parts)
-                if text.count(" ") >= 3:
-                    yield node.lineno, text
+                words = (str(p.value) if isinstance(p, ast.Constant) else "X" for p in parts)
+                yield node.lineno, "".join(words)
 
 
-TOKENS = re.compile(
-    r"//[^\n]*(?:\n[ \t]*//[^\n]*)*|/\*.*?\*/|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`",
-    re.DOTALL,
-)
-
-
-def _typescript(source: str) -> Iterator[Text]:
-    for found in TOKENS.finditer(source):
+def _typescript(source: str) -> Iterator[tuple[int, str]]:
+    for found in COMMENT_OR_STRING.finditer(source):
         text = re.sub(r"\$\{[^}]*\}", "X", found[0])
         if text[0] == "/":
             text = re.sub(r"(?m)^\s*(//+|/\*+|\*+/|\*) ?|\*/|<[^>]*>", "", text)
-        elif text.count(" ") < 3 or "<" in text or "\n" in text:
+        elif text.count(" ") < SHORTEST_MESSAGE - 1 or "<" in text or "\n" in text:
             continue
         yield source.count("\n", 0, found.start()) + 1, text.strip("\"'`")
 
 
-def _markdown(source: str) -> Iterator[Text]:
-    hide = lambda found: re.sub(r"[^\n]", "", found[0])  # noqa: E731 - line numbers stay as they are
-    source = re.sub(r"(?ms)^```.*?^```|^\|.*?$|^#.*?$|<!--.*?-->|^---.*?^---", hide, source)
-    source = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", source)
-    for found in re.finditer(r"(?:(?!\n\s*\n|\n\s*(?:[-*]|\d+\.) ).)+", source, re.DOTALL):
-        yield source.count("\n", 0, found.start()) + 1, re.sub(r"^\s*([-*]|\d+\.) ", "", found[0])
+def _matches(source: str, pattern: str, marks: str = "$^") -> Iterator[tuple[int, str]]:
+    for found in re.finditer(pattern, source):
+        yield source.count("\n", 0, found.start()) + 1, re.sub(marks, "", found[0])
 
 
-def _hash_comments(source: str) -> Iterator[Text]:
-    for found in re.finditer(
-        r"(?m)^[\t @]*#[^!\n]*(?:\n[\t @]*#[^\n]*)*|(?<=\s)##? [^\n]*$", source
-    ):
-        yield source.count("\n", 0, found.start()) + 1, re.sub(r"(?m)^[\t @]*#+ ?", "", found[0])
+def _markdown(source: str) -> Iterator[tuple[int, str]]:
+    code = r"(?ms)^```.*?^```|^\|.*?$|^#.*?$|<!--.*?-->|^---.*?^---"
+    source = re.sub(code, lambda found: re.sub(r"[^\n]", "", found[0]), source)
+    yield from _matches(re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", source), r"(?s)(?:(?!\n\s*\n).)+")
 
 
-def _schema(source: str) -> Iterator[Text]:
-    for found in re.finditer(r'"(?:title|description)": ("(?:[^"\\]|\\.)*")', source):
-        yield source.count("\n", 0, found.start()) + 1, json.loads(found[1])
+def _hash_comments(source: str) -> Iterator[tuple[int, str]]:
+    return _matches(source, r"(?m)(^[\t @]*#[^!\n]*\n?)+|(?<=\s)##? [^\n]*$", r"(?m)^[\t @]*#+ ?")
+
+
+def _schema(source: str) -> Iterator[tuple[int, str]]:
+    for line, text in _matches(source, r'"(title|description)": "(?:[^"\\]|\\.)*"'):
+        yield line, json.loads(f"{{{text}}}").popitem()[1]
 
 
 READERS = {
-    ".py": _python,
-    **dict.fromkeys(
-        (".ts", ".mjs", ".glsl", ".frag", ".vert", ".cs", ".hlsl", ".shader"), _typescript
-    ),
-    ".md": _markdown,
-    **dict.fromkeys((".toml", ".yml", "Makefile"), _hash_comments),
-    ".json": _schema,
+    (".py",): _python,
+    (".ts", ".mjs", ".glsl", ".frag", ".vert", ".cs", ".hlsl", ".shader"): _typescript,
+    (".md",): _markdown,
+    (".toml", ".yml", ".yaml", "Makefile", "Containerfile"): _hash_comments,
+    (".schema.json",): _schema,
 }
 
 
-def sentences(text: str) -> Iterator[str]:
-    """Yield the sentences of a text: one for each full stop, blank line or heading."""
-    text = re.sub(r"`[^`]*`", "code", text)
-    for part in re.split(r"(?<=[.!?])\s+(?=[A-Z`])|\n\s*\n|:\s*\n", text):
-        if one := " ".join(part.split()):
-            yield one
+def _sentences(text: str) -> list[str]:
+    parts = ENDS.split(re.sub(r"`[^`]*`", "code", text))
+    return [" ".join(part.split()) for part in parts if part and part.strip(" \n-*")]
 
 
-def hits(path: str, text: str) -> Iterator[tuple[str, str]]:
-    """Yield the rule and the sentence of each hit of one text."""
-    for number, one in enumerate(sentences(text)):
-        if NO_SUBJECT.search(one):
-            yield "no subject", one
-        elif number == 0 and NO_NOUN.search(one):
-            yield "a pronoun without a noun", one
-        for stumble, better in STUMBLES:
-            if stumble.search(one):
-                yield f"{stumble.pattern} (write: {better})", one
-        if len(one.split()) > MAX_WORDS and "=" not in one:
-            yield f"{len(one.split())} words, at most {MAX_WORDS}", one
+def hits(name: str, text: str) -> Iterator[str]:
+    """Yield the rule and the sentence of each hit in one text of a file."""
+    for number, one in enumerate(_sentences(text)):
+        if name in ALLOWED and one.startswith(ALLOWED[name]):
+            continue
+        if NO_SUBJECT.match(one):
+            yield f"no subject: {one}"
+        elif number == 0 and NO_NOUN.match(one):
+            yield f"a pronoun without a noun: {one}"
+        elif len(one.split()) > MAX_WORDS and not re.search(r"=|doi\b", one):
+            yield f"{len(one.split())} words, at most {MAX_WORDS}: {one}"
+        yield from (
+            f"'{w[0]}', write {new}: {one}" for old, new in STUMBLES if (w := old.search(one))
+        )
 
 
 def main(arguments: list[str]) -> int:
-    is_count = "--count" in arguments
+    """Print the hits, or their number in each folder, and return the exit code."""
     names = [name for name in arguments if name != "--count"]
-    if not names:
-        names = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).split("\n")
+    names = names or subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).split()
     texts, found = Counter[str](), Counter[str]()
     for name in names:
-        reader = next((r for end, r in READERS.items() if name.endswith(end)), None)
-        if reader is None or name.endswith(("package.json", "package-lock.json")):
-            continue
-        room = "/".join(
-            Path(name).parts[:3]
-            if len(Path(name).parts) > 3
-            else Path(name).parts[:2][:-1] or ["."]
-        )
-        for line, text in reader((ROOT / name).read_text("utf-8")):
-            texts[room] += 1
-            for rule, sentence in hits(name, text):
-                found[room] += 1
-                if not is_count:
-                    print(f"{name}:{line}: {rule}: {sentence[:160]}")
-    if is_count:
-        for room in sorted(texts):
-            print(f"{room:40} {texts[room]:6} texts {found[room]:5} hits")
-        print(f"{'all':40} {sum(texts.values()):6} texts {sum(found.values()):5} hits")
-    return int(bool(found))
+        room = "/".join(Path(name).parts[:-1][:3])
+        for reader in (reader for ends, reader in READERS.items() if name.endswith(ends)):
+            of_file = list(reader((ROOT / name).read_text("utf-8")))
+            lines = [f"{name}:{line}: {hit}" for line, text in of_file for hit in hits(name, text)]
+            sizes = [len(one.split()) for _, text in of_file for one in _sentences(text)]
+            if name.endswith(".md") and sum(sizes) > MAX_AVERAGE_WORDS * len(sizes):
+                lines.append(f"{name}: {sum(sizes) / len(sizes):.1f} words a sentence on average")
+            texts[room] += len(of_file)
+            found[room] += len(lines)
+            if "--count" not in arguments:
+                print(*(line[:240] for line in lines), sep="\n", end="\n" if lines else "")
+    for room in sorted(texts) if "--count" in arguments else ():
+        print(f"{room or '.':42} {texts[room]:6} texts {found[room]:5} hits")
+    print(f"prose: {found.total()} hits in {texts.total()} texts")
+    return int(found.total() > 0)
 
 
 if __name__ == "__main__":

@@ -37,7 +37,10 @@ def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 @pytest.mark.parametrize(
     ("flags", "message"),
     [
-        (["--grid", "2x1", "--tile-size", "8,8,8"], "--grid and --tile-size both say how to cut"),
+        (
+            ["--grid", "2x1", "--tile-size", "8,8,8"],
+            "--grid and --tile-size both set the size of tiles",
+        ),
         (["--channels="], "--channels is '', expected names or indices"),
         (["--channels", ","], "--channels is ',', expected names or indices"),
         (["--channels", "0,,1"], "--channels is '0,,1', expected names or indices"),
@@ -240,4 +243,4 @@ def test_an_answer_for_which_there_is_no_space_is_an_error_of_one_line(flags: li
 
 def test_a_port_that_there_is_not_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "out/mine", "--port", "99999"]) == 2
-    assert "'99999' is no port, expected 0 to 65535" in capsys.readouterr().err
+    assert "'99999' is not a port, expected 0 to 65535" in capsys.readouterr().err

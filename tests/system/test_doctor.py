@@ -70,8 +70,8 @@ def test_where_no_package_is_installed_they_are_named_without_a_traceback(tmp_pa
     assert {"numpy", "zarr", "usd-core", "vtk"} <= set(re.findall(r"[\w-]+", packages))
     for name in ("settings", "plan"):
         assert re.fullmatch(
-            r"stereocell: the package \w+ is missing: install StereoCell anew; "
-            r"`stereocell doctor` lists what else is\n",
+            r"stereocell: the package \w+ is missing: install StereoCell again "
+            r"\(`stereocell doctor` lists all missing packages\)\n",
             told[name][1],
         )
     assert not (tmp_path / "out").exists()
@@ -93,7 +93,7 @@ def test_what_is_needed_fails(
     assert main(["doctor"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("missing packages: zarr is ")
-    assert ", expected >=99; no-such-package is missing: what needs them fails" in lines[1]
+    assert ", expected >=99; no-such-package is missing: commands that need them fail" in lines[1]
     told = "\n".join(lines)
     assert "without memory: 1.0 GiB available: 0 workers" in told
     assert "without disk: 3.0 GiB free in this folder: a large build may not fit" in told
@@ -122,7 +122,7 @@ def test_a_folder_that_is_gone_does_not_end_the_looks(
     (tmp_path / "gone").rmdir()
     assert main(["doctor"]) == 0
     told = capsys.readouterr().out
-    assert "without disk: No such file or directory: not looked at\n" in told
+    assert "without disk: No such file or directory: can't be examined\n" in told
     assert "GPU" in told
 
 

@@ -260,7 +260,7 @@ def test_interrupted_bundle_stops_at_once_and_leaves_nothing_half_written(
     finally:
         bundle.kill()
     assert bundle.returncode == code, printed
-    assert printed.endswith("stereocell: stopped; the same command goes on from here\n")
+    assert printed.endswith("stereocell: stopped; the same command continues from here\n")
     assert "Traceback" not in printed
     assert not list(out.glob(".bundle*"))
     assert not (out / "bundle").exists()

@@ -18,36 +18,38 @@ from stereocell.engine.interrupts import Terminated, answering_sigterm
 from stereocell.model.errors import StereoCellError, UsageError
 from stereocell.storage.processes import require_address_space, shortage
 
-_GARBAGE_AFTER = 20_000  # new containers; at 700, as in Python, a tenth of a short command
+_GARBAGE_AFTER = (
+    20_000  # new objects between collections; at Python's 700, they take a tenth of the time
+)
 EXIT_CODES = """exit codes:
-  0    done; `view`, `serve`: stopped
-  1    an error, told in one line; `check`: something is wrong; `doctor`: what is needed is missing
+  0    success
+  1    an error, reported in one line; `check`: a check failed; `doctor`: a required part is missing
   2    wrong usage
-  130  stopped by Ctrl+C: the same command goes on from there
-  141  who read the answer went away, as `| head` does
-  143  stopped by SIGTERM, likewise"""
+  130  stopped by Ctrl+C; the same command continues
+  141  the reader of the output stopped reading, as `| head` does
+  143  stopped by SIGTERM; the same command continues"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code: 0, 1 for an error, 2 for wrong usage."""
+    """Run one command and return its exit code; see EXIT_CODES."""
     gc.set_threshold(_GARBAGE_AFTER, *gc.get_threshold()[1:])
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):  # characters that its encoding lacks are escaped
+        if isinstance(stream, TextIOWrapper):  # escape characters that the encoding lacks
             stream.reconfigure(errors="backslashreplace")
     try:
         return _main(sys.argv[1:] if arguments is None else arguments)
     except commands.StdoutLost as lost:
-        # Python would try to flush stdout again at exit
+        # Python flushes stdout again at exit, which would fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         error = lost.error
     if isinstance(error, BrokenPipeError):
-        return 141  # as shells report a program that SIGPIPE ends
+        return 141  # the code that shells report for SIGPIPE
     print(f"stereocell: stdout: {error.strerror or error}", file=sys.stderr)
     return 1
 
 
 def _main(words: Sequence[str]) -> int:
-    options = argparse.Namespace(json="--json" in words)  # until the arguments are parsed
+    options = argparse.Namespace(json="--json" in words)  # replaced once the words are parsed
     try:
         options = parse(words)
         with answering_sigterm():
@@ -57,13 +59,13 @@ def _main(words: Sequence[str]) -> int:
         return _fail(options, _line_of(options, error), code)
     except KeyboardInterrupt as stop:
         code = 143 if isinstance(stop, Terminated) else 130
-        return _fail(options, "stopped; the same command goes on from here", code)
+        return _fail(options, "stopped; the same command continues from here", code)
 
 
 def _line_of(options: argparse.Namespace, error: Exception) -> str:
-    """Return one line for an error of the input or a lack of this machine.
+    """Return one line for an error that a user can mend, such as a damaged file or a full disk.
 
-    All other errors are bugs, and raised again.
+    All other errors are bugs and are raised again.
     """
     if isinstance(error, StereoCellError):
         from stereocell.storage.shell_commands import fill_in
@@ -72,8 +74,10 @@ def _line_of(options: argparse.Namespace, error: Exception) -> str:
     if words := shortage(error):
         return words
     if isinstance(error, ModuleNotFoundError):
-        told = f"the package {error.name} is missing: install StereoCell anew"
-        return f"{told}; `stereocell doctor` lists what else is"
+        return (
+            f"the package {error.name} is missing: install StereoCell again "
+            "(`stereocell doctor` lists all missing packages)"
+        )
     if type(error).__module__ == "pxr.Tf":
         from stereocell.usd.typed_values import one_line
 
@@ -90,9 +94,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
 
 
 def run_to_line(options: argparse.Namespace) -> str:
-    """Run a command behind another one, and return the line of its error; empty: it went well.
+    """Run a command inside another one, and return its error in one line; empty: success.
 
-    Raises KeyboardInterrupt where it is stopped.
+    Raises KeyboardInterrupt if the command is stopped.
     """
     try:
         with answering_sigterm():
@@ -111,13 +115,13 @@ def _fail(options: argparse.Namespace, line: str, code: int) -> int:
 
 
 def _shortened(line: str) -> str:
-    """Cut the middle out of very long lines."""
+    """Return lines of which the middle is cut out if they are very long."""
     lines = commands.plain(line).split("\n")
     return "\n".join(one if len(one) < 1200 else f"{one[:700]} ... {one[-400:]}" for one in lines)
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Run a command; one that writes into OUT locks it: storage/lock.py, workspace.py."""
+    """Run a command. A command that writes into OUT locks it first."""
     out, name = getattr(options, "out", None), options.command
     options.shown, options.is_source = out, False
     if name in SHOWERS and commands.is_inbox(options):
@@ -141,7 +145,7 @@ def _run(options: argparse.Namespace) -> int:
                 from stereocell.storage.location import Location
 
                 shown = Location.of(out).shown
-                raise UsageError(f"OUT is {shown}, expected a folder or file of this machine")
+                raise UsageError(f"OUT is {shown}, expected a folder or a file on this machine")
             from stereocell.storage.workspace import opened
 
             is_writer = name in WRITERS
@@ -163,7 +167,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _given_places(options: argparse.Namespace) -> dict[str, str]:
-    """Return the places that the words of a command name, by the words that remedies have."""
+    """Return INPUT and TARGET of a command, to be filled into the remedies of messages."""
     from stereocell.storage.shell_commands import as_shown
 
     given = {"INPUT": getattr(options, "input", None), "TARGET": getattr(options, "target", None)}
@@ -171,14 +175,17 @@ def _given_places(options: argparse.Namespace) -> dict[str, str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports errors as the commands do: in a line, and in JSON where requested."""
+    """Reports errors as commands do, in one line, and in JSON with --json."""
 
     def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message}; `{self.prog} --help` says what there is")
+        raise UsageError(f"{message}; `{self.prog} --help` lists all flags")
 
 
 def _parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
-    """Return the parser of all commands; `words`: only of those among them the flags are needed."""
+    """Return the parser of all commands.
+
+    words  declare the flags of the commands among these words alone, which is faster; None: all
+    """
     parser = _Parser(
         prog="stereocell",
         description="Turn a multi-channel volume into a USD stage, a web bundle and a stereo view.",
@@ -200,38 +207,38 @@ def _parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             if PLACES[name].writes:
                 command.add_argument("--force", action="store_true", help=FORCE)
         command.set_defaults(handler=handler, command=name)
-        told = "one JSON object" if name not in SHOWERS else "JSON objects, one a line,"
-        command.add_argument("--json", action="store_true", help=f"answer with {told} on stdout")
+        form = "one JSON object" if name not in SHOWERS else "JSON objects, one per line,"
+        command.add_argument("--json", action="store_true", help=f"print {form} on stdout")
     return parser
 
 
 COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], Handler]] = {
     "build": (
-        "do all of it: plan, units, stage, bundle, report",
+        "build everything: plan, units, stage, bundle and report",
         "build my.ome.zarr -o out/mine --preset cycif --grid 5x2",
         flags.declare_build,
         commands.build,
     ),
     "plan": (
-        "settle what is built: level, region, tiles, channels",
+        "plan a build: resolution level, region, tiles and channels",
         "plan my.ome.tif -o out/mine --channels CD31,MART1",
         flags.declare_input,
         commands.plan,
     ),
     "iso": (
-        "look at one tile's iso-value: slices with the contours of every candidate",
+        "draw slices of one tile with the contours of all iso-values found",
         "iso my.ome.zarr --channel CD31 --tile r0_c0 -o cd31.png --preset cycif --grid 5x2",
         flags.declare_iso,
         commands.iso,
     ),
     "slices": (
-        "write 8-bit PNG slices of one channel, the right way up, with a JSON of places and window",
+        "write upright 8-bit PNG slices of one channel, and a JSON file of positions and window",
         "slices scans/head -o out/slices --preset mri --plane axial",
         flags.declare_slices,
         commands.slices,
     ),
     "units": (
-        "find iso-values, build meshes and volumes of every tile and channel",
+        "find iso-values, and build meshes and volumes of every tile and channel",
         "units out/mine --workers 4 --only r0_c3/CD31",
         flags.declare_units,
         commands.one_phase("units"),
@@ -243,7 +250,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.one_phase("stage"),
     ),
     "bundle": (
-        "export the web bundle from the composed USD stage",
+        "write the web bundle from the composed USD stage",
         "bundle out/mine --stage edited.usda",
         flags.declare_bundle,
         commands.one_phase("bundle"),
@@ -255,7 +262,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.export,
     ),
     "publish": (
-        "put the bundle on a web host, and hold what it sends against every hash",
+        "put the bundle on a web host, and check every file that the host sends",
         "publish out/mine s3://bucket/mine",
         flags.declare_publish,
         commands.publish,
@@ -267,37 +274,37 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
         commands.one_phase("report"),
     ),
     "tissue": (
-        "find tissue classes, and build each as a channel of probabilities",
+        "find tissue classes, and build the probability of each as a channel",
         "tissue out/head --classes 3",
         flags.declare_tissue,
         commands.tissue,
     ),
     "check": (
-        "hold everything that was written against its format's rules, and (--deep) its source",
+        "check all files by the rules of their formats, and with --deep by their source",
         "check out/mine --deep",
         flags.declare_check,
         commands.check,
     ),
     "view": (
-        "show a build, or a source that is built meanwhile, in a browser; --lan: on phones, too",
+        "show a build in a browser, or a volume while it is built; --lan: on phones too",
         "view my.ome.tif; stereocell view out/mine --lan",
         flags.declare_view,
         commands.view,
     ),
     "serve": (
-        "serve a build, or a source at once, here or (--lan) to phones",
+        "serve a build, or a volume while it is built, without opening a browser",
         "serve out/mine --lan",
         flags.declare_serve,
         commands.serve,
     ),
     "sample": (
-        "write a sample volume, with no network",
+        "write a sample volume; no network is needed",
         "sample cycif demo.ome.zarr --grid 5x2 --seed 1",
         flags.declare_sample,
         commands.sample,
     ),
     "doctor": (
-        "look what this machine has for the work, and what each missing thing costs",
+        "list the parts of this machine that StereoCell uses, and what is missing",
         "doctor",
         flags.declare_nothing,
         commands.doctor,
@@ -310,9 +317,9 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None], H
     ),
 }
 
-# Commands that write into OUT: one of them at a time
+# Commands that write into OUT, one at a time
 WRITERS = frozenset({"build", "plan", "units", "stage", "bundle", "report", "tissue"})
-# Commands that read an OUT on object storage -> the part that is fetched first; "": all of it
+# Commands that can read an OUT on object storage, and the folder to fetch first; "": all of OUT
 READERS = {
     "check": "",
     "export": "stage",
@@ -320,7 +327,7 @@ READERS = {
     "view": "bundle",
     "serve": "bundle",
 }
-# Commands that show a build, or a source that is not built
+# Commands that show a build or a source
 SHOWERS = frozenset({"view", "serve"})
 # Commands that import no large library
 LIGHT = frozenset({"settings", "doctor"})

@@ -1,4 +1,4 @@
-"""Build a source behind the page that shows it: `build` with the flags of `view`, in a process."""
+"""Build a source in a process of its own, while `view` or `serve` shows it."""
 
 import argparse
 from collections.abc import Callable
@@ -12,27 +12,27 @@ from stereocell.read.addresses.resolve import remember, resolve
 from stereocell.read.addresses.resolved import Resolved
 from stereocell.storage.processes import cores
 
-RunToLine = Callable[[argparse.Namespace], str]  # returns the line of an error; empty: it went well
+RunToLine = Callable[[argparse.Namespace], str]  # returns an error in one line; empty: success
 
 
 def build_behind(
     options: argparse.Namespace, handler: Callable[[argparse.Namespace], object]
 ) -> Callable[[Path, Watch], str]:
-    """Return the build of a source, with the flags that `view` or `serve` has been given.
+    """Return a function that builds the source with the flags of `view` or `serve`.
 
-    handler  of the command `build`
+    handler  the handler of the command `build`
 
-    It is called with OUT and is watched, in a process of its own: it is picklable, and so is all
-    that it holds. It returns the line of its error; empty: it went well.
+    The function takes OUT and a watcher of its progress, and returns its error in one line; empty:
+    success. It runs in a process of its own, so it and all its values can be pickled.
     """
     build = {"command": "build", "handler": handler, "input": str(options.out), "force": False}
-    found = resolve(str(options.out))  # what was fetched is not fetched again
+    found = resolve(str(options.out))  # fetched data is not fetched again
     return partial(_build, {**vars(options), **build}, found)
 
 
 def _build(given: dict[str, Any], found: Resolved, out: Path, watch: Watch) -> str:
-    # by its name: where Python runs the command's module, that is called __main__, which names
-    # another module in this process
+    # The module is imported by name. In the first process it is called __main__, and that name
+    # means another module here.
     run: RunToLine = import_module("stereocell.cli.__main__").run_to_line
     remember(str(given["input"]), found)
     given = {**given, "out": out, "workers": cores(), "scheduler": "", "watch": watch}

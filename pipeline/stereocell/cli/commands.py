@@ -1,8 +1,8 @@
-"""The commands' work and their answers.
+"""Run the commands and print their answers.
 
-Lines for people are printed as they come. With --json they are not, and the answer's data is
-printed as one JSON object at the end. Progress and errors go to stderr either way. Heavy imports
-are lazy, so that --help is quick.
+Lines for people are printed at once. With --json these lines are left out, and one JSON object is
+printed at the end. Progress and errors always go to stderr. Large libraries are imported inside of
+functions, so that --help is quick.
 """
 
 import argparse
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """data: for machines; code: the exit code."""
+    """The answer of a command: data for --json, and the exit code."""
 
     data: Mapping[str, Any] = field(default_factory=dict)
     code: int = 0
@@ -36,7 +36,7 @@ Handler = Callable[[argparse.Namespace], Answer]
 
 
 class StdoutLost(Exception):
-    """The answer can't be printed: stdout accepts no more. `error` has the reason."""
+    """The answer can't be printed, because stdout is closed or full. `error` has the reason."""
 
     def __init__(self, error: OSError) -> None:
         super().__init__(error)
@@ -58,14 +58,14 @@ def print_unless_json(options: argparse.Namespace, text: str) -> None:
 
 
 def plain(text: str) -> str:
-    """Escape control characters of file names and contents for a terminal; keep line ends."""
+    """Escape control characters, which names and contents of files may have; keep line ends."""
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
     )
 
 
 def with_given_names(options: argparse.Namespace, text: str) -> str:
-    """Return a text with long names that were given cut, and their line breaks escaped."""
+    """Return a text in which long names from the command line are cut, and line breaks escaped."""
     for given in map(str, vars(options).values()):
         shown = shortened(given).replace("\n", "\\n")
         if shown != given:
@@ -81,13 +81,13 @@ def answer(options: argparse.Namespace, found: Answer) -> int:
 
 
 def to_json(data: Mapping[str, Any]) -> str:
-    """Return one line of JSON, in its own characters where stdout can print them, else escaped."""
+    """Return one line of JSON. Characters that stdout can't print are escaped."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=False)
     return text if _can_be_printed(text) else json.dumps(data, allow_nan=False)
 
 
 def _can_be_printed(text: str) -> bool:
-    """Return whether stdout can encode the text, and a terminal can show it."""
+    """Return whether stdout can encode the text and a terminal can show it."""
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
@@ -96,7 +96,7 @@ def _can_be_printed(text: str) -> bool:
 
 
 def _as_given(options: argparse.Namespace, text: str) -> str:
-    """Name an OUT on object storage by its address, not by its working folder, in one line."""
+    """Return a text in which an OUT on object storage has its address, not its local folder."""
     text = with_given_names(options, text)
     is_kept = isinstance(getattr(options, "shown", None), str)
     return text.replace(str(options.out), options.shown.rstrip("/")) if is_kept else text
@@ -114,7 +114,7 @@ def settings(options: argparse.Namespace) -> Answer:
 
 
 def _series(options: argparse.Namespace) -> Answer | None:
-    """List the series of a source if the user requested only that."""
+    """List the series of a source, if --series is `list`."""
     if options.series != "list":
         return None
     from stereocell import read
@@ -133,7 +133,7 @@ def plan(options: argparse.Namespace) -> Answer:
 
 
 def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
-    """Write the plan; with the workers of all other phases, where these follow at once."""
+    """Write the plan. `engine` has the workers of the phases that follow, if any do."""
     from stereocell.building import phases
     from stereocell.planning.preset_choice import load_for
 
@@ -156,7 +156,7 @@ def _plan(options: argparse.Namespace, engine: "Engine | None") -> Answer:
 
 
 def iso(options: argparse.Namespace) -> Answer:
-    """Write the picture of one tile's iso-value and print the candidates."""
+    """Write a picture of one tile's iso-values, and print them."""
     if listed := _series(options):
         return listed
     from stereocell.planning.preset_choice import load_for, print_choice
@@ -176,7 +176,7 @@ def iso(options: argparse.Namespace) -> Answer:
 
 
 def run_phases(options: argparse.Namespace, *names: str) -> Answer:
-    """Run phases of a build in order and print their times."""
+    """Run phases of a build, in the given order."""
     out, engine = _workers_of(options)
     try:
         return _run_phases(options, out, engine, names)
@@ -185,18 +185,18 @@ def run_phases(options: argparse.Namespace, *names: str) -> Answer:
 
 
 def _workers_of(options: argparse.Namespace) -> "tuple[Path, Engine]":
-    """Return OUT as the workers reach it, and the workers. Raises UsageError."""
+    """Return OUT by a path that the workers can use, and the workers. Raises UsageError."""
     from stereocell.engine.run import Engine
     from stereocell.storage.claim import LOCK
 
     scheduler, edited = getattr(options, "scheduler", ""), getattr(options, "stage", None)
-    is_kept = isinstance(options.shown, str)  # on object storage: workers open it by themselves
+    is_kept = isinstance(options.shown, str)  # OUT is on object storage, and workers open it
     if is_kept and edited:
         raise UsageError(
-            f"--stage {edited}: {options.shown} is on object storage, expected OUT in a folder: "
-            "copy its stage/ there"
+            f"--stage is {edited}, but OUT is {options.shown}, on object storage; expected OUT in "
+            "a folder: copy the build there"
         )
-    out = options.out.absolute() if scheduler else options.out  # workers may have another folder
+    out = options.out.absolute() if scheduler else options.out  # workers may run in another folder
     shared = None if is_kept else out / LOCK
     watch = getattr(options, "watch", None)
     return out, Engine(getattr(options, "workers", 0), scheduler, shared, watch)
@@ -217,7 +217,9 @@ def _run_phases(
             edited, is_strict = (getattr(options, name, None) for name in ("stage", "strict"))
             phases.run_bundle(out, engine, stage=edited, is_strict=bool(is_strict))
         else:
-            from stereocell.report import phase  # slow to import: it draws
+            from stereocell.report import (
+                phase,
+            )  # imported here, since drawing needs large libraries
 
             engine.watch("report", 0, 1, "")
             phase.run_report(out)
@@ -316,7 +318,7 @@ def tissue(options: argparse.Namespace) -> Answer:
 
 
 def check(options: argparse.Namespace) -> Answer:
-    """Check the results; the exit code is 1 where a check fails."""
+    """Check the results. The exit code is 1 if a check fails."""
     from stereocell.storage.shell_commands import fill_in
     from stereocell.verify.formats import check as run
 
@@ -333,7 +335,7 @@ def _deep(options: argparse.Namespace) -> "Iterator[CheckLine]":
     from stereocell.engine.run import Engine
     from stereocell.verify.deep import check_deep
 
-    out = options.out.absolute()  # workers may have another folder
+    out = options.out.absolute()  # workers may run in another folder
     is_kept = isinstance(options.shown, str)
     engine = Engine(options.workers, options.scheduler, None if is_kept else out / "plan.json")
     try:
@@ -395,7 +397,7 @@ def publish(options: argparse.Namespace) -> Answer:
 
 
 def doctor(options: argparse.Namespace) -> Answer:
-    """Examine this machine; the exit code is 1 where a needed part is missing."""
+    """Examine this machine. The exit code is 1 if a required part is missing."""
     from stereocell.cli.doctor import examine
 
     found = []
@@ -411,7 +413,7 @@ def doctor(options: argparse.Namespace) -> Answer:
 
 def view(options: argparse.Namespace) -> Answer:
     """Serve a bundle and open it in a browser."""
-    # on the LAN every browser needs the code that is shown here
+    # With --lan every browser needs the code that the terminal shows, so none is opened here.
     return _serve(options, not (options.no_browser or options.lan))
 
 
@@ -422,7 +424,7 @@ def serve(options: argparse.Namespace) -> Answer:
 
 def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
     def run(folder: Path, live: "Live | None" = None) -> None:
-        from stereocell.serve.server import serve  # while a source is read for its first view
+        from stereocell.serve.server import serve  # imported while the source is read
 
         serve(
             folder,
@@ -443,27 +445,33 @@ def _serve(options: argparse.Namespace, open_browser: bool) -> Answer:
         else:
             _require_no_source_flags(options)
             run(options.out)
-    except BrokenPipeError as error:  # the reader of the address has gone
+    except BrokenPipeError as error:  # the program that reads the address has ended
         raise StdoutLost(error) from error
     return Answer()
 
 
 def is_inbox(options: argparse.Namespace) -> bool:
-    """Return whether an inbox is served. Raises UsageError where not one thing is named."""
+    """Return whether an inbox is served.
+
+    Raises UsageError unless the command names one of OUT, a source and an inbox.
+    """
     if options.inbox is None:
         if options.out is None:
             raise UsageError(
-                f"`stereocell {options.command}` needs OUT, a source, or --inbox FOLDER"
+                f"`stereocell {options.command}` has nothing to show, expected a build, a volume "
+                "or --inbox FOLDER"
             )
         if options.inbox_gb is not None:
-            raise UsageError("--inbox-gb is for an inbox: expected --inbox FOLDER with it")
+            raise UsageError("--inbox-gb is given without --inbox FOLDER, expected both")
         return False
     if options.out is not None:
-        raise UsageError(f"found --inbox and {options.out}, expected one of them")
+        raise UsageError(f"--inbox and {options.out} are both given, expected one of them")
     given = _source_flags(options)
     if given or options.allow_frame:
         first = [*given, "--allow-frame"][0]
-        raise UsageError(f"{first} is not for an inbox: leave it out; people choose in the page")
+        raise UsageError(
+            f"{first} does not apply to an inbox, whose users choose in the page: leave it out"
+        )
     return True
 
 
@@ -486,13 +494,13 @@ def serve_inbox(options: argparse.Namespace) -> Answer:
             open_browser=may_open,
             for_program=options.json,
         )
-    except BrokenPipeError as error:  # the reader of the address has gone
+    except BrokenPipeError as error:  # the program that reads the address has ended
         raise StdoutLost(error) from error
     return Answer()
 
 
 def _source_flags(options: argparse.Namespace) -> list[str]:
-    """Return the flags that were given and that say how a source is read and built."""
+    """Return the given flags that apply to a source alone, not to a build."""
     given = given_flags(options)
     if options.no_build:
         given.append("--no-build")
@@ -504,16 +512,16 @@ def _source_flags(options: argparse.Namespace) -> list[str]:
 
 
 def _require_no_source_flags(options: argparse.Namespace) -> None:
-    """Raise UsageError for flags that say how a source is read, where a build is shown."""
+    """Raise UsageError if a flag for sources is given with a build."""
     if given := _source_flags(options):
         raise UsageError(
-            f"{given[0]} says how a source is read, and {options.shown} is a build: leave it out, "
-            "or name the source"
+            f"{given[0]} sets how a volume is read, but {options.shown} is a build: leave it out, "
+            "or name the volume"
         )
 
 
 def _show_source(options: argparse.Namespace, run: "Callable[[Path, Live | None], None]") -> None:
-    """Serve the first view of a source that is not built, and build it behind the page."""
+    """Serve the first view of a source, and build the source meanwhile."""
     from stereocell.cli.build_behind import build_behind
     from stereocell.live.show_source import Behind, show_source
     from stereocell.planning.preset_choice import load_for

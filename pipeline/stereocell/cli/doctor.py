@@ -1,4 +1,4 @@
-"""The parts of this machine that builds need, the missing ones, and the cost of each lack."""
+"""Examine the parts of this machine that StereoCell uses, and what a missing part costs."""
 
 import os
 import platform
@@ -17,19 +17,19 @@ from stereocell.storage.assets import viewer_dist
 from stereocell.storage.processes import available_bytes, cores
 
 _GIB = 1 << 30
-UNIT_BYTES = 3.5 * _GIB  # memory planned for a unit of 194 x 512 x 512 voxels
-_MIN_FREE = 20 * _GIB  # bytes of free disk
-_NODE = "20.19"  # oldest version of Node.js
+UNIT_BYTES = 3.5 * _GIB  # bytes of memory that a unit of 194 x 512 x 512 voxels may take
+_MIN_FREE = 20 * _GIB  # bytes of free disk space below which a large build may not fit
+_NODE = "20.19"  # oldest version of Node.js that the validators run with
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "safari", "open")
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One part that was looked for.
+    """One examined part of this machine.
 
-    found      the part, or the finding in its place
-    cost       the loss without it; empty where it is present
-    is_needed  whether nothing can be built without it
+    found      what was found, such as a version
+    cost       what does not work without the part; empty if it is present
+    is_needed  whether nothing can be built without the part
     """
 
     name: str
@@ -40,28 +40,30 @@ class Finding:
 
 
 def examine() -> Iterator[Finding]:
-    """Yield the findings, one after another. Changes nothing on this machine."""
+    """Yield the findings one after another, and change nothing on this machine."""
     for look in LOOKS:
         try:
             found = look()
             yield from found if isinstance(found, list) else [found]
-        except ImportError as error:  # the line of the packages names the missing ones
+        except ImportError as error:  # the finding `packages` names what is missing
             name = look.__name__.strip("_")
-            yield Finding(name, False, str(error), "not looked at: install StereoCell anew")
-        except OSError as error:  # a folder that is gone or unreadable
+            yield Finding(name, False, str(error), "can't be examined: install StereoCell again")
+        except OSError as error:  # a folder was removed or can't be read
             name = look.__name__.strip("_")
-            yield Finding(name, False, error.strerror or str(error), "not looked at")
+            yield Finding(name, False, error.strerror or str(error), "can't be examined")
 
 
 def _python() -> Finding:
     found = f"{platform.python_implementation()} {platform.python_version()}"
     ok = sys.version_info >= (3, 11)
-    return _finding("Python", ok, found, "nothing runs: 3.11 or newer is needed", is_needed=True)
+    return _finding(
+        "Python", ok, found, "nothing works: install Python 3.11 or newer", is_needed=True
+    )
 
 
 def _packages() -> Finding:
-    """Check the packages that StereoCell requires, by their metadata; nothing is imported."""
-    cost = "what needs them fails: install StereoCell anew"
+    """Check the packages that StereoCell requires, by their metadata and without imports."""
+    cost = "commands that need them fail: install StereoCell again"
     try:
         from packaging.requirements import Requirement
     except ImportError:
@@ -94,22 +96,20 @@ def _lacks(name: str) -> bool:
 
 def _cores() -> Finding:
     found = cores()
-    return _finding(
-        "cores", found > 1, str(found), "units are built one after another, not side by side"
-    )
+    return _finding("cores", found > 1, str(found), "units are built one after another")
 
 
 def _memory() -> Finding:
     available = available_bytes()
     workers = int(available // UNIT_BYTES)
     found = f"{available / _GIB:.1f} GiB available: {workers} workers on tiles of 194 x 512 x 512"
-    return _finding("memory", workers >= 1, found, "smaller tiles are needed (--tile-size)")
+    return _finding("memory", workers >= 1, found, "builds need smaller tiles (--tile-size)")
 
 
 def _disk() -> Finding:
     free = shutil.disk_usage(Path.cwd()).free
     found = f"{free / _GIB:.1f} GiB free in this folder"
-    cost = "a large build may not fit: some 0.2 GB for each tile of 194 x 512 x 512 and channel"
+    cost = "a large build may not fit: a channel of a tile of 194 x 512 x 512 takes about 0.2 GB"
     return _finding("disk", free >= _MIN_FREE, found, cost)
 
 
@@ -119,24 +119,24 @@ def _temporary() -> Finding:
             pass
     except OSError as error:
         return _finding(
-            "temporary folder", False, str(error), "reports and JPEG in DICOM fail: set TMPDIR"
+            "temporary folder", False, str(error), "reports and DICOM with JPEG fail: set TMPDIR"
         )
-    return _finding("temporary folder", True, "can be written", "")
+    return _finding("temporary folder", True, "writable", "")
 
 
 def _viewer() -> Finding:
     folder = viewer_dist()
-    cost = "bundles get no page of their own: `make setup` builds it (Node 20.19), wheels bring it"
+    cost = "bundles have no page: build the viewer by `make setup`, or install a wheel"
     return _finding("viewer", folder is not None, "built" if folder else "not built", cost)
 
 
 def _browser() -> Finding:
     named = os.environ.get("BROWSER") or os.environ.get("CHROMIUM") or ""
-    # BROWSER is a list of commands, possibly with arguments
+    # BROWSER is a list of commands, which may have arguments.
     names = [one.split()[0] for one in named.split(os.pathsep) if one.strip()] or _BROWSERS
     found = next((name for name in names if shutil.which(name)), "")
-    lacking = f"BROWSER names {named}, which is not there" if named else "none on the PATH"
-    cost = "`stereocell view` opens no window here: open its address on another machine (--lan)"
+    lacking = f"BROWSER is {named}, which does not exist" if named else "not on the PATH"
+    cost = "`stereocell view` opens no window: open its address on another machine (--lan)"
     return _finding("browser", bool(found), found or lacking, cost)
 
 
@@ -144,16 +144,16 @@ def _node() -> Finding:
     from packaging.version import InvalidVersion, Version
 
     path = shutil.which("node")
-    cost = "`stereocell check` can't run the validators of glTF and KTX2; viewing needs none"
+    cost = "`stereocell check` can't run the validators of glTF and KTX2"
     if path is None:
-        return _finding("Node.js", False, "none on the PATH", cost)
+        return _finding("Node.js", False, "not on the PATH", cost)
     try:
         answer = subprocess.run(
             [path, "--version"], capture_output=True, encoding="utf-8", timeout=20
         )
         there = Version(answer.stdout.strip())
     except (subprocess.TimeoutExpired, InvalidVersion):
-        return _finding("Node.js", False, f"{path} does not tell its version", cost)
+        return _finding("Node.js", False, f"{path} does not print its version", cost)
     is_new = there >= Version(_NODE)
     found = f"{there} at {path}" + ("" if is_new else f", expected {_NODE} or newer")
     return _finding("Node.js", is_new, found, cost)
@@ -162,13 +162,13 @@ def _node() -> Finding:
 def _gpu() -> Finding:
     devices = sorted(str(path) for path in Path("/dev").glob("dri/render*"))
     devices += sorted(str(path) for path in Path("/dev").glob("nvidia[0-9]*"))
-    found = ", ".join(devices) or "none seen"
-    cost = "nothing in building; a browser on this machine draws in software, slowly"
+    found = ", ".join(devices) or "none found"
+    cost = "builds do not need it, but a browser on this machine draws slowly"
     return _finding("GPU", bool(devices), found, cost)
 
 
 def _formats() -> list[Finding]:
-    """Check the libraries that formats need beyond StereoCell's own."""
+    """Check the optional libraries of file formats."""
     from stereocell.read.known_formats import known_formats
 
     rows = known_formats().values()
@@ -177,16 +177,16 @@ def _formats() -> list[Finding]:
 
 
 def _extra(name: str, work: str, *modules: str) -> Callable[[], Finding]:
-    """Return the check of an extra.
+    """Return the check of one of StereoCell's extras.
 
-    work     the commands that need the extra, in words
-    modules  names of the modules that it installs
+    work     what needs the extra, for a sentence
+    modules  names of the modules that the extra installs
     """
 
     def look() -> Finding:
         missing = [module for module in modules if find_spec(module) is None]
         found = f"{', '.join(missing)} not installed" if missing else "installed"
-        cost = f"optional, {work} (pip install 'stereocell[{name}]')"
+        cost = f"optional, needed {work} (pip install 'stereocell[{name}]')"
         return _finding(f"extra {name}", not missing, found, cost)
 
     return look
@@ -208,11 +208,11 @@ LOOKS: tuple[Callable[[], Finding | list[Finding]], ...] = (
     _node,
     _gpu,
     _formats,
-    _extra("alpha-wrap", "for `--wrap alpha-wrap` alone", "pymeshlab"),
-    _extra("draco", "to export .precomputed and Draco's .glb", "DracoPy"),
-    _extra("maps", "for UVs and baked maps (`--maps`) alone", "xatlas", "alktx2"),
-    _extra("notebook", "for `stereocell.show` alone", "anywidget", "IPython", "traitlets"),
-    _extra("onnx", "for `stereocell tissue --model` alone", "onnxruntime"),
+    _extra("alpha-wrap", "for `--wrap alpha-wrap`", "pymeshlab"),
+    _extra("draco", "to export .precomputed, and .glb with Draco", "DracoPy"),
+    _extra("maps", "for UVs and baked maps (`--maps`)", "xatlas", "alktx2"),
+    _extra("notebook", "for `stereocell.show` in notebooks", "anywidget", "IPython", "traitlets"),
+    _extra("onnx", "for `stereocell tissue --model`", "onnxruntime"),
     _extra("tables", "to read tables in Parquet", "pyarrow"),
     _extra("video", "to export .mp4 and .webm", "imageio_ffmpeg"),
 )

@@ -1,4 +1,4 @@
-"""The flags of each command, and what they say as settings."""
+"""Declare the flags of each command, and turn them into settings."""
 
 import argparse
 import re
@@ -14,9 +14,11 @@ from stereocell.model.settings import AUTO, Flag
 from stereocell.model.titles import MAX_TITLE
 from stereocell.storage.processes import cores
 
+NUMBERS = {int: "whole number", float: "number"}
+
 
 def declare_input(parser: argparse.ArgumentParser) -> None:
-    """Declare what is read, and the OUT folder that is written."""
+    """Declare INPUT, how it is read, and OUT."""
     declare_source(parser)
     _declare_title(parser)
     parser.add_argument(
@@ -29,14 +31,14 @@ def _declare_title(parser: Any) -> None:
         "--title",
         type=_title,
         metavar="TEXT",
-        help="name of the specimen in stage and page (default: by the source)",
+        help="name of the specimen in the stage and the page (default: the name of the source)",
     )
 
 
 def _title(text: str) -> str:
     if not text.strip() or not text.isprintable() or len(text) > MAX_TITLE:
         raise argparse.ArgumentTypeError(
-            f"{text!r:.40} is no title, expected 1 to {MAX_TITLE} printable characters"
+            f"{text!r:.40} is not a title, expected 1 to {MAX_TITLE} printable characters"
         )
     return text.strip()
 
@@ -49,25 +51,26 @@ def declare_slices(parser: argparse.ArgumentParser) -> None:
         "--plane",
         choices=["acquired", "axial", "coronal", "sagittal", "xy", "xz", "yz"],
         default="acquired",
-        help="which planes: as the source's own images lie (default), of a patient axial, coronal "
-        "or sagittal, of microscopy xy, xz or yz",
+        help="planes to write: those of the source's own images (default); axial, coronal or "
+        "sagittal of a patient; xy, xz or yz of microscopy",
     )
 
 
 def declare_source(parser: argparse.ArgumentParser) -> None:
-    """Declare INPUT and how it is read: series, channels, spacing, time."""
+    """Declare INPUT and how it is read and built."""
     parser.add_argument(
         "input",
         type=_named,
-        help="a path: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of planes (TIFF, "
-        "PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, MRC, MGH, CZI, "
-        "...; or an http(s):// or s3:// address of OME-Zarr, TIFF or N5",
+        help="path of a volume: OME-Zarr, TIFF, DICOM (a folder or a file), NIfTI, a folder of "
+        "planes (TIFF, PNG, JPEG, BMP), Imaris, HDF5 (FILE.h5:/KEY), netCDF, MATLAB 7.3, NRRD, "
+        "MRC, MGH, CZI and others (docs/own-data.md); or an http(s):// or s3:// address of "
+        "OME-Zarr, TIFF or N5",
     )
     declare_how_to_read(parser)
 
 
 def declare_how_to_read(parser: argparse.ArgumentParser) -> None:
-    """Declare how a source is read and what is built of it: preset, channels, spacing, time."""
+    """Declare how a source is read and built: preset, channels, spacing, time."""
     declare_settings(parser)
     plan = parser.add_argument_group("what to build")
     for flag, _, field in _settings():
@@ -102,8 +105,8 @@ def _settings() -> Iterator[tuple[Flag, tuple[str, ...], Field[Any]]]:
 
 
 def as_typed(options: argparse.Namespace, line: str) -> str:
-    """Return an error's line with flags in place of the settings that were given by them."""
-    if not hasattr(options, "spacing_um"):  # a command without a source
+    """Return an error's line in which settings that came from flags are named by their flags."""
+    if not hasattr(options, "spacing_um"):  # the command reads no source
         return line
     from stereocell.planning.setting_names import in_flags
 
@@ -111,7 +114,7 @@ def as_typed(options: argparse.Namespace, line: str) -> str:
 
 
 def given_flags(options: argparse.Namespace) -> list[str]:
-    """Return the flags, among those that say how a source is read and built, that were given."""
+    """Return the given flags that say how a source is read and built."""
     names = ["--preset", "--config", *(flag.name for flag, _, _ in _settings())]
     return [name for name in names if getattr(options, _attribute(name)) is not None]
 
@@ -125,24 +128,24 @@ def declare_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
         type=_worker_count,
-        default="cores",  # counted only where it is not given
-        help="worker processes; 0 runs inline (default: the cores that it may run on)",
+        default="cores",  # counted later, and only if the flag is not given
+        help="number of worker processes; 0 uses this process (default: the number of cores)",
     )
     parser.add_argument(
         "--scheduler",
         default="",
         metavar="ADDRESS|FILE",
-        help="a running Dask cluster instead: tls://host:8786, or its scheduler file",
+        help="use a running Dask cluster: tls://host:8786, or its scheduler file",
     )
 
 
 def declare_out(parser: argparse.ArgumentParser) -> None:
-    """Declare OUT, an existing build."""
+    """Declare OUT, the folder of a build that exists."""
     parser.add_argument("out", type=_place, help="folder of a build, or its s3:// address")
 
 
 def _place(text: str) -> Path | str:
-    """Return a local path, or an address as it is."""
+    """Return a local path, or an address unchanged."""
     scheme, mark, path = _named(text).partition("://")
     if not mark:
         return Path(text)
@@ -150,15 +153,15 @@ def _place(text: str) -> Path | str:
 
 
 def _named(text: str) -> str:
-    """Return a name as it is; an empty one would mean the folder in which the command runs."""
+    """Return a name unchanged, and refuse an empty one, which would mean the working folder."""
     if not text:
         raise argparse.ArgumentTypeError(
-            "is empty, as a variable that is not set: expected a name (. is this folder)"
+            "is empty, perhaps because a variable is not set; expected a name (. is this folder)"
         )
     scheme, mark, place = text.partition("://")
     if mark and not (place if scheme == "file" else place.strip("/")):
         raise argparse.ArgumentTypeError(
-            f"is {text!r}: expected a place behind it, as {scheme}://bucket/specimen"
+            f"is {text!r}, expected more behind it, as {scheme}://bucket/specimen"
         )
     return text
 
@@ -179,7 +182,7 @@ def _count(text: str) -> int:
 
 def _port(text: str) -> int:
     if not text.isdecimal() or int(text) > 0xFFFF:
-        raise argparse.ArgumentTypeError(f"{text!r} is no port, expected 0 to 65535")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port, expected 0 to 65535")
     return int(text)
 
 
@@ -187,7 +190,7 @@ def _origin(text: str) -> str:
     found = re.fullmatch(r"https?://[a-z0-9.-]+(:\d{1,5})?", text.rstrip("/"), re.IGNORECASE)
     if found is None:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no origin, expected a scheme and a host, such as https://lab.example"
+            f"{text!r} is not an origin, expected a scheme and a host, such as https://lab.example"
         )
     return found.group().lower()
 
@@ -196,19 +199,19 @@ def _number_or_auto(kind: type[int] | type[float], text: str) -> float | str:
     try:
         return text if text == AUTO else kind(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"invalid {kind.__name__} value: {text!r}") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a {NUMBERS[kind]}") from None
 
 
 def _series(text: str) -> int | str:
     if text == "list":
         return text
     if not text.isdecimal() or int(text) < 1:
-        raise UsageError(f"--series is {text!r}, expected a number from 1, or `list` to see them")
+        raise UsageError(f"--series is {text!r}, expected a number from 1, or `list` to print them")
     return int(text)
 
 
 def _listed(flag: Flag, kind: type, text: str) -> list[Any]:
-    """Return the values between commas: names, or three numbers."""
+    """Return the values of a list with commas: names, or three numbers."""
     if kind is not str:
         return numbers(text, kind, flag.name)
     values = [value.strip() for value in text.split(",")]
@@ -218,7 +221,7 @@ def _listed(flag: Flag, kind: type, text: str) -> list[Any]:
 
 
 def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
-    """Return three numbers between commas. Raises UsageError."""
+    """Return the three numbers of a list with commas. Raises UsageError."""
     try:
         values = [kind(part) for part in text.split(",")]
     except ValueError:
@@ -229,8 +232,8 @@ def numbers(text: str, kind: type[int] | type[float], flag: str) -> list[Any]:
 
 
 def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
-    """Return a channel and what is given for it."""
-    if flag.form.endswith("[=PATH]"):  # a path may hold anything
+    """Return a channel and the value given for it. Raises UsageError."""
+    if flag.form.endswith("[=PATH]"):  # the path may contain any character, also `=`
         name, _, value = text.partition("=")
         if not name or text.endswith("="):
             raise UsageError(f"{flag.name} is {text!r}, expected {flag.form}")
@@ -247,15 +250,18 @@ def _pair(flag: Flag, kind: type, text: str) -> tuple[str, Any]:
 
 
 def _number_or_text(text: str) -> float | str:
-    """Return a number, or a text of a number and more, as 162+b. Raises ValueError."""
+    """Return a number, or the text of a number above the background, as 162+b.
+
+    Raises ValueError for any other text.
+    """
     number, plus, more = text.partition("+")
     return text if float(number) == float(number) and plus and more else float(text)
 
 
 def flags_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the flags as the TOML's sections and keys. Raises UsageError."""
+    """Return the given flags as sections and keys of the settings. Raises UsageError."""
     if options.grid is not None and options.tile_size is not None:
-        raise UsageError("--grid and --tile-size both say how to cut, expected one of them")
+        raise UsageError("--grid and --tile-size both set the size of tiles, expected one of them")
     given: dict[str, Any] = {}
     for flag, place, _ in _settings():
         value = getattr(options, _attribute(flag.name))
@@ -273,14 +279,16 @@ def flags_of(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def declare_settings(parser: argparse.ArgumentParser) -> None:
-    """Declare presets, the settings file and a flag a setting."""
+    """Declare --preset and --config."""
     from stereocell.planning.settings import preset_names
 
     presets = ", ".join(preset_names())
     parser.add_argument(
-        "--preset", help=f"{presets}, none, or a TOML file of your own (default: by the input)"
+        "--preset", help=f"{presets}, none, or your own TOML file (default: chosen by the input)"
     )
-    parser.add_argument("--config", type=_file, help="settings (see `stereocell settings`)")
+    parser.add_argument(
+        "--config", type=_file, help="TOML file of settings (see `stereocell settings`)"
+    )
 
 
 def declare_build(parser: argparse.ArgumentParser) -> None:
@@ -292,10 +300,18 @@ def declare_build(parser: argparse.ArgumentParser) -> None:
 def declare_iso(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `iso`."""
     declare_source(parser)
-    parser.add_argument("--channel", required=True, metavar="X", help="by name or index, as CD31")
-    parser.add_argument("--tile", required=True, help="as a build names it: r0_c0")
     parser.add_argument(
-        "-o", "--out", type=_place, metavar="PNG", help="default: iso_CHANNEL_TILE.png here"
+        "--channel", required=True, metavar="X", help="channel, by its name or its index, as CD31"
+    )
+    parser.add_argument(
+        "--tile", required=True, help="tile, by the name that a build gives it, as r0_c0"
+    )
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=_place,
+        metavar="PNG",
+        help="picture to write (default: iso_CHANNEL_TILE.png in this folder)",
     )
 
 
@@ -303,7 +319,9 @@ def declare_units(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `units`."""
     declare_out(parser)
     declare_workers(parser)
-    parser.add_argument("--only", metavar="TILE/CHANNEL", help="build one unit, as r0_c3/CD31")
+    parser.add_argument(
+        "--only", metavar="TILE/CHANNEL", help="build one channel of one tile alone, as r0_c3/CD31"
+    )
 
 
 def declare_stage(parser: argparse.ArgumentParser) -> None:
@@ -316,11 +334,11 @@ def declare_bundle(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `bundle`."""
     declare_out(parser)
     declare_workers(parser)
-    parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
+    parser.add_argument("--stage", type=_file, help="an edited stage to use instead of OUT/stage")
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="write nothing, and fail, where an edit is not taken over",
+        help="fail, and write nothing, if an edit of the stage can't be taken over",
     )
 
 
@@ -331,10 +349,12 @@ def declare_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--deep",
         action="store_true",
-        help="also hold the stage against its source, and the bundle against the stage",
+        help="also compare the stage with its source, and the bundle with the stage",
     )
     parser.add_argument(
-        "--stage", type=_file, help="what the bundle was exported from, instead of OUT/stage"
+        "--stage",
+        type=_file,
+        help="the stage that the bundle was exported from, if it is not OUT/stage",
     )
 
 
@@ -343,32 +363,35 @@ def declare_tissue(parser: argparse.ArgumentParser) -> None:
     declare_out(parser)
     declare_workers(parser)
     parser.add_argument(
-        "--classes", metavar="N|auto", help="how many (default auto: by the volume itself)"
+        "--classes", metavar="N|auto", help="number of classes (default auto: found in the volume)"
     )
     parser.add_argument(
-        "--channel", default="", metavar="X", help="learn from this one, by name or index"
+        "--channel", default="", metavar="X", help="channel to learn from, by its name or its index"
     )
     parser.add_argument(
-        "--model", type=_file, metavar="FILE.onnx", help="a network of your own (docs/tissue.md)"
+        "--model",
+        type=_file,
+        metavar="FILE.onnx",
+        help="your own network, used instead of learning (docs/tissue.md)",
     )
     parser.add_argument(
         "--model-seconds",
         type=float,
         default=300,
         metavar="S",
-        help="longest time for one patch of the network, in s (default %(default)s)",
+        help="longest time that the network may take for one patch, in s (default %(default)s)",
     )
     parser.add_argument(
         "--model-memory-gb",
         type=float,
         default=4,
         metavar="GB",
-        help="most memory for the network, in GB (default %(default)s)",
+        help="largest memory that the network may use, in GB (default %(default)s)",
     )
     parser.add_argument(
         "--everywhere",
         action="store_true",
-        help="learn in all that isn't background; by default in MR inside the brain alone",
+        help="learn from everything but the background (default in MR: from the brain alone)",
     )
 
 
@@ -377,7 +400,7 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", choices=["cycif", "brain-cells", "mri", "cells"])
     parser.add_argument("out", type=_place, metavar="OUT", help="file or folder to write")
     parser.add_argument(
-        "--seed", type=int, default=0, help="cycif, mri: another seed, another block or noise"
+        "--seed", type=int, default=0, help="seed of the random numbers of cycif, mri and cells"
     )
     cycif = parser.add_argument_group("cycif")
     cycif.add_argument(
@@ -385,7 +408,10 @@ def declare_sample(parser: argparse.ArgumentParser) -> None:
     )
     cycif.add_argument("--tile-size", default="48,96,96", help="z,y,x (default %(default)s)")
     cycif.add_argument(
-        "--brightness-spread", type=float, default=1.0, help="cells are up to 1 + this as bright"
+        "--brightness-spread",
+        type=float,
+        default=1.0,
+        help="the brightest cell is 1 + this times as bright as the darkest (default %(default)s)",
     )
 
 
@@ -402,13 +428,18 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         type=_place,
         nargs="?",
         metavar="OUT|SOURCE",
-        help="folder of a build, or its s3:// address; or a source: all that `build` takes",
+        help="folder of a build, or its s3:// address; or a volume, as `build` reads it",
     )
-    parser.add_argument("--port", type=_port, default=8000, help="default 8000; 0: any free one")
+    parser.add_argument(
+        "--port",
+        type=_port,
+        default=8000,
+        help="port of the server (default 8000; 0: any free port)",
+    )
     parser.add_argument(
         "--lan",
         action="store_true",
-        help="also for phones in this network: TLS, and a QR code that lets one device in",
+        help="serve phones in this network too: TLS, and a QR code that lets one device in",
     )
     parser.add_argument(
         "--allow-frame",
@@ -416,26 +447,26 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="ORIGIN",
-        help="a page of this origin (https://lab.example) may hold the viewer in a frame; may be "
+        help="let pages of this origin (https://lab.example) embed the viewer in a frame; can be "
         "given several times",
     )
-    inbox = parser.add_argument_group("an inbox, without OUT|SOURCE")
+    inbox = parser.add_argument_group("an inbox, in place of OUT|SOURCE")
     inbox.add_argument(
         "--inbox",
         type=_file,
         metavar="FOLDER",
-        help="a page on which people hand in files or an address, look, and build; FOLDER keeps "
-        "uploads and builds (docs/inbox.md)",
+        help="serve a page on which people upload files or enter an address, look and build; "
+        "FOLDER keeps uploads and builds (docs/inbox.md)",
     )
     inbox.add_argument(
         "--inbox-gb",
         type=_positive,
         metavar="GB",
-        help="largest upload, in GB, and what its archive unpacks to (default 50)",
+        help="largest upload, packed and unpacked, in GB (default 50)",
     )
-    behind = parser.add_argument_group("a source")
+    behind = parser.add_argument_group("a volume that is not built")
     behind.add_argument(
-        "--no-build", action="store_true", help="only look: don't build the source behind the page"
+        "--no-build", action="store_true", help="only show the volume, and build nothing meanwhile"
     )
     behind.add_argument(
         "-o",
@@ -443,8 +474,8 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
         dest="build_out",
         type=_file,
         metavar="OUT",
-        help="folder of the build (default: NAME.stereocell here, by the specimen's name; beside "
-        "the source where that is the working folder)",
+        help="folder of the build (default: NAME.stereocell in this folder, by the specimen's "
+        "name; beside the volume if this folder is the volume)",
     )
     _declare_title(behind)
     declare_how_to_read(parser)
@@ -453,87 +484,104 @@ def declare_serve(parser: argparse.ArgumentParser) -> None:
 def declare_export(parser: argparse.ArgumentParser) -> None:
     """Declare the flags of `export`."""
     declare_out(parser)
-    parser.add_argument("file", type=_file, metavar="FILE", help="what to write, by its ending")
-    parser.add_argument("--channels", type=_names, default=(), metavar="A,B", help="these alone")
     parser.add_argument(
-        "--tiles", type=_names, default=(), metavar="r0_c0,r0_c1", help="these alone"
+        "file", type=_file, metavar="FILE", help="file to write; its ending chooses the format"
     )
-    parser.add_argument("--region", metavar="x0:x1,y0:y1,z0:z1", help="in um, as the stage has it")
-    parser.add_argument("--stage", type=_file, help="an edited stage, instead of OUT/stage")
+    parser.add_argument(
+        "--channels", type=_names, default=(), metavar="A,B", help="write these channels alone"
+    )
+    parser.add_argument(
+        "--tiles", type=_names, default=(), metavar="r0_c0,r0_c1", help="write these tiles alone"
+    )
+    parser.add_argument(
+        "--region", metavar="x0:x1,y0:y1,z0:z1", help="write this box alone, in um of the stage"
+    )
+    parser.add_argument("--stage", type=_file, help="an edited stage to use instead of OUT/stage")
     parser.add_argument(
         "--strict",
         action="store_const",
         const=True,
-        help="write nothing, and fail, where an edit is left out",
+        help="fail, and write nothing, if an edit of the stage would be left out",
     )
     surfaces = parser.add_argument_group("surfaces")
     surfaces.add_argument("--lod", type=_count, help="level of detail (default 0: the finest)")
     surfaces.add_argument(
-        "--max-triangles", type=_count, metavar="N", help="the finest level of at most as many"
+        "--max-triangles",
+        type=_count,
+        metavar="N",
+        help="use the finest level of detail of at most this many triangles",
     )
     surfaces.add_argument(
-        "--max-bytes", type=_count, metavar="N", help="the finest level whose file is no larger"
+        "--max-bytes",
+        type=_count,
+        metavar="N",
+        help="use the finest level of detail whose file has at most this many bytes",
     )
     surfaces.add_argument(
         "--scale",
         type=_positive,
-        help="times the specimen (default: life-size; in .usdz and print the size of a hand)",
+        help="factor by which the specimen is enlarged (default: 1; in .usdz and in files for "
+        "printers it becomes the size of a hand)",
     )
     surfaces.add_argument(
         "--units",
         choices=["um", "mm", "m"],
-        help="of the numbers in .stl .3mf .ply .obj .nrrd .nii .raw (default mm)",
+        help="unit of lengths in .stl .3mf .ply .obj .nrrd .nii .raw (default mm)",
     )
     surfaces.add_argument(
         "--wall-mm",
         type=_positive,
         metavar="MM",
-        help="name what is thinner in print (default 0.8)",
+        help="report walls that are thinner than this in print (default 0.8)",
     )
     surfaces.add_argument(
-        "--compress", choices=["meshopt", "draco"], help=".glb of a fifth, for fewer programs"
+        "--compress",
+        choices=["meshopt", "draco"],
+        help="compress a .glb to about a fifth; fewer programs open it",
     )
     surfaces.add_argument(
         "--components",
         action="store_const",
         const=True,
-        help="bodies of a .3mf stay objects, for mesh programs; PrusaSlicer moves them apart",
+        help="keep components of a .3mf as objects (PrusaSlicer moves them apart)",
     )
     surfaces.add_argument(
         "--occlusion",
         action="store_const",
         const=True,
-        help="vertices are darker where light is occluded; some programs show these alone",
+        help="darken vertices that little light reaches; some programs show only these colours",
     )
 
     surfaces.add_argument(
         "--width",
         type=_width,
         metavar="PIXELS",
-        help="of .png (default 1600), .mp4 and .webm (640)",
+        help="width of .png (default 1600), .mp4 and .webm (640)",
     )
     volumes = parser.add_argument_group("volumes")
     volumes.add_argument(
         "--bits",
         type=int,
         choices=[8, 16],
-        help="8: the channel's window; 16: the source's values (default: 16 where OUT has them)",
+        help="8: the display window; 16: the source's values (default: 16 if OUT has them)",
     )
     volumes.add_argument(
         "--unity",
         action="store_const",
         const=True,
-        help="one channel in .raw or .nrrd, upright, as UnityVolumeRendering reads it",
+        help="write one channel to .raw or .nrrd in the orientation of UnityVolumeRendering",
     )
     pages = parser.add_argument_group("a page in one file, .html")
     pages.add_argument(
         "--max-mb",
         type=_positive,
         metavar="MB",
-        help="the finest levels of surfaces and volumes that fit are taken (default 25)",
+        help="largest size of the page, which gets the finest levels that fit (default 25)",
     )
     pages.add_argument(
-        "--view", metavar="LINK", help="a link that the viewer has made: how the page opens"
+        "--view",
+        metavar="LINK",
+        help="a link copied from the viewer, whose view the page opens with",
     )
 
 
@@ -544,30 +592,32 @@ def declare_publish(parser: argparse.ArgumentParser) -> None:
         "target",
         type=_named,
         metavar="TARGET",
-        help="a folder, or an address, as s3://bucket/specimen",
+        help="a folder, or an address such as s3://bucket/specimen",
     )
     parser.add_argument(
         "--url",
-        help="https:// address at which browsers find TARGET: every file is fetched from there, "
-        "and a link and a QR code are printed (default: S3's own)",
+        help="https:// address of TARGET for browsers; every file is fetched from it as a check, "
+        "and a link and a QR code are printed (default: S3's own address)",
     )
     parser.add_argument(
         "--private",
         action="store_true",
-        help="do not ask S3 to let everybody read it (ACL public-read): a policy does, or nobody",
+        help="do not ask S3 to let everybody read the files (ACL public-read)",
     )
 
 
 def _width(text: str) -> int:
     if not text.isdecimal() or not 64 <= int(text) <= 8192:
-        raise argparse.ArgumentTypeError(f"{text!r} is no width, expected 64 to 8192")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a width, expected 64 to 8192 pixels")
     return int(text)
 
 
 def _names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(","))
     if not all(names):
-        raise argparse.ArgumentTypeError(f"{text!r} has an empty name")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} has an empty name, expected names with commas between them"
+        )
     return names
 
 
@@ -577,9 +627,9 @@ def _positive(text: str) -> float:
     except ValueError:
         number = 0.0
     if not 0 < number < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
     return number
 
 
 def declare_nothing(_: argparse.ArgumentParser) -> None:
-    """A command without flags of its own."""
+    """Declare nothing: the command has no flags of its own."""

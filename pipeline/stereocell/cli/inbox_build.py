@@ -1,6 +1,7 @@
-"""Build an item of an inbox: `build` with a person's choices, in a process that prints nothing.
+"""Build an item of an inbox with a user's choices, in a process that prints nothing.
 
-What a build prints may hold texts from an upload, and the terminal is not the place for them.
+The lines that a build prints may contain texts from an upload, such as names of files. These do not
+belong into the terminal of the server.
 """
 
 import argparse
@@ -22,15 +23,15 @@ from stereocell.storage.processes import cores
 def make_inbox_build(
     source: str, found: Resolved, choices: Choices, out: Path, *, is_stranger: bool
 ) -> Build:
-    """Return the build of an item; see `inbox.builds.MakeBuild`."""
+    """Return a function that builds an item; see `inbox.builds.MakeBuild`."""
     return partial(_build, source, found, choices, out, is_stranger)
 
 
 def _build(
     source: str, found: Resolved, choices: Choices, out: Path, is_stranger: bool, watch: Watch
 ) -> str:
-    # by its name: where Python runs the command's module, that is called __main__, which names
-    # another module in this process
+    # The module is imported by name. In the first process it is called __main__, and that name
+    # means another module here.
     main = import_module("stereocell.cli.__main__")
     run: RunToLine = main.run_to_line
     if is_stranger:
@@ -48,7 +49,7 @@ def _build(
 
 
 def _be_silent() -> None:
-    """Let this process and its workers print nowhere."""
+    """Discard everything that this process and its workers print."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)

@@ -1,7 +1,7 @@
-"""The table of the folders that each command reads and writes: for --force and for wrong folders.
+"""Table of the folders that each command reads and writes.
 
-A test checks that every command has a row, and runs each writing command on a folder that holds
-other files.
+--force and the refusal of wrong folders use it. A test checks that every command has a row, and
+runs each writing command on a folder that holds other files.
 """
 
 import argparse
@@ -15,10 +15,10 @@ _BUNDLE = frozenset({Kind.BUILD, Kind.BUNDLE, Kind.SITE})
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """The places of one command.
+    """The folders of one command.
 
-    reads   kinds of folders that OUT may be; empty: OUT is not read
-    writes  the argument that names the place of the result; empty: nothing is written
+    reads   kinds of folders that OUT may be; empty: the command reads no OUT
+    writes  argument that names the result; empty: the command writes nothing
     """
 
     reads: frozenset[Kind] = frozenset()
@@ -45,17 +45,17 @@ PLACES = {
     "settings": Places(),
 }
 FORCE = (
-    "replace all that lies where the result goes; without it, only StereoCell's own results of the "
-    "same specimen are replaced"
+    "replace whatever the result would overwrite (default: replace only StereoCell's results of "
+    "the same specimen)"
 )
 
 
 def require_place(options: argparse.Namespace) -> dict[str, str]:
-    """Return the places that remedies may name, where OUT is one that a command reads or writes.
+    """Return the folders that remedies may name, once OUT has been found to be of the right kind.
 
-    options  the command's arguments; `shown` is OUT as it was given: a path or an address
+    options  the command's arguments; `shown` is OUT as given, a path or an address
 
-    Raises OutputError where OUT is another folder. Imports are lazy, so that --help is quick.
+    Raises OutputError if OUT is a folder of another kind.
     """
     from stereocell.storage.shell_commands import as_shown
 

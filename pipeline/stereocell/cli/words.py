@@ -6,20 +6,20 @@ from collections.abc import Sequence
 from stereocell.model.errors import UsageError
 from stereocell.model.utf8 import escaped_bytes
 
-_BELOW_ZERO = re.compile(r"-\.?\d")  # no flag of ours has a digit there
-# argparse of Python 3.11 removes `--` from the values of flags, so that no value is left
+_BELOW_ZERO = re.compile(r"-\.?\d")  # a negative number; no flag begins like this
+# argparse of Python 3.11 drops the value `--` of a flag, which then has no value.
 _NO_VALUE = re.compile(r"(--[a-z][a-z-]*(?==)|-[a-z])=?--")
 
 
 def prepared(words: Sequence[str]) -> list[str]:
-    """Return the words as argparse takes them.
+    """Return the words of a command line in the form that argparse needs.
 
-    Values that begin with a minus and a digit are joined to their flags: argparse takes such a
-    value, `-20:20,:,:`, for another flag. Raises UsageError for a value that is `--`, and for a
-    word that is not UTF-8.
+    Values that begin with a minus and a digit, as `-20:20,:,:`, are joined to their flags, because
+    argparse would read such a value as a flag. Raises UsageError for a value that is `--`, and for
+    a word that is not UTF-8.
     """
     joined: list[str] = []
-    is_open = True  # flags end at the first bare `--`
+    is_open = True  # until the first bare `--`, after which there are no flags
     for place, word in enumerate(words, 1):
         before = joined[-1] if joined else ""
         flag, is_joined, value = word.partition("=") if word.startswith("--") else ("", "", word)
@@ -37,8 +37,6 @@ def prepared(words: Sequence[str]) -> list[str]:
 
 
 def _require_utf8(where: str, word: str) -> None:
-    """Raise UsageError for bytes that are not UTF-8, which Python keeps as lone surrogates."""
+    """Raise UsageError if a word is not UTF-8. Python keeps such bytes as lone surrogates."""
     if shown := escaped_bytes(word):
-        raise UsageError(
-            f"{where} is '{shown}', expected UTF-8: give a file with such a name another one"
-        )
+        raise UsageError(f"{where} is '{shown}', expected UTF-8: rename the file")

@@ -7,7 +7,7 @@ Lengths are metres. Tilesets are z-up and glTF is y-up: readers turn glTF's (x, 
 (x, -z, y), and the boxes here are turned in the same way.
 
 The extras of each content hold its file's hash, so that a reader that trusts the tileset detects a
-damaged surface. 128 bits suffice for that, in base64url, named as in RFC 6920: "sha-256-128".
+damaged surface. The hash has 128 bits in base64url. Its name is that of RFC 6920: "sha-256-128".
 
 The first image needs only manifest.json, one tileset, and the coarsest LODs. If there are many
 tiles, the finer LODs of each are therefore in a separate tileset, `<tile>/finer.json`. A reader

@@ -11,10 +11,9 @@ with brightness and cuts only the cores of the brightest cells. The total follow
 `edges` counts only gradients steeper than noise. The weight of a voxel is 1 - n / g^2, where g is
 its gradient and n is NOISE_FACTOR times the mean square gradient of the tile's dim part. The
 weighted total finds the edges of bodies of any brightness. Among the levels near its maximum,
-total / sqrt(area) chooses one. This last choice keeps the volume of a blurred ball. There r f(r) is
-a blur in one dimension, so |f'| r has its maximum at the true radius R, except for an error of
-s^4 / R^3 (s is the blur's sigma). And |f'| r is total / sqrt(area) as a function of the level's
-radius r.
+total / sqrt(area) chooses one. This last choice keeps the volume of a blurred ball, where r f(r) is
+a blur in one dimension. At a level of radius r, total / sqrt(area) is |f'| r. This has its maximum
+at the true radius R, except for an error of s^4 / R^3, where s is the blur's sigma.
 
 References
 V. Pekar, R. Wiemker & D. Hempel, "Fast detection of meaningful isosurfaces for volume data

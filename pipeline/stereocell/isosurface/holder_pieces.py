@@ -15,7 +15,7 @@ _BONE_SHARE = 0.1  # largest share of a soft holder's voxels above BONE_HU; five
 _METAL_HU = 2200.0
 _RING = (2, 3)  # voxels: inner and outer distance of the ring around dense voxels that is examined
 _IN_AIR = 0.35  # share of that ring that is solid; dense voxels with a smaller share lie in air
-# Directions of six in which most voxels of a piece within the body see the body, at least
+# A piece lies within the body if most of its voxels have body on at least so many of six sides
 _MIN_DIRECTIONS = 4
 _FOAM_HU = -700.0  # darkest foam or cloth that continues a holder
 _NO_FLESH_HU = -120.0  # a piece with 95 % of its voxels below holds no flesh, not even fat

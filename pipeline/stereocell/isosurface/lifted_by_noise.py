@@ -4,10 +4,10 @@ Each voxel is its denoised value plus noise. So the histogram of the denoised va
 level was found, gives the number of voxels that noise is expected to lift above the level.
 
 Far below the level only noise lifts voxels. Near the level, a thin wall that the filters flattened
-has the same values as the rim of a thick body, so near and far voxels are counted apart. On shells
-of 1 to 3 voxels with noise of up to a tenth of their height, the share of the shells that is
-missing is found to within .05 with this FAR. On nuclei in noise of a third of their height the
-share found is 2 %, although 88 % of the voxels above the level lie outside of the solid.
+has the same values as the rim of a thick body, so near and far voxels are counted apart. FAR was
+tuned on shells of 1 to 3 voxels with noise of up to a tenth of their height. It finds the missing
+share of these shells to within .05. On nuclei in noise of a third of their height the share found
+is 2 %, although 88 % of the voxels above the level lie outside of the solid.
 """
 
 from dataclasses import dataclass

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from stereocell.isosurface.level import Level, clear_of
 
 MAX_NEAR = 3
-MARK = "+b"  # suffix of a level that counts from the background, as in flags
+MARK = "+b"  # suffix of a level above the background, also in flags
 ABOVE_BACKGROUND = f" ({MARK}: above the background)"  # explains MARK at the end of a line
 # Least confidence, 0..1, at which an unclear level is listed beside an unsure surface. Hardly any
 # evidence supports levels below it.

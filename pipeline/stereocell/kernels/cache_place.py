@@ -1,9 +1,9 @@
 """Where compiled kernels are cached, and whether all of them are. Imports do not include numba.
 
 The place is the first of these that can be written: the folder named by NUMBA_CACHE_DIR,
-`__pycache__` beside the kernels, or the user's cache. It holds one folder for each module, named by
-a hash of the module and of the kernels that it imports. numba itself would not notice that a called
-function in another file has changed.
+`__pycache__` beside the kernels, or the user's cache. It holds one folder for each module. The
+folder's name is a hash of the module and of the kernels that it imports, because numba does not
+notice that a called function in another file has changed.
 """
 
 import hashlib

@@ -5,8 +5,8 @@ round body lie inside of it, so coarse levels would lose a third of a body's vol
 vertices of a body move outward by one distance, until its volume is that of the fine body or the
 distance reaches its bound.
 
-- Towards a cut the move fades out, so that vertices of the cut stay bit by bit and no other vertex
-  reaches it.
+- The move fades out towards a cut, so that vertices of the cut keep their exact position and no
+  other vertex reaches it.
 - Vertices of caps, the flat ends of bodies, move within their planes.
 - No vertex leaves the tile's box, or the box of the fine mesh where caps at the end of the data lie
   outside of the tile's.
@@ -47,8 +47,8 @@ MIN_WAY = 0.05  # share of the whole move below which a vertex in a defect does 
 MAX_VOLUME_ERROR = 0.03  # largest error of a body's volume, as a share of that volume
 
 FEW = 0.02  # share of a body's vertices; if fewer are held back, others do not move farther
-# Share and number of a level's vertices in defects of the first try, above which all these bodies
-# stop moving
+# If more than this share and more than this number of a level's vertices are in defects after the
+# first try, all bodies with defects stop moving
 MANY = 0.05
 COSTLY = 10_000
 

@@ -1,4 +1,4 @@
-"""Curves as inline SVG: crisp, small, and coloured by the page's own CSS."""
+"""Draw curves as inline SVG, which the page's CSS colours."""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,18 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 from stereocell.model.channel import OpacityPoints
 
 WIDTH, HEIGHT = 320.0, 120.0  # units of the SVG's viewBox
-_BINS = 128  # bars of a drawn histogram
+_BINS = 128  # largest number of bars of a drawn histogram
 
 
 def histogram(
     counts: Sequence[int], functions: Mapping[str, OpacityPoints], iso_normalized: float | None
 ) -> Markup:
-    """Return a channel's histogram (log counts) over its window, with opacities and iso-value.
+    """Return a chart of a channel's histogram over its window, with opacities and iso-value.
 
-    counts          of equal bins over the window
+    counts          of equal bins over the window; drawn logarithmically
+    functions       opacity points of each transfer function; 0 is at the bottom, 1 at the top
     iso_normalized  0..1 in the window; None: no line
 
-    The lines have the classes `tf` and `tf-<name>`; opacity runs from 0 at the bottom to 1.
+    The lines of functions have the CSS classes `tf` and `tf-<name>`.
     """
     summed = np.add.reduceat(counts, np.arange(0, len(counts), max(1, len(counts) // _BINS)))
     heights = np.log1p(summed) / max(1.0, float(np.log1p(summed).max()))
@@ -35,16 +36,18 @@ def histogram(
     return _svg("histogram with transfer functions", parts)
 
 
-def ladder(heights: Sequence[float], *, taken: Sequence[float], others: Sequence[float]) -> Markup:
-    """Return the histogram that levels are found on.
+def candidates(
+    heights: Sequence[float], *, taken: Sequence[float], others: Sequence[float]
+) -> Markup:
+    """Return a chart of the histogram on which iso-values are found, with vertical lines at them.
 
-    heights        up to 1, evenly along the axis
-    taken, others  places on the axis, 0..1: the surface's level, and levels that were found besides
+    heights        0..1, evenly spaced along the axis
+    taken, others  positions on the axis, 0..1: the surface's iso-value, and the others found
     """
     parts = [f'<path class="curve" d="{_path(np.linspace(0, 1, len(heights)), heights)}"/>']
     parts += [_rule("found", place) for place in others]
     parts += [_rule("mark", place) for place in taken]
-    return _svg("histogram with levels", parts)
+    return _svg("histogram with iso-values", parts)
 
 
 def threshold(
@@ -55,11 +58,12 @@ def threshold(
     peaks: Sequence[float],
     rules: Mapping[str, float],
 ) -> Markup:
-    """Return a histogram and its moving mean, with vertical lines by their class.
+    """Return a chart of a histogram and its moving mean, with vertical lines at thresholds.
 
     counts, smoothed  of equal bins along the axis, (n,)
-    top               count at the chart's top; larger counts are cut there
-    peaks, rules      places on the axis, 0..1; ticks at the top mark the peaks
+    top               count at the top of the chart, where larger counts are cut off
+    peaks             positions of peaks on the axis, 0..1; short ticks at the top mark them
+    rules             CSS class of each line: its position on the axis, 0..1
     """
     edges = np.linspace(0, 1, len(counts) + 1)
     steps = _path(np.repeat(edges, 2)[1:-1], np.repeat(np.minimum(np.divide(counts, top), 1), 2))
@@ -74,7 +78,7 @@ def threshold(
 
 
 def _path(x: ArrayLike, y: ArrayLike) -> str:
-    """Return a path through points in 0..1, y upwards."""
+    """Return the SVG path through points with coordinates 0..1, y upwards."""
     points = np.stack([np.asarray(x) * WIDTH, (1 - np.asarray(y)) * (HEIGHT - 4) + 4], axis=1)
     return "M" + "L".join(_point(point) for point in points)
 
@@ -84,7 +88,7 @@ def _point(point: NDArray[np.float64]) -> str:
 
 
 def _rule(kind: str, at: float) -> str:
-    """Return a vertical line at `at`, clamped to 0..1."""
+    """Return a vertical line at a position of the axis, which is clamped to 0..1."""
     x = min(max(at, 0.0), 1.0) * WIDTH
     return f'<path class="{kind}" d="M{x:.1f},0V{HEIGHT:g}"/>'
 

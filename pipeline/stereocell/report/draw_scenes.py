@@ -1,4 +1,4 @@
-"""Pictures of meshes of units, as WebP."""
+"""Draw the meshes of units as WebP pictures."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from stereocell.textures.draw_meshes import Box, Shape, draw_pixels
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A mesh as `save_unit` wrote it (.npz), and its colour, linear RGB 0..1."""
+    """A mesh file (.npz) that `save_unit` wrote, and its colour, linear RGB 0..1."""
 
     file: str
     color: tuple[float, float, float]
@@ -20,11 +20,11 @@ class Surface:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """The content of one picture. Boxes are (min, max) corners (x, y, z) in world um.
+    """The content of one picture. A box is its smallest and largest corner (x, y, z), world um.
 
-    boxes  drawn as outlines
-    frame  fills the picture
-    size   pixels: width, largest height
+    boxes  boxes drawn as outlines
+    frame  box that fills the picture
+    size   width and largest height of the picture, pixels
     """
 
     surfaces: tuple[Surface, ...]

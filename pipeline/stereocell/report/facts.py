@@ -1,4 +1,4 @@
-"""A build in numbers: read from OUT and summed up, nothing drawn."""
+"""Numbers of a build, read from OUT and summed up for the report."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -26,10 +26,17 @@ PHASES = ("plan", "units", "stage", "bundle")
 
 @dataclass(frozen=True, slots=True)
 class LodFacts:
-    """One level of detail; None where the record lacks the number.
+    """One level of detail of one unit; None where the record lacks a number.
 
-    bytes     of the glb where the bundle has one, else of the unit's own file
-    mean_um, p95_um, max_um  distance between mesh and iso-surface, the larger of both directions
+    distance_um  99th percentile of the distance between mesh and iso-surface
+    bytes        size of the .glb in the bundle, or else of the unit's own file
+    mean_um, p95_um, max_um  the same distance: mean, 95th percentile, largest
+    faults       defects that the exact check found
+    fallbacks    components left as in the finer level, because simplifying made defects
+    angle_deg    1st percentile of the triangles' smallest angles
+    enclosed     share of the finest surface inside this level or on it, 0..1
+
+    Distances are measured from the mesh and from the iso-surface; the larger one counts.
     """
 
     triangles: int
@@ -48,16 +55,16 @@ class LodFacts:
 class UnitFacts:
     """One finished (tile, channel).
 
-    directory   the folder of its results
-    iso_value   above the background, voxel values; None: the channel has none
-    background  its mean over the tile, voxel values; 0: none was subtracted
-    confidence  0..1, of the tile by itself; None: nothing is there
-    reason      the reason for a missing surface; empty: there is one
-    voxels      (x, y, z) of the stored volume, with its apron
-    volume_bytes, ktx2_bytes  stored 8-bit voxels; volume and bricks in the bundle (0: none yet)
-    cover       of the source's voxels by the surface; None: the channel has no level
-    lifted      how many of these voxels only noise lifts above the level; None: not known
-    seconds     by step; empty where they were lost
+    directory   folder of its results
+    iso_value   voxel value above the background; None: the channel has none
+    background  mean of the subtracted background over the tile, voxel values; 0: none
+    confidence  0..1, of this tile alone; None: the tile holds no structure
+    reason      why there is no surface; empty: there is one
+    voxels      (x, y, z), size of the stored volume with its apron
+    volume_bytes, ktx2_bytes  size of the 8-bit voxels, and of their files in the bundle (0: none)
+    cover       how the surface covers the source's voxels; None: the channel has no iso-value
+    lifted      number of voxels that only noise lifts above the iso-value; None: unknown
+    seconds     time of each step; empty where the record is missing
     """
 
     tile: Tile
@@ -84,13 +91,13 @@ class UnitFacts:
 
     @property
     def slowest_step(self) -> str:
-        """The step that took longest; empty where times were lost."""
+        """The step that took longest; empty where no times are recorded."""
         return max(self.seconds, key=lambda step: self.seconds[step], default="")
 
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
-    """Seconds that one step took over all units; `slowest` names the unit with the largest."""
+    """Seconds of one step over all units; `slowest` is the unit that took `largest`."""
 
     name: str
     median: float
@@ -111,7 +118,10 @@ class FileFacts:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """All facts of a build. `phases`: seconds of each, and its part of the units where not all."""
+    """All numbers of a build.
+
+    phases  seconds of each phase, and which part of the units it ran; empty: all of them
+    """
 
     plan: Plan
     survey: Survey
@@ -123,7 +133,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Total:
-    """Sums over units; the distance is the largest. `lods` has one entry per level of detail."""
+    """Sums over units, with one entry of `lods` for each level of detail."""
 
     lods: tuple[LodFacts, ...]
     units: int
@@ -235,7 +245,7 @@ def sum_up(units: Iterable[UnitFacts]) -> Total:
 
 
 def _all_of(lods: Sequence[LodFacts]) -> LodFacts:
-    """Return sums of counts, the largest distances, the smallest angle and enclosure."""
+    """Return one level of detail of several units: sums, largest distances, smallest angle."""
 
     def known(name: str) -> list[Any]:
         return [value for lod in lods if (value := getattr(lod, name)) is not None]
@@ -262,7 +272,7 @@ class _Spent:
 
 
 def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
-    """Return the steps in the order in which units run them."""
+    """Return the times of the steps, in the order in which units run them."""
     spent: dict[str, _Spent] = defaultdict(_Spent)
     for unit in sorted(units, key=lambda unit: -len(unit.seconds)):  # most steps first
         for step, seconds in unit.seconds.items():
@@ -277,7 +287,7 @@ def _steps(units: Sequence[UnitFacts]) -> tuple[StepFacts, ...]:
 
 
 def _files(out_folder: OutFolder) -> tuple[FileFacts, ...]:
-    """Return count and bytes of the files in units, stage and bundle, by suffix, largest first."""
+    """Return number and bytes of the files in units, stage and bundle, by suffix, largest first."""
     rows = []
     for part in (out_folder.out / "units", out_folder.stage_dir, out_folder.bundle_dir):
         sizes: dict[str, list[int]] = defaultdict(list)

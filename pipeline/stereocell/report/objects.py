@@ -1,4 +1,4 @@
-"""The report's facts of label maps: how many objects, and how true their surfaces are."""
+"""The report's numbers of label maps: objects, and how exact their surfaces are."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +11,11 @@ from stereocell.steps.unit_files import load_objects, load_record
 
 @dataclass(frozen=True, slots=True)
 class ObjectLevel:
-    """One level of all objects of a label map.
+    """One level of detail of all objects of a label map.
 
-    bias  largest share that an object's volume has more or less than its voxels
-    distance_um, farthest_um  from the walls between voxels, 99th percentile and largest
+    distance_um, farthest_um  distance from the faces between voxels, 99th percentile and largest
+    bias   largest relative error of an object's volume, compared with its voxels
+    bytes  size of the .glb files in the bundle
     """
 
     triangles: int
@@ -28,10 +29,12 @@ class ObjectLevel:
 class LabelFacts:
     """One label map.
 
-    objects  of it; `pieces`: further pieces of those that tiles cut
-    changed  voxels that were changed, so that no object touches itself by an edge or a corner
-    stopped  what is said of levels of which simplifying did not come to an end
-    units    the folders of its units that have a surface
+    color    linear RGB, 0..1
+    objects  number of objects
+    pieces   number of further pieces, into which the planes between tiles cut objects
+    changed  voxels that were changed, so that no object touches itself at an edge or a corner
+    stopped  notes on objects whose simplification stopped early
+    units    folders of its units that have a surface
     """
 
     name: str
@@ -45,7 +48,7 @@ class LabelFacts:
 
 
 def gather_labels(out_folder: OutFolder, plan: Plan) -> tuple[LabelFacts, ...]:
-    """Return the facts of each label map. Raises OutputError where a unit is damaged."""
+    """Return the numbers of each label map. Raises OutputError where a unit is damaged."""
     index = out_folder.index()
     found = []
     for labels in plan.labels:

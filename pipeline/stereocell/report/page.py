@@ -1,7 +1,7 @@
-"""Write the report: one page that holds its own pictures, for any browser, with no network.
+"""Write the report: one HTML page that holds its own pictures and needs no network.
 
-Pictures and table rows are capped, evenly chosen, so that the page of a whole slide with thousands
-of units stays one that a phone opens; sums and remarks cover all units.
+A whole slide has thousands of units. The page shows pictures and table rows of some of them, evenly
+chosen, so that a phone can open it. Sums and remarks cover all units.
 """
 
 import base64
@@ -34,7 +34,8 @@ from stereocell.report import charts
 from stereocell.report.draw_scenes import Picture, Scene, Surface, draw_scene
 from stereocell.report.facts import Facts, UnitFacts, gather, sum_up
 from stereocell.report.objects import LabelFacts, gather_labels
-from stereocell.report.remarks import find_remarks
+from stereocell.report.opening import find_opening
+from stereocell.report.remarks import find_covers, find_remarks
 from stereocell.report.select_units import choose_level, choose_units, thin_out
 from stereocell.report.texture_facts import compare, sum_up_maps
 from stereocell.report.texture_similarity import CLOSE_PX, ERROR_PX
@@ -45,17 +46,18 @@ from stereocell.storage.sealed_text import write_sealed_text
 from stereocell.textures.unwrap import mip_levels_apart
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html.j2"
-MAX_PICTURED = 60  # units
-MAX_ROWS = 400  # units in a table
-_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # drawn in one picture
-# pixels: width, and the most height
+MAX_PICTURED = 60  # largest number of units with pictures
+MAX_ROWS = 400  # largest number of units in a table
+_TILE_TRIANGLES, _WHOLE_TRIANGLES = 400_000, 1_500_000  # largest number drawn in one picture
+# pixels: width and largest height of a picture
 _TILE_PX, _WHOLE_PX = (420, 420), (1120, 620)
 
 
 def write_report(out: Path) -> None:
-    """Write OUT/report/index.html from what lies in OUT.
+    """Write OUT/report/index.html from the files of OUT.
 
-    Stage and bundle may be missing: the page says so. Raises OutputError where plan or units are.
+    Stage and bundle may be missing, and the page then says so. Raises OutputError where the plan or
+    a unit is missing.
     """
     out_folder = OutFolder(out)
     facts = gather(out_folder)
@@ -65,11 +67,12 @@ def write_report(out: Path) -> None:
 def render(out_folder: OutFolder, facts: Facts) -> str:
     """Return the page as HTML."""
     plan = facts.plan
-    tissue = find_tissue(out_folder.out, plan)  # first: what is damaged ends it before all is drawn
+    tissue = find_tissue(out_folder.out, plan)  # first, since damaged files raise an error here
     chosen = choose_units(len(plan.tiles), len(plan.channels), MAX_PICTURED)
     tiles = [plan.tiles[tile] for tile, _ in chosen]
     units = {(unit.tile.id, unit.channel.id): unit for unit in facts.units}
     labels = gather_labels(out_folder, plan)
+    covers = find_covers(facts.units)
     scenes = [_scene(facts, None, labels), *(_scene(facts, tile) for tile in tiles)]
     cards = [
         [
@@ -90,7 +93,8 @@ def render(out_folder: OutFolder, facts: Facts) -> str:
         whole=pictured[0],
         whole_note=_drawn_note(facts.units, _WHOLE_TRIANGLES)
         if plan.channels
-        else "Objects at their coarsest level",
+        else "Objects at their coarsest level of detail",
+        opening=find_opening(facts, covers, labels),
         remarks=find_remarks(facts),
         channels=_channels(facts),
         labels=[(one, css_color(one.color)) for one in labels],
@@ -135,7 +139,7 @@ def _template() -> Template:
 
 
 def _tissue(found: TissueFacts) -> dict[str, Any]:
-    """Return what the page says of the tissue classes."""
+    """Return the template's values for the tissue classes."""
     return {
         **found.record,
         "picture": _inline(Picture(*found.picture)),
@@ -144,7 +148,7 @@ def _tissue(found: TissueFacts) -> dict[str, Any]:
 
 
 def _channels(facts: Facts) -> list[dict[str, Any]]:
-    """Return what the page says of each channel."""
+    """Return the template's values for each channel."""
     rows = []
     for channel in facts.plan.channels:
         found = facts.survey[channel.id]
@@ -165,7 +169,7 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
                 "thinned": found.thinning(facts.plan),
                 "spread": (min(levels), max(levels)) if levels else None,
                 "above": found.statistics.background is not None,
-                "ladder": _ladder(found),
+                "candidates": _candidates(found),
                 "others": _others(facts, channel, found),
                 "arcs": len(suggested.shapes),
                 "no_arcs": suggested.reason,
@@ -185,12 +189,12 @@ def _channels(facts: Facts) -> list[dict[str, Any]]:
 
 
 def _thresholds(facts: Facts) -> list[dict[str, Any]]:
-    """Return what the page says of the thresholds, with slices of a tile that shows them."""
+    """Return the template's values for the adaptive thresholds, each with slices of one tile."""
     inner = slice(APRON, -APRON)
     rows = []
-    # a tissue class has probabilities, not a histogram of bodies
+    # The voxels of a tissue class are probabilities, and their histogram has no such threshold.
     for channel in (one for one in facts.plan.channels if not one.source):
-        unit = _telling(facts, channel)
+        unit = _clearest_unit(facts, channel)
         found = facts.survey[unit.channel.id]
         figure = draw_threshold(found.statistics)
         share = found.appearance.threshold_normalized
@@ -212,8 +216,8 @@ def _thresholds(facts: Facts) -> list[dict[str, Any]]:
     return rows
 
 
-def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
-    """Return the histogram that the channel's levels were found on; None: none was found."""
+def _candidates(found: ChannelSurvey) -> dict[str, Any] | None:
+    """Return the iso-values that were found, with their histogram; None where there are none."""
     curve, level = found.curve, found.appearance.level
     if curve is None or len(curve.values) < 2 or not found.ladder:
         return None
@@ -221,12 +225,12 @@ def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
     places = {one.value: float(np.interp(one.value, curve.values, along)) for one in found.ladder}
     taken = [] if level is None else [float(np.interp(level.iso, curve.values, along))]
     return {
-        "chart": charts.ladder(curve.heights, taken=taken, others=list(places.values())),
+        "chart": charts.candidates(curve.heights, taken=taken, others=list(places.values())),
         "ends": (curve.values[0], curve.values[-1]),
         "rows": [
             {
                 "level": one,
-                "doubt": one.why_unclear,
+                "reason": one.why_unclear,
                 "taken": level is not None and one.value == level.iso,
             }
             for one in found.ladder
@@ -234,8 +238,8 @@ def _ladder(found: ChannelSurvey) -> dict[str, Any] | None:
     }
 
 
-def _telling(facts: Facts, channel: Channel) -> UnitFacts:
-    """Return a channel's unit with the largest surface; without any, that in the middle."""
+def _clearest_unit(facts: Facts, channel: Channel) -> UnitFacts:
+    """Return the unit of a channel with the most triangles, or else the one in the middle."""
     units = [unit for unit in facts.units if unit.channel == channel]
     with_surface = [unit for unit in units if unit.lods]
     if not with_surface:
@@ -244,8 +248,8 @@ def _telling(facts: Facts, channel: Channel) -> UnitFacts:
 
 
 def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[str, Any]]:
-    """Return the next-best levels of a channel, each with a picture of a tile that shows them."""
-    unit = _telling(facts, channel)
+    """Return the next-best iso-values of a channel, each with a picture of its contour."""
+    unit = _clearest_unit(facts, channel)
     low, high = found.statistics.window
     return [
         {
@@ -253,7 +257,7 @@ def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[s
             "value": f"{other.value:.5g}{' above the background' if other.above else ''}",
             "setting": other.setting,
             "confidence": other.confidence,
-            # the stored voxels end there: a level beyond crosses none of them
+            # Stored voxels end at the display window, so a value outside of it has no contour.
             "window": None if other.above or low < other.value < high else (low, high),
             "tile": unit.tile.id,
             "picture": _inline(Picture(*draw_slices(_cut(facts, unit, other)))),
@@ -272,7 +276,7 @@ def _others(facts: Facts, channel: Channel, found: ChannelSurvey) -> list[dict[s
 
 
 def _card(facts: Facts, unit: UnitFacts) -> dict[str, Any]:
-    """Return what the page shows of one unit: its slices."""
+    """Return the template's values for one unit, with pictures of its slices."""
     return {
         "unit": unit,
         "color": css_color(facts.survey[unit.channel.id].appearance.color),
@@ -281,7 +285,7 @@ def _card(facts: Facts, unit: UnitFacts) -> dict[str, Any]:
 
 
 def _cut(facts: Facts, unit: UnitFacts, other: OtherLevel | None = None) -> list[Slice]:
-    """Return a unit's slices with its surface, or with the contour of another level."""
+    """Return a unit's slices with its surface, or with the contour of another iso-value."""
     plan = facts.plan
     lattice = unit.tile.lattice(plan.region)
     inner = slice(APRON, -APRON)
@@ -304,7 +308,7 @@ def _cut(facts: Facts, unit: UnitFacts, other: OtherLevel | None = None) -> list
     )
     if other is None:
         return slices
-    # the only line there: drawn as a surface is, and not dashed
+    # The contour is the only line, so it is drawn like a surface instead of dashed.
     return [
         replace(one, above=None, contours=() if one.above is None else ((OUTLINE, one.above),))
         for one in slices
@@ -323,7 +327,7 @@ def _in_eight_bits(
 
 
 def _scene(facts: Facts, tile: Tile | None, labels: Sequence[LabelFacts] = ()) -> Scene:
-    """Return a tile with its channels, or the whole specimen; label maps if there is no image."""
+    """Return the scene of a tile, or of the whole specimen: label maps where there is no image."""
     tiles = facts.plan.tiles if tile is None else (tile,)
     most = _WHOLE_TRIANGLES if tile is None else _TILE_TRIANGLES
     units = [u for u in facts.units if u.lods and (tile is None or u.tile == tile)]
@@ -357,12 +361,12 @@ def _level(units: Sequence[UnitFacts], most: int) -> tuple[int, int]:
 def _drawn_note(units: Sequence[UnitFacts], most: int) -> str:
     with_surface = [unit for unit in units if unit.lods]
     level, every = _level(with_surface, most)
-    which = "" if every == 1 else f", about one in {every} of the {len(with_surface):,} surfaces"
-    return f"lod{level}{which}"
+    which = "" if every == 1 else f" (about one in {every} of the {len(with_surface):,} surfaces)"
+    return f"Level of detail {level}{which}"
 
 
 def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the corners (x, y, z) in world um of the box that a tile's mesh fills."""
+    """Return the box that a tile's mesh fills, by two corners (x, y, z) in world um."""
     lattice = tile.lattice(facts.plan.region)
     ends = [lattice.start, [end - 1 for end in lattice.stop]]
     corners = zyx_to_xyz([facts.plan.position_um(end) for end in ends])
@@ -370,7 +374,7 @@ def _box_um(facts: Facts, tile: Tile) -> tuple[tuple[float, ...], tuple[float, .
 
 
 def _rows(units: Sequence[UnitFacts]) -> list[UnitFacts]:
-    """Return the units that tables list: all, or evenly chosen ones."""
+    """Return the units that tables list: all of them, or MAX_ROWS evenly chosen ones."""
     if len(units) <= MAX_ROWS:
         return list(units)
     return [units[i * len(units) // MAX_ROWS] for i in range(MAX_ROWS)]
@@ -394,7 +398,7 @@ def srgb(linear: Sequence[float]) -> tuple[float, float, float]:
 
 
 def css_color(linear: Sequence[float]) -> str:
-    """Return a linear RGB colour, 0..1, as CSS writes it: #rrggbb in sRGB."""
+    """Return a linear RGB colour, 0..1, in the form of CSS: #rrggbb in sRGB."""
     return "#" + "".join(f"{round(255 * v):02x}" for v in srgb(linear))
 
 
@@ -403,7 +407,7 @@ def _count(number: int) -> str:
 
 
 def _size(count: int) -> str:
-    """Return bytes in words, in powers of 1000."""
+    """Return a number of bytes as text, with units in powers of 1000."""
     size, unit = float(count), "B"
     for larger in ("kB", "MB", "GB", "TB"):
         if size < 999.5:
@@ -421,5 +425,5 @@ def _seconds(seconds: float) -> str:
 
 
 def _um(length: float) -> str:
-    """Return a length in um, three digits that count."""
+    """Return a length in um with three significant digits."""
     return f"{length:,.0f}" if length >= 999.5 else f"{length:.3g}"

@@ -1,4 +1,4 @@
-"""The report as a phase of a build: it is written anew where its content has changed."""
+"""The report as a phase of a build, which writes it again where its content has changed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from stereocell.report.page import TEMPLATE, write_report
 
 @dataclass(frozen=True, slots=True)
 class WriteReport(Keyed):
-    """Write the report; the fields are the documents of OUT that it shows, and its template."""
+    """Write the report. The fields are all documents of OUT that it shows, and its template."""
 
-    VERSION: ClassVar[int] = 1
+    VERSION: ClassVar[int] = 2
 
     index: Mapping[str, str]
     survey: Mapping[str, Any]
@@ -27,7 +27,7 @@ class WriteReport(Keyed):
 
 
 def run_report(out: Path) -> None:
-    """Write OUT/report/index.html: pictures, sizes, times.
+    """Write OUT/report/index.html, where its content has changed.
 
     Raises OutputError where units are missing or damaged.
     """

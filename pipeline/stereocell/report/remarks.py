@@ -1,4 +1,4 @@
-"""Remarks for a reader of the report, unit by unit."""
+"""Remarks of the report: warnings and notes, each with a line for every channel or tile."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -8,13 +8,13 @@ from stereocell.model.counted import counted
 from stereocell.model.unit import MAX_MISSING, Cover
 from stereocell.report.facts import Facts, UnitFacts
 
-MIN_ANGLE_DEG = 12.0  # 1st percentile of lod0; below, slivers are shaded as streaks
-_MAX_LINES = 30  # lines printed of one remark
+MIN_ANGLE_DEG = 12.0  # degrees, 1st percentile of lod0; thinner triangles are shaded as streaks
+_MAX_LINES = 30  # largest number of lines of one remark
 
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """One kind of finding with its units. `is_note`: worth knowing, but not a problem."""
+    """One kind of finding, with its lines. A note is worth knowing, but is not a problem."""
 
     title: str
     lines: tuple[str, ...]
@@ -23,7 +23,7 @@ class Remark:
 
 def find_remarks(facts: Facts) -> list[Remark]:
     """Return the remarks, most severe first."""
-    units = facts.units
+    units, covers = facts.units, find_covers(facts.units)
     looks = {channel.name: facts.survey[channel.id].appearance for channel in facts.plan.channels}
     with_surface = {u.channel.name for u in units if not u.reason}
     whole = [
@@ -38,53 +38,54 @@ def find_remarks(facts: Facts) -> list[Remark]:
     found = [
         _remark("without a surface", whole, "channel"),
         _remark("with an unsure surface", unsure, "channel"),
-        _remark("without a surface, in channels that have some", bare, is_note=True),
         _remark(
-            f"with thin triangles in lod0 (1st percentile of their angles below "
+            "without a surface of a channel that has one elsewhere", bare, "tile", is_note=True
+        ),
+        _remark(
+            f"with thin triangles at the finest level (1 % of the angles are below "
             f"{MIN_ANGLE_DEG:g}°)",
             _thin(units),
             "channel",
             is_note=True,
         ),
         _remark(
-            f"whose surface leaves out more than {MAX_MISSING:.0%} of the source's voxels above "
-            "its level",
-            [line for line, cover in _covers(units) if cover.missing > MAX_MISSING],
+            f"with a surface that leaves out more than {MAX_MISSING:.0%} of the voxels above "
+            "its iso-value",
+            [f"{name}: {one.words}" for name, one in covers.items() if one.missing > MAX_MISSING],
             "channel",
         ),
         _remark(
-            "with the share of the source's voxels above the level that the surface covers",
-            [line for line, cover in _covers(units) if cover.missing <= MAX_MISSING],
+            "with a surface that covers nearly all voxels above its iso-value",
+            [f"{name}: {one.words}" for name, one in covers.items() if one.missing <= MAX_MISSING],
             "channel",
             is_note=True,
         ),
         _remark(
-            "with pieces apart from the body left out", _holders(facts), "channel", is_note=True
+            "without pieces that lie apart from the body", _holders(facts), "channel", is_note=True
         ),
-        _remark("open at the block's faces", _open(facts), "surface", is_note=True),
-        _remark("on how the source is read and built", facts.plan.notes, "note", is_note=True),
-        _counts(("fragment", "fragments"), "dropped", units, lambda u: u.fragments_dropped),
+        _remark("left open at the faces of the volume", _open(facts), "surface", is_note=True),
+        _remark("on how the source was read and built", facts.plan.notes, "note", is_note=True),
+        _counts(("fragment", "fragments"), "removed", units, lambda u: u.fragments_dropped),
         _counts(("cavity", "cavities"), "filled", units, lambda u: u.cavities_filled),
     ]
     return [remark for remark in found if remark is not None]
 
 
-def _covers(units: Iterable[UnitFacts]) -> list[tuple[str, SurfaceCover]]:
-    """Return a line for each channel with a surface, and how it covers the source's voxels."""
+def find_covers(units: Iterable[UnitFacts]) -> dict[str, SurfaceCover]:
+    """Return how the surface of each channel covers the source's voxels, by the channel's name."""
     by_channel: dict[str, list[UnitFacts]] = {}
     for unit in units:
         if unit.cover is not None and unit.cover.source:
             by_channel.setdefault(unit.channel.name, []).append(unit)
-    lines = []
+    found = {}
     for name, built in by_channel.items():
         total = sum((unit.cover for unit in built if unit.cover is not None), Cover(0, 0, 0))
-        cover = SurfaceCover.of(total, sum_lifted(unit.lifted for unit in built if unit.lifted))
-        lines.append((f"{name}: {cover.words}", cover))
-    return lines
+        found[name] = SurfaceCover.of(total, sum_lifted(u.lifted for u in built if u.lifted))
+    return found
 
 
 def _holders(facts: Facts) -> list[str]:
-    """Return a line for each channel whose CT's table or head holder is left out."""
+    """Return a line for each CT channel whose surface leaves out the table or the head holder."""
     return [
         f"{channel.name}: {', '.join(holder.pieces)}, {holder.WORDS}; --keep-holder builds it too"
         for channel in facts.plan.channels
@@ -93,11 +94,11 @@ def _holders(facts: Facts) -> list[str]:
 
 
 def _open(facts: Facts) -> list[str]:
-    """Return a line for each channel that is left open where the block ends."""
+    """Return a line for each channel with a surface that stays open at the faces of the volume."""
     if facts.plan.settings.surface.caps:
         return []
     built = dict.fromkeys(unit.channel.name for unit in facts.units if not unit.reason)
-    why = "open on purpose (--no-caps), on the planes of the outermost voxels; no solid"
+    why = "open at the planes of the outermost voxels, as --no-caps asks; it is not a solid"
     return [f"{name}: {why}" for name in built]
 
 
@@ -110,7 +111,7 @@ def _thin(units: Iterable[UnitFacts]) -> list[str]:
             thin.setdefault(unit.channel.name, []).append((angle, unit.tile.id))
     return [
         f"{channel}: {min(found)[0]:.1f}° in {min(found)[1]}"
-        + (f", {len(found):,} tiles below" if len(found) > 1 else "")
+        + (f", and {len(found):,} tiles in all" if len(found) > 1 else "")
         for channel, found in thin.items()
     ]
 
@@ -126,7 +127,7 @@ def _remark(
 def _counts(
     nouns: tuple[str, str], what: str, units: Iterable[UnitFacts], count: Callable[[UnitFacts], int]
 ) -> Remark | None:
-    """Return a note with the sum of `count` over the units, its lines by channel."""
+    """Return a note with the sum of a count over all units, and a line for each channel."""
     by_channel: dict[str, list[UnitFacts]] = {}
     for unit in units:
         if count(unit):

@@ -2,15 +2,18 @@
 
 from collections.abc import Sequence
 
-MIN_TILES = 6  # tiles pictured at least, where channels are many
+MIN_TILES = 6  # tiles that get pictures at least, also where there are many channels
 _GOLDEN = (5**0.5 - 1) / 2  # 1 / golden ratio
 
 
 def choose_units(tiles: int, channels: int, most: int) -> list[tuple[int, list[int]]]:
-    """Return the units to picture: (tile, its channels), all by index; at most `most` units.
+    """Return the units to draw: pairs of a tile's index and its channels' indices.
 
-    All units where they fit. Else evenly spaced tiles with all channels; where too few tiles would
-    fit, more tiles with some channels each, in rotation.
+    most  largest number of units
+
+    All units are drawn if they are few enough. Otherwise evenly spaced tiles are drawn with all
+    channels. If that leaves fewer than MIN_TILES tiles, more tiles are drawn, each with some of the
+    channels in rotation.
     """
     if tiles * channels <= most:
         return [(tile, list(range(channels))) for tile in range(tiles)]
@@ -25,12 +28,12 @@ def choose_units(tiles: int, channels: int, most: int) -> list[tuple[int, list[i
 
 
 def choose_level(triangles: Sequence[Sequence[int]], most: int) -> tuple[int, int]:
-    """Return the finest level at which meshes can be drawn, and k: every k-th mesh is drawn.
+    """Return the finest level of detail to draw, and k: about one in k meshes is drawn.
 
-    triangles  per mesh, of each of its levels, finest first; at least one mesh
+    triangles  for each mesh, the number at each of its levels, finest first; at least one mesh
     most       largest number of triangles to draw
 
-    k is 1 unless even the coarsest level of all meshes exceeds `most`.
+    k is 1 unless even the coarsest levels of all meshes together exceed `most`.
     """
     levels = max(len(mesh) for mesh in triangles)
     for level in range(levels):
@@ -41,8 +44,9 @@ def choose_level(triangles: Sequence[Sequence[int]], most: int) -> tuple[int, in
 
 
 def thin_out(count: int, every: int) -> list[int]:
-    """Return about one in `every` of the indices below `count`, rising.
+    """Return about one in `every` of the indices below `count`, in rising order.
 
-    By steps of the golden ratio: a fixed stride could hit the same channel in every tile.
+    The indices are spread by the golden ratio, because a fixed stride could pick the same channel
+    in every tile.
     """
     return [i for i in range(count) if i * _GOLDEN % 1 < 1 / every]

@@ -1,4 +1,4 @@
-"""The report's facts about baked maps: texels, charts, levels without maps, likeness."""
+"""The report's numbers of baked maps: texels, charts, levels without maps, similarity."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,16 +9,17 @@ from stereocell.report.select_units import thin_out
 from stereocell.report.texture_similarity import find_close_likeness, find_likeness
 from stereocell.steps.unit_files import load_lods, load_record
 
-MAX_COMPARED = 3  # units whose levels are drawn and compared: 4 to 10 s each
-COMPARED = 2  # the compared level; the coarsest where there are fewer
+MAX_COMPARED = 3  # largest number of units that are drawn and compared; each takes 4 to 10 s
+COMPARED = 2  # level of detail that is compared with lod0; the coarsest where there are fewer
 
 
 @dataclass(frozen=True, slots=True)
 class LevelMaps:
-    """The maps of one channel at one level.
+    """The maps of one channel at one level of detail.
 
-    texel_um  (smallest, largest) edge of a texel over the tiles
-    without   reason -> number of tiles with values at vertices in place of maps
+    tiles     number of tiles with maps
+    texel_um  smallest and largest edge of a texel over the tiles
+    without   number of tiles without maps, by reason; their values lie at vertices
     """
 
     level: int
@@ -32,7 +33,7 @@ class LevelMaps:
 
 @dataclass(frozen=True, slots=True)
 class Likeness:
-    """The likeness of a level to lod0: SSIM, -1..1, at each view and close up."""
+    """The similarity of a level of detail to lod0: SSIM, -1..1, of each view and close up."""
 
     unit: str
     level: int
@@ -41,12 +42,12 @@ class Likeness:
 
     @property
     def mean(self) -> float:
-        """The mean over the views."""
+        """The mean SSIM of the views."""
         return sum(self.views) / len(self.views)
 
 
 def sum_up_maps(units: Sequence[UnitFacts]) -> list[LevelMaps]:
-    """Return the maps of each level of one channel's units."""
+    """Return the maps of one channel's units, for each level of detail."""
     records = [load_record(unit.directory)["lods"] for unit in units if unit.lods]
     levels = max(map(len, records), default=0)
     return [
@@ -74,7 +75,7 @@ def _level(maps: Sequence[dict[str, Any]], level: int) -> LevelMaps:
 
 
 def compare(facts: Facts) -> list[Likeness]:
-    """Return the likeness of some evenly chosen units that have several levels."""
+    """Return the similarity of some units with several levels, evenly chosen."""
     units = [unit for unit in facts.units if len(unit.lods) > 1]
     found = []
     every = max(1, -(-len(units) // MAX_COMPARED))

@@ -1,15 +1,16 @@
-"""Compare pictures of a coarser level with its baked maps and of the finest level, by SSIM.
+"""Compare a coarser level of detail, drawn with its baked maps, with the finest level by SSIM.
 
-The pictures are drawn without OpenGL, so that the figures are equal on every machine. Parallel
-projection, one light beside the viewer's eye, and ambient light that occlusion dims. Shading is per
-pixel, by the normal map in the frame of the interpolated tangents, as in glTF and USD renderers;
-without maps by the interpolated normals.
+The pictures are drawn without OpenGL, so that the figures are equal on every machine. They have a
+parallel projection, one light beside the viewer's eye, and ambient light that occlusion dims. Each
+pixel is shaded by the normal map in the frame of the interpolated tangents, as in renderers of glTF
+and USD. A level without maps is shaded by its interpolated normals.
 
-A picture is so large that the level's distance from the iso-surface, the 99th percentile
-(`stereocell:distance`), spans ERROR_PX, within bounds. A viewer at rest switches to the next finer
-level where the largest (`stereocell:largestDistance`, `geometricError` of tilesets) spans as many.
+The size of a picture is chosen so that the level's distance from the iso-surface, the 99th
+percentile (`stereocell:distance`), spans ERROR_PX pixels, within bounds. A viewer at rest switches
+to the next finer level where the largest distance (`stereocell:largestDistance`, `geometricError`
+of tilesets) spans as many pixels.
 
-SSIM is the mean over the picture, by scikit-image.
+SSIM is computed by scikit-image, and averaged over the picture.
 
 References: Wang, Bovik, Sheikh & Simoncelli, "Image quality assessment: from error visibility to
 structural similarity", IEEE Transactions on Image Processing 13(4), 2004,
@@ -26,17 +27,17 @@ from skimage.metrics import structural_similarity
 from stereocell.model.mesh import Lod
 from stereocell.textures.rasterize import find_pixels
 
-# directions of the viewer, x right, y up, z towards the viewer: in front, then around
+# Directions (x, y, z) to the viewer: front, right, left, above, below. z points out of the front.
 VIEWS = ((0.0, 0.0, 1.0), (0.9, 0.3, 0.5), (-0.9, 0.3, 0.5), (0.1, 0.9, 0.4), (0.1, -0.9, 0.4))
-ERROR_PX = 2.0  # pixels, the viewer's target error, of its largest distance
-MIN_PX, MAX_PX = 48, 256  # pixels, smallest and largest edge of a picture
-CLOSE_PX = 512  # pixels, edge of the close picture, equal for every level
-_FINE = 2  # factor by which a picture is drawn larger, then averaged down
-_AMBIENT, _GROUND = 0.35, 0.0  # grey values, 0..1
+ERROR_PX = 2.0  # pixels, the web viewer's largest allowed error
+MIN_PX, MAX_PX = 48, 256  # pixels, bounds of a picture's edge
+CLOSE_PX = 512  # pixels, edge of the close picture, the same for all levels
+_FINE = 2  # factor by which a picture is drawn larger before it is averaged down
+_AMBIENT, _GROUND = 0.35, 0.0  # grey values 0..1 of ambient light and of the background
 
 
 def find_likeness(fine: Lod, coarse: Lod) -> tuple[float, ...]:
-    """Return the SSIM, -1..1, of two levels of one surface, for each of VIEWS."""
+    """Return the SSIM, -1..1, of two levels of one surface, one for each of VIEWS."""
     ends = np.array([fine.mesh.positions.min(axis=0), fine.mesh.positions.max(axis=0)])
     diagonal = float(np.linalg.norm(ends[1] - ends[0]))
     wanted = ERROR_PX * diagonal / max(coarse.distance_um, 1e-9)
@@ -117,7 +118,10 @@ def _shading(
 
 
 def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an image uint8 (h, w), row 0 at v = 1, at UVs (n, 2): (n,), bilinear, clamped."""
+    """Return the values (n,) of an image uint8 (h, w) at UVs (n, 2), bilinear and clamped.
+
+    Row 0 of the image lies at v = 1.
+    """
     height, width = image.shape
     place = [(1 - uvs[:, 1]) * height - 0.5, uvs[:, 0] * width - 0.5]
     found: NDArray[np.float64] = ndimage.map_coordinates(
@@ -128,7 +132,7 @@ def sample(image: NDArray[np.uint8], uvs: NDArray[np.float64]) -> NDArray[np.flo
 
 def compare(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Return the mean SSIM of two pictures of values 0..1, each float64 (height, width)."""
-    # Gaussian window of 11 x 11 pixels and variances of the population, as in the paper
+    # The paper has a Gaussian window of 11 x 11 pixels and variances of the population.
     return float(
         structural_similarity(
             a, b, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False

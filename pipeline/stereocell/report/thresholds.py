@@ -1,6 +1,6 @@
-"""A channel's adaptive threshold in the report: the figure, other methods' thresholds, slices.
+"""Draw a channel's adaptive threshold for the report, beside thresholds of other methods.
 
-The others are thresholds of scikit-image on the same counts.
+The other thresholds, Otsu's and Li's, are computed by scikit-image from the same counts.
 
 References: Otsu, "A threshold selection method from gray-level histograms", IEEE Transactions on
 Systems, Man, and Cybernetics 9(1), 1979, https://doi.org/10.1109/TSMC.1979.4310076
@@ -24,20 +24,25 @@ from stereocell.report.draw_scenes import Picture
 from stereocell.transfer.adaptive_threshold import Histogram, Threshold
 from stereocell.transfer.channel_statistics import ChannelStatistics
 
-READINGS = {  # format arguments: the levels of Threshold.between
+READINGS = {  # Threshold.reading: sentence; its format arguments are Threshold.between
     "two peaks": "between the second-highest peak, at {1:.5g}, and the peak before it, at {0:.5g}",
-    "no peak before": "between the second-highest peak, at {0:.5g}, before which there is none, "
+    "no peak before": "between the second-highest peak, at {0:.5g}, which is the first, "
     "and the next one, at {1:.5g}",
-    "single peak": "at the foot of the longer side of the only peak, at {0:.5g}",
+    "single peak": "at the foot of the longer side of the only peak, which is at {0:.5g}",
 }
-MAX_NAMED = 6  # largest number of chance rises that are listed
-_ROOM = 1.6  # chart's top as a multiple of the second-highest peak: air, the highest, is cut
-_LI_VOXELS = 200_000  # about the number of voxels that represent the counts in Li's method
+MAX_NAMED = 6  # largest number of listed rises that may be due to chance
+_ROOM = 1.6  # top of the chart, as a multiple of the second-highest peak; air is often higher
+_LI_VOXELS = 200_000  # approximate number of voxels that represent the counts in Li's method
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A threshold: its name, the class of its line, voxel value, share of the voxels above it."""
+    """One threshold.
+
+    kind   CSS class of its line
+    value  voxel value
+    above  share of the voxels above it, 0..1
+    """
 
     name: str
     kind: str
@@ -47,7 +52,11 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class ThresholdFigure:
-    """chart: histogram, smoothed, peaks, thresholds; ends: the axis' ends, in voxel values."""
+    """A chart of histogram, peaks and thresholds.
+
+    reading  how the adaptive threshold follows from the peaks
+    ends     smallest and largest voxel value of the axis
+    """
 
     reading: str
     rows: tuple[Row, ...]
@@ -56,7 +65,7 @@ class ThresholdFigure:
 
 
 def draw_threshold(statistics: ChannelStatistics) -> ThresholdFigure | None:
-    """Return a channel's figure; None where it has no threshold."""
+    """Return a channel's figure, or None where it has no adaptive threshold."""
     found, values = statistics.threshold, statistics.values
     if found is None:
         return None
@@ -84,18 +93,18 @@ def draw_threshold(statistics: ChannelStatistics) -> ThresholdFigure | None:
 
 
 def describe(found: Threshold) -> str:
-    """Return how a threshold follows from its peaks, and the rises that were dropped, as text."""
+    """Return as text how a threshold follows from its peaks, and which rises were ignored."""
     reading = READINGS[found.reading].format(*found.between)
     left_out = ", ".join(f"{level:.5g}" for level in found.chance[:MAX_NAMED])
     if len(found.chance) > MAX_NAMED:
         left_out += f" and {len(found.chance) - MAX_NAMED} more"
     if not left_out:
         return reading
-    return f"{reading}. Rises that counting alone may make, at {left_out}, are no peaks"
+    return f"{reading}. Rises at {left_out} may be due to chance and were ignored"
 
 
 def find_peers(histogram: Histogram) -> tuple[float, float]:
-    """Return Otsu's and Li's thresholds, voxel values. At least two bins must have counts."""
+    """Return Otsu's and Li's thresholds as voxel values. At least two bins must have counts."""
     counts, levels = np.asarray(histogram.counts), histogram.levels
     otsu = filters.threshold_otsu(hist=(counts, levels))
     fewer = np.ceil(counts * min(1.0, _LI_VOXELS / counts.sum())).astype(np.int64)
@@ -110,11 +119,11 @@ def draw_cut(
     *,
     views: Sequence[View] = MICROSCOPE,
 ) -> Picture:
-    """Return a volume's mid-slices in which voxels below the threshold are hidden.
+    """Return a picture of a volume's middle slices, with voxels below the threshold in black.
 
     volume     uint8 (z, y, x), windowed
     threshold  0..1 in the window
-    views      ways to look at it
+    views      directions of the slices
     """
     slices = []
     for view in views:
@@ -127,7 +136,7 @@ def draw_cut(
 
 
 def _share_above(statistics: ChannelStatistics, value: float) -> float:
-    """Return the share of all voxels at or above a value, to within a bin of the window."""
+    """Return the share of all voxels at or above a value, exact to one bin of the window."""
     counts = np.asarray(statistics.histogram)
     upper = np.linspace(*statistics.window, len(counts) + 1)[1:]
     return float(counts[upper > value].sum() / counts.sum())

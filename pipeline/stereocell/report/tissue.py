@@ -1,4 +1,4 @@
-"""The report's picture of tissue classes: planes through their middle, coloured by probability."""
+"""The report's picture of tissue classes: three planes, coloured by probability."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from stereocell.preview.views import views_of
 from stereocell.steps.open_source import open_source
 from stereocell.steps.tissue_files import FOLDER, read_record
 
-SHOWN_PX = 330  # pixels, longest side of a plane
+SHOWN_PX = 330  # pixels, longest edge of a plane
 _GAP_PX = 6  # pixels between planes
 
 
 @dataclass(frozen=True, slots=True)
 class TissueFacts:
-    """record: OUT/tissue/tissue.json. picture: WebP data, width and height in pixels."""
+    """Content of OUT/tissue/tissue.json, and a picture: WebP data, width and height in pixels."""
 
     record: dict[str, Any]
     picture: tuple[bytes, int, int]
@@ -63,9 +63,9 @@ def find_tissue(out: Path, plan: Plan) -> TissueFacts | None:
 
 
 def _middle(read: Callable[[Box], NDArray[np.float32]], region: Box) -> list[int]:
-    """Return the voxel (z, y, x) at the centre of all classes, from planes across the region.
+    """Return the voxel (z, y, x) at the centre of all classes, estimated from evenly spaced planes.
 
-    read  returns probabilities of a box, float32 (class, z, y, x), 0..1
+    read  returns the probabilities 0..1 of a box, float32 (class, z, y, x)
     """
     found = []
     for axis in range(3):
@@ -85,7 +85,7 @@ def _plane(region: Box, axis: int, at: int) -> Box:
 
 
 def _paint(panels: list[tuple[Image.Image, list[float]]]) -> tuple[bytes, int, int]:
-    """Return the planes side by side, at one scale: WebP data, width and height in pixels."""
+    """Return the planes side by side at one scale: WebP data, width and height in pixels."""
     scale = SHOWN_PX / max(max(extent) for _, extent in panels)
     sizes = [tuple(max(2, round(um * scale)) for um in extent) for _, extent in panels]
     width = sum(right for _, right in sizes) + _GAP_PX * (len(sizes) - 1)

@@ -54,8 +54,8 @@ class UnwrapOptions:
         "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2",
         bounds=Bounds(3, MAX_PADDING),
     )
-    # For texels of one coarse voxel spacing, a unit of 194 x 512 x 512 full of membranes needs an
-    # edge of 1750 texels, and units of nuclei and vessels need 300 to 1000.
+    # With texels of one coarse voxel spacing, a unit of 194 x 512 x 512 voxels full of membranes
+    # needs a map of 1750 texels. Units of nuclei and vessels need 300 to 1000.
     max_texture: int = setting(
         1024, "largest edge of a map in texels; texels grow up to 2.8 times to fit", bounds=COUNT
     )

@@ -6,6 +6,7 @@ the result of a shader that takes trilinear samples at a distance of h on both s
 axis: with r = h / spacing of that axis, f(+r) - f(-r) = r (f[1] - f[-1]). Each channel has a number
 `gradient_max`, the step of the last row.
 
+References
 Kindlmann & Durkin, "Semi-automatic generation of transfer functions for direct volume rendering",
 IEEE Symposium on Volume Visualization 1998; Kniss, Kindlmann & Hansen, "Multidimensional transfer
 functions for interactive volume rendering", IEEE TVCG 8(3), 2002.
