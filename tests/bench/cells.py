@@ -49,9 +49,9 @@ from stereocell.meshes.validity import find_defects
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
 from stereocell.objects.build_objects import MARGIN
+from stereocell.objects.interfaces import extract_interfaces, put_on_lattice, surfaces_of
 from stereocell.objects.options import ObjectOptions
-from stereocell.objects.simplify_walls import simplify_walls
-from stereocell.objects.walls import extract_walls, put_on_lattice, surfaces_of
+from stereocell.objects.simplify_interfaces import simplify_interfaces
 from stereocell.objects.well_composed import make_well_composed
 from support.touching_cells import RADIUS_UM, touching_cells
 
@@ -140,9 +140,9 @@ def _levels(labels: NDArray[np.int32], spacing_um: Triple, step_um: float) -> Ma
     z, y, x = (-MARGIN * s for s in spacing_um)
     meter, made = Meter(), []
     mended, _, _ = make_well_composed(np.pad(labels, MARGIN))
-    walls = extract_walls(mended, spacing_um, step_um, origin_um=(z, y, x))
+    walls = extract_interfaces(mended, spacing_um, step_um, origin_um=(z, y, x))
     for level, error in enumerate(ObjectOptions().errors):
-        walls, _ = simplify_walls(walls, error * min(spacing_um), volumes, step_um)
+        walls, _ = simplify_interfaces(walls, error * min(spacing_um), volumes, step_um)
         mesh = surfaces_of(walls, np.arange(1, count + 1, dtype=np.int32))
         made.append((f"ours, lod{level}", mesh, meter.read()))
     return made

@@ -55,7 +55,7 @@ def measure(number: int) -> Ladder:
     """Return the levels of one case of the corpus."""
     case = list(all_cases())[number]
     sight = look_at(case)
-    levels, shown = sight.found.ladder, sight.found.shown()
+    levels, shown = sight.found.all_levels, sight.found.shown()
     if clear_of(levels) and not shown:
         levels = ()  # noise or uneven light: no choice of a level is asked for
     clear = [k for k, level in enumerate(levels) if level in shown]

@@ -46,7 +46,7 @@ def test_a_network_of_more_memory_than_its_bound_is_refused(tmp_path: Path) -> N
 
 def test_a_tensor_beyond_this_machine_names_the_bound_to_raise(tmp_path: Path) -> None:
     line = refusal(write_huge_model(tmp_path / "m.onnx", planes=1 << 44), ModelBounds())
-    assert "it asks for more memory than it gets" in line
+    assert "it needs more memory than allowed" in line
     assert "--model-memory-gb" in line
     assert "bfc_arena" not in line
 

@@ -11,8 +11,8 @@ from pxr import Sdf, Usd, UsdGeom, Vt
 
 from stereocell.objects import build_objects as building
 from stereocell.objects.build_objects import BuiltObjects
-from stereocell.objects.intensities import Measured
-from stereocell.objects.walls import Walls
+from stereocell.objects.intensities import Intensities
+from stereocell.objects.interfaces import Interfaces
 from stereocell.samples.cells import make_tissue
 from stereocell.steps import build_objects as objects_maker
 from support.exhaustive import sweep
@@ -60,12 +60,12 @@ def test_levels_whose_simplification_stops_early_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_ome_tiff(tmp_path / "l.ome.tif", boxes((3, 4, 20), shape=(16, 24, 24)))
-    right = building.simplify_walls
+    right = building.simplify_interfaces
 
-    def simplify_walls(walls: Walls, error: float, *given: Any, **named: Any) -> Any:
+    def simplify_interfaces(walls: Interfaces, error: float, *given: Any, **named: Any) -> Any:
         return (walls, False) if error > 0.2 else right(walls, error, *given, **named)
 
-    monkeypatch.setattr(building, "simplify_walls", simplify_walls)
+    monkeypatch.setattr(building, "simplify_interfaces", simplify_interfaces)
     build(tmp_path / "l.ome.tif", tmp_path / "out", "--labels", ".")
     wanted = "l: simplifying lod3 stopped early in r0_c0, because triangles would have crossed"
     output = said(capsys)
@@ -93,7 +93,7 @@ def test_the_deep_check_measures_the_image_again(
     assert run("check", tmp_path / "right", "--deep", "--workers", 0) == 0
     right = objects_maker.measure_intensities
 
-    def measure(*given: Any, **named: Any) -> Measured:
+    def measure(*given: Any, **named: Any) -> Intensities:
         found = right(*given, **named)
         getattr(found, measure_of)[-1] += 30
         return found

@@ -118,7 +118,7 @@ def test_measured_voxels_that_are_damaged_or_gone_are_named(measured_stage, tmp_
     with pytest.raises(StereoCellError, match=r"CD31\.vdb: can't be read as OpenVDB"):
         edited_over(tmp_path / "own/stage.usda", tmp_path, (490, 2050))
     write_vdb(file, np.zeros((9, 20, 20), np.uint8), first_um=(0, 0, 0), spacing_um=(1, 1, 1))
-    with pytest.raises(StereoCellError, match=r"CD31\.vdb: no grid 'measured' of floats"):
+    with pytest.raises(StereoCellError, match=r"CD31\.vdb: found no grid 'measured' of floats"):
         edited_over(tmp_path / "own/stage.usda", tmp_path, (490, 2050))
 
 

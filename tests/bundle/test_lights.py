@@ -215,7 +215,7 @@ def test_a_large_image_is_reduced_and_keeps_its_light(edit, tmp_path):
     ("name", "content", "reason"),
     [
         ("a.hdr", b"no image", "can't be read as Radiance HDR"),
-        ("a.png", b"no image", "can't be read as an image, expected one as .exr"),
+        ("a.png", b"no image", "can't be read as an image, expected one in .exr"),
         ("a.exr", b"no image", "can't be read as OpenEXR"),
     ],
 )

@@ -194,7 +194,7 @@ def test_cut_volume_is_one_line(tmp_path, capfd):
     atlas = tmp_path / "stage/tiles/r0_c1/CD31.exr"
     atlas.write_bytes(atlas.read_bytes()[:-50])
     with pytest.raises(
-        StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: it ends at byte"
+        StereoCellError, match=r"CD31\.exr: can't be read as OpenEXR: the file ends at byte"
     ):
         write(stage, tmp_path / "bundle")
     for line in capfd.readouterr().err.splitlines():  # OpenEXR's own words would come on top

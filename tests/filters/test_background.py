@@ -1,4 +1,4 @@
-"""The background is found under bodies, lies where it was, and is one for all tiles."""
+"""The background is found under bodies, at its true height, and is the same in all tiles."""
 
 import numpy as np
 import pytest
@@ -17,25 +17,25 @@ def _ramp() -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_ramp_under_noise_and_bodies_is_found_where_it_lies() -> None:
+def test_a_ramp_under_noise_and_bodies_is_found() -> None:
     rng = np.random.default_rng(0)
     ball = blurred_ball(REGION.shape, SPACING, (6.7, 9.0, 9.0), 2.0, 0.3)
     counts = (_ramp() + 500 * ball + rng.normal(0, 5, REGION.shape)).astype(np.float32)
     found = find_background(counts, REGION, spacing_um=SPACING, block_um=4.5).at(REGION)
     inner = (slice(12, 36), slice(24, 104), slice(24, 104))
-    # a low percentile of a ramp lies below its middle: a constant, which no threshold sees
+    # A low percentile of a ramp lies below its middle by a constant, which no threshold notices.
     error = found[inner] - _ramp()[inner]
-    assert np.ptp(np.percentile(error, [2, 98])) < 25  # of a ramp that rises by 280
+    assert np.ptp(np.percentile(error, [2, 98])) < 25  # for a ramp that rises by 280
     assert abs(np.median(error)) < 35
 
 
-def test_a_ground_that_falls_to_the_rim_is_found_on_to_the_rim() -> None:
-    """As a lens's vignetting leaves it: a parabola, steepest at the ends of what is built."""
+def test_a_ground_that_falls_towards_the_rim_is_found_up_to_the_rim() -> None:
+    """Vignetting of a lens leaves a parabola, which is steepest at the ends of the region."""
     z, y, x = np.indices(REGION.shape)
     ground = 500 - 300 * ((x - 64) / 64) ** 2 + 0 * y + 0 * z
     found = find_background(ground.astype(np.float32), REGION, spacing_um=SPACING, block_um=4.5)
     error = found.at(REGION) - ground
-    assert np.ptp(np.percentile(error, [1, 99])) < 60  # of 300
+    assert np.ptp(np.percentile(error, [1, 99])) < 60  # for a drop of 300
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_coarser_voxels_give_the_same_background() -> None:
     np.testing.assert_allclose(coarse.at(REGION), fine.at(REGION), atol=3)
 
 
-def test_block_larger_than_the_region_is_one_constant() -> None:
+def test_a_block_larger_than_the_region_gives_a_constant() -> None:
     found = find_background(_ramp(), REGION, spacing_um=SPACING, block_um=1e6)
     assert found.values.shape == (1, 1, 1)
     assert found.at(REGION).shape == (1, 1, 1)

@@ -1,4 +1,4 @@
-"""The median against SciPy's, and what it is for."""
+"""The median and the Gaussian, compared with SciPy's, and the purpose of each."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from stereocell.model.volume import Volume
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.float32])
 @pytest.mark.parametrize("shape", [(5, 17, 23), (1, 2, 9), (3, 1, 1)])
-def test_median_is_scipy_s(dtype: Any, shape: tuple[int, int, int]) -> None:
+def test_the_median_equals_that_of_scipy(dtype: Any, shape: tuple[int, int, int]) -> None:
     voxels = np.random.default_rng(0).integers(0, 250, shape).astype(dtype)
     found = denoise(Volume(voxels, (1.0, 1.0, 1.0)), 0.0)
     wanted = ndimage.median_filter(voxels, (1, 3, 3), mode="nearest")
@@ -33,7 +33,9 @@ def test_denoising_follows_the_plane_of_the_images(axis: int) -> None:
 
 @pytest.mark.parametrize("shape", [(5, 17, 23), (3, 2, 9), (1, 5, 2), (3, 1, 1), (2, 6, 1)])
 @pytest.mark.parametrize("sigma_um", [0.0, 1.0])
-def test_no_value_moves_farther_than_it_may(shape: tuple[int, int, int], sigma_um: float) -> None:
+def test_no_value_changes_by_more_than_the_limit(
+    shape: tuple[int, int, int], sigma_um: float
+) -> None:
     voxels = np.random.default_rng(0).integers(0, 250, shape).astype(np.float64)
     others = np.ones((3, 3, 3), bool)
     others[:, 1, 1] = False
@@ -49,7 +51,7 @@ def test_no_value_moves_farther_than_it_may(shape: tuple[int, int, int], sigma_u
 
 @pytest.mark.parametrize("max_shift", [None, 0.0])
 @pytest.mark.parametrize("place", [(4, 10, 10), (4, 0, 0), (4, 0, 9), (4, 19, 19)])
-def test_one_hot_voxel_goes_anywhere_and_with_any_bound(
+def test_one_hot_voxel_is_removed_at_any_place_and_with_any_limit(
     place: tuple[int, int, int], max_shift: float | None
 ) -> None:
     voxels = np.full((9, 20, 20), 100, np.uint16)
@@ -59,7 +61,7 @@ def test_one_hot_voxel_goes_anywhere_and_with_any_bound(
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_camera_s_hot_pixel_goes_from_all_planes(axis: int) -> None:
+def test_a_camera_s_hot_pixel_is_removed_from_all_planes(axis: int) -> None:
     voxels = np.full((20, 20, 20), 100, np.uint16)
     np.moveaxis(voxels, axis, 0)[:, 8, 9] = 60_000
     found = denoise(Volume(voxels, (1.0, 1.0, 1.0), slice_axis=axis), 1.0, 0.0)
@@ -68,7 +70,7 @@ def test_a_camera_s_hot_pixel_goes_from_all_planes(axis: int) -> None:
 
 @pytest.mark.parametrize("slope", [-1, 1])
 def test_a_bar_of_one_voxel_that_leans_against_the_planes_stays(slope: int) -> None:
-    """It has no neighbour of its own brightness in its plane."""
+    """The bar has no neighbours of its own brightness in the plane."""
     voxels = np.full((20, 20, 20), 100, np.uint16)
     for z in range(4, 16):
         voxels[z, 4 + z // 2, 10 + slope * (z - 10)] = 1100
@@ -87,8 +89,8 @@ def test_no_median_reaches_across_a_coarse_axis_of_the_plane() -> None:
 
 @pytest.mark.parametrize("shape", [(11, 17, 23), (2, 3, 40), (1, 1, 1)])
 @pytest.mark.parametrize("sigma_um", [0.1, 0.28, 1.1])
-def test_gaussian_is_scipy_s(shape: tuple[int, int, int], sigma_um: float) -> None:
-    """Up to the last digits of float32: sums run in another order."""
+def test_the_gaussian_equals_that_of_scipy(shape: tuple[int, int, int], sigma_um: float) -> None:
+    """Results are equal up to the last digits of float32, because sums run in another order."""
     spacing = (0.56, 0.28, 0.14)
     voxels = np.random.default_rng(0).integers(0, 60_000, shape).astype(np.uint16)
     wanted = ndimage.gaussian_filter(
@@ -99,7 +101,7 @@ def test_gaussian_is_scipy_s(shape: tuple[int, int, int], sigma_um: float) -> No
     np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
-def test_even_volume_stays_and_the_argument_too() -> None:
+def test_an_even_volume_and_the_argument_do_not_change() -> None:
     voxels = np.full((6, 7, 8), 700.3, np.float32)
     np.testing.assert_array_equal(denoise(Volume(voxels, (0.28, 0.14, 0.14)), 0.3), voxels)
     noise = np.random.default_rng(0).random((6, 7, 8)).astype(np.float32)
@@ -109,8 +111,8 @@ def test_even_volume_stays_and_the_argument_too() -> None:
 
 
 @pytest.mark.parametrize("max_shift", [None, 500.0])
-def test_voxel_depends_on_its_neighbours_alone(max_shift: float | None) -> None:
-    """Bit by bit: neighbouring tiles read windows that begin and end elsewhere."""
+def test_each_result_depends_only_on_the_voxel_s_neighbours(max_shift: float | None) -> None:
+    """Results are equal bit by bit, because neighbouring tiles read different windows."""
     voxels = np.random.default_rng(0).integers(0, 60_000, (20, 40, 50)).astype(np.uint16)
     spacing = (0.28, 0.14, 0.14)
     whole = denoise(Volume(voxels, spacing), 0.2, max_shift)
@@ -118,7 +120,7 @@ def test_voxel_depends_on_its_neighbours_alone(max_shift: float | None) -> None:
     np.testing.assert_array_equal(part[4:-4, 8:-8, 8:-8], whole[7:13, 13:25, 15:40])
 
 
-def test_hot_voxel_leaves_no_trace_and_a_body_stays() -> None:
+def test_a_hot_voxel_leaves_no_trace_and_a_body_stays() -> None:
     voxels = np.full((9, 20, 20), 100, np.uint16)
     voxels[2:7, 5:15, 5:15] = 200
     clean = denoise(Volume(voxels, (1.0, 1.0, 1.0)), 1.0)

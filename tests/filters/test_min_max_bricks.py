@@ -28,7 +28,7 @@ def test_bricks_hold_every_value_that_trilinear_interpolation_gives(volume, seed
 
 @pytest.mark.slow
 @given(volumes)
-def test_bricks_cover_their_voxels_and_one_more_on_each_side_and_nothing_else(volume):
+def test_bricks_cover_exactly_their_voxels_and_one_more_on_each_side(volume):
     bricks = min_max_bricks(volume)
     for brick in np.ndindex(bricks.shape[:3]):
         first = [SKIP_BRICK * b for b in brick]
@@ -52,7 +52,7 @@ def test_mip_levels_of_a_constant_volume_are_constant(shape, value):
 
 
 def test_mip_levels_of_a_ramp_keep_its_place_in_the_box():
-    # A linear ramp over the box [0, 1] is the same ramp at every resolution, odd sizes too.
+    # A linear ramp over the box [0, 1] is the same ramp at every resolution, also for odd sizes.
     n = 39
     ramp = (np.arange(n) + 0.5) / n * 200
     volume = np.broadcast_to(np.rint(ramp).astype(np.uint8), (7, 5, n))
@@ -63,7 +63,7 @@ def test_mip_levels_of_a_ramp_keep_its_place_in_the_box():
 
 
 def test_odd_axes_are_weighted_by_covered_area():
-    # 5 -> 2: each coarse voxel covers 2.5 fine ones; means of (0, 0, .5 * 100) and (.5 * 100, 0, 0)
+    # 5 -> 2: each coarse voxel covers 2.5 fine ones. Its mean is over (0, 0, .5 * 100) or reversed.
     volume = np.zeros((1, 1, 5), np.uint8)
     volume[0, 0, 2] = 100
     assert mip_levels(volume)[1].tolist() == [[[20, 20]]]

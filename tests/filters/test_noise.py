@@ -1,4 +1,4 @@
-"""The noise of a channel against noise that was added with a known deviation."""
+"""The noise of a channel, compared with noise that was added with a known deviation."""
 
 import numpy as np
 import pytest
@@ -17,13 +17,13 @@ def _deviation(voxels: np.ndarray, darkest: float | None = None) -> float:
 
 
 @pytest.mark.parametrize("deviation", [3.0, 40.0])
-def test_even_noise_is_measured(deviation: float) -> None:
+def test_noise_on_an_even_ground_is_measured(deviation: float) -> None:
     noise = np.random.default_rng(0).normal(1000.0, deviation, SHAPE).astype(np.float32)
     assert _deviation(noise) == pytest.approx(deviation, rel=0.05)
     assert _deviation(noise.round().astype(np.uint16)) == pytest.approx(deviation, rel=0.08)
 
 
-def test_bodies_and_a_slope_are_no_noise() -> None:
+def test_bodies_and_a_slope_do_not_count_as_noise() -> None:
     rng = np.random.default_rng(0)
     bodies = ndimage.gaussian_filter(rng.normal(size=SHAPE), 8) > 0.008
     scene = 200.0 + 800.0 * ndimage.gaussian_filter(bodies.astype(np.float64), 1)
@@ -31,24 +31,24 @@ def test_bodies_and_a_slope_are_no_noise() -> None:
     assert _deviation(scene + rng.normal(0, 20.0, SHAPE)) == pytest.approx(20.0, rel=0.25)
 
 
-def test_photons_have_the_noise_of_the_bright_parts() -> None:
+def test_photon_noise_is_that_of_the_bright_parts() -> None:
     photons = np.random.default_rng(0).poisson(np.where(np.arange(96) < 48, 10.0, 100.0), SHAPE)
     assert _deviation(photons) == pytest.approx(10.0, rel=0.1)
 
 
 @pytest.mark.parametrize("thickness", [1, 3])
-def test_a_thin_shell_without_noise_has_none(thickness: float) -> None:
+def test_a_thin_shell_does_not_count_as_noise(thickness: float) -> None:
     assert _deviation(ThinBody("sphere", thickness, 1, 0).voxels()) == 0.0
 
 
-def test_padding_takes_no_part() -> None:
+def test_padding_is_left_out_of_the_noise() -> None:
     voxels = np.random.default_rng(0).normal(500.0, 10.0, SHAPE)
     voxels[:, :, :80] = 0.0
     assert _deviation(voxels, 0.0) == pytest.approx(10.0, rel=0.1)
 
 
-def test_vessels_cut_out_of_a_volume_have_no_noise_and_a_cut_out_body_has_its_own() -> None:
-    """Each edge of a thin vessel would be taken for noise, were it not for the even ground."""
+def test_cut_out_vessels_have_no_noise_and_a_cut_out_body_has_its_own() -> None:
+    """Without the rule for even ground, each edge of a thin vessel would count as noise."""
     rng, (_, rows, columns) = np.random.default_rng(2), np.indices((64, 96, 96))
     seeds = np.zeros(rows.shape)
     for start, stop in rng.uniform(5, 90, (12, 2, 2)):
@@ -76,6 +76,6 @@ def test_blocks_add_up_and_a_volume_of_one_pixel_has_no_noise() -> None:
     assert _deviation(np.ones((1, 1, 1))) == 0.0
 
 
-def test_a_mask_s_voxels_stay_on_their_side_of_half_way() -> None:
+def test_smoothing_keeps_a_mask_s_voxels_on_their_side_of_half_height() -> None:
     assert find_max_shift(3.0, 2.0, None) == 6.0
     assert find_max_shift(0.0, 2.0, (0.0, 255.0)) < 255.0 / 2

@@ -1,7 +1,7 @@
-"""Thin sheets and shells of all orientations, in volumes of thick and thin slices, after filters.
+"""Thin sheets and shells in all orientations, in volumes of thick and thin slices, after filters.
 
-The unfiltered voxels keep all of a body and its one component: that is what filters are compared
-with. Where there is noise, a voxel may be lost that stands out by less than the noise.
+The unfiltered voxels hold the whole body in one component, and are the reference for filtered ones.
+In noise, a voxel that stands out by less than the noise may be lost.
 """
 
 from collections.abc import Callable
@@ -41,7 +41,7 @@ def _filtered(body: ThinBody, noise: float = 0.0) -> NDArray[np.float32]:
 def _least_kept(
     level: float, is_asked: Callable[[ThinBody], bool], noise: float = 0.0
 ) -> tuple[float, ThinBody]:
-    """Return the least share of a body's voxels above the level that filters leave, and whose."""
+    """Return the smallest share of a body's voxels above the level after filters, and the body."""
     shares = []
     for body in filter(is_asked, thin_bodies()):
         source, field = _source(body) > level, _filtered(body, noise)
@@ -72,7 +72,7 @@ def test_a_shell_in_one_piece_is_not_torn_into_rings(level: float) -> None:
 
 
 def test_sheets_of_a_voxel_stay_in_noise_of_a_twentieth_of_their_height() -> None:
-    """They stand out by 15 deviations at a quarter of their height, and 3 may go to chance."""
+    """At a quarter of their height they stand out by 15 deviations; 3 of these may be noise."""
     noise = 0.05 * CONTRAST
     share, body = _least_kept(
         QUARTER, lambda body: body.shape in NORMALS and body.thickness >= 1.5, noise
@@ -80,8 +80,8 @@ def test_sheets_of_a_voxel_stay_in_noise_of_a_twentieth_of_their_height() -> Non
     assert share > 0.93, body
 
 
-def test_the_gaussian_by_itself_removes_a_sheet_of_one_voxel() -> None:
-    """Its centre keeps erf(1 / sqrt 8) = .38 of its height, under a half."""
+def test_the_gaussian_alone_removes_a_sheet_of_one_voxel() -> None:
+    """The sheet's centre keeps erf(1 / sqrt 8) = .38 of its height, less than a half."""
     body = ThinBody("across x", 1, 1, 0)
     volume = Volume(body.voxels(), body.spacing)
     source = volume.voxels > HALF

@@ -1,4 +1,4 @@
-"""Bytes of trees and frames, written out by hand; messages; and what breaks their rules."""
+"""Bytes of trees and frames, written by hand; messages; and errors for faulty ones."""
 
 import hashlib
 import json
@@ -34,10 +34,11 @@ from support.server.brick_decoder import decode_brick, decode_frame, reassemble
 SOURCE = bytes(range(16))
 SCHEMA = json.loads(schema_path("brick_stream.schema.json").read_text("utf-8"))
 
-# 20 x 3 x 2 texels, threshold 40; the first 15 along x are 200, the last 5 are 7: a root of level
-# 1, a leaf, and an empty node, as texel 15, its apron, is 7 too. Root texels along x: seven of 200,
-# (200 + 7) / 2 = 103.5 -> 104, two of 7, and 7 behind the end. Interpolated between them at texels
-# 13 to 16 (at 1/4 and 3/4) it is 176, 128, 79.75, 31.25 where 200, 200, 7, 7 should be.
+# A volume of 20 x 3 x 2 texels with threshold 40. The first 15 texels along x are 200, the last 5
+# are 7. The tree is a root of level 1, a leaf, and an empty node, because its apron, texel 15, is 7
+# too. Root texels along x are seven of 200, then (200 + 7) / 2 = 103.5 -> 104, two of 7, and 7
+# beyond the end. Interpolated at texels 13 to 16 (at 1/4 and 3/4) they give 176, 128, 79.75, 31.25,
+# where the true values are 200, 200, 7, 7.
 HEADER_HEX = """
 89 53 43 42 56 48 0d 0a  01 00  40 00  10 01 02 01
 14 00 00 00  03 00 00 00  02 00 00 00  03 00 00 00  02 00 00 00
@@ -49,7 +50,7 @@ EMPTY_HEX = "00 01 00 07  01 00 00 00 00 00  07 07 00 00 00 00"
 
 
 def by_hand():
-    """Return the volume, its tree's bytes, and the bricks' frames."""
+    """Return the volume, the bytes of its tree, and the frames of its bricks."""
     volume = np.full((2, 3, 20), 7, np.uint8)
     volume[..., :15] = 200
     root, leaf = (np.full((18, 18, 18), 7, np.uint8) for _ in range(2))
@@ -114,7 +115,7 @@ def test_a_tables_part_is_one_zstd_frame():
         ("part", ENTRY.size),
     ],
 )
-def test_the_schemas_layouts_leave_no_byte_out(name, size):
+def test_the_layouts_in_the_schema_cover_every_byte(name, size):
     layout = SCHEMA["x-layout"][name]
     at = 0
     for item in layout["fields"]:
@@ -123,7 +124,7 @@ def test_the_schemas_layouts_leave_no_byte_out(name, size):
     assert at == layout["bytes"] == size
 
 
-def test_the_schemas_node_is_the_record_that_is_written():
+def test_the_node_in_the_schema_is_the_written_record():
     fields = {f["name"]: f for f in SCHEMA["x-layout"]["node"]["fields"]}
     for name in RECORD.names:
         kind, offset = RECORD.fields[name]
@@ -133,7 +134,7 @@ def test_the_schemas_node_is_the_record_that_is_written():
     assert set(RECORD.names) == {*NODE.names, "length", "hash"}
 
 
-def test_a_tree_comes_back_from_its_bytes():
+def test_a_tree_is_read_back_from_its_bytes():
     volume = phantom()
     bvh = build(volume, 20)
     data = encode_tree(bvh, SOURCE)
@@ -149,7 +150,7 @@ def test_a_tree_comes_back_from_its_bytes():
     np.testing.assert_array_equal(reassemble(again), reassemble(bvh))
 
 
-def test_same_volume_same_bytes():
+def test_the_same_volume_gives_the_same_bytes():
     volume = phantom()
     assert encode_tree(build(volume, 9), SOURCE) == encode_tree(build(volume.copy(), 9), SOURCE)
 
@@ -157,12 +158,12 @@ def test_same_volume_same_bytes():
 @pytest.mark.slow
 @settings(max_examples=400, deadline=None)
 @given(st.integers(0, 183), st.integers(0, 255))
-def test_a_spoilt_byte_is_refused_or_changes_no_structure(at, value):
+def test_a_damaged_byte_is_refused_or_changes_no_structure(at, value):
     _, data, _ = by_hand()
-    spoilt = bytearray(data)
-    spoilt[at] = value
+    damaged = bytearray(data)
+    damaged[at] = value
     try:
-        table = parse_table(bytes(spoilt))
+        table = parse_table(bytes(damaged))
     except BrickFormatError:
         return
     assert table.nodes["child_mask"].tolist() == [3, 0, 0]
@@ -173,7 +174,7 @@ def test_a_spoilt_byte_is_refused_or_changes_no_structure(at, value):
 @pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.binary(max_size=200))
-def test_no_bytes_make_the_readers_stumble(data):
+def test_any_bytes_are_read_or_refused_in_one_line(data):
     for read in (parse_table, decode_frame, decode_brick):
         for given_ in (data, by_hand()[1][:64] + data, b"\x02\x01\0\0" + data, b"\x01\x01" + data):
             try:
@@ -208,7 +209,7 @@ VIEW = {
         {"type": "ack", "sequence": 1},
     ],
 )
-def test_messages_of_the_document_are_taken(message):
+def test_messages_from_the_documentation_are_accepted(message):
     assert parse_message(json.dumps(message)) == message
 
 
@@ -222,7 +223,7 @@ def test_messages_of_the_document_are_taken(message):
         ("{}", "type: expected one of hello, open"),
         ('{"type": ["view"]}', "type: expected one of"),
         ('{"type": "bye"}', "type: expected one of"),
-        ('{"type": "ack", "sequence": NaN}', "NaN is no number"),
+        ('{"type": "ack", "sequence": NaN}', "NaN is not a JSON number"),
         ('{"type": "ack", "sequence": 0}', r"ack: \$.sequence: minimum"),
         ('{"type": "ack", "sequence": 1, "x": 0}', r"ack: \$: additionalProperties"),
         ('{"type": "cancel"}', r"cancel: \$: required"),
@@ -251,7 +252,7 @@ def test_other_messages_are_refused_in_one_line(text, said):
         {"type": "hello", **{f"k{i}": 0 for i in range(5000)}},
     ],
 )
-def test_no_message_of_allowed_length_takes_long_to_refuse(hostile):
+def test_every_message_of_allowed_length_is_refused_quickly(hostile):
     text = json.dumps(hostile)
     assert len(text) < 1 << 16
     start = time.process_time()

@@ -1,4 +1,4 @@
-"""What docs/unity-unreal.md says of slice atlases: slicing one so gives the tile's volume back.
+"""Slicing an atlas by the recipes in docs/unity-unreal.md returns the volume of the tile.
 
 The atlas is read by three.js, whose EXR reader shares no code with the library that wrote it.
 """
@@ -40,7 +40,7 @@ needs_viewer = pytest.mark.skipif(
 
 @dataclass(frozen=True)
 class Atlas:
-    """The image, float16 (rows of pixels from above, columns), and what the recipe asks for."""
+    """The image, float16 (rows of pixels from above, columns), and the numbers for the recipe."""
 
     image: NDArray[np.float16]
     columns: int
@@ -86,7 +86,7 @@ def atlas(stage_path: Path, tile: str, tmp_path: Path) -> Atlas:
 
 
 def sliced_in_unreal(atlas: Atlas) -> NDArray[np.float16]:
-    """Return what Volume Texture makes of it: (w, v, u), v from above."""
+    """Return the texture that Volume Texture makes: (w, v, u), v from above."""
     nx, ny, _ = atlas.size
     across, down = atlas.image.shape[1] // nx, atlas.image.shape[0] // ny
     cells = [
@@ -97,7 +97,7 @@ def sliced_in_unreal(atlas: Atlas) -> NDArray[np.float16]:
 
 
 def sliced_in_unity(atlas: Atlas) -> NDArray[np.float16]:
-    """Return what Texture Shape 3D makes of it by columns and rows: (w, v, u), v from below."""
+    """Return the texture that Texture Shape 3D makes: (w, v, u), v from below."""
     height, width = (
         n // parts for n, parts in zip(atlas.image.shape, (atlas.rows, atlas.columns), strict=True)
     )
@@ -107,7 +107,7 @@ def sliced_in_unity(atlas: Atlas) -> NDArray[np.float16]:
 
 @pytest.mark.slow
 @needs_viewer
-def test_slicing_by_either_recipe_gives_the_volume_back(atlas: Atlas, tile: str) -> None:
+def test_slicing_by_either_recipe_returns_the_volume(atlas: Atlas, tile: str) -> None:
     (content,) = (each for each in make_tiles() if each.id == tile)
     (channel,) = (each for each in content.channels if each.channel_id == F_ID)
     expected = (channel.volume / 255).astype(np.float16)
@@ -116,7 +116,7 @@ def test_slicing_by_either_recipe_gives_the_volume_back(atlas: Atlas, tile: str)
     unreal, unity = sliced_in_unreal(atlas), sliced_in_unity(atlas)
     deep = atlas.columns * atlas.rows
     assert unreal.shape == unity.shape == (deep, ny, nx)
-    assert deep > nz  # so the black cells are tried too
+    assert deep > nz  # the black cells are tested too
     assert np.array_equal(unreal[:nz], expected)
     assert np.array_equal(unity[:nz, ::-1], expected)
     assert not unreal[nz:].any()
@@ -126,7 +126,7 @@ def test_slicing_by_either_recipe_gives_the_volume_back(atlas: Atlas, tile: str)
 
 @pytest.mark.slow
 @needs_viewer
-def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
+def test_voxels_lie_where_the_recipe_states(atlas: Atlas) -> None:
     depth_um, height_um, width_um = SPACING_UM
     assert np.allclose(atlas.spacing, [width_um, height_um, depth_um], rtol=1e-6)
     texture = sliced_in_unity(atlas)
@@ -136,7 +136,7 @@ def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
     x = atlas.low[0] + (i - 1) * atlas.spacing[0]
     y = atlas.high[1] - (j - 1) * atlas.spacing[1]
     z = atlas.low[2] + (k - 1) * atlas.spacing[2]
-    # the letter at that place of the world; its outermost voxels repeat beyond it
+    # The letter at that position in the world; its outermost voxels repeat beyond it.
     at = [np.rint(a / h).astype(int) for a, h in zip((z, -y, x), SPACING_UM, strict=True)]
     at = [np.clip(a, 0, n - 1) for a, n in zip(at, letter.shape, strict=True)]
     u, v, w = (i + 0.5) / nx, 1 - (j + 0.5) / ny, (k + 0.5) / len(texture)
@@ -147,7 +147,7 @@ def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
     assert np.array_equal(texture[tuple(texels)] > 0.5, letter[tuple(at)])
 
 
-def test_the_recipe_names_the_numbers_by_which_it_was_followed() -> None:
+def test_the_recipe_states_the_formulas_that_this_test_uses() -> None:
     recipe = (ROOT / "docs" / "unity-unreal.md").read_text("utf-8")
     formulas = [
         "x = low.x + (i - 1) sx      y = high.y - (j - 1) sy      z = low.z + (k - 1) sz",

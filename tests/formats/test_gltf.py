@@ -14,7 +14,7 @@ MAP = Textures(b"map")
 
 
 def patch(x0, x1, y=-40.0, n=9):
-    """A square in the plane y = `y`, x from x0 to x1, normals up, UVs and tangents along x."""
+    """Return a square in the plane y = `y`, x from x0 to x1, with UVs and tangents along x."""
     u, v = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
     positions = np.stack([x0 + u * (x1 - x0), np.full_like(u, y), v * 17.3], -1).reshape(-1, 3)
     i = np.arange(n * n).reshape(n, n)
@@ -61,7 +61,7 @@ def test_step_is_a_power_of_two_that_spans_the_extent(extent_um):
     assert extent_um * 1e-6 / step <= 2**14
 
 
-def test_triangles_keep_winding_and_number():
+def test_triangles_keep_their_winding_and_number():
     mesh = patch(0, 10)
     document, arrays = read(
         encode_glb(mesh, choose_step(20), material=RED, name="mesh", extras=EXTRAS).data
@@ -72,7 +72,8 @@ def test_triangles_keep_winding_and_number():
     ]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert len(facing) == len(mesh.triangles)
-    assert (facing[:, 1] > 0).all()  # counter-clockwise seen from above, as the normals say
+    # Counter-clockwise as seen from above, in agreement with the normals
+    assert (facing[:, 1] > 0).all()
 
 
 def test_vertices_without_a_triangle_are_left_out():
@@ -97,8 +98,8 @@ def test_color_and_extras_are_written():
     assert "KHR_texture_basisu" not in document["extensionsUsed"]
 
 
-def test_json_of_a_small_level_says_nothing_twice():
-    """It would weigh as much as the level's triangles do."""
+def test_the_json_of_a_small_level_repeats_nothing():
+    """Otherwise the JSON would be as large as the level's triangles."""
     names = {"tile": "r10_c10", "channel": "MART1"}
     data = encode_glb(
         patch(0, 10), choose_step(20), material=RED, name="MART1_r10_c10", extras=names
@@ -123,7 +124,7 @@ def test_normals_and_tangents_are_kept_to_about_a_degree():
         encode_glb(mesh, choose_step(20), material=RED, name="m", extras=EXTRAS, textures=MAP).data
     )
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
-    # vertices are ordered anew: find each by its place
+    # Vertices are in another order, so each is found by its position.
     x, _, z = arrays[attributes["POSITION"]].astype(float).T
     u, v = (np.rint(39 * axis / axis.max()).astype(int) for axis in (x, z))
     for name, expected in (("NORMAL", normals), ("TANGENT", tangents)):
@@ -135,7 +136,7 @@ def test_normals_and_tangents_are_kept_to_about_a_degree():
         assert (found[:, 3:] == there[:, 3:]).all()
 
 
-def test_normal_map_brings_uvs_with_v_down_and_tangents():
+def test_a_normal_map_adds_tangents_and_uvs_with_v_down():
     mesh = patch(0, 10)
     document, arrays = read(
         encode_glb(
@@ -151,14 +152,14 @@ def test_normal_map_brings_uvs_with_v_down_and_tangents():
     uvs = arrays[attributes["TEXCOORD_0"]] / 65535
     tangents = arrays[attributes["TANGENT"]]
     z = arrays[attributes["POSITION"]][:, 2]
-    assert np.corrcoef(z, uvs[:, 1])[0, 1] == pytest.approx(-1)  # st.v grows with z here
+    assert np.corrcoef(z, uvs[:, 1])[0, 1] == pytest.approx(-1)  # v of USD's st grows with z here
     assert (tangents == [127, 0, 0, -127]).all()
     assert document["extensionsRequired"][-1] == "KHR_texture_basisu"
     image = document["bufferViews"][document["images"][0]["bufferView"]]
     assert image["byteLength"] == len(b"not looked into")
 
 
-def test_occlusion_and_colour_maps_come_beside_the_normal_map():
+def test_occlusion_and_colour_maps_are_written_with_the_normal_map():
     maps = Textures(b"normals", b"occlusion", b"colours")
     document, _ = read(
         encode_glb(
@@ -178,7 +179,7 @@ def test_occlusion_and_colour_maps_come_beside_the_normal_map():
     assert "COLOR_0" not in document["meshes"][0]["primitives"][0]["attributes"]
 
 
-def test_vertex_colours_are_linear_and_dimmed_where_the_sky_is_hidden():
+def test_vertex_colours_are_linear_and_darker_where_the_sky_is_hidden():
     mesh = patch(0, 10, n=2)
     colors = np.float32([[1, 0.5, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     openness = np.float32([1, 1, 0, 0])
@@ -189,11 +190,11 @@ def test_vertex_colours_are_linear_and_dimmed_where_the_sky_is_hidden():
     attributes = document["meshes"][0]["primitives"][0]["attributes"]
     expected = np.rint(colors * np.where(openness, 1, 0.6)[:, None] * 255)
     points = arrays[attributes["POSITION"]][:, [0, 2]].astype(float)
-    order = np.lexsort((points[:, 0], points[:, 1]))  # as the patch numbers its corners
+    order = np.lexsort((points[:, 0], points[:, 1]))  # in the order of the patch's corners
     assert np.abs(arrays[attributes["COLOR_0"]][order] - expected).max() <= 1
 
 
-def test_uvs_outside_the_unit_square_survive():
+def test_uvs_outside_the_unit_square_are_kept():
     mesh = patch(0, 10)
     wide = Mesh(mesh.positions, mesh.triangles, mesh.normals, mesh.uvs * 3 - 1, mesh.tangents)
     document, arrays = read(
@@ -203,7 +204,7 @@ def test_uvs_outside_the_unit_square_survive():
     assert (uvs.min(), uvs.max()) == (-1, 2)
 
 
-def test_many_vertices_take_32_bit_indices():
+def test_many_vertices_have_32_bit_indices():
     document, arrays = read(
         encode_glb(patch(0, 9, n=260), choose_step(20), material=RED, name="m", extras={}).data
     )
@@ -212,7 +213,7 @@ def test_many_vertices_take_32_bit_indices():
     assert arrays[indices].max() == 260 * 260 - 1
 
 
-def test_same_mesh_same_bytes():
+def test_the_same_mesh_gives_the_same_bytes():
     first, second = (
         encode_glb(patch(0, 9), choose_step(20), material=RED, name="m", extras=EXTRAS)
         for _ in range(2)
@@ -220,7 +221,7 @@ def test_same_mesh_same_bytes():
     assert first == second
 
 
-def test_what_can_not_be_written_is_refused():
+def test_meshes_that_cannot_be_written_are_refused():
     mesh = patch(0, 10)
     nothing = Mesh(mesh.positions, mesh.triangles[:0], mesh.normals)
     plain = Mesh(mesh.positions, mesh.triangles, mesh.normals)

@@ -1,4 +1,4 @@
-"""Objects named in a .glb: each vertex's, a table of them, and what the validator says."""
+"""Objects in a .glb: the object of each vertex, a table of objects, and the validator's result."""
 
 import json
 import shutil
@@ -41,7 +41,7 @@ def arrays_of(data):
 
 
 def shuffled(mesh, seed=1):
-    """The same mesh with its vertices and triangles in no order."""
+    """Return the mesh with its vertices and triangles in random order."""
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(mesh.positions))
     new = np.argsort(order).astype(np.uint32)
@@ -67,7 +67,7 @@ def test_every_vertex_has_its_object():
         assert np.abs(off - object_bundle.RADIUS_UM).max() < 2 * step_um
 
 
-def test_objects_come_one_after_another():
+def test_triangles_are_grouped_by_object():
     arrays = arrays_of(encode(shuffled(MESH)))
     ids = arrays["_FEATURE_ID_0"][:, 0].astype(int)
     owners = ids[arrays["indices"].reshape(-1, 3)]
@@ -77,7 +77,7 @@ def test_objects_come_one_after_another():
     assert len(owners) == len(MESH.triangles)
 
 
-def test_the_table_says_labels_and_columns():
+def test_the_table_has_labels_and_columns():
     features = tile_features(TABLE, TILE, wanted=("CD8", "cell_type", "no such"))
     found = property_table(encode(features=features))
     assert found["label"] == TABLE.labels[ROWS].tolist()
@@ -90,33 +90,33 @@ def test_the_table_says_labels_and_columns():
     assert found["cell_type"] == [None if k < 0 else names[k] for k in kinds]
 
 
-def test_what_is_missing_has_no_data():
+def test_missing_values_are_read_back_as_no_data():
     first = tile_features(TABLE, object_bundle.TILES[0], wanted=("CD8", "cell_type"))
     found = property_table(encode(object_bundle.tile_mesh(0, 8), first))
     assert [i for i, v in enumerate(found["CD8"]) if v is None] == [3]
     assert [i for i, v in enumerate(found["cell_type"]) if v is None] == [4]
 
 
-def test_a_category_may_be_called_none_and_two_alike():
+def test_a_category_may_be_called_none_and_two_may_be_called_alike():
     values = (np.arange(len(ROWS)) % 4 - 1).astype(np.float32)
     column = Column("kind", "Kind", values, categories=("none", "T", "T"))
     found = property_table(encode(features=Features(TABLE.labels[ROWS], (column,))))["kind"]
     assert found[:5] == [None, "none", "T", "T_", None]
 
 
-def test_labels_of_64_bits_are_whole():
+def test_labels_of_64_bits_are_exact():
     wide = object_bundle.make_table(is_wide=True)
     found = property_table(encode(features=tile_features(wide, TILE)))
     assert found["label"][-1] == 2**63
 
 
-def test_meshes_without_objects_name_no_extension():
+def test_meshes_without_objects_use_no_extension_for_them():
     document, _ = read(encode(replace(MESH, objects=None)))
     assert "EXT_mesh_features" not in document["extensionsUsed"]
     assert "_FEATURE_ID_0" not in document["meshes"][0]["primitives"][0]["attributes"]
 
 
-def test_readers_that_know_no_objects_draw_them():
+def test_readers_without_support_for_objects_can_draw_them():
     document, _ = read(encode(features=tile_features(TABLE, TILE)))
     assert set(document["extensionsUsed"]) >= {"EXT_mesh_features", "EXT_structural_metadata"}
     required = {"EXT_meshopt_compression", "KHR_mesh_quantization"}
@@ -125,7 +125,7 @@ def test_readers_that_know_no_objects_draw_them():
     assert ids == {"featureIds": [{"featureCount": len(ROWS), "attribute": 0, "propertyTable": 0}]}
 
 
-def test_what_can_not_be_named_is_refused():
+def test_objects_that_cannot_be_numbered_are_refused():
     far = MESH.objects.copy()
     far[-24:] = 1 << 16
     with pytest.raises(ValueError, match="split the tile"):
@@ -137,17 +137,17 @@ def test_what_can_not_be_named_is_refused():
     with pytest.raises(ValueError, match="one row for each"):
         encode(features=Features(TABLE.labels[:3], ()))
     one = Column("a", "a", np.zeros(4, np.float32))
-    with pytest.raises(ValueError, match="8 at most"):
+    with pytest.raises(ValueError, match="expected up to 8"):
         encode(features=Features(TABLE.labels[:40], (one,) * (MAX_COLUMNS + 1)))
 
 
-def test_the_last_object_that_16_bits_name_is_written():
+def test_the_last_object_of_16_bits_is_written():
     objects = MESH.objects.copy()
     objects[-24:] = (1 << 16) - 1
     assert arrays_of(encode(replace(MESH, objects=objects)))["_FEATURE_ID_0"].max() == 65535
 
 
-def test_same_objects_same_bytes():
+def test_the_same_objects_give_the_same_bytes():
     assert encode(features=tile_features(TABLE, TILE)) == encode(
         features=tile_features(TABLE, TILE)
     )

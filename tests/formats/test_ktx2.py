@@ -18,7 +18,7 @@ def volume():
     return np.random.default_rng(1).integers(0, 255, (9, 33, 20), dtype=np.uint8)
 
 
-def test_volume_comes_back_level_by_level(volume):
+def test_a_volume_is_read_back_level_by_level(volume):
     levels = mip_levels(volume)
     texture = encode_3d(levels)
     header, index, _, _ = parse(texture.data)
@@ -34,7 +34,7 @@ def test_volume_comes_back_level_by_level(volume):
         assert (place.offset, place.length, place.size) == (offset, length, level.shape[::-1])
 
 
-def test_smallest_level_comes_first_and_no_byte_is_left_over(volume):
+def test_the_smallest_level_is_first_and_every_byte_is_used(volume):
     data = encode_3d(mip_levels(volume)).data
     _, index, _, key_values = parse(data)
     end = data.index(key_values) + len(key_values)
@@ -45,7 +45,7 @@ def test_smallest_level_comes_first_and_no_byte_is_left_over(volume):
 
 
 @pytest.mark.parametrize(("components", "vk_format"), [(1, 9), (2, 16), (4, 37)])
-def test_descriptor_names_every_component(components, vk_format):
+def test_the_descriptor_states_every_component(components, vk_format):
     data = encode_2d(np.zeros((3, 5, components), np.uint8)).data
     header, _, descriptor, _ = parse(data)
     assert header["format"] == vk_format
@@ -60,7 +60,7 @@ def test_descriptor_names_every_component(components, vk_format):
 
 
 def read_pairs(key_values):
-    """Return keys and values as they lie in the file: sorted, each padded to four bytes."""
+    """Return keys and values as in the file: sorted, each padded to four bytes."""
     pairs = []
     while key_values:
         (length,) = struct.unpack_from("<I", key_values)
@@ -77,26 +77,26 @@ def test_writer_and_orientation_are_named(volume):
     assert len(key_values) % 4 == 0
     (first, orientation), (second, writer) = read_pairs(key_values)
     assert (first, second) == ("KTXorientation", "KTXwriter")
-    assert orientation == "rdo"  # right, down, out of the picture
+    assert orientation == "rdo"  # right, down, towards the viewer
     assert writer.startswith("stereocell ")
     _, _, _, key_values = parse(encode_2d(np.zeros((3, 5, 4), np.uint8)).data)
     assert read_pairs(key_values)[0] == ("KTXorientation", "rd")
 
 
-def test_same_volume_same_bytes(volume):
+def test_the_same_volume_gives_the_same_bytes(volume):
     assert encode_3d([volume]).data == encode_3d([volume.copy()]).data
 
 
-def test_non_contiguous_volume_is_written_as_it_reads(volume):
+def test_a_non_contiguous_volume_is_written_in_its_logical_order(volume):
     assert encode_3d([volume[::-1, :, ::2]]).data == encode_3d([volume[::-1, :, ::2].copy()]).data
 
 
-def test_level_of_wrong_size_is_refused(volume):
+def test_a_level_of_wrong_size_is_refused(volume):
     with pytest.raises(ValueError, match=r"level 1 is .* not \(4, 16, 10, 1\)"):
         encode_3d([volume, volume[::3, ::3, ::3]])
 
 
-def test_normal_map_keeps_its_normals_and_its_bytes():
+def test_a_normal_map_keeps_its_normals_and_always_has_the_same_bytes():
     y, x = np.mgrid[0:64, 0:64] / 32 - 1
     normals = np.stack([0.5 * np.sin(3 * x), 0.5 * np.cos(2 * y), np.ones_like(x)], -1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -114,6 +114,6 @@ def test_normal_map_keeps_its_normals_and_its_bytes():
     assert angle.mean() < 0.7
 
 
-def test_normal_map_of_odd_size_is_refused():
+def test_a_normal_map_of_odd_size_is_refused():
     with pytest.raises(ValueError, match="a baked map of 30 x 32 x 3"):
         encode_normal_map(np.zeros((32, 30, 3), np.uint8))

@@ -26,13 +26,13 @@ def lods(x0, distances):
 
 
 def whole(tiles):
-    """The one file that few tiles make."""
+    """Return the only file for a few tiles."""
     (text,) = make_tilesets(tiles).values()
     return json.loads(text)
 
 
 def chain(tile):
-    """A tile and all below it, each the only child of the one before."""
+    """Return a tile and all below it, each the only child of the one before."""
     found = [tile]
     while "children" in found[-1]:
         (child,) = found[-1]["children"]
@@ -42,13 +42,13 @@ def chain(tile):
 
 @pytest.fixture(scope="module")
 def many():
-    """More tiles than one file describes; the last has one LOD."""
+    """Return files for more tiles than one file describes; the last tile has one LOD."""
     tiles = [lods(20 * n, [0.02, 0.1, 0.5]) for n in range(MAX_WHOLE_TILES)]
     files = make_tilesets([*tiles, lods(20 * MAX_WHOLE_TILES, [0])])
     return {address: json.loads(text) for address, text in files.items()}, files
 
 
-def test_coarse_lods_come_first_and_errors_are_measured_distances_in_metres():
+def test_coarse_lods_are_first_and_errors_are_measured_distances_in_metres():
     levels = chain(whole([lods(0, [0.02, 0.1, 0.5])])["root"]["children"][0])
     uris = [tile["content"]["uri"] for tile in levels]
     assert uris == ["t0/lod2.glb", "t0/lod1.glb", "t0/lod0.glb"]
@@ -78,7 +78,7 @@ def test_boxes_are_turned_z_up():
     )
 
 
-def test_boxes_are_whole_nanometres_and_hold_all_that_they_held():
+def test_boxes_are_rounded_outwards_to_whole_nanometres():
     low, high = (1.00012345e-3, -7.7777777e-5, 3.3333333e-6), (1.0009e-3, -1e-9, 5.5555555e-6)
     tile = whole([[TileLod("t/lod0.glb", ABC, 0, low, high)]])["root"]["children"][0]
     box = tile["boundingVolume"]["box"]
@@ -92,7 +92,7 @@ def test_boxes_are_whole_nanometres_and_hold_all_that_they_held():
         assert b - 1e-18 <= box[axis] + box[half] <= b + 2.01 * NM
 
 
-def test_box_of_the_root_holds_those_of_the_tiles():
+def test_the_root_s_box_contains_those_of_the_tiles():
     boxes = [(0.0, 3.4e-9), (1.2e-9, 6.5e-9), (-2.5e-9, 0.1e-9)]
     tiles = [
         [TileLod(f"t{n}/lod0.glb", ABC, 0, (a, a, a), (b, b, b))] for n, (a, b) in enumerate(boxes)
@@ -111,14 +111,14 @@ def test_box_of_the_root_holds_those_of_the_tiles():
             assert lowest <= low < high <= highest
 
 
-def test_contents_give_the_first_128_bits_of_their_hash():
+def test_contents_state_the_first_128_bits_of_their_hash():
     assert content_hash(ABC) == "ungWv48Bz-pBQUDeXa4iIw"
     assert base64.urlsafe_b64decode(content_hash(ABC) + "==") == bytes.fromhex(ABC)[:16]
     (tile,) = whole([lods(0, [0])])["root"]["children"]
     assert tile["content"]["extras"] == {"sha-256-128": content_hash(ABC)}
 
 
-def test_root_holds_every_tile_and_has_no_content():
+def test_the_root_contains_every_tile_and_has_no_content():
     tileset = whole([lods(0, [0]), lods(20, [0])])
     root = tileset["root"]
     assert tileset["asset"]["version"] == "1.1"
@@ -128,7 +128,7 @@ def test_root_holds_every_tile_and_has_no_content():
     assert [n * 1e6 for n in root["boundingVolume"]["box"][:4]] == pytest.approx(middle, abs=1.5e-3)
 
 
-def test_refinement_is_said_at_roots_and_inherited_below(many):
+def test_refinement_is_stated_at_roots_and_inherited_below(many):
     for tileset in many[0].values():
         assert tileset["root"]["refine"] == "REPLACE"
         waiting = list(tileset["root"].get("children", ()))
@@ -138,13 +138,13 @@ def test_refinement_is_said_at_roots_and_inherited_below(many):
             waiting += tile.get("children", ())
 
 
-def test_as_many_tiles_as_the_limit_are_one_file():
+def test_tiles_up_to_the_limit_are_in_one_file():
     tiles = [lods(n, [0, 0.1]) for n in range(MAX_WHOLE_TILES)]
     assert list(make_tilesets(tiles)) == [TILESET]
     assert len(make_tilesets([*tiles, lods(99, [0, 0.1])])) == 2 + MAX_WHOLE_TILES
 
 
-def test_of_many_tiles_the_finer_levels_are_files_of_their_own(many):
+def test_the_finer_levels_of_many_tiles_are_in_separate_files(many):
     contents, files = many
     assert next(iter(files)) == TILESET
     *with_finer, alone = contents[TILESET]["root"]["children"]
@@ -157,13 +157,13 @@ def test_of_many_tiles_the_finer_levels_are_files_of_their_own(many):
         assert holder["content"]["uri"] == address
         hashed = content_hash(hashlib.sha256(files[address]).hexdigest())
         assert holder["content"]["extras"] == {"sha-256-128": hashed}
-        # as large as what is drawn until it has come
+        # Error and box are those of the coarsest surface, which is drawn until the file arrives.
         assert holder["geometricError"] == coarsest["geometricError"]
         assert holder["boundingVolume"] == coarsest["boundingVolume"]
     assert len(files) == 1 + len(with_finer)
 
 
-def test_an_external_tileset_names_its_surfaces_from_its_own_folder(many):
+def test_an_external_tileset_addresses_surfaces_from_its_own_folder(many):
     contents, _ = many
     finer = contents["t0/finer.json"]
     levels = chain(finer["root"])

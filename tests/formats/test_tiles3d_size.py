@@ -1,4 +1,4 @@
-"""What a bundle of 70 channels and 242 tiles makes a phone read before its first picture."""
+"""The JSON that a phone reads before the first image, for 70 channels and 242 tiles."""
 
 import json
 
@@ -15,7 +15,7 @@ from stereocell.usd.composed_appearance import ComposedAppearance
 
 COLUMNS, ROWS, CHANNELS, LODS = 22, 11, 70, 4
 EDGE_UM = np.array([512, 512, 194]) * [0.14, 0.14, 0.28]  # x, y, z of a tile
-STEP_M = 2.0**-27  # the lattice on which vertices lie
+STEP_M = 2.0**-27  # step of the lattice on which vertices lie
 FIRST_PICTURE_BYTES = 300_000
 FUNCTIONS = ("default", "arcs", "sharp", "soft", "surface", "threshold")
 
@@ -27,7 +27,7 @@ def rng():
 
 @pytest.fixture(scope="module")
 def tiles():
-    """Bounds as sums of spacings are: with all digits that a double has."""
+    """Return bounds that are sums of spacings, with all digits of a double."""
     found = []
     for row in range(ROWS):
         for column in range(COLUMNS):
@@ -39,7 +39,7 @@ def tiles():
 
 
 def lods(rng, tile):
-    """Surfaces that fill most of the tile, at distances as they are measured."""
+    """Return surfaces that fill most of the tile, at realistic distances."""
     low, high = (np.array(corner) * 1e-6 for corner in (tile.low, tile.high))
     low += rng.random(3) * (high - low) / 10
     low, high = (tuple(map(float, np.rint(c / STEP_M) * STEP_M)) for c in (low, high))
@@ -93,15 +93,15 @@ def manifest(rng, tiles, files):
     return describe_bundle(specimen, tiles, channels=channels, index=ref("files.json", 14_000_000))
 
 
-def test_manifest_of_70_channels_fits_its_schema(manifest, tiles):
+def test_the_manifest_of_70_channels_matches_its_schema(manifest, tiles):
     content = json.loads(manifest)
     schema = json.loads(schema_path("bundle.schema.json").read_text("utf-8"))
     Draft202012Validator(schema).validate(content)
     assert (len(content["tiles"]), len(content["channels"])) == (len(tiles), CHANNELS)
 
 
-def test_first_picture_waits_for_less_than_300_kb_of_json(manifest, files):
-    """The manifest, and the tileset of the first channel: see surface_set.ts."""
+def test_the_first_image_waits_for_less_than_300_kb_of_json(manifest, files):
+    """The phone reads the manifest, and the tileset of the first channel: see surface_set.ts."""
     first = {"manifest.json": len(manifest), TILESET: len(files[TILESET])}
     print(first, sum(first.values()))
     assert sum(first.values()) < FIRST_PICTURE_BYTES, first

@@ -1,4 +1,4 @@
-"""Bundles whose finer surfaces are in external tilesets, and what is found where one is faulty."""
+"""Bundles whose finer surfaces are in external tilesets, and the errors for faulty ones."""
 
 import json
 import shutil
@@ -20,7 +20,7 @@ FINER = f"{CHANNEL}/r0_c0/finer.json"
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A tile of three LODs, in a bundle that takes one tile for many."""
+    """Build a tile of three LODs in a bundle for which one tile counts as many."""
     out = tmp_path_factory.mktemp("out")
     spheres.write_one_tile(out / "stage")
     with pytest.MonkeyPatch.context() as patch:
@@ -31,16 +31,16 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def bundle(made, tmp_path):
-    """A copy to be spoilt."""
+    """Return a copy of the bundle that a test may damage."""
     return shutil.copytree(made / "bundle", tmp_path / "bundle")
 
 
 def found(bundle, name="tilesets"):
-    """The line of that name; those after it, which take long, are never made."""
+    """Return the line of that name. Later lines, which take long, are not computed."""
     return next(line for line in check(bundle.parent) if line.name == name)
 
 
-def test_what_the_pipeline_writes_passes(bundle):
+def test_bundles_of_the_pipeline_pass(bundle):
     assert (found(bundle).ok, found(bundle).detail) == (True, "3 contents")
     assert found(bundle, "hashes").ok
 
@@ -50,7 +50,7 @@ def test_external_tilesets_are_listed(bundle):
     assert {path for path in listed if path.endswith(".json")} >= {FINER, f"{CHANNEL}/tileset.json"}
 
 
-def test_contents_come_coarse_ones_first_with_their_place(bundle):
+def test_contents_are_yielded_coarse_ones_first_with_their_paths(bundle):
     names = [
         (content.path.relative_to(bundle / CHANNEL).as_posix(), content.error_m <= content.limit_m)
         for content in walk(bundle, bundle / CHANNEL / "tileset.json")
@@ -64,18 +64,18 @@ def test_other_tiles_are_not_opened(bundle):
     assert list(walk(bundle, bundle / CHANNEL / "tileset.json", "r0_c1")) == []
 
 
-def test_surfaces_behind_an_external_tileset_are_held_against_the_stage(made):
+def test_surfaces_in_an_external_tileset_are_compared_with_the_stage(made):
     finding = compare_tile(BundleTask(made / "stage" / "stage.usda", made / "bundle", "r0_c0"))
     assert (finding.surfaces, finding.problems) == (3, ())
 
 
-def test_changed_surface_behind_an_external_tileset_is_found(bundle):
+def test_a_changed_surface_in_an_external_tileset_is_found(bundle):
     path = bundle / CHANNEL / "r0_c0/lod0.glb"
     path.write_bytes(path.read_bytes()[:-1] + b"?")
     assert f"{FINER}: lod0.glb: expected sha-256-128 " in found(bundle).detail
 
 
-def test_spoilt_external_tileset_is_found(bundle):
+def test_a_damaged_external_tileset_is_found(bundle):
     path = bundle / FINER
     path.write_bytes(path.read_bytes().replace(b"lod1.glb", b"lod9.glb"))
     detail = found(bundle).detail
@@ -87,32 +87,32 @@ def test_spoilt_external_tileset_is_found(bundle):
     ("content", "message"),
     [
         (b'{"asset": {', "damaged, this is not JSON"),
-        (b"[]", "no 3D Tiles tileset"),
-        (b'{"geometricError": 1}', "no 3D Tiles tileset"),
+        (b"[]", "not a 3D Tiles tileset"),
+        (b'{"geometricError": 1}', "not a 3D Tiles tileset"),
     ],
 )
-def test_external_tileset_that_is_none_is_found(bundle, content, message):
+def test_a_file_that_is_not_a_tileset_is_found(bundle, content, message):
     (bundle / FINER).write_bytes(content)
     detail = found(bundle).detail
     assert f"{FINER}: {message}" in detail
     assert "\n" not in detail
 
 
-def test_missing_external_tileset_is_found_once(bundle):
+def test_a_missing_external_tileset_is_found_once(bundle):
     (bundle / FINER).unlink()
     assert found(bundle).detail.count("finer.json") == 1
     assert f"{FINER} is missing: run `stereocell bundle OUT`" in found(bundle).detail
 
 
 @pytest.mark.parametrize("uri", ["finer.json", "../tileset.json"])
-def test_tilesets_that_lead_back_to_themselves_are_refused(bundle, uri):
+def test_tilesets_that_name_themselves_are_refused(bundle, uri):
     path = bundle / FINER
     path.write_text(path.read_text("utf-8").replace("lod1.glb", uri))
     assert f"{FINER}: {uri} is a tileset that was named before" in found(bundle).detail
 
 
 @pytest.mark.parametrize("uri", ["../../../../secret.json", "/etc/passwd"])
-def test_what_lies_outside_the_bundle_is_not_opened(bundle, uri):
+def test_files_outside_the_bundle_are_not_opened(bundle, uri):
     (bundle.parent / "secret.json").write_text("no JSON")
     path = bundle / FINER
     path.write_text(path.read_text("utf-8").replace("lod1.glb", uri))
@@ -121,7 +121,7 @@ def test_what_lies_outside_the_bundle_is_not_opened(bundle, uri):
     assert "no JSON" not in detail
 
 
-def test_a_tileset_that_links_to_itself_is_none(bundle):
+def test_a_tileset_that_is_a_link_to_itself_is_found(bundle):
     (bundle / FINER).unlink()
     (bundle / FINER).symlink_to(bundle / FINER)
     assert FINER in found(bundle).detail
@@ -131,11 +131,11 @@ def test_a_tileset_that_links_to_itself_is_none(bundle):
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ('"lod1.glb"', f'"{"a" * 5000}.glb"', "over 1024 characters"),
-        ('"geometricError":', '"geometricError":"x","was":', "no 3D Tiles tileset: ValueError"),
+        ('"lod1.glb"', f'"{"a" * 5000}.glb"', "expected up to 1024 characters"),
+        ('"geometricError":', '"geometricError":"x","was":', "not a 3D Tiles tileset: ValueError"),
     ],
 )
-def test_what_no_tileset_says_is_one_line(bundle, before, after, message):
+def test_the_error_for_invalid_content_is_one_line(bundle, before, after, message):
     path = bundle / FINER
     path.write_text(path.read_text("utf-8").replace(before, after))
     detail = found(bundle).detail
@@ -144,7 +144,7 @@ def test_what_no_tileset_says_is_one_line(bundle, before, after, message):
     assert len(detail) < 1000
 
 
-def test_errors_that_grow_behind_an_external_tileset_are_found(bundle):
+def test_errors_that_grow_within_an_external_tileset_are_found(bundle):
     path = bundle / FINER
     content = json.loads(path.read_bytes())
     content["root"]["geometricError"] = 9.0
@@ -152,7 +152,7 @@ def test_errors_that_grow_behind_an_external_tileset_are_found(bundle):
     assert f"{FINER}: lod1.glb has a larger geometricError" in found(bundle).detail
 
 
-def test_hash_of_an_external_tileset_is_that_of_its_bytes(bundle):
+def test_the_hash_of_an_external_tileset_is_that_of_its_bytes(bundle):
     listed = json.loads((bundle / "files.json").read_bytes())
     contents = walk(bundle, bundle / CHANNEL / "tileset.json")
     (external,) = (content for content in contents if content.is_tileset)

@@ -1,4 +1,4 @@
-"""Bricks and the tree over them: against brute force, and against what the sampling needs."""
+"""Bricks and the tree over them, compared with brute force and with the needs of sampling."""
 
 import itertools
 
@@ -29,14 +29,14 @@ def bvh():
 
 
 def bricks_of(bvh):
-    """Yield (node, brick or None)."""
+    """Yield pairs of a node and its brick, or None."""
     stored = iter(bvh.bricks)
     for node in bvh.nodes:
         yield node, None if node["flags"] & EMPTY else next(stored)
 
 
 def box_of(node, reach=0):
-    """Return the texels of a node's box, cut at the volume's ends, and `reach` more of them."""
+    """Return the texels of a node's box, cut off at the volume's ends, and `reach` more."""
     edge = STREAM_BRICK << int(node["level"])
     return tuple(
         slice(max(0, int(node[a]) * edge - reach), min(n, (int(node[a]) + 1) * edge + reach))
@@ -45,7 +45,7 @@ def box_of(node, reach=0):
 
 
 def clamped(level, at):
-    """Return texels of an array at integer places (3, ...), the nearest one outside."""
+    """Return texels of an array at integer positions (3, ...); outside, the nearest texel."""
     limits = np.array(level.shape).reshape(3, *[1] * (at.ndim - 1)) - 1
     return level[tuple(np.clip(at, 0, limits))]
 
@@ -54,7 +54,7 @@ def cells(count):
     return np.stack(np.meshgrid(*[np.arange(count)] * 3, indexing="ij"))
 
 
-def test_a_leaf_holds_its_texels_and_one_of_its_neighbours_all_round(bvh):
+def test_a_leaf_holds_its_texels_and_one_more_on_each_side(bvh):
     leaves = [(n, b) for n, b in bricks_of(bvh) if n["level"] == 0 and b is not None]
     assert leaves
     for node, brick in leaves:
@@ -63,7 +63,7 @@ def test_a_leaf_holds_its_texels_and_one_of_its_neighbours_all_round(bvh):
 
 
 def test_a_trilinear_sample_inside_a_leaf_needs_no_other_brick(bvh):
-    """As a GPU samples: texel i has its centre at i + 1/2, faces repeat the last texel."""
+    """A GPU samples like this: texel i has its centre at i + 1/2, and faces repeat texels."""
     rng = np.random.default_rng(1)
     for node, brick in bricks_of(bvh):
         if brick is None or node["level"] > 0:
@@ -78,7 +78,7 @@ def test_a_trilinear_sample_inside_a_leaf_needs_no_other_brick(bvh):
 
 
 def test_a_coarse_texel_is_the_mean_of_its_cell(bvh):
-    """Where no cell is cut by the volume's end: 2^level texels an axis, rounded half up."""
+    """If the volume's end cuts no cell: 2^level texels along an axis, rounded half up."""
     checked = 0
     for node, brick in bricks_of(bvh):
         level = int(node["level"])
@@ -116,8 +116,8 @@ def test_errors_are_those_of_trilinear_interpolation(bvh):
 
 
 @pytest.mark.parametrize("turn", [1, -1])
-def test_nothing_sampled_in_a_node_leaves_its_range(bvh, turn):
-    """On a ramp, a coarse apron reaches further than the leaves' do."""
+def test_all_samples_in_a_node_lie_in_its_range(bvh, turn):
+    """On a ramp, the apron of a coarse node reaches further than those of leaves."""
     check_ranges(bvh)
     ramp = np.broadcast_to(np.arange(10, 250, 3, dtype=np.uint8)[::turn], (40, 40, 80))
     check_ranges(build(ramp.copy(), 0))
@@ -138,7 +138,7 @@ def check_ranges(bvh):
             assert bvh.nodes[child]["max"] <= node["max"]
 
 
-def test_empty_is_what_no_sample_lifts_above_the_threshold(bvh):
+def test_a_node_is_empty_if_no_sample_in_it_exceeds_the_threshold(bvh):
     empties = 0
     for node, brick in bricks_of(bvh):
         reach = VOLUME[box_of(node, 1)]
@@ -153,7 +153,7 @@ def test_empty_is_what_no_sample_lifts_above_the_threshold(bvh):
     assert empties > 5
 
 
-def test_children_lie_in_their_parents_box_in_the_order_of_their_bits(bvh):
+def test_children_lie_in_their_parent_s_box_in_the_order_of_their_bits(bvh):
     starts = first_children(bvh.nodes)
     assert starts[-1] == len(bvh.nodes)
     covered = np.zeros(VOLUME.shape, dtype=int)
@@ -170,7 +170,7 @@ def test_children_lie_in_their_parents_box_in_the_order_of_their_bits(bvh):
     assert (covered == 1).all()
 
 
-def test_leaves_make_up_the_volume_but_for_what_is_invisible(bvh):
+def test_leaves_make_up_the_visible_part_of_the_volume(bvh):
     again = reassemble(bvh)
     differs = again != VOLUME
     assert VOLUME[differs].max(initial=0) <= THRESHOLD
@@ -182,7 +182,7 @@ def test_leaves_make_up_the_volume_but_for_what_is_invisible(bvh):
     npst.arrays(np.uint8, npst.array_shapes(min_dims=3, max_dims=3, max_side=40)),
     st.integers(-1, 254),
 )
-def test_any_volume_comes_back(volume, threshold):
+def test_any_volume_is_read_back(volume, threshold):
     again = reassemble(build(volume, threshold))
     differs = again != volume
     assert volume[differs].max(initial=0) <= max(threshold, 0)
@@ -205,7 +205,7 @@ def test_a_constant_volume_has_no_error():
 
 
 def test_weights_interpolate_a_ramp_exactly():
-    """Coarse texel k's centre lies at (k - 1/2) 2^level finest texels from the box's low side."""
+    """The centre of coarse texel k lies (k - 1/2) 2^level finest texels from the box's low side."""
     for level in range(1, 5):
         count = STREAM_BRICK << level
         centres = (np.arange(STORED) - 0.5) * 2**level
@@ -213,6 +213,6 @@ def test_weights_interpolate_a_ramp_exactly():
 
 
 @pytest.mark.parametrize("shape", [(0, 3, 3), (3, 3), (1, 1, (16 << 15) + 1)])
-def test_what_is_no_volume_is_refused(shape):
+def test_empty_flat_and_oversized_arrays_are_refused(shape):
     with pytest.raises(ValueError, match="a volume of"):
         build(np.zeros(shape, np.uint8), 0)

@@ -9,7 +9,7 @@ from stereocell.model.volume import Volume
 
 @pytest.mark.parametrize("axis", [1, 2])
 def test_levels_do_not_depend_on_the_axis_across_which_the_slices_lie(axis: int) -> None:
-    """A head's bone in slices four times as far apart as pixels, turned as a patient may lie."""
+    """A head's bone in slices four times as far apart as pixels, along each axis in turn."""
     z, y, x = np.mgrid[:14, :64, :60] - np.array([6.5, 31.5, 29.5])[:, None, None, None]
     radius = np.sqrt((4 * z) ** 2 + y**2 + x**2)
     clean = np.where(radius < 26, 40, -1000) + 900 * (abs(radius - 24) < 1.5)

@@ -1,4 +1,4 @@
-"""What varies along the axes alone, on fields whose share is known."""
+"""The share of the variance along the axes, on fields whose share is known."""
 
 import numpy as np
 import pytest
@@ -26,13 +26,13 @@ def _share(field: NDArray[np.float64], cuts: list[tuple[tuple[int, int], ...]] =
     [3.0 * X + np.sin(Y / 3), 10.0 ** (-Z / 19), 1.0 * (X > 12) + 2.0 * (Y > 20) + 0.1 * Z],
     ids=["ramp and stripes", "depth", "fields side by side"],
 )
-def test_sums_of_functions_of_the_axes_are_all_light(field: NDArray[np.float64]) -> None:
+def test_sums_of_functions_of_one_axis_each_count_as_light(field: NDArray[np.float64]) -> None:
     assert _share(field) == pytest.approx(1.0, abs=1e-6)
     assert _share(field, TILES) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_product_is_light_but_for_what_its_factors_have_together() -> None:
-    """Of (x - mean) (y - mean) nothing lies along an axis; of 2 + each factor, most."""
+def test_a_product_counts_as_light_except_for_the_product_of_deviations() -> None:
+    """The product (x - mean) (y - mean) has no part along an axis, (2 + x) (2 + y) a large one."""
     x, y = X - X.mean(), Y - Y.mean()
     assert _share(x * y) == pytest.approx(0.0, abs=1e-9)
     x, y = x / np.ptp(x), y / np.ptp(y)
@@ -41,7 +41,7 @@ def test_a_product_is_light_but_for_what_its_factors_have_together() -> None:
     assert _share((2 + x) * (2 + y)) == pytest.approx(alone / (alone + both), rel=1e-6)
 
 
-def test_a_ball_is_no_light_in_whatever_tiles() -> None:
+def test_a_ball_does_not_count_as_light_in_any_tiles() -> None:
     ball = 1.0 * ((Z - 10) ** 2 + (Y - 14) ** 2 + (X - 18) ** 2 < 64)
     assert _share(ball) < MAX_LIGHT / 2
     assert _share(ball, TILES) == pytest.approx(_share(ball), rel=1e-9)
@@ -52,7 +52,7 @@ def test_a_slab_that_fills_the_field_is_a_body() -> None:
     assert _share(1.0 * (Z > 10)) == pytest.approx(1.0)
 
 
-def test_padding_takes_no_part() -> None:
+def test_padding_is_left_out_of_the_profiles() -> None:
     field = np.broadcast_to(5.0 + X, SHAPE).astype(np.float32)
     kept = np.broadcast_to((Y > 3) & (Z < 15), SHAPE)
     tile = Profiles.of(np.where(kept, field, np.float32(1e6)), kept, (0, 0, 0))

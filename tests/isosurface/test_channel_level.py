@@ -1,4 +1,4 @@
-"""A channel's levels: on volumes with a truth, on volumes of nothing, however they are cut."""
+"""A channel's levels on volumes with a known truth and on empty volumes, in any cut into tiles."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from support.exhaustive import sweep
 MADE = {case.name: case for case in made_cases()}
 NESTED = {case.name: case for case in nested_cases()}
 EMPTY = {case.name: case for case in empty_cases()}
-# the least Dice that a person would call a fit; those that are not here are hard
+# Least Dice that a person would call a good fit. Volumes that are not listed are hard.
 EASY = {
     "one blob": 0.9,
     "steep background": 0.85,
@@ -28,14 +28,14 @@ EASY = {
 }
 
 
-def dice(sight: Sight, rung: int = 0) -> float:
-    inside = sight.values > sight.found.clear[rung].value
+def dice(sight: Sight, level: int = 0) -> float:
+    inside = sight.values > sight.found.clear[level].value
     return float(2 * (inside & sight.truth).sum() / (inside.sum() + sight.truth.sum()))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sweep(EASY, kept=[name for name in EASY if name != "dim tissue"]))
-def test_finds_the_bodies(name: str) -> None:
+def test_the_first_level_finds_the_bodies(name: str) -> None:
     assert dice(look_at(MADE[name])) > EASY[name]
 
 
@@ -54,17 +54,15 @@ def test_finds_the_bodies(name: str) -> None:
         ],
     ),
 )
-def test_finds_nothing_where_nothing_is(name: str) -> None:
+def test_an_empty_volume_has_no_clear_level(name: str) -> None:
     assert look_at(EMPTY[name]).found.clear == ()
 
 
 @pytest.mark.slow
-def test_of_uneven_light_is_said_that_it_is_light() -> None:
+def test_the_reason_for_no_surface_names_uneven_light() -> None:
     found = look_at(EMPTY["empty, emccd, depth x 10"]).found
     assert found.light > 0.95
-    assert (
-        "of what varies lies along the axes alone, and in no valley, as light does" in found.doubt
-    )
+    assert "lies along the axes alone and in no valley, as with uneven light" in found.why_unclear
 
 
 @pytest.mark.slow
@@ -74,20 +72,20 @@ def test_bodies_are_found_in_uneven_light_and_so_are_sections_and_edges(name: st
 
 
 @pytest.mark.slow
-def test_the_cut_into_tiles_changes_no_level() -> None:
+def test_levels_do_not_depend_on_the_cut_into_tiles() -> None:
     case = MADE["tissue"]
     cuts = [look_at(replace(case, grid=grid)).found for grid in ((1, 1), (3, 2), (1, 5))]
-    whole = [level.value for level in cuts[0].ladder]
+    whole = [level.value for level in cuts[0].all_levels]
     assert len(whole) >= 3
     for found in cuts[1:]:
-        assert [level.value for level in found.ladder] == whole
+        assert [level.value for level in found.all_levels] == whole
         assert found.noise == cuts[0].noise
-        for a, b in zip(found.ladder, cuts[0].ladder, strict=True):
+        for a, b in zip(found.all_levels, cuts[0].all_levels, strict=True):
             assert a.sharpness == pytest.approx(b.sharpness, rel=1e-9)
 
 
 @pytest.mark.slow
-def test_a_tile_without_both_sides_is_said_to_hold_nothing() -> None:
+def test_a_tile_with_voxels_on_one_side_alone_has_no_level() -> None:
     sight = look_at(replace(MADE["tissue"], grid=(1, 8)))
     level = sight.found.clear[0]
     judged = [sight.found.judge_tile(level, evidence) for _, evidence in sight.tiles]
@@ -98,7 +96,7 @@ def test_a_tile_without_both_sides_is_said_to_hold_nothing() -> None:
     assert max(found.confidence for found in at_rim) > 0.7
 
 
-def test_of_ct_no_background_is_taken_and_bone_lies_within_skin() -> None:
+def test_no_background_is_subtracted_from_ct_and_bone_lies_within_skin() -> None:
     rng = np.random.default_rng(3)
     z, y, x = np.mgrid[:40, :96, :96]
     away = np.sqrt((2 * (z - 20.3)) ** 2 + (y - 47.7) ** 2 + (x - 48.1) ** 2)
@@ -114,10 +112,10 @@ def test_of_ct_no_background_is_taken_and_bone_lies_within_skin() -> None:
 
 
 @pytest.mark.parametrize("ghost", [0.0, 12.0])
-def test_of_mr_the_outer_level_keeps_skin_that_is_dim_beside_a_bright_brain(ghost: float) -> None:
-    """As in FLAIR: skin of every brightness up to the brain's, which has the only peak.
+def test_the_outer_level_of_mr_keeps_skin_that_is_dimmer_than_the_brain(ghost: float) -> None:
+    """Like FLAIR: skin has every brightness up to the brain's, and only the brain has a peak.
 
-    ghost  what half of the air has more than the other half: air then has a valley of its own
+    ghost  brightness that half of the air has more than the other half, as a valley of its own
     """
     rng = np.random.default_rng(4)
     z, y, x = np.mgrid[:30, :96, :96]
@@ -142,14 +140,14 @@ def test_nuclei_in_cells_have_a_level_of_their_own(name: str) -> None:
     assert dice(sight, 1) > 0.9
 
 
-def test_bodies_that_are_all_alike_have_no_second_level() -> None:
-    """What lies further in is the flank of the same blurred edge."""
+def test_equal_bodies_have_no_second_level() -> None:
+    """A further level would lie on the inner flank of the same blurred edge."""
     rng = np.random.default_rng(6)
     z, y, x = np.ogrid[:48, :96, :96]
     ball = (z - 24) ** 2 + (y - 48) ** 2 + (x - 40) ** 2 < 18**2
     voxels = rng.poisson(10 + 90 * ball).astype(np.uint16)
     sight = look_at(Case("ball", "made", (1.0, 1.0, 1.0), lambda: (voxels, ball)))
-    assert len(sight.found.ladder) == 1
+    assert len(sight.found.all_levels) == 1
     assert dice(sight) > 0.97
 
 
@@ -160,7 +158,7 @@ def test_equal_voxels_have_no_level() -> None:
     assert look_at(case).found.clear == ()
 
 
-def test_padding_is_runs_of_the_darkest_and_not_a_noisy_dark_end() -> None:
+def test_padding_is_runs_of_the_darkest_value_and_not_dark_noise() -> None:
     rng = np.random.default_rng(5)
     noisy = rng.poisson(0.7, (6, 64, 64)).astype(np.uint8)
     assert not find_padding(noisy, 0.0, (2, 4, 4)).any()
@@ -171,29 +169,30 @@ def test_padding_is_runs_of_the_darkest_and_not_a_noisy_dark_end() -> None:
     assert not found[:, 25:].any()
 
 
-def test_padding_at_an_end_is_a_run_half_as_long() -> None:
+def test_padding_at_the_end_of_a_row_needs_a_run_of_half_the_length() -> None:
     voxels = np.ones((1, 12, 30))
-    voxels[0, :, :4] = 0  # of nine, the five behind the end repeat the first one
+    # Four of a window of nine; the five beyond the row's end repeat the first voxel
+    voxels[0, :, :4] = 0
     assert not find_padding(voxels, 0.0, (2, 4, 4)).any()
     voxels[0, :, 4] = 0
     assert find_padding(voxels, 0.0, (2, 4, 4))[0, :, :9].all()
-    narrow = np.zeros((1, 12, 6))  # narrower than the run that is asked for
+    narrow = np.zeros((1, 12, 6))  # narrower than the required run
     assert find_padding(narrow, 0.0, (2, 4, 4)).all()
 
 
-def test_held_out_cases_are_not_all_easy_and_none_is_named_twice() -> None:
+def test_held_out_cases_include_empty_volumes_and_all_names_differ() -> None:
     names = [case.name for case in all_cases()]
     assert len(names) == len(set(names))
     assert {case.group for case in all_cases() if case.held_out} >= {"made", "empty"}
 
 
 @pytest.mark.slow
-def test_without_evidence_there_is_no_level() -> None:
+def test_tiles_without_voxels_have_no_level() -> None:
     sight = look_at(EMPTY["empty, scmos, plain"])
     bare = [replace(tile, plain=_none(tile.plain), padding=_none(tile.padding), above=None)
             for _, tile in sight.tiles]  # fmt: skip
     found = find_levels(bare, counting=Counting(sight.scale, None, 0.0), finest_um=1.0)
-    assert found.ladder == ()
+    assert found.all_levels == ()
     assert found.clear == ()
 
 

@@ -1,4 +1,4 @@
-"""Components by runs of voxels: the same as SciPy's labels tell."""
+"""Components found by runs of voxels, compared with SciPy's labels."""
 
 from typing import Literal
 
@@ -13,7 +13,7 @@ SPACING = (2.0, 1.0, 0.5)
 
 @pytest.mark.parametrize("connectivity", [6, 26])
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
-def test_components_are_scipy_s(connectivity: Literal[6, 26], share: float) -> None:
+def test_components_equal_those_of_scipy(connectivity: Literal[6, 26], share: float) -> None:
     mask = np.random.default_rng(0).random((9, 14, 23)) < share
     around = ndimage.generate_binary_structure(3, 1 if connectivity == 6 else 3)
     labels, count = ndimage.label(mask, around)
@@ -38,7 +38,7 @@ def test_components_are_scipy_s(connectivity: Literal[6, 26], share: float) -> N
 
 
 @pytest.mark.parametrize("value", [False, True])
-def test_mask_of_nothing_and_of_all(value: bool) -> None:
+def test_an_empty_mask_has_no_component_and_a_full_one_has_one(value: bool) -> None:
     found = find_components(np.full((3, 4, 5), value), SPACING, 26)
     assert found.voxels.tolist() == ([60] if value else [])
     assert found.whole.tolist() == ([False] if value else [])

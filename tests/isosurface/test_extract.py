@@ -1,4 +1,4 @@
-"""Surfaces against analytic bodies, and across tiles."""
+"""Iso-surfaces compared with analytic bodies, and across tiles."""
 
 from dataclasses import replace
 
@@ -64,18 +64,18 @@ def test_normals_point_outwards_and_match_the_triangles() -> None:
     assert enclosed_volume(mesh) > 0
 
 
-def test_body_at_the_data_s_end_is_capped() -> None:
+def test_body_at_the_end_of_the_data_is_capped() -> None:
     ball = blurred_ball((24, 48, 48), SPACING, (0.0, 3.2, 3.2), 2.0, 0.2)
     mesh = _whole(1000 * ball, 500.0)
     assert open_edges(mesh) == 0
     cap = mesh.positions[:, 2] < -0.1 * SPACING[0]
     rim = np.linalg.norm(mesh.positions[:, :2] - [3.2, -3.2], axis=1) > 1.6
     assert (cap & ~rim).sum() > 100
-    assert mesh.normals[cap & ~rim, 2].max() < -0.99  # it faces away from the body
+    assert mesh.normals[cap & ~rim, 2].max() < -0.99  # the cap faces away from the body
 
 
-def test_a_cavity_that_the_block_s_face_opens_is_sound_without_a_cap() -> None:
-    """The solid around it fills the block, and has no surface of its own."""
+def test_a_cavity_that_the_block_s_face_cuts_is_valid_without_a_cap() -> None:
+    """The solid around the cavity fills the block, and has no other surface."""
     hole = 3 - np.linalg.norm(
         np.indices((12, 16, 16)) - np.reshape([11, 8, 8], (3, 1, 1, 1)), axis=0
     )
@@ -95,7 +95,8 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
     rng = np.random.default_rng(3)
     voxels = np.zeros((48, 100, 100), np.float32)
     for center in rng.uniform([2, 2, 2], [11, 12, 12], (14, 3)):
-        voxels += 1000 * blurred_ball(voxels.shape, SPACING, tuple(center), 1.6, 0.2)  # type: ignore[arg-type]
+        # Type: ignore[arg-type]
+        voxels += 1000 * blurred_ball(voxels.shape, SPACING, tuple(center), 1.6, 0.2)
     voxels += rng.normal(0, 40, voxels.shape)
     region = Box((0, 0, 0), (48, 100, 100))
     reach = OPTIONS.reach_um(SPACING) + SMOOTHING_REACH * 0.14
@@ -105,7 +106,8 @@ def test_tiles_meet_without_cracks(axis: int, tile_size: tuple[int, int, int]) -
     rims = []
     for tile in cut(region, tile_size):
         lattice = tile.lattice(region)
-        mesh = _extract(voxels, lattice.grown(halo, region), lattice, region, 500.0)  # type: ignore[arg-type]
+        # Type: ignore[arg-type]
+        mesh = _extract(voxels, lattice.grown(halo, region), lattice, region, 500.0)
         on_plane = np.abs(mesh.positions[:, coordinate]) == plane
         rims.append({row.tobytes() for row in mesh.positions[on_plane]})
     assert len(rims[0]) > 50
@@ -130,7 +132,7 @@ def test_gradient_of_huge_and_tiny_voxels_has_the_same_digits(exponent: int) -> 
     )
 
 
-def test_f_stays_an_f() -> None:
+def test_an_f_keeps_its_orientation_in_world_space() -> None:
     body = f_phantom().astype(np.float32)
     mesh = _whole(body, 550.0)
     depth, height, width = ((n - 1) * step for n, step in zip(body.shape, SPACING, strict=True))
@@ -140,7 +142,7 @@ def test_f_stays_an_f() -> None:
     assert y.max() <= 0  # rows grow downwards
     assert y.min() >= -height
     assert z.max() <= depth
-    # the stem is left, the long arm on top, the foot below and nearer to the viewer
+    # The stem is on the left, the long arm on top. The foot is at the bottom, nearer to the viewer.
     assert (x < width / 2).mean() > 0.6
     right = x > 24 * SPACING[2]
     assert right.any()

@@ -1,4 +1,4 @@
-"""A CT's table and head holder: found where there is one, and nothing of the body is lost."""
+"""A CT scan's table and head holder are found and left out, and every part of the body stays."""
 
 import json
 
@@ -18,14 +18,14 @@ WHOLE = Box((0, 0, 0), SHAPE)
 
 
 def _places() -> list[NDArray[np.float64]]:
-    """Return the voxels' places from the middle, mm."""
+    """Return the voxels' positions from the middle of the volume, in mm."""
     middle = [(n - 1) / 2 for n in SHAPE]
     grid = np.indices(SHAPE)
     return [(g - m) * s / 1000 for g, m, s in zip(grid, middle, SPACING, strict=True)]
 
 
 def _head(noise: float = 15.0) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-    """Return a head with ears, cut off at the volume's end, and where it is."""
+    """Return a head with ears that the volume's end cuts off, and the mask of the head."""
     z, y, x = _places()
     head = (y / 75) ** 2 + (x / 62) ** 2 < 1
     ears = (abs(abs(x) - 66) < 5) & (abs(y) < 8) & (abs(z) < 25)
@@ -39,7 +39,7 @@ def _with(hu: NDArray[np.int16], piece: NDArray[np.bool_]) -> NDArray[np.int16]:
 
 
 def _cradle(gap_mm: float) -> NDArray[np.bool_]:
-    """Return a shell of 6 mm under the head, as long as the volume, wider than the head."""
+    """Return a shell of 6 mm under the head, as long as the volume and wider than the head."""
     _, y, x = _places()
     away = np.hypot(y + 25 - gap_mm, x)
     return (away > 99) & (away < 105) & (y > 35)
@@ -47,7 +47,7 @@ def _cradle(gap_mm: float) -> NDArray[np.bool_]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gap_mm", [8.0, 0.0])
-def test_a_cradle_is_left_out_whether_it_touches_or_not(gap_mm: float) -> None:
+def test_a_cradle_is_left_out_whether_or_not_it_touches_the_head(gap_mm: float) -> None:
     hu, body = _head()
     cradle = _cradle(gap_mm) & ~body
     holder = find_holder(_with(hu, cradle), SPACING, WHOLE)
@@ -55,11 +55,11 @@ def test_a_cradle_is_left_out_whether_it_touches_or_not(gap_mm: float) -> None:
     out = holder.at(WHOLE)
     assert (out & cradle).sum() > 0.7 * cradle.sum()
     assert not (out & body).any()
-    assert len(holder.pieces) in (1, 2)  # two, where it touches in the middle
+    assert len(holder.pieces) in (1, 2)  # two if the cradle touches the head in the middle
     assert "mm" in holder.pieces[0]
 
 
-def test_nothing_of_a_body_alone_is_left_out() -> None:
+def test_a_body_without_a_holder_is_kept_whole() -> None:
     assert find_holder(_head()[0], SPACING, WHOLE) is None
 
 
@@ -72,7 +72,7 @@ def test_an_arm_beside_the_body_stays() -> None:
     assert find_holder(np.where(arm, np.int16(40), hu), SPACING, WHOLE) is None
 
 
-def test_other_units_than_hounsfield_s_have_no_holder() -> None:
+def test_values_other_than_hounsfield_units_have_no_holder() -> None:
     hu, body = _head()
     cradle = _cradle(8.0) & ~body
     raw = (_with(hu, cradle) + 1024).clip(0).astype(np.uint16)
@@ -81,7 +81,7 @@ def test_other_units_than_hounsfield_s_have_no_holder() -> None:
 
 
 @pytest.mark.slow
-def test_the_mask_of_a_part_and_of_a_file_is_the_same() -> None:
+def test_the_mask_is_the_same_for_a_part_and_after_saving() -> None:
     hu, body = _head()
     holder = find_holder(_with(hu, _cradle(8.0) & ~body), SPACING, WHOLE)
     assert holder is not None
@@ -92,7 +92,7 @@ def test_the_mask_of_a_part_and_of_a_file_is_the_same() -> None:
     assert holder.around(Box((0, 0, 0), (60, 30, 130))) is None
 
 
-def test_a_coarser_sight_of_the_region_names_the_same_voxels() -> None:
+def test_a_coarser_copy_of_the_region_gives_the_same_voxels() -> None:
     hu, body = _head()
     cradle = _cradle(8.0) & ~body
     thinned = _with(hu, cradle)[::2]
@@ -109,7 +109,7 @@ def _left_out(hu: NDArray[np.int16]) -> NDArray[np.bool_]:
 
 
 def _skull() -> NDArray[np.bool_]:
-    """Return a shell of 6 mm, open where the volume ends, as the neck of a dry skull is."""
+    """Return a shell of 6 mm that is open at the volume's end, like the neck of a dry skull."""
     z, y, x = _places()
     outer = (z / 120) ** 2 + (y / 75) ** 2 + (x / 62) ** 2
     inner = (z / 114) ** 2 + (y / 69) ** 2 + (x / 56) ** 2
@@ -117,11 +117,11 @@ def _skull() -> NDArray[np.bool_]:
 
 
 @pytest.mark.slow
-def test_a_dry_skull_with_something_thick_in_it_stays_and_its_cradle_goes() -> None:
+def test_a_dry_skull_with_a_thick_core_stays_and_its_cradle_is_left_out() -> None:
     z, y, x = _places()
     skull, cradle = _skull(), _cradle(8.0)
     core = np.hypot(y, x - 10) < 20
-    rod = (np.hypot(y - 30, x + 20) < 9) & (abs(z) < 60)  # long and thin, and within
+    rod = (np.hypot(y - 30, x + 20) < 9) & (abs(z) < 60)  # long and thin, and inside the skull
     hu = np.where(skull, 700, np.where(core | rod, 90, -1000)).astype(np.int16)
     out = _left_out(_with(hu, cradle & ~skull))
     assert not (out & (skull | core | rod)).any()
@@ -144,10 +144,10 @@ def test_an_animal_s_ears_and_tail_stay() -> None:
 def _chest(
     table_hu: int, table_mm: tuple[float, float], gap_mm: float
 ) -> tuple[NDArray[np.int16], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return a chest with lungs, ribs and a spine on a table, the table, and the bones.
+    """Return a chest with lungs, ribs and a spine on a table, the mask of the table, and the bones.
 
-    table_mm  its thickness and width
-    gap_mm    between the body and the table; 0: they touch
+    table_mm  thickness and width of the table
+    gap_mm    distance between the body and the table; 0: they touch
     """
     z, y, x = _places()
     body = (y / 55) ** 2 + (x / 80) ** 2 < 1
@@ -170,13 +170,13 @@ def test_a_table_that_is_the_largest_piece_of_bone_in_a_chest_is_left_out(
 ) -> None:
     hu, table, bones = _chest(table_hu, (thickness_mm, 180.0), gap_mm)
     sizes = np.bincount(cc3d.connected_components(hu > 300, connectivity=26).ravel())[1:]
-    assert sizes.max() > 0.9 * np.count_nonzero(hu[table] > 300)  # it is the largest piece
+    assert sizes.max() > 0.9 * np.count_nonzero(hu[table] > 300)  # the table is the largest piece
     out = _left_out(hu)
     assert (out & table).sum() > 0.7 * table.sum()
     assert not (out & bones).any()
 
 
-def test_air_takes_the_place_of_what_is_left_out_and_all_else_is_as_measured() -> None:
+def test_left_out_voxels_become_air_and_all_others_stay_as_measured() -> None:
     hu, table, _ = _chest(900, (8.0, 180.0), 6.0)
     holder = find_holder(hu, SPACING, WHOLE)
     assert holder is not None
@@ -187,12 +187,12 @@ def test_air_takes_the_place_of_what_is_left_out_and_all_else_is_as_measured() -
     np.testing.assert_array_equal(left[~out], hu[~out])
 
 
-def test_a_pad_as_faint_as_skin_is_left_out_whole() -> None:
+def test_a_pad_as_faint_as_skin_is_left_out_completely() -> None:
     z, y, x = _places()
     body = (y / 55) ** 2 + (x / 80) ** 2 < 1
     away = np.hypot(y / 55, x / 80) * 55
     pad = (away > 57) & (away < 63) & (y > 25)
-    fragment = np.mod(x + z, 30) < 20  # what a level of -300 leaves of the pad
+    fragment = np.mod(x + z, 30) < 20  # the part of the pad that a level of -300 keeps
     hu = np.where(body, 40.0, np.where(pad, np.where(fragment, -240.0, -360.0), -1000.0))
     table = (y > 66) & (y < 76) & (abs(x) < 85)
     hu[table] = 100
@@ -238,6 +238,6 @@ def test_voxels_on_a_coarser_grid_are_left_out_at_their_places() -> None:
     holder = Holder(Box((0, 0, 0), (8, 8, 8)), mask, ())
     fine = np.full((8, 8, 8), 40.0, np.float32)
     coarse = np.full((4, 4, 4), 40.0, np.float32)
-    places = [np.arange(0.5, 8, 2)] * 3  # each between two voxels
+    places = [np.arange(0.5, 8, 2)] * 3  # each position lies between two voxels
     whole = holder.left_out_of(fine, Box((0, 0, 0), (8, 8, 8)))
     np.testing.assert_array_equal(holder.left_out_at(coarse, places), whole[::2, ::2, ::2])

@@ -1,4 +1,4 @@
-"""Which levels of a ladder may have a surface: clear ones, and an outer one that nearly is."""
+"""The levels that may have a surface: the clear ones, and an outer one that is nearly clear."""
 
 from dataclasses import replace
 from math import inf
@@ -15,32 +15,32 @@ CORES = replace(CLEAR, value=300.0, share=0.1)
 
 
 @pytest.mark.parametrize(
-    "short", [{"separation": 0.67}, {"separation": 0.69, "sharpness": 0.035}, {"snr": 2.5}]
+    "measures", [{"separation": 0.67}, {"separation": 0.69, "sharpness": 0.035}, {"snr": 2.5}]
 )
-def test_a_level_that_falls_short_by_a_little_goes_before_specks(short: dict[str, float]) -> None:
-    outer = replace(CLEAR, **short)
+def test_a_nearly_clear_level_is_put_before_specks(measures: dict[str, float]) -> None:
+    outer = replace(CLEAR, **measures)
     assert not outer.is_clear
     assert shown_of([outer, SPECKS]) == (outer, SPECKS)
 
 
-def test_a_level_that_falls_short_by_a_little_goes_before_one_that_no_window_shows() -> None:
+def test_a_nearly_clear_level_is_put_before_one_above_the_display_window() -> None:
     outer = replace(CLEAR, separation=0.67)
     assert shown_of([outer, CORES], highest=400.0) == (CORES,)
     assert shown_of([outer, CORES], highest=250.0) == (outer, CORES)
 
 
-def test_a_valley_that_falls_short_by_a_little_goes_before_any_other() -> None:
+def test_a_nearly_clear_level_in_a_valley_is_put_before_any_other() -> None:
     outer = replace(CLEAR, snr=2.5, dip=0.5)
     assert shown_of([outer, CORES]) == (outer, CORES)
 
 
-def test_levels_that_fall_short_by_much_are_passed_over() -> None:
-    # a normal distribution has .64 of its variance between the halves
-    for short in ({"separation": 0.64}, {"snr": 2.0}, {"rise": 1.0}):
-        assert shown_of([replace(CLEAR, **short), SPECKS]) == (SPECKS,)
+def test_levels_that_are_far_from_clear_are_skipped() -> None:
+    # In a normal distribution .64 of the variance lies between the halves.
+    for measures in ({"separation": 0.64}, {"snr": 2.0}, {"rise": 1.0}):
+        assert shown_of([replace(CLEAR, **measures), SPECKS]) == (SPECKS,)
 
 
-def test_where_nothing_is_clear_nothing_is_shown() -> None:
+def test_without_a_clear_level_no_level_is_shown() -> None:
     assert shown_of([replace(CLEAR, separation=0.67)], highest=inf) == ()
 
 
@@ -49,7 +49,7 @@ TRUNK = next((case for case in real_cases() if case.name == "mr trunk"), None)
 
 @pytest.mark.skipif(TRUNK is None, reason="needs level_corpus/mr_trunk.npz in STEREOCELL_DATA")
 def test_a_coarse_mr_of_a_trunk_keeps_its_skin() -> None:
-    """Air and tissue differ by 2.5 times the noise; the next level would keep fat alone."""
+    """Air and tissue differ by 2.5 times the noise. The next level would keep only fat."""
     assert TRUNK is not None
     sight = look_at(TRUNK)
     outer = sight.found.shown()[0]
@@ -62,10 +62,10 @@ def test_a_coarse_mr_of_a_trunk_keeps_its_skin() -> None:
     ("times", "dip", "is_haze"),
     [(30.0, 0.3, True), (9.0, 0.3, False), (30.0, 1.0, False)],
 )
-def test_a_level_around_bodies_far_brighter_than_it_may_be_a_haze(
+def test_a_level_around_far_brighter_bodies_may_be_a_haze(
     times: float, dip: float, is_haze: bool
 ) -> None:
-    """As bodies count those that have a peak of their own, and not a tail of bright voxels."""
+    """Only bodies with a peak of their own count, and not a tail of bright voxels."""
     bodies = replace(CLEAR, value=2000.0, inside=50 + times * CLEAR.contrast, dip=dip)
     assert bodies_in_haze(CLEAR, [CLEAR, bodies]) == (bodies if is_haze else None)
     assert bodies_in_haze(bodies, [CLEAR, bodies]) is None

@@ -1,4 +1,4 @@
-"""Levels read from a histogram, on distributions whose levels are known."""
+"""Levels from a histogram, on distributions whose levels are known."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def histogram_of(values: np.ndarray) -> LevelHistogram:
     )
 
 
-def test_bins_are_narrow_where_most_values_are_and_hold_all() -> None:
+def test_bins_are_narrow_where_most_values_are_and_cover_all_values() -> None:
     usual = RNG.normal(100, 3, 100_000)
     values = np.concatenate([usual, [60_000.0] * 40]).astype(np.float32)
     scale = scale_of(values)
@@ -30,7 +30,7 @@ def test_bins_are_narrow_where_most_values_are_and_hold_all() -> None:
     assert (np.diff(edges) > 0).all()
     assert edges[0] < values.min()
     assert edges[-1] > values.max()
-    # within a fine bin of its place
+    # Each value lies in its bin, or less than one fine step outside of it.
     step = (scale.high - scale.low) / 2**16
     assert (values > edges[bins] - step).all()
     assert (values < edges[bins + 1] + step).all()
@@ -42,7 +42,7 @@ def test_bins_are_narrow_where_most_values_are_and_hold_all() -> None:
 
 def test_li_s_threshold_is_scikit_image_s() -> None:
     values = np.concatenate([RNG.normal(100, 10, 90_000), RNG.normal(400, 60, 10_000)])
-    # it counts from the very least value, ours from a quantile
+    # scikit-image subtracts the smallest value first, and we subtract a low quantile.
     assert histogram_of(values).li_threshold() == pytest.approx(threshold_li(values), rel=0.04)
 
 
@@ -56,7 +56,7 @@ def test_half_height_lies_between_two_heights_and_is_a_fixed_point() -> None:
     assert np.isnan(histogram_of(np.full(1000, 7.0)).half_height())
 
 
-def test_valleys_part_peaks_that_are_ten_times_apart_and_none_in_one_peak() -> None:
+def test_valleys_lie_between_peaks_up_to_ten_times_apart_and_not_within_one_peak() -> None:
     dark = RNG.normal(100, 2, 900_000)
     dim, bright = RNG.normal(190, 8, 80_000), RNG.normal(1000, 60, 20_000)
     valleys = histogram_of(np.concatenate([dark, dim, bright])).find_valleys(2.0)

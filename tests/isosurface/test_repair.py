@@ -1,4 +1,4 @@
-"""Fragments, gaps and cavities, at sizes on either side of the limits."""
+"""Repair of fragments, gaps and cavities that are smaller and larger than the limits."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def _boxes(*boxes: tuple[slice, slice, slice], shape: int = 40) -> NDArray[np.fl
     return distance
 
 
-def test_small_fragment_goes_and_large_solid_stays() -> None:
+def test_small_fragment_is_dropped_and_large_solid_stays() -> None:
     small, large = np.s_[3:5, 3:5, 3:5], np.s_[15:30, 15:30, 15:30]
     result = repair(_boxes(small, large), SPACING, options=RepairOptions(0.0, 4.0, 0.0))
     assert result.fragments_dropped == 1
@@ -25,7 +25,7 @@ def test_small_fragment_goes_and_large_solid_stays() -> None:
     assert (result.distance[large] > 0).all()
 
 
-def test_fragment_that_leaves_the_window_is_not_judged() -> None:
+def test_fragment_at_the_window_s_end_is_never_dropped() -> None:
     cut = np.s_[0:2, 3:5, 3:5]
     result = repair(_boxes(cut), SPACING, options=RepairOptions(0.0, 4.0, 0.0))
     assert result.fragments_dropped == 0
@@ -53,7 +53,7 @@ def test_slit_narrower_than_the_ball_closes_and_a_wider_one_stays() -> None:
         assert (middle > 0) == closes
 
 
-def test_closing_leaves_a_smooth_ball_where_it_is() -> None:
+def test_closing_does_not_move_a_smooth_ball() -> None:
     z, y, x = np.indices((40, 40, 40)) - 20.0
     ball = np.clip(12 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)
     closed = repair(ball, SPACING, options=RepairOptions(3.0, 0.0, 0.0)).distance
@@ -63,10 +63,10 @@ def test_closing_leaves_a_smooth_ball_where_it_is() -> None:
 
 @pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (0.28, 0.14, 0.14), (2.0, 0.7, 1.3)])
 @pytest.mark.parametrize("balls", [0.9, 1.0, 2.3])  # radius in coarsest spacings
-def test_closing_is_that_of_exact_distances(
+def test_closing_equals_closing_by_exact_distances(
     spacing: tuple[float, float, float], balls: float
 ) -> None:
-    """The whole window's distances by another program, in place of a band's."""
+    """Our closing computes distances in a band only; SciPy computes those of the whole window."""
     noise = np.random.default_rng(1).normal(size=(20, 30, 41))
     h = max(spacing)
     distance = np.clip(ndimage.gaussian_filter(noise, 1.5) * 20 * h, -2 * h, 2 * h)
@@ -84,7 +84,7 @@ def test_closing_is_that_of_exact_distances(
     assert balls < 2 or (found > 0).sum() > (distance > 0).sum()
 
 
-def test_windows_of_nothing_and_of_a_whole_solid_stay() -> None:
+def test_empty_and_full_windows_do_not_change() -> None:
     for value in (-2.0, 2.0):
         whole = np.full((7, 8, 9), value, np.float32)
         result = repair(whole.copy(), SPACING, options=RepairOptions(1.5, 3.0, 3.0))

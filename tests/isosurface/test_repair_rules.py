@@ -1,4 +1,4 @@
-"""A channel's own lengths: by the first paper's rule, from the components in all its tiles."""
+"""Lengths for a channel's repair, by the first paper's rule on the components in all its tiles."""
 
 from dataclasses import asdict, replace
 
@@ -22,7 +22,7 @@ RADII = {(5.0, 5.0, 5.0): 3.0, (10.0, 12.0, 14.0): 4.0, (16.0, 15.0, 25.0): 1.2}
 
 
 def _distance() -> NDArray[np.float32]:
-    """Three balls, um."""
+    """Return the distance to three balls, um."""
     places = [i * h for i, h in zip(np.indices(SHAPE), SPACING, strict=True)]
     away = [
         np.sqrt(sum((p - c) ** 2 for p, c in zip(places, centre, strict=True))) - radius
@@ -31,12 +31,12 @@ def _distance() -> NDArray[np.float32]:
     return np.clip(-np.minimum.reduce(away), -1, 1).astype(np.float32)
 
 
-def test_faces_are_those_of_the_extracted_surface() -> None:
+def test_face_counts_equal_those_of_the_extracted_surface() -> None:
     distance, whole = _distance(), Box((0, 0, 0), SHAPE)
     components = find_components(distance > 0, SPACING, 26)
     mesh = extract_surface(distance, Lattice.of_whole(whole, SPACING))
     assert len(components.diagonal_um) == len(RADII)
-    # twice the vertices, and four less for each ball
+    # Each ball has twice as many triangles as vertices, less four.
     assert components.faces().sum() - 4 * len(RADII) == len(mesh.triangles)
     for diagonal, radius in zip(
         sorted(components.diagonal_um), sorted(RADII.values()), strict=True
@@ -45,27 +45,27 @@ def test_faces_are_those_of_the_extracted_surface() -> None:
     assert components.whole.all()
 
 
-def test_small_ball_is_under_half_of_the_means_and_goes() -> None:
+def test_small_ball_is_under_half_of_the_means_and_is_dropped() -> None:
     distance = _distance()
     sums = sum_components(distance > 0, SPACING, 1.0)
     assert (sums.count, sums.kept) == (3, 2)
     options = choose(_plan_with(max_fragment_um=4.0), [asdict(sums)])
     dropped = repair(distance, SPACING, options=options)
     assert dropped.fragments_dropped == 1
-    assert dropped.distance[32, 60, 100] < 0  # the small one's centre
+    assert dropped.distance[32, 60, 100] < 0  # centre of the small ball
     assert dropped.distance[10, 20, 20] > 0
 
 
-def test_rule_ends_where_the_halo_does_and_can_be_left_out() -> None:
+def test_fragments_longer_than_the_limit_stay_and_a_limit_of_zero_keeps_all() -> None:
     sums = asdict(sum_components(_distance() > 0, SPACING, 1.0))
-    # what would go is larger than what a unit is sure to see whole
+    # The small ball is larger than the fragments that a unit is certain to see completely.
     for length in (3.0, 0.0):
         options = choose(_plan_with(max_fragment_um=length), [sums])
         assert repair(_distance(), SPACING, options=options).fragments_dropped == 0
         assert options.min_diagonal_um <= max(1.5, length)
 
 
-def test_specks_do_not_rule_the_means() -> None:
+def test_specks_do_not_affect_the_means() -> None:
     rng = np.random.default_rng(0)
     inside = _distance() > 0
     specks = inside | (rng.random(SHAPE) > 0.999)
@@ -73,29 +73,29 @@ def test_specks_do_not_rule_the_means() -> None:
     assert sum_components(np.zeros(SHAPE, bool), SPACING, 1.5).count == 0
 
 
-def test_alpha_is_shorter_for_frayed_solids_and_stays_in_its_bounds() -> None:
+def test_alpha_is_shorter_for_noisy_solids_and_stays_in_its_bounds() -> None:
     plan = _plan_with(max_alpha_um=2.0)
     plain = {"count": 4, "faces": 4 * 4000, "diagonal_um": 4 * 12.0}
     plain |= {"kept": 4, "kept_faces": 4 * 4000, "kept_diagonal_um": 4 * 12.0}
     alpha = choose(plan, [plain]).alpha_um
     assert alpha == pytest.approx(6 * 12 / 4000**0.5)
-    # the same over two tiles
+    # Sums over two tiles give the same alpha.
     halves = [{key: value / 2 for key, value in plain.items()}] * 2
     assert choose(plan, halves).alpha_um == pytest.approx(alpha)
-    frayed = plain | {"kept_faces": 4 * 10_000}
-    assert choose(plan, [frayed]).alpha_um == pytest.approx(6 * 12 / 100)
+    noisy = plain | {"kept_faces": 4 * 10_000}
+    assert choose(plan, [noisy]).alpha_um == pytest.approx(6 * 12 / 100)
     assert choose(plan, [plain | {"kept_faces": 10**9}]).alpha_um == 0.5
     assert choose(plan, [plain | {"kept_faces": 4}]).alpha_um == 2.0
     assert choose(plan, []).alpha_um == 2.0
 
 
-def test_a_solid_that_fills_its_tile_has_no_faces_and_decides_nothing() -> None:
+def test_a_solid_that_fills_its_tile_has_no_faces_and_does_not_affect_alpha() -> None:
     sums = asdict(sum_components(np.ones((8, 9, 10), bool), SPACING, 1.0))
     assert (sums["kept"], sums["kept_faces"]) == (1, 0)
     assert choose(_plan_with(max_alpha_um=2.0), [sums]).alpha_um == 2.0
 
 
-def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
+def test_given_lengths_are_used_and_offset_may_follow_alpha() -> None:
     assert choose(_plan_with(alpha_um=0.8), []).alpha_um == 0.8
     assert choose(_plan_with(alpha_um=0.8), []).offset_um == 0.0
     tenth = choose(_plan_with(alpha_um=0.8, offset_um="auto"), []).offset_um
@@ -103,7 +103,7 @@ def test_what_is_given_is_used_and_offset_may_follow_alpha() -> None:
     assert choose(_plan_with(alpha_um=0.8, offset_um=0.3), []).offset_um == 0.3
 
 
-def test_offset_moves_the_surface_outward_and_brings_no_fragment_back() -> None:
+def test_offset_moves_the_surface_outward_and_restores_no_fragment() -> None:
     distance = _distance()
     options = RepairOptions(0.0, 5.0, 0.0, offset_um=0.3)
     moved = repair(distance.copy(), SPACING, options=options)

@@ -1,4 +1,4 @@
-"""How much of a solid is too thin for every k-th plane."""
+"""The part of a solid that is too thin for a surface that only every k-th plane carries."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from stereocell.isosurface.thin_structures import count_thin
 @pytest.mark.parametrize("every", [2, 3])
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("first", range(4, 7))
-def test_a_plate_is_thin_up_to_the_distance_of_planes_wherever_it_lies(
+def test_a_plate_no_thicker_than_the_planes_distance_is_thin_wherever_it_lies(
     every: int, axis: int, first: int
 ) -> None:
     for thickness in range(1, every + 3):

@@ -1,4 +1,4 @@
-"""Compiled kernels: kept where they can be, compiled once, and anew only where code changes."""
+"""Compiled kernels are cached where possible, compiled once, and again only if code changes."""
 
 import os
 import subprocess
@@ -13,8 +13,8 @@ CALL = """
 import numpy as np
 from stereocell.kernels import cache_place, compiled, half_edges
 print(cache_place.find_home())
-print(half_edges.label_bodies(np.zeros((0, 3), np.int32), 2)[1])
-print(sum(half_edges.label_bodies.stats.cache_hits.values()))
+print(half_edges.label_vertices(np.zeros((0, 3), np.int32), 2)[1])
+print(sum(half_edges.label_vertices.stats.cache_hits.values()))
 """
 
 
@@ -30,7 +30,7 @@ def call(**environment: str) -> list[str]:
 
 
 @pytest.mark.slow
-def test_second_process_takes_what_the_first_compiled(tmp_path: Path) -> None:
+def test_a_second_process_uses_kernels_that_the_first_compiled(tmp_path: Path) -> None:
     assert call(NUMBA_CACHE_DIR=str(tmp_path)) == [str(tmp_path), "2", "0"]
     assert call(NUMBA_CACHE_DIR=str(tmp_path)) == [str(tmp_path), "2", "1"]
 
@@ -38,11 +38,11 @@ def test_second_process_takes_what_the_first_compiled(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_kernels_work_where_no_folder_can_be_written(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
-    blocked.touch()  # root may write into any folder, but no one into a file
+    blocked.touch()  # root may write into any folder, but nobody can create a folder in a file
     assert call(NUMBA_CACHE_DIR=str(blocked)) == ["None", "2", "0"]
 
 
-def test_user_s_cache_is_taken_where_the_package_s_own_can_t_be(
+def test_the_user_s_cache_is_used_if_the_package_s_folder_cannot_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "__pycache__").touch()
@@ -52,7 +52,7 @@ def test_user_s_cache_is_taken_where_the_package_s_own_can_t_be(
     assert cache_place.find_home.__wrapped__() == tmp_path / "cache" / "stereocell"
 
 
-def test_folder_follows_a_module_and_the_kernels_it_imports(
+def test_the_folder_s_name_changes_with_a_module_and_the_kernels_it_imports(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for file in cache_place._HERE.glob("*.py"):

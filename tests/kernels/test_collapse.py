@@ -1,4 +1,4 @@
-"""Collapses block by block: as sound, and as few triangles, as of the whole at once."""
+"""Collapses by blocks give results as valid and as coarse as collapses of the whole at once."""
 
 import numpy as np
 import pytest
@@ -17,13 +17,15 @@ ERROR_UM = 0.03
 
 @pytest.fixture
 def bodies() -> Mesh:
-    """Two balls of several blocks each, so that there are seams."""
+    """Return two balls of several blocks each, so that there are seams between blocks."""
     mesh = joined(ball(5.0, 120), moved(ball(3.0, 80), (9.0, 0.0, 0.0)))
     assert len(mesh.positions) > 4 * collapses.BLOCK
     return mesh
 
 
-def test_blocks_are_as_good_as_the_whole(bodies: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_simplified_by_blocks_is_as_good_as_one_simplified_at_once(
+    bodies: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
     by_blocks = simplify(bodies, ERROR_UM)
     monkeypatch.setattr(collapses, "BLOCK", len(bodies.positions))
     at_once = simplify(bodies, ERROR_UM)
@@ -35,7 +37,7 @@ def test_blocks_are_as_good_as_the_whole(bodies: Mesh, monkeypatch: pytest.Monke
     assert far.max() < STRAY * ERROR_UM
 
 
-def test_triangles_keep_their_order(bodies: Mesh) -> None:
+def test_locked_triangles_keep_their_order(bodies: Mesh) -> None:
     at, triangles = bodies.positions.astype(np.float64), bodies.triangles.astype(np.int32)
     count = len(at)
     left, moves = collapse(at, triangles, np.ones(count, bool))
@@ -43,7 +45,7 @@ def test_triangles_keep_their_order(bodies: Mesh) -> None:
     assert not len(moves)
 
 
-def test_what_was_done_before_is_done_again_but_round_what_is_locked_now(bodies: Mesh) -> None:
+def test_earlier_collapses_are_repeated_except_around_newly_locked_vertices(bodies: Mesh) -> None:
     at, triangles = bodies.positions.astype(np.float64), bodies.triangles.astype(np.int32)
     locked = np.zeros(len(at), bool)
     first, moves = collapse(at, triangles, locked)
@@ -56,10 +58,10 @@ def test_what_was_done_before_is_done_again_but_round_what_is_locked_now(bodies:
     assert moved in left
     assert moved not in now[:, 0]
     assert len(left) < 1.02 * len(first)
-    # nearly all is as before
+    # Nearly all triangles are the same.
     was, is_now = ({tuple(t) for t in some.tolist()} for some in (first, left))
     assert len(was & is_now) > 0.9 * len(first)
-    # and none is farther from the surface than it may be
+    # No vertex is farther from the surface than allowed.
     done = compact(bodies, left.astype(np.uint32))
     assert find_defects(done).total == 0
     assert Nearest(done, 10).distances(at).max() < STRAY * ERROR_UM
@@ -82,7 +84,7 @@ def neighbours_apart(triangles: NDArray[np.int32], place: NDArray[np.int64]) -> 
     return float(np.abs(place[triangles[:, 0]] - place[triangles[:, 1]]).mean())
 
 
-def test_near_vertices_stand_together() -> None:
+def test_near_vertices_follow_each_other_in_the_order() -> None:
     rng = np.random.default_rng(0)
     mesh = ball(5.0, 100)
     count = len(mesh.positions)
@@ -105,6 +107,6 @@ def test_near_vertices_stand_together() -> None:
     np.testing.assert_array_equal(np.sort(turns), np.arange(len(triangles)))
 
 
-def test_points_alone_have_an_order() -> None:
+def test_equal_points_keep_their_order_and_no_points_have_one() -> None:
     np.testing.assert_array_equal(order_vertices(np.zeros((3, 3))), [0, 1, 2])
     assert len(order_vertices(np.zeros((0, 3)))) == 0

@@ -1,7 +1,8 @@
-"""Collapses give the same meshes bit by bit, whoever rearranges the code and on any processor.
+"""Collapses give the same meshes bit by bit, after each change of the code and on any processor.
 
-The inputs are faces of voxels, whole numbers. Kernels add, multiply, divide and take roots, which
-IEEE 754 defines to the last bit. A change that is meant to give other meshes writes new digests.
+The inputs are faces of voxels, so coordinates are whole numbers. Kernels add, multiply, divide and
+take roots, which IEEE 754 defines to the last bit. A change that is meant to give other meshes
+replaces the digests.
 """
 
 import hashlib

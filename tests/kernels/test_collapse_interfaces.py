@@ -1,4 +1,4 @@
-"""Interfaces that are simplified: lines and corners between several of them."""
+"""Simplified interfaces keep the lines and corners between them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,10 +58,10 @@ def test_three_half_planes_keep_their_line_and_their_borders() -> None:
     assert len(left) < 0.6 * len(triangles)
     on_line = np.unique(left[np.isin(left, np.arange(9))])
     assert {0, 8} <= set(on_line.tolist())  # the ends lie on borders
-    assert len(on_line) < 9  # those between have moved along it
+    assert len(on_line) < 9  # vertices between the ends have moved along the line
     borders = np.isclose(np.hypot(at[:, 0], at[:, 1]), 8)
     assert set(np.flatnonzero(borders)) <= set(left.ravel().tolist())
-    # no sheet has lost or won area, and each triangle is of the sheet that it was of
+    # No sheet has gained or lost area, and each triangle still belongs to its sheet.
     sheet = np.repeat(np.arange(3), len(triangles) // 3)
     area = np.linalg.norm(
         np.cross(at[left[:, 1]] - at[left[:, 0]], at[left[:, 2]] - at[left[:, 0]]), axis=1
@@ -69,22 +69,22 @@ def test_three_half_planes_keep_their_line_and_their_borders() -> None:
     np.testing.assert_allclose(np.bincount(sheet[is_left], area), np.full(3, 128.0), rtol=1e-9)
 
 
-def test_a_bent_line_stays_where_it_is_bent() -> None:
+def test_a_line_between_interfaces_keeps_its_bend() -> None:
     at, triangles = sheets((0, 110, 230))
     at[:, 0] += np.maximum(at[:, 2] - 4, 0)  # all sheets shear from the middle on
     left, _ = simplified(at, triangles)
     assert 4 in left
 
 
-def test_an_interface_within_two_objects_alone_is_simplified_like_a_surface() -> None:
+def test_an_interface_between_only_two_objects_is_simplified_like_a_surface() -> None:
     at, triangles = sheets((0, 180))
     left, _ = simplified(at, triangles)
     inner = (np.abs(at[:, 0]) < 8) & (at[:, 2] > 0) & (at[:, 2] < 8)
     assert len(np.intersect1d(left, np.flatnonzero(inner))) < 0.35 * inner.sum()
 
 
-def test_a_tetrahedron_and_two_that_share_a_face_stay() -> None:
-    """Any collapse would lay interfaces on one another."""
+def test_one_tetrahedron_and_two_with_a_common_face_do_not_change() -> None:
+    """Any collapse would put two interfaces on top of each other."""
     at = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.9, 0], [0.5, 0.3, 0.8], [0.5, 0.3, -0.8]])
     faces = [(0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3), (1, 0, 4), (2, 1, 4), (0, 2, 4)]
     for triangles in (faces[:4], faces):
@@ -101,7 +101,7 @@ def test_locked_vertices_stay() -> None:
     assert is_left.all()
 
 
-def test_what_was_done_before_is_done_again_but_round_what_is_locked_now() -> None:
+def test_earlier_collapses_are_repeated_except_around_newly_locked_vertices() -> None:
     at, triangles = sheets((0, 110, 230), cells=20)
     at += np.random.default_rng(4).normal(scale=0.02, size=at.shape)
     free = np.zeros(len(at), bool)
@@ -114,7 +114,7 @@ def test_what_was_done_before_is_done_again_but_round_what_is_locked_now() -> No
     moved, kept = made[len(made) // 2]
     left, is_left_now, _ = collapse(at, triangles, locked, 0.1, made)
     assert {moved, kept} <= set(left[is_left_now].ravel().tolist())
-    # far from there all is as before
+    # All triangles far from the locked vertices are the same.
     far = np.linalg.norm(at - at[kept], axis=1) > 8
     was, now = ({tuple(t) for t in some if far[t].all()} for some in
                 (first[is_left].tolist(), left[is_left_now].tolist()))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Half-edges: twins, fans and bodies, against what is counted by hand or by array expressions."""
+"""Half-edges: twins, fans and components, compared with counts by hand or by array expressions."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from stereocell.kernels.half_edges import (
     CROWDED,
     count_fans,
     find_first,
-    label_bodies,
+    label_vertices,
     lie_within,
     match_twins,
     measure_areas,
@@ -26,7 +26,7 @@ TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
 
 
 @pytest.mark.parametrize("name", [name for name in SOUND if name != "nothing"])
-def test_twins_run_along_the_same_edge_the_other_way(name: str) -> None:
+def test_twins_run_along_the_same_edge_in_opposite_directions(name: str) -> None:
     mesh = SOUND[name]
     triangles = mesh.triangles.astype(np.int32)
     twins = match_twins(triangles, len(mesh.positions))
@@ -42,13 +42,13 @@ def test_borders_and_crowded_edges_have_no_twins() -> None:
     assert (
         sorted(match_twins(TETRAHEDRON[1:], 4)[match_twins(TETRAHEDRON[1:], 4) < 0]) == [BORDER] * 3
     )
-    fan = np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]], np.int32)  # three at the edge 0-1
+    fan = np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]], np.int32)  # three triangles at the edge 0-1
     assert (match_twins(fan, 5)[[0, 3, 6]] == CROWDED).all()
     alike = np.array([[0, 1, 2], [0, 1, 3]], np.int32)
     assert (match_twins(alike, 4)[[0, 3]] == CROWDED).all()
 
 
-def test_vertex_with_two_fans_is_told() -> None:
+def test_a_vertex_with_two_fans_is_recognized() -> None:
     both = np.concatenate([TETRAHEDRON, [[0, 5, 4], [0, 4, 6], [4, 5, 6], [0, 6, 5]]]).astype(
         np.int32
     )
@@ -56,11 +56,11 @@ def test_vertex_with_two_fans_is_told() -> None:
     assert (valence < 0).tolist() == [True] + [False] * 6
 
 
-def test_bodies_are_numbered_by_their_first_vertices_and_measured() -> None:
+def test_components_are_numbered_by_their_first_vertices_and_measured() -> None:
     one, other = ball(2.0), moved(ball(1.0), (9.0, 0.0, 0.0))
     mesh = joined(one, other)
     triangles, count = mesh.triangles.astype(np.int32), len(mesh.positions)
-    label, bodies = label_bodies(triangles, count)
+    label, bodies = label_vertices(triangles, count)
     np.testing.assert_array_equal(
         label, np.repeat([0, 1], [len(one.positions), len(other.positions)])
     )
@@ -75,21 +75,22 @@ def test_bodies_are_numbered_by_their_first_vertices_and_measured() -> None:
     np.testing.assert_allclose(sides, np.repeat([[4.0], [2.0]], 3, axis=1), rtol=0.02)
 
 
-def test_gain_is_the_area_where_all_move_outwards() -> None:
+def test_the_gain_is_the_area_if_all_vertices_move_outwards() -> None:
     mesh = ball(2.0, 60)
     at, triangles = mesh.positions.astype(np.float64), mesh.triangles.astype(np.int32)
-    label, bodies = label_bodies(triangles, len(at))
+    label, bodies = label_vertices(triangles, len(at))
     gain = sum_gains(at, triangles, label, bodies, sum_normals(at, triangles))
     np.testing.assert_allclose(gain, 4 * np.pi * 4, rtol=0.01)
 
 
-def test_windings_are_six_volumes_whichever_axis_and_zero_and_boxes() -> None:
+def test_windings_give_six_times_the_volume_along_each_axis_and_the_boxes() -> None:
     one, other = ball(2.0), moved(ball(1.0), (9.0, 0.0, 0.0))
     mesh = joined(one, other)
     triangles, count = mesh.triangles.astype(np.int32), len(mesh.positions)
     turned = triangles.copy()
-    turned[len(one.triangles) :] = turned[len(one.triangles) :, ::-1]  # the small one, inwards
-    label, bodies = label_bodies(turned, count)
+    # The small ball is wound inwards
+    turned[len(one.triangles) :] = turned[len(one.triangles) :, ::-1]
+    label, bodies = label_vertices(turned, count)
     assert find_first(turned, label, bodies + 1).tolist() == [0, len(one.triangles), -1]
     at = mesh.positions.astype(np.float64)
     normals = sum_normals(at, triangles).astype(np.float32)
@@ -102,7 +103,7 @@ def test_windings_are_six_volumes_whichever_axis_and_zero_and_boxes() -> None:
     np.testing.assert_allclose(high, [at[label == body].max(axis=0) for body in range(2)])
 
 
-def test_a_box_lies_within_another_only_along_all_axes() -> None:
+def test_a_box_lies_within_another_only_if_it_does_so_along_all_axes() -> None:
     low = np.array([[0, 0, 0], [1, 1, 1], [1, 1, -1], [0, 0, 0]], np.float64)
     high = np.array([[4, 4, 4], [2, 2, 2], [2, 2, 2], [4, 4, 4]], np.float64)
     asked = np.array([1, 2, 3])
@@ -119,5 +120,5 @@ def test_renumbered_triangles_have_the_same_corners_in_order() -> None:
     assert (len(used), own.shape) == (0, (0, 3))
 
 
-def test_a_part_of_kernels_is_called_from_python_too() -> None:
+def test_a_part_of_a_kernel_can_be_called_from_python() -> None:
     assert doubled_area(np.eye(3), 0, 1, 2) == (1.0, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""The sums that a level is found on, beside the same by numpy."""
+"""The sums on which levels are found, compared with numpy's."""
 
 import numpy as np
 
@@ -16,10 +16,10 @@ OWN = (slice(1, 20), slice(1, 23), slice(4, 36))
 SPACING = (0.5, 0.2, 0.2)
 
 
-def test_sums_and_differences_are_numpy_s() -> None:
+def test_sums_and_differences_equal_those_of_numpy() -> None:
     rng = np.random.default_rng(3)
     field = rng.gamma(2, 50, (21, 24, 40)).astype(np.float32)
-    field[3, 4:9], field[5, 5, 5] = field[3, 4, 0], 1e6  # differences of 0, and beyond all bins
+    field[3, 4:9], field[5, 5, 5] = field[3, 4, 0], 1e6  # differences of 0, and one beyond all bins
     padding = np.zeros(field.shape, bool)
     padding[:, 18:, :9] = True
     scale = Scale(-20.0, 600.0, 90.0)

@@ -1,4 +1,4 @@
-"""Nearest points by the grid: the same as libigl finds them by its tree."""
+"""Nearest points by the grid, compared with those that libigl finds by its tree."""
 
 import igl
 import numpy as np
@@ -11,7 +11,7 @@ from support.meshes import ball, joined, moved
 
 
 def scene() -> Mesh:
-    """Bodies of unlike sizes, and one triangle as large as all of them."""
+    """Return bodies of different sizes, and one triangle as large as all of them."""
     large = Mesh(
         np.float32([[-40, -40, 9], [40, -40, 9], [0, 60, 9]]),
         np.uint32([[0, 1, 2]]),
@@ -22,7 +22,7 @@ def scene() -> Mesh:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reach", [6.0, 60.0, 600.0])
-def test_distances_are_libigl_s(reach: float) -> None:
+def test_distances_equal_those_of_libigl(reach: float) -> None:
     mesh = scene()
     points = np.random.default_rng(0).uniform(-reach, reach, (examples(2000, 400), 3))
     vertices, triangles = mesh.positions.astype(np.float64), mesh.triangles.astype(np.int64)
@@ -36,7 +36,7 @@ def test_distances_are_libigl_s(reach: float) -> None:
     assert lone.distances(points[:1])[0] == pytest.approx(near.distances(points[:1])[0])
 
 
-def test_sides_are_libigl_s() -> None:
+def test_sides_equal_those_of_libigl() -> None:
     mesh = joined(ball(5.0, 30), moved(ball(2.0, 7), (9.0, 0.0, 0.0)))
     points = np.random.default_rng(0).uniform(-12, 12, (5000, 3))
     signed, _, _, _ = igl.signed_distance(
@@ -49,13 +49,13 @@ def test_sides_are_libigl_s() -> None:
 
 
 @pytest.mark.slow
-def test_a_part_is_measured_by_the_whole_s_grid() -> None:
+def test_a_part_of_a_mesh_is_measured_with_the_grid_of_the_whole() -> None:
     mesh = joined(ball(5.0, 30), moved(ball(2.0, 7), (9.0, 0.0, 0.0)))
     alone, gone = ball(5.0, 30), np.zeros(len(mesh.positions), bool)
     gone[len(alone.positions) :] = True
     part, same = Nearest(mesh, 50).without(gone), Nearest(alone, 50)
     points = np.random.default_rng(0).uniform(-12, 12, (2000, 3))
-    for _ in range(2):  # what was seen before is not left out
+    for _ in range(2):  # the second time, triangles that were examined before still count
         np.testing.assert_array_equal(part.distances(points), same.distances(points))
     np.testing.assert_array_equal(part.points, same.points)
     np.testing.assert_array_equal(part.vertices, same.vertices)

@@ -1,4 +1,4 @@
-"""The wrap over triangles, whose package the dev group brings, and what is said without it."""
+"""The alpha wrap of triangles, with its package from the dev group, and the error without it."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def _source(folder: Path) -> str:
     return str(folder / "ball.ome.tif")
 
 
-def test_more_tiles_than_one_are_refused(
+def test_the_wrap_refuses_more_than_one_tile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("stereocell.planning.settle.find_wrapper", lambda: "1")
@@ -33,7 +33,7 @@ def test_more_tiles_than_one_are_refused(
     )
 
 
-def test_missing_package_is_named_with_its_remedy(
+def test_the_error_for_a_missing_package_says_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(alpha_wrap, "LIBRARY", "no_such_wrapper")
@@ -45,14 +45,16 @@ def test_missing_package_is_named_with_its_remedy(
     assert not out.exists()
 
 
-def test_unknown_wrap_lists_the_known(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_error_for_an_unknown_wrap_lists_the_known_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     flags = ["-o", str(tmp_path / "out"), "--wrap", "foil"]
     assert main(["plan", _source(tmp_path), *flags]) == 2
     assert "'foil', expected one of voxels, alpha-wrap" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_wrap_is_closed_and_lies_the_offset_away() -> None:
+def test_the_wrap_is_closed_and_lies_at_the_offset_from_the_surface() -> None:
     shape = (30, 40, 40)
     z, y, x = np.indices(shape) - np.float64(14.6)
     distance = np.clip(9 - np.sqrt(z**2 + y**2 + x**2), -2, 2).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Volumes that simplification takes are given back."""
+"""Bodies get back the volume that simplification took."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from stereocell.isosurface.extract import extract_surface
 from stereocell.meshes import keep_volume
-from stereocell.meshes.keep_volume import Earlier, FineVolumes
+from stereocell.meshes.keep_volume import EarlierLevel, FineVolumes
 from stereocell.meshes.simplify_valid import Simplifier, simplify_without_defects
 from stereocell.meshes.validity import Defects, border, find_defects, label_components
 from stereocell.model.lattice import Lattice
@@ -21,7 +21,7 @@ ERROR = 0.6
 
 
 def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, Mesh]:
-    """Return the simplified mesh, and the same with its volumes."""
+    """Return the simplified mesh, and the same mesh with its volumes restored."""
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
     found = FineVolumes(fine, planes).keep(simple.mesh, simple.vertices, max_move_um=ERROR)
     assert found.defects.counts == find_defects(found.mesh, planes=planes).counts
@@ -29,7 +29,7 @@ def kept(fine: Mesh, planes: tuple[tuple[int, float], ...] = ()) -> tuple[Mesh, 
 
 
 @pytest.mark.parametrize("fine", [ball(5.0, 60), joined(ball(5.0, 60), turned(ball(3.0, 40)))])
-def test_bodies_and_cavities_have_their_volume(fine: Mesh) -> None:
+def test_bodies_and_cavities_get_their_volume_back(fine: Mesh) -> None:
     simple, mesh = kept(fine)
     assert abs(enclosed_volume(simple) / enclosed_volume(fine) - 1) > 0.03
     assert enclosed_volume(mesh) == pytest.approx(enclosed_volume(fine), rel=1e-3)
@@ -48,7 +48,7 @@ def half_ball() -> tuple[Mesh, tuple[tuple[int, float], ...]]:
     return half, planes
 
 
-def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
+def test_vertices_of_a_cut_stay_bit_by_bit_and_no_other_passes_it() -> None:
     half, planes = half_ball()
     simple, mesh = kept(half, planes)
     rim = np.unique(border(simple.triangles))
@@ -59,7 +59,7 @@ def test_cut_stays_bit_by_bit_and_nothing_passes_it() -> None:
     assert abs(enclosed_volume(simple) - enclosed_volume(half)) > 0.02 * whole
 
 
-def test_no_vertex_leaves_the_tile_s_box_or_the_fine_mesh_s() -> None:
+def test_no_vertex_leaves_the_common_box_of_tile_and_fine_mesh() -> None:
     fine = ball(5.0, 60)
     simple = simplify_without_defects(fine, (), max_error_um=ERROR)
     box = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 4.0, 9.0])
@@ -72,14 +72,14 @@ def test_no_vertex_leaves_the_tile_s_box_or_the_fine_mesh_s() -> None:
     assert free.positions[:, 1].max() > high[1] + 0.05
     assert mesh.positions[:, 2].min() >= low[2]
     assert mesh.positions[:, 1].max() <= high[1]
-    assert np.linalg.norm(mesh.positions, axis=1).max() > 5.05  # elsewhere they moved out
+    assert np.linalg.norm(mesh.positions, axis=1).max() > 5.05  # elsewhere vertices moved out
     assert enclosed_volume(mesh) == pytest.approx(enclosed_volume(fine), rel=0.003)
 
 
-def test_where_very_many_would_cross_the_bodies_stay_at_once(
+def test_bodies_stop_moving_at_once_if_very_many_vertices_would_cross(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Of noise all tries would fail, and cost more than the rest of the level."""
+    """In noise all tries would fail, and cost more than the rest of the level."""
     one = ball(5.0, 60)
     pair = joined(one, moved(one, (10.02, 0.0, 0.0)))
     checks = []
@@ -95,7 +95,7 @@ def test_where_very_many_would_cross_the_bodies_stay_at_once(
     assert len(checks) == 2
 
 
-def test_bodies_that_would_cross_stay_apart_and_move_elsewhere() -> None:
+def test_bodies_that_would_cross_stay_apart_and_grow_elsewhere() -> None:
     fine = crowd()
     simple, mesh = kept(fine)
     assert kinds(find_defects(mesh)) == set()
@@ -103,11 +103,11 @@ def test_bodies_that_would_cross_stay_apart_and_move_elsewhere() -> None:
     assert enclosed_volume(mesh) > 0.995 * enclosed_volume(fine)
 
 
-def test_body_that_lacks_volume_is_named_by_its_own_volume_whether_a_cut_opens_it_or_not() -> None:
+def test_a_body_s_missing_volume_is_measured_against_its_own_even_if_a_cut_opens_it() -> None:
     half, planes = half_ball()
     fine = joined(half, moved(ball(5.0, 60), (12.0, 0.0, 8.0)))
     simple = simplify_without_defects(fine, planes, max_error_um=ERROR)
-    volumes, told = FineVolumes(fine, planes), []
+    volumes, lacks_volume = FineVolumes(fine, planes), []
     for move in (0.01, 0.05, 0.1, 0.2, ERROR):
         found = volumes.keep(simple.mesh, simple.vertices, max_move_um=move)
         for is_half, whole in ((True, 250 / 3 * np.pi), (False, 500 / 3 * np.pi)):
@@ -116,14 +116,14 @@ def test_body_that_lacks_volume_is_named_by_its_own_volume_whether_a_cut_opens_i
                     (mesh.positions[mesh.triangles[:, 0], 0] < 6) == is_half
                 ])) for mesh in (fine, found.mesh)
             )  # fmt: skip
-            told.append(abs(after - before) > 0.03 * whole)
+            lacks_volume.append(abs(after - before) > 0.03 * whole)
             own = (found.mesh.positions[:, 0] < 6) == is_half
-            assert (found.lacks[own] == told[-1]).all()
-    assert told[:2] == [True, True]
-    assert told[-2:] == [False, False]
+            assert (found.lacks[own] == lacks_volume[-1]).all()
+    assert lacks_volume[:2] == [True, True]
+    assert lacks_volume[-2:] == [False, False]
 
 
-def test_bodies_that_did_not_change_keep_their_moves_and_are_not_looked_at_again(
+def test_unchanged_bodies_keep_their_moves_and_are_not_checked_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fine = joined(crowd(), moved(ball(5.0, 60), (40.0, 0.0, 0.0)))
@@ -142,7 +142,7 @@ def test_bodies_that_did_not_change_keep_their_moves_and_are_not_looked_at_again
         return find_defects(*given, fresh=fresh, **named)
 
     monkeypatch.setattr(keep_volume, "find_defects", count_fresh)
-    earlier = Earlier(first, before.vertices, after.changed)
+    earlier = EarlierLevel(first, before.vertices, after.changed)
     second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
     assert looked_at[0] == is_far[after.mesh.triangles[:, 0]].sum()
     assert len(looked_at) == 1
@@ -153,14 +153,14 @@ def test_bodies_that_did_not_change_keep_their_moves_and_are_not_looked_at_again
     assert enclosed_volume(second.mesh) > 0.995 * enclosed_volume(fine)
 
 
-def test_defects_of_bodies_that_did_not_change_are_told_of_again() -> None:
+def test_defects_of_unchanged_bodies_are_reported_again() -> None:
     one = ball(5.0, 60)
     fine = joined(one, moved(one, (6.0, 0.0, 0.0)), moved(one, (40.0, 0.0, 0.0)))
     volumes, simplifier = FineVolumes(fine, ()), Simplifier(fine, ())
     before = simplifier.simplify(ERROR)
     first = volumes.keep(before.mesh, before.vertices, max_move_um=ERROR)
     after = simplifier.simplify(ERROR / 4, np.array([False, False, True]))
-    earlier = Earlier(first, before.vertices, after.changed)
+    earlier = EarlierLevel(first, before.vertices, after.changed)
     second = volumes.keep(after.mesh, after.vertices, max_move_um=ERROR, earlier=earlier)
     assert first.defects.total > 0
     assert second.defects.counts == first.defects.counts
@@ -168,7 +168,7 @@ def test_defects_of_bodies_that_did_not_change_are_told_of_again() -> None:
 
 
 def shells(seed: int) -> Mesh:
-    """Walls within walls, bent, a voxel or two apart."""
+    """Return bent walls within walls, a voxel or two apart."""
     at = np.stack(np.indices((28,) * 3), -1).astype(float)
     bent = 5 * ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=(28,) * 3), 2)
     away = np.linalg.norm(at - 14, axis=-1) + bent
@@ -177,7 +177,7 @@ def shells(seed: int) -> Mesh:
 
 
 @pytest.mark.parametrize("seed", [19, 21])
-def test_what_crosses_a_body_that_stays_stays_as_well(
+def test_a_body_that_crosses_an_unmoved_body_is_not_moved_either(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(keep_volume, "TRIES", 0)

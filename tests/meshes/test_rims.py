@@ -1,4 +1,4 @@
-"""Rims of neighbouring tiles: thinned out alike, and sound on each side."""
+"""Rims of neighbouring tiles are thinned out alike, and stay valid on each side."""
 
 import numpy as np
 import pytest
@@ -24,14 +24,14 @@ Edges = set[tuple[bytes, ...]]
 
 @pytest.fixture(scope="module", params=[2.2, 1.4])
 def sponge(request: pytest.FixtureRequest) -> Field:
-    """Smoothed noise: curves of all kinds in every plane."""
+    """Return smoothed noise, whose surface has curves of all kinds in every plane."""
     noise = np.random.default_rng(3).normal(size=SHAPE)
     field = ndimage.gaussian_filter(noise, request.param)
     return np.clip(field / field.std() * 0.4, -0.56, 0.56).astype(np.float32)
 
 
 def _tiles(field: Field, error_um: float) -> list[tuple[Mesh, Lattice]]:
-    """Return four tiles, two by two, of unlike sizes."""
+    """Return four tiles, two by two, of different sizes."""
     region, tiles = Box((0, 0, 0), SHAPE), []
     for y0, y1 in ((0, 41), (40, 80)):
         for x0, x1 in ((0, 61), (60, 100)):
@@ -59,7 +59,7 @@ def _rims(tiles: list[tuple[Mesh, Lattice]]) -> dict[tuple[int, float, int], lis
 
 
 @pytest.mark.slow
-def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> None:
+def test_both_tiles_keep_the_same_edges_and_fewer_of_them(sponge: Field) -> None:
     whole, thinned = (_rims(_tiles(sponge, error)) for error in (0.0, ERROR))
     assert len(thinned) == 4
     for plane, (one, other) in thinned.items():
@@ -68,14 +68,14 @@ def test_both_tiles_keep_the_same_edges_and_less_than_half(sponge: Field) -> Non
 
 
 @pytest.mark.slow
-def test_each_tile_is_sound(sponge: Field) -> None:
+def test_each_tile_is_valid(sponge: Field) -> None:
     for mesh, lattice in _tiles(sponge, ERROR):
         assert kinds(find_defects(mesh, planes=lattice.cut_planes())) == set()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 6])
-def test_no_triangle_comes_to_lie_in_the_other_plane_where_two_meet(seed: int) -> None:
+def test_no_triangle_comes_to_lie_in_a_second_plane_where_two_planes_meet(seed: int) -> None:
     noise = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 0.8)
     field = np.clip(noise / noise.std() * 0.4, -0.56, 0.56).astype(np.float32)
     for mesh, lattice in _tiles(field, 0.1):

@@ -1,4 +1,4 @@
-"""Triangles that meet: each kind by hand, and random ones against rational arithmetic."""
+"""Triangles that meet: each kind by hand, and random ones compared with rational arithmetic."""
 
 from fractions import Fraction
 from itertools import combinations, product
@@ -38,7 +38,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_pairs_by_hand(kind: str) -> None:
+def test_pairs_of_each_kind_meet_or_not_in_all_projections(kind: str) -> None:
     expected, more, second = KINDS[kind]
     positions = np.array(CORNER + more, float)
     for axes in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):  # in all three planes of projection
@@ -56,7 +56,7 @@ def _plus(a: Point, b: Point, t: Fraction) -> Point:
 
 
 def _solve(rows: list[list[Fraction]]) -> list[Fraction] | None:
-    """Gauss on a square system with its right side; None if it is singular."""
+    """Solve a square system with its right side by Gauss's method; return None if singular."""
     n = len(rows)
     rows = [list(row) for row in rows]
     for k in range(n):
@@ -72,7 +72,7 @@ def _solve(rows: list[list[Fraction]]) -> list[Fraction] | None:
 
 
 def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
-    """The corners of what two triangles share: where edges of one meet the other, and edges meet.
+    """Return the corners of the common part of two triangles.
 
     Rational arithmetic, by brute force over edges and faces, edges and edges, corners and faces.
     """
@@ -87,7 +87,7 @@ def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
                 t, u, v = solved
                 if 0 <= t <= 1 and u >= 0 and v >= 0 and u + v <= 1:
                     found.add(_plus(p, q, t))
-        for point in first:  # corners in the other's plane
+        for point in first:  # corners in the plane of the other triangle
             for i, j in combinations(range(3), 2):
                 solved = _solve([[b[k] - a[k], c[k] - a[k], point[k] - a[k]] for k in (i, j)])
                 if solved is not None:
@@ -108,8 +108,8 @@ def _common_points(one: list[Point], other: list[Point]) -> set[Point]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shared", sweep([0, 1, 2], kept=[1]))
-def test_random_triangles_on_a_coarse_grid_against_rational_arithmetic(shared: int) -> None:
-    """On 4 x 4 x 3 points, most pairs are special: coplanar, collinear, touching."""
+def test_random_triangles_on_a_coarse_grid_meet_as_in_rational_arithmetic(shared: int) -> None:
+    """On 4 x 4 x 3 points most pairs of triangles are special: coplanar, collinear, touching."""
     rng = np.random.default_rng(shared)
     met = 0
     for _ in range(200):
@@ -128,8 +128,8 @@ def test_random_triangles_on_a_coarse_grid_against_rational_arithmetic(shared: i
     assert 10 < met < 190
 
 
-def test_signs_are_exact_where_floats_round() -> None:
-    """Kettner et al. 2008: points near a line, of which naive determinants are wrong."""
+def test_signs_are_exact_although_floats_round() -> None:
+    """Kettner et al. 2008: for points near a line, naive determinants have wrong signs."""
     a = np.array([[0.5, 0.5]]) + np.arange(64)[:, None] * 2.0**-53
     b, c = np.full((64, 2), 12.0), np.full((64, 2), 24.0)
     assert (orient_2d(a, b, c) == 0).all()
@@ -141,8 +141,8 @@ def test_signs_are_exact_where_floats_round() -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1e-4, 1e6])
 @pytest.mark.parametrize("kind", ["anywhere", "on a grid", "nearly in a plane"])
-def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> None:
-    """Rationals of Python against floats that are trusted where they may be."""
+def test_the_side_of_a_plane_is_the_same_as_in_exact_arithmetic(kind: str, scale: float) -> None:
+    """Compare with Python's rationals. Floats decide only where their error is small enough."""
     rng = np.random.default_rng(1)
     points = scale * rng.normal(size=(4, 300, 3))
     if kind == "on a grid":
@@ -163,10 +163,10 @@ def test_side_of_a_plane_is_as_in_exact_arithmetic(kind: str, scale: float) -> N
 
 
 @pytest.mark.parametrize("axes", [[0, 1, 2], [1, 2, 0], [2, 0, 1]])
-def test_floats_alone_part_triangles_of_one_plane(
+def test_floats_alone_separate_triangles_of_one_plane(
     axes: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Walls of what is cut by the volume's end are such: exact tests of all pairs would be slow."""
+    """Walls at the end of the volume are like this. Exact tests of all pairs would be slow."""
     asked = []
     monkeypatch.setattr(
         self_intersections, "_apart", lambda at, triangles, pairs: asked.append(pairs) or pairs
@@ -182,7 +182,7 @@ def test_floats_alone_part_triangles_of_one_plane(
 
 
 @pytest.mark.parametrize("axes", [[0, 1, 2], [1, 2, 0], [2, 0, 1]])
-def test_floats_alone_part_the_triangles_of_a_large_flat_face(
+def test_floats_alone_separate_the_triangles_of_a_large_flat_face(
     axes: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All triangles of a polygon meet at one corner, so exact tests of all pairs would be slow."""
@@ -200,8 +200,8 @@ def test_floats_alone_part_the_triangles_of_a_large_flat_face(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
-def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
-    """Of triangles in a crowd, some with common corners, every share of which is fresh."""
+def test_all_pairs_with_a_fresh_triangle_are_found_and_no_others(seed: int) -> None:
+    """A crowd of triangles, some with common corners; each share of them is fresh in turn."""
     rng = np.random.default_rng(seed)
     positions = rng.integers(0, 9, (120, 3)).astype(float)
     triangles = np.array([rng.permutation(120)[:3] for _ in range(250)])
@@ -216,11 +216,11 @@ def test_fresh_triangles_are_in_all_pairs_that_are_asked_for(seed: int) -> None:
 
 
 def test_few_fresh_triangles_among_many_are_found_in_all_their_pairs() -> None:
-    """Where they are few, only what lies around them is looked at: also far across cells."""
+    """If few are fresh, only triangles around them are examined, even far across the grid."""
     rng = np.random.default_rng(9)
     centres = rng.random((4000, 1, 3)) * [100, 90, 2]
     positions = (centres + rng.normal(size=(4000, 3, 3))).reshape(-1, 3)
-    positions[:3] = [[0, 0, 1], [100, 90, 1], [100, 80, 1]]  # through the whole crowd
+    positions[:3] = [[0, 0, 1], [100, 90, 1], [100, 80, 1]]  # a triangle through the whole crowd
     triangles = np.arange(12_000).reshape(-1, 3)
     everything = find_crossings(positions, triangles)
     fresh = np.zeros(4000, bool)
@@ -235,8 +235,8 @@ def test_few_fresh_triangles_among_many_are_found_in_all_their_pairs() -> None:
     "kind",
     sweep(["a star", "round twice", "anyhow", "in a plane", "on edge"], ["round twice", "on edge"]),
 )
-def test_triangles_round_a_vertex_against_each_pair_of_them(kind: str) -> None:
-    """All at once, where most pairs need no look, find what each pair by itself does."""
+def test_triangles_around_a_vertex_give_the_same_pairs_together_and_two_by_two(kind: str) -> None:
+    """Together most pairs are skipped; the result must be that of testing each pair alone."""
     rng = np.random.default_rng(len(kind))
     met, spread = 0, 0
     tries = examples(150, 30)
@@ -266,7 +266,7 @@ def test_triangles_round_a_vertex_against_each_pair_of_them(kind: str) -> None:
         assert find_crossings(positions, triangles).tolist() == [list(pair) for pair in alone]
         met += bool(alone)
         is_spread = find_spread(positions, triangles.astype(np.int32))
-        assert not is_spread[1:].any()  # those of the ring have two triangles each
+        assert not is_spread[1:].any()  # vertices of the ring have two triangles each
         spread += bool(is_spread[0])
     assert 150 * met >= tries * {"round twice": 100, "anyhow": 40, "in a plane": 5}.get(kind, 0)
     assert 150 * spread >= tries * {"a star": 120, "in a plane": 20}.get(kind, 0)

@@ -40,7 +40,7 @@ def _border(mesh: Mesh) -> set[bytes]:
 
 
 @pytest.mark.parametrize("error", [0.02, 0.1, 0.5])
-def test_coarser_level_has_fewer_triangles_and_stays_near(error: float) -> None:
+def test_a_coarser_level_has_fewer_triangles_and_stays_near(error: float) -> None:
     fine = _sphere()
     coarse = simplify(fine, error)
     assert len(coarse.triangles) < 0.6 * len(fine.triangles)
@@ -59,15 +59,15 @@ def test_distance_between_concentric_spheres_is_the_difference_of_radii() -> Non
     assert _distance(_sphere(5.0), _sphere(4.0)) == pytest.approx(1.0, abs=0.02)
 
 
-def test_small_body_stays_one_beside_a_large_one() -> None:
+def test_a_small_body_stays_a_solid_beside_a_large_one() -> None:
     large, small = _sphere(), _sphere(0.4, 24)
     both = joined(large, moved(small, (9.0, 0.0, 0.0)))
     coarse = simplify(both, 1.0)
     far = coarse.positions[:, 0] > 8
     assert 4 <= far[coarse.triangles].all(axis=1).sum() < 0.2 * len(small.triangles)
-    assert np.ptp(coarse.positions[far], axis=0).min() > 0.1  # it doesn't lie flat
+    assert np.ptp(coarse.positions[far], axis=0).min() > 0.1  # the small body is not flat
     assert open_edges(coarse) == 0
-    again = simplify(coarse, 2.0)  # the next level has it too
+    again = simplify(coarse, 2.0)  # the next level has the small body too
     assert (again.positions[:, 0] > 8).sum() >= 4
 
 
@@ -78,7 +78,7 @@ def test_no_vertex_is_farther_than_three_errors_from_the_result(error: float) ->
     assert away.max() <= STRAY * error
 
 
-def test_vertices_that_are_left_have_not_moved() -> None:
+def test_remaining_vertices_have_not_moved() -> None:
     fine = _sphere()
     there = {row.tobytes() for row in np.concatenate([fine.positions, fine.normals], axis=1)}
     coarse = simplify(fine, 0.1)
@@ -87,7 +87,7 @@ def test_vertices_that_are_left_have_not_moved() -> None:
     } < there
 
 
-def test_handle_stays_whatever_the_error() -> None:
+def test_a_handle_stays_at_any_error() -> None:
     torus = to_mesh(pv.ParametricTorus(u_res=60, v_res=30).triangulate().clean())
     coarse = simplify(torus, 5.0)
     edges = np.sort(coarse.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -97,7 +97,7 @@ def test_handle_stays_whatever_the_error() -> None:
 
 
 def test_no_triangle_comes_to_lie_in_a_cut_plane() -> None:
-    """A shallow dome over a square cut: its corners would make triangles of the cut alone."""
+    """A shallow dome over a square cut, whose corners would form triangles in the cut plane."""
     side = 9
     y, x = np.mgrid[:side, :side].astype(np.float32)
     rise = np.minimum(np.minimum(x, side - 1 - x), np.minimum(y, side - 1 - y)) * 0.1
@@ -105,14 +105,14 @@ def test_no_triangle_comes_to_lie_in_a_cut_plane() -> None:
     at = np.arange(side * side).reshape(side, side)
     a, b, c, d = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]))
     triangles = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]).astype(np.uint32)
-    triangles = triangles[(rise.ravel()[triangles] > 0).any(axis=1)]  # without two of the corners
+    triangles = triangles[(rise.ravel()[triangles] > 0).any(axis=1)]  # removes two of the corners
     dome = Mesh(positions, triangles, np.zeros_like(positions))
     without, coarse = simplify(dome, 5.0), simplify(dome, 5.0, planes=((2, 0.0),))
     assert (without.positions[:, 2] == 0)[without.triangles].all(axis=1).any()
     assert not (coarse.positions[:, 2] == 0)[coarse.triangles].all(axis=1).any()
 
 
-def test_body_with_a_border_keeps_it_whatever_the_error() -> None:
+def test_a_body_keeps_its_border_at_any_error() -> None:
     half = _open_half()
     coarse = simplify(half, 50.0)
     assert _border(half) == _border(coarse)
@@ -121,8 +121,8 @@ def test_body_with_a_border_keeps_it_whatever_the_error() -> None:
     assert (count == 1).sum() == len(_border(half))
 
 
-def test_simplified_levels_of_a_thin_plate_stay_closed_and_without_sheets() -> None:
-    """A plate far thinner than the error is what simplification folds onto itself."""
+def test_simplified_levels_of_a_thin_plate_stay_closed_and_solid() -> None:
+    """Simplification tends to fold a plate that is far thinner than the error onto itself."""
     sphere = _sphere(sides=48)
     plate = Mesh(sphere.positions * np.float32([1, 1, 0.01]), sphere.triangles, sphere.normals)
     mesh = plate

@@ -1,4 +1,4 @@
-"""Simplification that stays valid, where simplification alone makes walls cross."""
+"""Simplified meshes stay valid, where simplification alone makes walls cross."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ SHAPE = (32, 32, 32)
 
 
 def sponge(seed: int) -> Mesh:
-    """Smoothed noise: handles, thin walls and bodies side by side."""
+    """Return the surface of smoothed noise: handles, thin walls and bodies side by side."""
     field = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=SHAPE), 1.6)
     distance = np.clip(field / field.std() - 0.3, -2, 2).astype(np.float32)
     whole = Box((0, 0, 0), SHAPE)
@@ -27,7 +27,7 @@ def sponge(seed: int) -> Mesh:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "max_error_um"), [(0, 0.8), (1, 2.0), (2, 4.0)])
-def test_crossings_that_simplification_makes_are_mended(seed: int, max_error_um: float) -> None:
+def test_crossings_that_simplification_causes_are_repaired(seed: int, max_error_um: float) -> None:
     fine = sponge(seed)
     assert "crossings" in kinds(find_defects(simplify(fine, max_error_um)))
     done = simplify_without_defects(fine, (), max_error_um=max_error_um)
@@ -37,20 +37,20 @@ def test_crossings_that_simplification_makes_are_mended(seed: int, max_error_um:
     assert len(done.mesh.triangles) < 0.5 * len(fine.triangles)
 
 
-def test_each_vertex_has_its_number_in_the_given_mesh() -> None:
+def test_each_vertex_has_its_index_in_the_given_mesh() -> None:
     fine = sponge(0)
     done = simplify_without_defects(fine, (), max_error_um=0.5)
     np.testing.assert_array_equal(fine.positions[done.vertices], done.mesh.positions)
 
 
-def test_body_that_is_inside_out_is_given_up() -> None:
+def test_a_body_that_is_inside_out_keeps_its_surface() -> None:
     done = simplify_without_defects(turned(ball()), (), max_error_um=0.5)
     assert done.fallbacks == 1
     np.testing.assert_array_equal(done.mesh.triangles, turned(ball()).triangles)
 
 
-def test_bodies_that_cross_as_they_are_given_are_given_up_at_once() -> None:
-    """Balls of locked vertices that grow round each of so many crossings would take minutes."""
+def test_given_bodies_that_cross_keep_their_surface_at_once() -> None:
+    """Growing balls of locked vertices around each of so many crossings would take minutes."""
     fine = joined(crowd(), moved(ball(5.0, 60), (14.0, 0.0, 0.0)), moved(ball(), (40.0, 0.0, 0.0)))
     assert len(find_defects(fine).crossings) > 500
     done = simplify_without_defects(fine, (), max_error_um=0.5)
@@ -58,10 +58,10 @@ def test_bodies_that_cross_as_they_are_given_are_given_up_at_once() -> None:
     is_far = done.mesh.positions[:, 0] > 30
     alone = simplify_without_defects(moved(ball(), (40.0, 0.0, 0.0)), (), max_error_um=0.5)
     count = is_far[done.mesh.triangles[:, 0]].sum()
-    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # by rounding
+    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # up to rounding
 
 
-def test_simplified_ball_is_one_body_and_says_so() -> None:
+def test_a_simplified_ball_is_counted_as_one_body_without_defects() -> None:
     done = simplify_without_defects(ball(), (), max_error_um=0.5)
     assert (done.simplified_again, done.fallbacks) == (0, 0)
     assert len(done.mesh.triangles) < 0.3 * len(ball().triangles)
@@ -69,8 +69,8 @@ def test_simplified_ball_is_one_body_and_says_so() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("error_um", [0.5, 1.5])
-def test_one_frayed_body_of_many_crossings_is_sound_as_a_whole(error_um: float) -> None:
-    """Later tries look only at what is new in them: nothing may be missed by that."""
+def test_one_noisy_body_with_many_crossings_is_valid_as_a_whole(error_um: float) -> None:
+    """Later tries check only changed triangles, and must not miss any defect by that."""
     field = np.random.default_rng(5).normal(size=(28, 28, 28)).astype(np.float32)
     field = ndimage.gaussian_filter(field, 0.6)
     mesh = extract_surface(field, Lattice.of_whole(Box((0, 0, 0), field.shape), (1.0, 1.0, 1.0)))
@@ -80,8 +80,8 @@ def test_one_frayed_body_of_many_crossings_is_sound_as_a_whole(error_um: float) 
 
 
 @pytest.mark.slow
-def test_where_very_many_cross_the_error_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Locks would come to nearly all of it, round by round, and at last it would stay as it was."""
+def test_the_error_is_halved_if_very_many_vertices_cross(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Locks would cover nearly all of the body round by round, and leave it unsimplified."""
     fine = sponge(2)
     monkeypatch.setattr(simplify_valid, "COSTLY", 10)
     many = simplify_without_defects(fine, (), max_error_um=4.0)
@@ -95,7 +95,7 @@ def test_where_very_many_cross_the_error_is_halved(monkeypatch: pytest.MonkeyPat
     assert kinds(find_defects(at_once.mesh)) == set()
 
 
-def test_some_bodies_get_another_error_and_the_others_stay() -> None:
+def test_some_bodies_are_simplified_by_another_error_and_the_others_stay() -> None:
     fine = joined(crowd(), moved(ball(5.0, 60), (40.0, 0.0, 0.0)))
     simplifier = Simplifier(fine, ())
     first = simplifier.simplify(0.6)
@@ -110,7 +110,7 @@ def test_some_bodies_get_another_error_and_the_others_stay() -> None:
     assert second.changed[is_second[1]].all()
     assert not second.changed[~is_second[1]].any()
     count = is_second[1][now].sum()
-    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # by rounding
+    assert count == pytest.approx(len(alone.mesh.triangles), rel=0.05)  # up to rounding
     assert count > 2 * is_second[0][was].sum()
     others = [
         each.vertices[each.mesh.triangles[~some[each.mesh.triangles[:, 0]]]]
@@ -120,7 +120,7 @@ def test_some_bodies_get_another_error_and_the_others_stay() -> None:
     assert kinds(find_defects(second.mesh)) == set()
 
 
-def test_bodies_that_cross_as_they_are_given_are_given_up_with_every_error() -> None:
+def test_given_bodies_that_cross_keep_their_surface_with_every_error() -> None:
     fine = joined(ball(5.0, 60), moved(ball(5.0, 60), (6.0, 0.0, 0.0)))
     simplifier = Simplifier(fine, ())
     assert simplifier.simplify(0.6).fallbacks == 2

@@ -1,4 +1,4 @@
-"""Tubes are closed, face outwards, and have the volume of the cylinders that they stand for."""
+"""Tubes are closed, face outwards, and have the volumes of prisms and cones."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_a_tube_is_closed_and_its_normals_point_outwards():
     assert (np.einsum("ij,ij->i", facing, mesh.normals[mesh.triangles[:, 0]]) > 0).all()
 
 
-def test_a_tube_that_tapers_has_a_cone_s_volume():
+def test_a_tapering_tube_has_the_volume_of_a_pyramid():
     mesh = sweep_tubes([(np.array([(0, 0, 0), (0, 0, 6)], float), np.array([2.0, 0.0]))])
     assert volume(mesh) == pytest.approx(6 * polygon_area(2) / 3, rel=1e-5)
 

@@ -1,4 +1,4 @@
-"""The check of meshes: sound ones pass, and each kind of fault, put in by hand, is found."""
+"""The check of meshes passes valid ones, and finds each kind of defect that is put in by hand."""
 
 from dataclasses import replace
 
@@ -15,17 +15,17 @@ from support.meshes import SOUND, _with, ball, joined, kinds, moved, to_mesh, tu
 
 
 @pytest.mark.parametrize("name", SOUND)
-def test_sound_meshes_have_no_defects(name: str) -> None:
+def test_valid_meshes_have_no_defects(name: str) -> None:
     assert kinds(find_defects(SOUND[name])) == set()
 
 
-def test_missing_triangle_leaves_a_hole() -> None:
+def test_a_missing_triangle_leaves_open_edges() -> None:
     defects = find_defects(_with(ball(), ball().triangles[1:]))
     assert kinds(defects) == {"open"}
     assert len(defects.open) == 3
 
 
-def test_turned_triangle_has_non_manifold_edges() -> None:
+def test_a_turned_triangle_has_non_manifold_edges() -> None:
     triangles = ball().triangles.copy()
     triangles[100] = triangles[100, ::-1]
     defects = find_defects(_with(ball(), triangles))
@@ -33,14 +33,14 @@ def test_turned_triangle_has_non_manifold_edges() -> None:
     assert len(defects.non_manifold_edges) == 3
 
 
-def test_triangle_that_comes_twice() -> None:
+def test_a_triangle_that_is_listed_twice_is_found() -> None:
     triangles = np.concatenate([ball().triangles, ball().triangles[50:51]])
     defects = find_defects(_with(ball(), triangles))
     assert kinds(defects) >= {"non_manifold_edges", "crossings"}
 
 
-def test_edge_of_four_triangles() -> None:
-    """Two boxes that share an edge, and its vertices."""
+def test_an_edge_of_four_triangles_is_found() -> None:
+    """Two boxes share an edge and its two vertices."""
     a = SOUND["box"]
     b = moved(a, (1.0, 2.0, 0.0))
     both = joined(a, b)
@@ -51,7 +51,7 @@ def test_edge_of_four_triangles() -> None:
     assert (welded.positions[defects.non_manifold_edges[0], :2] == [1, 2]).all()
 
 
-def test_bow_tie_of_two_boxes_at_a_corner() -> None:
+def test_two_boxes_that_share_a_vertex_are_found() -> None:
     a = SOUND["box"]
     both = joined(a, moved(a, (1.0, 2.0, 3.0)))
     places, number = np.unique(both.positions, axis=0, return_inverse=True)
@@ -59,12 +59,12 @@ def test_bow_tie_of_two_boxes_at_a_corner() -> None:
     defects = find_defects(welded)
     assert kinds(defects) == {"non_manifold_vertices"}
     np.testing.assert_array_equal(welded.positions[defects.non_manifold_vertices], [[1, 2, 3]])
-    # with a vertex for each box they are sound by numbers, and touch all the same
+    # With a vertex for each box their topology is valid, but they still touch.
     assert kinds(find_defects(both)) == {"crossings"}
 
 
-def test_wall_in_a_cut_plane() -> None:
-    """A ball cut open at x = 0, and a triangle of three vertices of its rim."""
+def test_a_triangle_in_a_cut_plane_is_found() -> None:
+    """A ball is cut open at x = 0, and has a triangle of three vertices of its rim."""
     mesh = ball()
     x = mesh.positions[:, 0].copy()
     x[np.abs(x) < 1e-3] = 0
@@ -82,7 +82,7 @@ def test_wall_in_a_cut_plane() -> None:
     assert defects.walls.tolist() == [len(half.triangles)]
 
 
-def test_vertex_pushed_through_the_other_side() -> None:
+def test_a_vertex_pushed_through_the_other_side_makes_crossings() -> None:
     positions = ball().positions.copy()
     top = int(positions[:, 2].argmax())
     positions[top, 2] = -6
@@ -90,8 +90,8 @@ def test_vertex_pushed_through_the_other_side() -> None:
     assert kinds(defects) == {"crossings"}
 
 
-def test_coplanar_fold() -> None:
-    """A vertex of a box's flat face drawn over the next edge, within the face."""
+def test_a_coplanar_fold_is_a_crossing() -> None:
+    """A vertex of a box's flat face is moved over the next edge, within the face."""
     grid = pv.Box((0, 4, 0, 4, 0, 1), level=3).triangulate().clean()
     mesh = to_mesh(grid)
     assert kinds(find_defects(mesh)) == set()
@@ -101,8 +101,8 @@ def test_coplanar_fold() -> None:
     assert kinds(find_defects(replace(mesh, positions=positions))) == {"crossings"}
 
 
-def test_sliver_without_area() -> None:
-    """Three corners on a line, of which floats make an area that isn't zero."""
+def test_a_sliver_without_area_is_degenerate() -> None:
+    """Three corners lie on a line, but floating-point arithmetic gives an area that is not 0."""
     box = SOUND["box"]
     positions = np.concatenate([box.positions, box.positions[:1]])
     a, b, c = box.triangles[0]
@@ -114,13 +114,13 @@ def test_sliver_without_area() -> None:
     np.testing.assert_array_equal(defects.degenerate, [len(box.triangles) + 1])
 
 
-def test_body_inside_out_and_a_cavity_without_a_solid() -> None:
+def test_a_body_inside_out_and_a_cavity_without_a_solid_are_found() -> None:
     assert kinds(find_defects(turned(ball()))) == {"inside_out"}
     aside = joined(ball(), moved(turned(ball(2.0)), (20.0, 0.0, 0.0)))
     assert kinds(find_defects(aside)) == {"inside_out"}
 
 
-def test_vertices_of_defects_are_where_they_are() -> None:
+def test_vertices_of_defects_are_those_around_the_hole() -> None:
     mesh = _with(ball(), ball().triangles[1:])
     np.testing.assert_array_equal(
         find_defects(mesh).vertices(mesh.triangles), np.sort(ball().triangles[0])
@@ -142,7 +142,7 @@ def _half(at: int) -> tuple[Mesh, Box, Box]:
 
 
 @pytest.mark.parametrize("at", [5, 10, 14])
-def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
+def test_a_mesh_may_be_open_only_on_its_cut_planes(at: int) -> None:
     mesh, _, _ = _half(at)
     assert kinds(find_defects(mesh, planes=((0, float(at)),))) == set()
     assert kinds(find_defects(mesh)) >= {"open"}
@@ -151,15 +151,15 @@ def test_mesh_may_be_open_on_its_cut_planes_only(at: int) -> None:
 
 
 @pytest.mark.parametrize("at", [5, 10, 14])
-def test_cut_body_inside_out_is_found(at: int) -> None:
-    """Its volume is that between it and the plane: a small cap as well as all but a cap."""
+def test_a_cut_body_that_is_inside_out_is_found(at: int) -> None:
+    """A small cap and all but a cap both enclose a volume with the plane."""
     mesh, _, _ = _half(at)
     assert kinds(find_defects(turned(mesh), planes=((0, float(at)),))) == {"inside_out"}
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_iso_surface_of_noise_is_sound(seed: int) -> None:
-    """All of marching cubes' cases, beside each other in all ways."""
+def test_the_iso_surface_of_noise_is_valid(seed: int) -> None:
+    """All cases of marching cubes occur next to each other in all combinations."""
     noise = np.random.default_rng(seed).normal(size=(24, 24, 24))
     distance = np.clip(noise, -2, 2).astype(np.float32)
     box = Box((0, 0, 0), (24, 24, 24))

@@ -8,13 +8,13 @@ import pytest
 from stereocell.meshes.weld import weld_seams
 from stereocell.model.mesh import Mesh
 
-# an octahedron: closed, and each vertex is its own normal
+# An octahedron: it is closed, and each vertex is its own normal
 _PLACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], "f4")
 _FACES = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
 
 
 def cut_apart(objects: list[int] | None = None) -> Mesh:
-    """Return the octahedron with vertices of its own for each face, as charts of one face have."""
+    """Return the octahedron with separate vertices for each face, as if each were one chart."""
     corners = np.array(_FACES).ravel()
     places = _PLACES[corners]
     return Mesh(
@@ -33,7 +33,7 @@ def faces_at_edges(triangles: np.ndarray) -> set[int]:
     return set(edges.values())
 
 
-def test_a_surface_that_was_cut_into_charts_is_closed_again():
+def test_a_surface_that_was_cut_into_charts_is_closed_after_welding():
     mesh = cut_apart()
     assert faces_at_edges(mesh.triangles) == {1}
     kept, welded = weld_seams(mesh)
@@ -51,14 +51,14 @@ def test_surfaces_that_touch_stay_apart():
     assert len(kept) == 6 + 3
 
 
-def test_objects_keep_vertices_of_their_own():
+def test_vertices_of_different_objects_are_not_joined():
     kept, welded = weld_seams(cut_apart(objects=[0] * 4 + [1] * 4))
     assert len(kept) == 5 + 5
     assert set(welded[:12]).isdisjoint(welded[12:])
 
 
 @pytest.mark.parametrize("size", [0, 24])
-def test_a_mesh_without_uvs_is_left_as_it_is(size):
+def test_a_mesh_without_uvs_does_not_change(size):
     mesh = cut_apart()
     plain = Mesh(mesh.positions[:size], mesh.triangles[: size // 3], mesh.normals[:size])
     kept, welded = weld_seams(plain)

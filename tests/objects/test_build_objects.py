@@ -1,4 +1,4 @@
-"""The objects of a tile: closed, as large as their voxels, and with the neighbour's triangles."""
+"""The objects of a tile are closed, as large as their voxels, and fit the neighbouring tile's."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def one_object(mesh: Mesh, number: int) -> Mesh:
 
 @pytest.fixture(scope="module")
 def halves() -> tuple[np.ndarray, np.ndarray, list[list[int]], list[BuiltObjects]]:
-    """Cells in two tiles, each with a window of its own: its cells' box and what changes them."""
+    """Return cells in two tiles, each with its window: its cells' box and what affects them."""
     labels, centres = touching_cells((36, 56, 160), SPACING_UM)
     left = centres[:, 2] < 40
     owned = [np.flatnonzero(part) + 1 for part in (left, ~left)]
@@ -66,8 +66,8 @@ def test_each_object_is_closed_and_keeps_its_volume(halves) -> None:
 
 
 @pytest.mark.slow
-def test_two_tiles_have_the_same_wall_at_the_finest_level(halves) -> None:
-    """To the bit: each cell is closed, and between the two of a pair there is no gap."""
+def test_two_tiles_have_the_same_interface_at_the_finest_level(halves) -> None:
+    """Corners are equal bit by bit: each cell is closed, and the two of a pair leave no gap."""
     _, _, owned, built = halves
 
     def corners(one: BuiltObjects) -> set[tuple[tuple[float, ...], ...]]:
@@ -76,7 +76,7 @@ def test_two_tiles_have_the_same_wall_at_the_finest_level(halves) -> None:
         return {tuple(sorted(map(tuple, triangle))) for triangle in found}
 
     shared = corners(built[0]) & corners(built[1])
-    # the walls between the tiles, as each of them measured it
+    # the interfaces between the tiles, as measured in each of them
     between = [
         {
             (min(pair), max(pair)): area
@@ -97,7 +97,7 @@ def test_two_tiles_have_the_same_wall_at_the_finest_level(halves) -> None:
 
 
 @pytest.mark.slow
-def test_walls_are_those_of_faces_between_voxels(halves) -> None:
+def test_objects_touch_where_their_voxels_share_faces(halves) -> None:
     labels, _, owned, built = halves
     pairs = set()
     for axis in range(3):
@@ -111,7 +111,7 @@ def test_walls_are_those_of_faces_between_voxels(halves) -> None:
         assert found == {(a, b) for a, b in pairs if a in numbers}
 
 
-def test_a_ball_has_a_balls_area() -> None:
+def test_a_ball_has_the_area_and_volume_of_a_ball() -> None:
     z, y, x = np.mgrid[:40, :60, :60] * np.array(SPACING_UM)[:, None, None, None]
     ball = ((z - 19) ** 2 + (y - 15) ** 2 + (x - 15) ** 2 < 100).astype(np.int32)
     built = build(ball, [1])
@@ -133,12 +133,12 @@ def test_a_shell_of_one_voxel_is_left_out_and_its_neighbour_is_not() -> None:
     assert not any(find_defects(one_object(built.lods[0].mesh, 0)).counts.values())
 
 
-def test_nothing_owned_has_no_levels() -> None:
+def test_a_tile_without_objects_of_its_own_has_no_levels() -> None:
     assert build(np.ones((4, 4, 4), np.int32), []).lods == ()
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
-def test_intensities_are_those_of_numpy(dtype: str) -> None:
+def test_intensities_equal_those_of_numpy(dtype: str) -> None:
     rng = np.random.default_rng(4)
     labels = rng.integers(0, 9, (6, 20, 20)).astype(np.int32)
     voxels = rng.normal(60, 20, labels.shape).clip(0, 200).astype(dtype)

@@ -1,4 +1,4 @@
-"""Where objects are, found block by block: against counting each label by itself."""
+"""Extents of objects, found block by block, compared with a search for each label by itself."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def labels_of(dtype: str) -> NDArray[np.integer]:
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "uint32", "uint64"])
-def test_blocks_together_are_the_whole(dtype: str) -> None:
+def test_merged_extents_of_blocks_are_those_of_the_whole(dtype: str) -> None:
     labels = labels_of(dtype)
     blocks = [(slice(a, b), slice(c, d)) for a, b in ((0, 4), (4, 9)) for c, d in ((0, 5), (5, 12))]
     found = merge_extents([find_extents(labels[z, y], (z.start, y.start, 0)) for z, y in blocks])
@@ -29,13 +29,13 @@ def test_blocks_together_are_the_whole(dtype: str) -> None:
         np.testing.assert_allclose(found.centroids[row], at.mean(axis=0))
 
 
-def test_nothing_has_no_extents() -> None:
+def test_an_empty_block_has_no_extents() -> None:
     empty = find_extents(np.zeros((2, 3, 4), np.uint8), (0, 0, 0))
     assert len(empty.labels) == len(merge_extents([empty, empty]).labels) == 0
     assert merge_extents([]).low.shape == (0, 3)
 
 
-def test_runs_end_with_their_row() -> None:
+def test_runs_end_at_the_end_of_their_row() -> None:
     labels = np.ones((1, 2, 5), np.uint8)
     labels[0, 1, 2:] = 2
     runs = Runs.of(labels)

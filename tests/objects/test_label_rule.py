@@ -1,4 +1,4 @@
-"""Label maps are told from images: made ones, and real ones of both kinds."""
+"""Label maps are distinguished from images: synthetic ones, and real ones of both kinds."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SHAPE = (24, 96, 96)
 
 
 def cells(count: int, share: float = 1.0) -> np.ndarray:
-    """Cells of a Voronoi diagram with random numbers, some left out."""
+    """Return cells of a Voronoi diagram with random numbers, some of which are left out."""
     places = np.stack(np.mgrid[tuple(slice(n) for n in SHAPE)], -1).reshape(-1, 3)
     number = cKDTree(RNG.uniform(0, SHAPE, (count, 3))).query(places)[1].reshape(SHAPE)
     names = RNG.permutation(count * 3)[:count] + 1
@@ -24,7 +24,7 @@ def cells(count: int, share: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16, np.uint32, np.int64])
 @pytest.mark.parametrize("share", [1.0, 0.4])
-def test_cells_are_labels_whatever_their_numbers(dtype: type, share: float) -> None:
+def test_cells_are_labels_with_any_numbers(dtype: type, share: float) -> None:
     voxels = cells(60, share)
     found = recognise(voxels.astype(dtype))
     assert found.kind == "labels"
@@ -46,22 +46,22 @@ def test_two_values_are_a_mask_and_one_is_an_image() -> None:
     assert recognise(np.full(SHAPE, 7, np.uint8)).kind == "image"
 
 
-def test_numbers_below_zero_and_real_ones_are_an_image_s() -> None:
+def test_negative_and_real_numbers_are_an_image() -> None:
     voxels = cells(60)
     assert recognise((voxels - 100).astype(np.int16)).kind == "image"
     assert recognise(voxels.astype(np.float32)).kind == "image"
 
 
 @pytest.mark.parametrize("levels", [64, 255])
-def test_a_smooth_image_of_few_levels_is_one(levels: int) -> None:
+def test_a_smooth_image_of_few_levels_is_an_image(levels: int) -> None:
     field = ndimage.gaussian_filter(RNG.normal(size=SHAPE), 6)
     field = levels * (field - field.min()) / np.ptp(field)
     assert recognise(field.astype(np.uint8)).kind == "image"
 
 
 @pytest.mark.parametrize("ground", [5, 1000, 65535])
-def test_an_image_on_an_even_ground_is_one(ground: int) -> None:
-    """As a masked scan has it, or one in which all dark voxels were cut off at one value."""
+def test_an_image_on_an_even_ground_is_an_image(ground: int) -> None:
+    """Masked scans are like this, and images in which all dark voxels were cut off at one value."""
     voxels = np.full(SHAPE, ground, np.uint16)
     bodies = cells(400, 0.05) > 0
     voxels[bodies] = RNG.normal(4000, 300, np.count_nonzero(bodies)).astype(np.uint16)
@@ -74,8 +74,8 @@ CASES = {
     for case in all_cases()
     if not case.name.startswith(("balls", "tubes", "membranes"))
 }
-# one of each kind: of the real ones those of other instruments, of made ones those of other grey
-# values and shapes, of empty ones those of other cameras, lights and faults
+# One case of each kind: real ones from different instruments, synthetic ones with different grey
+# values and shapes, empty ones with different cameras, lights and faults
 KEPT = (
     "two classes", "steep background", "saturated", "eight bit", "tissue", "bodies in depth",
     "straight edge", "nested, 40 photons, x 1.5", "empty, counted photons, 0.05",
@@ -90,9 +90,9 @@ REAL = ("nuclei", "ovule walls", "CT skin", "MRI head", "light sheet, cells")
 @pytest.mark.parametrize(
     "name", sweep(CASES, kept=[*KEPT, *(name for name in REAL if name in CASES)])
 )
-def test_no_image_of_the_corpus_is_refused(name: str) -> None:
+def test_every_image_of_the_corpus_is_an_image(name: str) -> None:
     voxels, _ = CASES[name].load()
-    for half in (64, 32, 16):  # of many channels smaller blocks are looked at
+    for half in (64, 32, 16):  # images with many channels are examined in smaller blocks
         middle = tuple(slice(max(0, n // 2 - half), n // 2 + half) for n in voxels.shape)
         assert recognise(voxels[middle]).kind == "image"
 

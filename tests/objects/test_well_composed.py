@@ -1,4 +1,4 @@
-"""Labels whose objects have surfaces without pinches."""
+"""Label maps are changed so that the surfaces of objects have no pinches."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.critical import find_critical
 from stereocell.kernels.half_edges import CROWDED, count_fans, match_twins
-from stereocell.objects.walls import _faces
+from stereocell.objects.interfaces import _faces
 from stereocell.objects.well_composed import make_well_composed
 
 
 def has_pinches(labels: NDArray[np.int32]) -> bool:
-    """Whether the faces between an object's voxels and others make no 2-manifold."""
+    """Return whether the faces between an object's voxels and others form no 2-manifold."""
     _, quads, sides = _faces(labels)
     for number in range(1, int(labels.max()) + 1):
         own = np.concatenate([quads[sides[:, 0] == number], quads[sides[:, 1] == number][:, ::-1]])
@@ -32,8 +32,8 @@ def test_a_place_is_found_exactly_where_a_surface_is_pinched(seed: int) -> None:
     assert (find_critical(labels, 100)[1] > 0) == has_pinches(labels)
 
 
-def test_all_cubes_of_one_label() -> None:
-    """256 cubes of 2 x 2 x 2 voxels, inside and outside."""
+def test_all_cubes_of_one_label_are_judged_correctly() -> None:
+    """There are 256 cubes of 2 x 2 x 2 voxels, inside or outside."""
     for bits in range(256):
         cube = (bits >> np.arange(8) & 1).reshape(2, 2, 2).astype(np.int32)
         labels = np.zeros((6, 6, 6), np.int32)
@@ -51,7 +51,7 @@ def blobs(shape: tuple[int, int, int], seed: int) -> NDArray[np.int32]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mended_objects_have_no_pinch_and_few_voxels_less(seed: int) -> None:
+def test_changed_objects_have_no_pinch_and_few_voxels_are_changed(seed: int) -> None:
     labels = blobs((30, 30, 30), seed)
     assert has_pinches(labels)
     mended, changed, _ = make_well_composed(labels)
@@ -62,7 +62,7 @@ def test_mended_objects_have_no_pinch_and_few_voxels_less(seed: int) -> None:
     np.testing.assert_array_equal(again, mended)
 
 
-def test_shells_of_one_voxel_are_taken_out_and_named() -> None:
+def test_shells_of_one_voxel_are_removed_and_reported() -> None:
     z, y, x = np.mgrid[:24, :24, :24] - 11.5
     radius = np.sqrt(z**2 + y**2 + x**2)
     labels = np.zeros((24, 24, 24), np.int32)
@@ -76,7 +76,7 @@ def test_shells_of_one_voxel_are_taken_out_and_named() -> None:
     assert find_critical(mended, 10)[1] == 0
 
 
-def test_noise_is_known_after_few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_is_recognized_after_few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     rounds = []
 
     def counted(labels: NDArray[np.int32], most: int) -> tuple[NDArray[np.int64], int]:

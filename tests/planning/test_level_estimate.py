@@ -105,7 +105,7 @@ def test_large_voxel_sizes_are_printed_in_millimetres() -> None:
 def test_the_plan_says_that_noise_has_no_surface(tmp_path: Path) -> None:
     noise = np.random.default_rng(0).poisson(200, (32, 64, 64)).astype(np.uint16)
     (note,) = _level_notes(_planned(tmp_path, noise))
-    assert note.startswith("Channel0: no surface: neighbouring voxels have nothing to do")
+    assert note.startswith("Channel0: no surface: neighbouring voxels are unrelated")
 
 
 def test_the_plan_calls_a_level_unsure_if_no_tile_has_enough_voxels_above_it(

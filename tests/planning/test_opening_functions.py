@@ -68,7 +68,7 @@ def _opened(
         statistics=statistics,
         level=SurfaceLevel(level, None, 1.0),
         confidence=1.0,
-        doubt="",
+        why_unclear="",
         modality=settings.plan.modality,
         is_hounsfield=is_hounsfield,
         unevenness=unevenness,
@@ -191,7 +191,7 @@ def test_only_bodies_are_cut_open_and_vessels_are_shown_whole_and_red(
         statistics=statistics,
         level=SurfaceLevel(90.0, None, 1.0),
         confidence=1.0,
-        doubt="",
+        why_unclear="",
         modality="MR",
     )
     repair = RepairOptions(0, 0, 0, 0, 0, 0)

@@ -392,7 +392,7 @@ VIEW = {"type": "view", "id": 1, "trees": [0], "pixels_per_radian": 500, "texel_
         ([HELLO, {**VIEW, **CAMERA}], 1008, "tree 0 is not open"),
         ([HELLO, {"type": "have", "tree": 0, "nodes": ""}], 1008, "tree 0 is not open"),
         ([HELLO, {"type": "ack", "sequence": 1}], 1008, "ack of frame 1, the last one was 0"),
-        ([HELLO, {"type": "ack"}], 1007, "ack: $: required is not as the schema asks"),
+        ([HELLO, {"type": "ack"}], 1007, "ack: $: required does not match the schema"),
         ([HELLO, "{"], 1007, "not JSON"),
         ([HELLO, {"type": "open", "volumes": [CD31] * 65}], 1007, "maxItems"),
         ([HELLO] + [{"type": "open", "volumes": [CD31] * 64}] * 17, 1008, "more than 1024 trees"),

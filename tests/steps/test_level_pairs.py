@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from stereocell.formats.gltf import Material, choose_step, encode_glb
-from stereocell.formats.gltf_decode import Drawn, read_glb
+from stereocell.formats.gltf_decode import DecodedMesh, read_glb
 from stereocell.isosurface.repair import RepairOptions
 from stereocell.model.lattice import Lattice
 from stereocell.model.lattice_field import LatticeField
@@ -29,7 +29,7 @@ STEP_M = choose_step(8.0)
 
 
 @pytest.fixture(scope="module")
-def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drawn], ...]:
+def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[DecodedMesh], ...]:
     """The decoded levels of two tiles, whose common plane cuts objects and their bridges."""
     noise = np.random.default_rng(5).normal(size=REGION.shape)
     field = ndimage.gaussian_filter(noise, (1.5, 3, 3))
@@ -61,7 +61,7 @@ def levels(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drawn], ...]:
     return tuple(tiles)
 
 
-def _unmatched(*parts: Drawn) -> NDArray[np.float32]:
+def _unmatched(*parts: DecodedMesh) -> NDArray[np.float32]:
     """Return the ends of directed edges without an opposite edge after welding, (n, 2, 3)."""
     triangles = np.concatenate([part.positions_m[part.triangles] for part in parts])
     points, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -81,7 +81,7 @@ def _unmatched(*parts: Drawn) -> NDArray[np.float32]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("ours", "theirs"), list(product(range(4), repeat=2)))
 def test_two_tiles_close_at_any_pair_of_levels(
-    levels: tuple[list[Drawn], ...], ours: int, theirs: int
+    levels: tuple[list[DecodedMesh], ...], ours: int, theirs: int
 ) -> None:
     one, other = levels[0][ours], levels[1][theirs]
     for alone in (one, other):
@@ -93,7 +93,7 @@ def test_two_tiles_close_at_any_pair_of_levels(
 
 @pytest.mark.slow
 def test_coarser_levels_have_fewer_triangles_and_the_same_rims(
-    levels: tuple[list[Drawn], ...],
+    levels: tuple[list[DecodedMesh], ...],
 ) -> None:
     for tile in levels:
         counts = [len(level.triangles) for level in tile]

@@ -9,7 +9,7 @@ LONG_FILES = [
         "building/test_stated_level",
         "isosurface/test_channel_level",
         "objects/test_label_rule",
-        "objects/test_walls",
+        "objects/test_interfaces",
         "preview/test_iso_value",
         "report/test_page",
         "system/test_doctor",

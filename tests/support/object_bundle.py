@@ -129,7 +129,7 @@ def make_table(is_wide: bool = False, has_organs: bool = False) -> ObjectTable:
     if is_wide:
         labels[beam] = 2**63
     columns = (
-        Column("volume_um3", "Volume", volumes.astype(np.float32), "Of its voxels", "um3"),
+        Column("volume_um3", "Volume", volumes.astype(np.float32), "Volume of its voxels", "um3"),
         Column("x_um", "x", np.append(centers[:, 0], middle[0]).astype(np.float32), "", "um"),
         Column("CD8", "CD8", cd8.astype(np.float32), "Mean over its voxels", "counts"),
         Column("row", "Row", rows.astype(np.float32)),

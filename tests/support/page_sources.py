@@ -201,7 +201,7 @@ def first_view(source: Path) -> dict[str, Any]:
             statistics=statistics,
             level=SurfaceLevel(low + level / 256 * (high - low), None, 0.0),
             confidence=1.0,
-            doubt="",
+            why_unclear="",
             modality=plan.modality,
             depth_voxels=shortest / min(plan.spacing_um),
         )

@@ -1,4 +1,4 @@
-"""Baked maps: tangents by the rules, the fine surface's normals given back, nothing at a cut."""
+"""Baked maps: tangents by the rules, the fine surface's normals, and no seam at a cut."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ FINE = replace(OPTIONS, texel_um=0.1)
 
 
 def test_tangents_follow_mikktspace() -> None:
-    """Its rules once more, corner by corner, in plain words."""
+    """Apply the rules again, corner by corner, in a simple way."""
     done = unwrapped(simplify(sphere(), 0.1)).mesh
     assert done.uvs is not None
     expected, sign = np.zeros((len(done.positions), 3)), np.zeros(len(done.positions))
@@ -54,7 +54,7 @@ def test_tangents_follow_mikktspace() -> None:
     np.testing.assert_array_equal(found[:, 3], np.sign(sign))
 
 
-def test_tangents_are_unit_and_across_the_normals() -> None:
+def test_tangents_are_unit_vectors_across_the_normals() -> None:
     mesh = unwrapped(simplify(sphere(), 0.2)).mesh
     assert mesh.tangents is not None
     np.testing.assert_allclose(np.linalg.norm(mesh.tangents[:, :3], axis=1), 1, atol=1e-4)
@@ -62,7 +62,7 @@ def test_tangents_are_unit_and_across_the_normals() -> None:
 
 
 def shade(lod: Lod, triangle: NDArray, weights: NDArray) -> NDArray[np.float64]:
-    """Return the normals (n, 3) that a renderer finds at places of triangles."""
+    """Return the normals (n, 3) that a renderer finds at positions of triangles."""
     mesh = lod.mesh
     assert mesh.uvs is not None
     assert mesh.tangents is not None
@@ -85,7 +85,7 @@ def degrees(a: NDArray, b: NDArray) -> NDArray[np.float64]:
 
 
 def rippled(positions: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Unit normals of a sphere with ripples that no coarse vertex normal can hold."""
+    """Return unit normals of a sphere with ripples that no coarse vertex normal can show."""
     radial = positions / np.linalg.norm(positions, axis=1, keepdims=True)
     x, y, z = radial.T
     ripples = radial + 0.35 * np.stack([np.sin(9 * y), np.sin(9 * z), np.sin(9 * x)], axis=1)
@@ -93,8 +93,8 @@ def rippled(positions: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 @pytest.mark.slow
-def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
-    """Shade a coarse sphere by its map: it must have the fine one's normals, ripples and all."""
+def test_a_baked_map_gives_the_normals_of_the_fine_surface() -> None:
+    """A coarse sphere that is shaded by its map has the fine normals, with all ripples."""
     body = sphere()
     fine = replace(body, normals=rippled(body.positions).astype(np.float32))
     done = unwrapped(simplify(body, 0.4), FINE)
@@ -107,7 +107,7 @@ def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
         off = degrees(shade(lod, every, places), truth)
         smooth = np.einsum("nk,nkd->nd", places, done.mesh.normals[done.mesh.triangles])
         smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
-        assert np.median(degrees(smooth, truth)) > 12  # without the map it would not do
+        assert np.median(degrees(smooth, truth)) > 12  # without the map, normals are far off
         assert np.median(off) < 1.5
         assert np.percentile(off, 95) < 5
     assert maps.openness.min() == 255
@@ -115,8 +115,8 @@ def test_baked_map_gives_back_the_fine_surface_s_normals() -> None:
 
 
 @pytest.mark.slow
-def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
-    """The inner wall's triangles are nearer than the outer wall's to a chord of a coarse mesh."""
+def test_a_baked_map_of_a_thin_shell_never_shows_the_other_wall() -> None:
+    """A chord of a coarse mesh is nearer to the inner wall's triangles than to the outer wall's."""
     outer, inner = sphere(5.0, 24), sphere(4.8, 96)
     turned = inner.triangles[:, ::-1] + np.uint32(len(outer.positions))
     shell = Mesh(
@@ -126,11 +126,11 @@ def test_baked_map_of_a_thin_shell_shows_no_other_wall() -> None:
     )
     done = unwrapped(simplify(sphere(), 0.5), FINE)
     maps = bake(done.mesh, done.size, Baker(bare(shell)))
-    assert maps.normals[..., 2].min() > 128 + 50  # no normal is turned away
+    assert maps.normals[..., 2].min() > 128 + 50  # no normal faces away
 
 
-def test_openness_is_that_of_the_sky_above() -> None:
-    """Beside a wall half of it is hidden, as far as the rays go; on an open floor nothing is."""
+def test_openness_is_the_visible_share_of_the_sky() -> None:
+    """Beside a wall half of the sky is hidden, as far as rays reach; on an open floor none is."""
     box = Box((0, 0, 0), (24, 80, 80))
     z, _, x = np.indices(box.shape)
     solid = (z < 10) | (x < 20)
@@ -154,7 +154,7 @@ def test_openness_is_that_of_the_sky_above() -> None:
     assert (none == 1).all()
 
 
-# --- neighbours
+# --- neighbouring tiles
 
 SPACING = (1.0, 1.0, 1.0)
 REGION = Box((0, 0, 0), (48, 48, 64))
@@ -165,7 +165,7 @@ HALO = (24, 24, 24)
 
 @pytest.fixture(scope="module")
 def neighbours() -> tuple[tuple[Lod, ...], ...]:
-    """Two units whose common plane cuts bodies, at every angle and close to each other."""
+    """Return two units whose common plane cuts bodies at all angles, some of them near others."""
     rng = np.random.default_rng(3)
     grid = np.indices(REGION.shape).transpose(1, 2, 3, 0)
     inside = np.zeros(REGION.shape, bool)
@@ -198,7 +198,7 @@ def neighbours() -> tuple[tuple[Lod, ...], ...]:
 
 
 def on_the_cut(lod: Lod) -> dict[bytes, tuple[NDArray[np.float64], float]]:
-    """Return normal and openness as shaded at places of the border on the common plane."""
+    """Return normal and openness, as shaded, at positions of the border on the common plane."""
     mesh = lod.mesh
     assert lod.baked is not None
     assert mesh.uvs is not None
@@ -211,7 +211,7 @@ def on_the_cut(lod: Lod) -> dict[bytes, tuple[NDArray[np.float64], float]]:
             for first, second in ((share, 1 - share), (1 - share, share)):
                 weight = np.zeros((on_plane.sum(), 3))
                 weight[:, k], weight[:, (k + 1) % 3] = first, second
-                # of equal sums whichever end comes first
+                # The sum is the same whichever end comes first.
                 places.append(np.round(first * at[:, 0] + second * at[:, 1], 4) + 0.0)
                 triangles.append(np.flatnonzero(on_plane))
                 weights.append(weight)
@@ -225,7 +225,7 @@ def on_the_cut(lod: Lod) -> dict[bytes, tuple[NDArray[np.float64], float]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("level", [1, 2])
-def test_neighbours_shade_alike_along_the_cut(
+def test_neighbours_have_the_same_shading_along_the_cut(
     neighbours: tuple[tuple[Lod, ...], ...], level: int
 ) -> None:
     ours, theirs = (on_the_cut(lods[level]) for lods in neighbours)
@@ -236,11 +236,11 @@ def test_neighbours_shade_alike_along_the_cut(
     angle = degrees(a, b)
     assert np.percentile(angle, 99) < 2, (np.median(angle), angle.max())
     open_a, open_b = (np.array([side[place][1] for place in common]) for side in (ours, theirs))
-    assert open_a.min() < 0.9  # else this would show nothing
+    assert open_a.min() < 0.9  # otherwise the test would show nothing
     assert np.percentile(np.abs(open_a - open_b), 99) < 0.05
 
 
-def test_levels_record_what_they_wear(neighbours: tuple[tuple[Lod, ...], ...]) -> None:
+def test_levels_record_their_values_and_maps(neighbours: tuple[tuple[Lod, ...], ...]) -> None:
     for lods in neighbours:
         first = lods[0].baked
         assert first is not None
@@ -251,11 +251,11 @@ def test_levels_record_what_they_wear(neighbours: tuple[tuple[Lod, ...], ...]) -
             assert lod.normal_map is not None
             assert lod.baked.openness.shape == lod.normal_map.shape[:2]
             assert lod.baked.texel_um == 1.0
-            assert lod.baked.charts > 2  # a part of a ball and its cap
+            assert lod.baked.charts > 2  # at least a part of a ball and its cap
 
 
 @pytest.mark.slow
-def test_baking_twice_gives_the_same() -> None:
+def test_baking_twice_gives_the_same_maps() -> None:
     body = sphere(sides=48)
     fine = replace(body, normals=rippled(body.positions).astype(np.float32))
     images = []

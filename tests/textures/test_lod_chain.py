@@ -1,4 +1,4 @@
-"""Levels of detail as they are written: sound, with their borders, measured and recorded."""
+"""Levels of detail as written: valid, with their borders, measured and recorded."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -37,7 +37,7 @@ PLANES = Lattice(LATTICE, LATTICE, REGION, SPACING, ORIGIN).cut_planes()
 
 @pytest.fixture(scope="module")
 def sponge() -> Mesh:
-    """Smoothed noise: handles, thin walls and bodies side by side, cut by a plane."""
+    """Return smoothed noise: handles, thin walls and bodies side by side, cut by a plane."""
     noise = np.random.default_rng(0).normal(size=REGION.shape)
     field = ndimage.gaussian_filter(noise, 1.6)
     distance = np.clip((field - 0.3 * field.std()) / field.std(), -2, 2).astype(np.float32)
@@ -53,7 +53,7 @@ def _chain(mesh: Mesh) -> Iterator[Simplified]:
 
 
 def _settings(errors: tuple[float, ...]) -> Settings:
-    """Return settings for levels of these errors."""
+    """Return settings for levels with these errors."""
     settings = Settings()
     return replace(
         settings,
@@ -66,14 +66,14 @@ def _rim(mesh: Mesh) -> set[bytes]:
     return {ends.tobytes() for ends in mesh.positions[border(mesh.triangles)]}
 
 
-def test_simplification_alone_makes_defects_here(sponge: Mesh) -> None:
-    """Else the tests below would show nothing."""
+def test_simplification_alone_causes_defects_in_this_mesh(sponge: Mesh) -> None:
+    """Otherwise the tests below would show nothing."""
     assert kinds(find_defects(sponge, planes=PLANES)) == set()
     assert kinds(find_defects(simplify(sponge, 2.0, planes=PLANES), planes=PLANES)) == {"crossings"}
 
 
 @pytest.mark.slow
-def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
+def test_every_level_is_valid_and_keeps_its_border(sponge: Mesh) -> None:
     levels = list(_chain(sponge))
     for level in levels:
         assert kinds(find_defects(level.mesh, planes=PLANES)) == set()
@@ -85,7 +85,7 @@ def test_every_level_is_sound_and_keeps_its_border(sponge: Mesh) -> None:
     assert counts[-1] < 0.15 * counts[0]
 
 
-def test_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
+def test_a_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
     sponge: Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = moved(ball(1.0), (15.0, -20.0, -9.0))
@@ -99,13 +99,14 @@ def test_body_that_cannot_be_simplified_keeps_its_surface_and_is_counted(
     kept = simplify_without_defects(both, PLANES, max_error_um=2.0)
     assert kept.fallbacks > 0
     assert kinds(find_defects(kept.mesh, planes=PLANES)) == set()
-    assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # the sponge is one body, mostly
-    assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)  # the ball isn't
+    assert len(kept.mesh.triangles) > 0.5 * len(sponge.triangles)  # most of the sponge is one body
+    # The ball is simplified
+    assert (kept.mesh.positions[:, 2] < -5).sum() < 0.5 * len(alone.positions)
 
 
 @pytest.mark.slow
-def test_mesh_with_defects_of_its_own_keeps_the_body_that_has_them() -> None:
-    """Nothing hides: what is at fault stays, and is found by whoever checks."""
+def test_a_mesh_with_defects_keeps_the_bodies_that_have_them() -> None:
+    """Defects are not hidden: the check still finds them."""
     holed = replace(ball(), triangles=ball().triangles[1:])
     done = simplify_without_defects(holed, (), max_error_um=0.5)
     assert done.fallbacks == 1
@@ -115,7 +116,7 @@ def test_mesh_with_defects_of_its_own_keeps_the_body_that_has_them() -> None:
 
 @pytest.fixture(scope="module")
 def with_process() -> Mesh:
-    """A body of radius 9.5 at x = 15 with a process of radius 1.3 that ends at x = 71."""
+    """Return a body of radius 9.5 at x = 15 with a process of radius 1.3 that ends at x = 71."""
     shape = (40, 40, 80)
     z, y, x = (axis.astype(np.float64) for axis in np.indices(shape))
     body = 9.5 - np.sqrt((z - 19.4) ** 2 + (y - 19.6) ** 2 + (x - 15.3) ** 2)
@@ -127,11 +128,11 @@ def with_process() -> Mesh:
 
 
 def _farthest(mesh: Mesh, simplified: Mesh) -> float:
-    """Return how far the vertex of `mesh` lies that is farthest from the other."""
+    """Return the largest distance of a vertex of `mesh` from the other mesh."""
     return float(Nearest(simplified, 10).distances(mesh.positions.astype(np.float64)).max())
 
 
-def test_thin_process_stays(with_process: Mesh) -> None:
+def test_a_thin_process_stays(with_process: Mesh) -> None:
     done = simplify_without_defects(with_process, (), max_error_um=2.0)
     assert _farthest(with_process, done.mesh) <= STRAY * 2.0
     assert kinds(find_defects(done.mesh)) == set()
@@ -139,12 +140,13 @@ def test_thin_process_stays(with_process: Mesh) -> None:
     assert len(done.mesh.triangles) < 0.25 * len(with_process.triangles)
 
 
-def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process: Mesh) -> None:
+def test_each_level_is_near_the_one_before_and_keeps_the_process(with_process: Mesh) -> None:
     errors = (0.1, 0.5, 2.0)
     lods = _levels(with_process, (), _settings(errors))
     tip = float(with_process.positions[:, 0].max())
     for before, lod, error in zip(lods, lods[1:], errors[1:], strict=False):
-        assert _farthest(before.mesh, lod.mesh) <= (STRAY + 1) * error  # and volumes are kept
+        # One more error allows for the move that restores the volumes.
+        assert _farthest(before.mesh, lod.mesh) <= (STRAY + 1) * error
         assert lod.mesh.positions[:, 0].max() > tip - 8
         assert lod.quality is not None
         assert lod.quality.away.max < 8
@@ -152,18 +154,18 @@ def test_no_level_strays_from_the_one_before_and_the_process_stays(with_process:
 
 @pytest.mark.slow
 def test_each_level_has_the_fine_volume(sponge: Mesh) -> None:
-    """Of an open mesh too: what its border spans is the same at all levels."""
+    """This holds for an open mesh too: its border is the same at all levels."""
     settings = _settings((0.1, 0.5, 1.0))
     for fine, planes in ((ball(4.0, 60), ()), (sponge, PLANES)):
         whole = enclosed_volume(fine)
-        solid = whole if not planes else 0.38 * 39 * 39 * 30  # of the noise above .3 sigma
+        solid = whole if not planes else 0.38 * 39 * 39 * 30  # volume of the noise above .3 sigma
         for lod in _levels(fine, planes, settings):
             assert abs(enclosed_volume(lod.mesh) - whole) < 0.005 * solid
             assert _rim(lod.mesh) == _rim(fine)
 
 
 @pytest.mark.slow
-def test_bodies_without_room_for_their_volume_are_simplified_less(
+def test_bodies_without_space_for_their_volume_are_simplified_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fine, settings = crowd(), _settings((0.1, 0.35, 1.1, 4.0))
@@ -176,25 +178,25 @@ def test_bodies_without_room_for_their_volume_are_simplified_less(
         assert {kind for lod in lods for kind in kinds(find_defects(lod.mesh))} == set()
     assert min(volumes[0]) > 0.99
     assert min(volumes[1]) < 0.97
-    assert faces[0][:2] == faces[1][:2]  # where all have room nothing changes
+    assert faces[0][:2] == faces[1][:2]  # nothing changes while all have space
     assert faces[0][2] > faces[1][2]
-    monkeypatch.setattr(lod_chain, "FINER", (0.0,))  # as heavy as the level before
+    monkeypatch.setattr(lod_chain, "FINER", (0.0,))  # as many triangles as the level before
     monkeypatch.setattr(lod_chain, "MAX_MORE", 0)
     heavy = [len(lod.mesh.triangles) for lod in _levels(fine, (), settings)]
     assert max(a / b for a, b in zip(heavy, faces[1], strict=True)) <= lod_chain.MAX_HEAVIER
 
 
-def test_small_bodies_go_as_a_whole_from_the_level_that_would_make_them_thin() -> None:
+def test_small_bodies_are_removed_from_the_level_that_would_make_them_thin() -> None:
     large, small = ball(10.0, 60), moved(ball(0.8, 20), (15.0, 0.0, 0.0))
     fine = joined(large, small)
     lods = _levels(fine, (), _settings((0.1, 0.5, 1.0)))
     far = [(lod.mesh.positions[:, 0] > 12).sum() for lod in lods]
     assert far[0] > far[1] > 4
-    assert far[2] == 0  # its diagonal of 2.8 is less than 4 errors
-    assert lods[2].distance_um < 1  # of what is left
+    assert far[2] == 0  # the diagonal of 2.8 is less than 4 errors
+    assert lods[2].distance_um < 1  # the distance of the remaining bodies
 
 
-def test_coarser_levels_have_the_finest_s_values() -> None:
+def test_coarser_levels_have_the_values_of_the_finest() -> None:
     fine = ball(4.0, 60)
 
     def get_texturer(mesh: Mesh, number: NDArray[np.int64]) -> Texturer:
@@ -210,12 +212,12 @@ def test_coarser_levels_have_the_finest_s_values() -> None:
     for lod in lods:
         assert lod.normal_map is None
         assert lod.baked is not None
-        assert lod.baked.reason == "maps are not asked for"
-        wanted = lod.mesh.positions[:, 2] / 8 + 0.5  # moved a little, to keep the volume
+        assert lod.baked.reason == "maps were not requested"
+        wanted = lod.mesh.positions[:, 2] / 8 + 0.5  # vertices moved a little to keep the volume
         np.testing.assert_allclose(lod.baked.openness / 255, wanted, atol=0.03)
 
 
-def test_every_share_of_enclosure_is_measured() -> None:
+def test_the_enclosed_share_is_measured() -> None:
     ball_ = Nearest(ball(4.0, 60), 2000)
     assert measure_enclosure(ball_, Nearest(ball(5.0, 60), 10)) == 1.0
     assert measure_enclosure(ball_, Nearest(ball(3.0, 60), 10)) == 0.0
@@ -225,7 +227,7 @@ def test_every_share_of_enclosure_is_measured() -> None:
 
 
 @pytest.mark.slow
-def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
+def test_simplifying_twice_gives_the_same_result(sponge: Mesh) -> None:
     first, second = (list(_chain(sponge)) for _ in range(2))
     for a, b in zip(first, second, strict=True):
         np.testing.assert_array_equal(a.mesh.triangles, b.mesh.triangles)
@@ -233,7 +235,7 @@ def test_simplification_says_the_same_twice(sponge: Mesh) -> None:
 
 
 @pytest.mark.slow
-def test_record_tells_distances_faults_and_angles(sponge: Mesh) -> None:
+def test_each_level_records_distances_defects_and_angles(sponge: Mesh) -> None:
     settings = Settings()
     settings = replace(settings, surface=settings.surface.resolved(SPACING))
     lods = _levels(sponge, PLANES, settings)
@@ -253,7 +255,7 @@ def test_spread_between_concentric_balls_is_the_difference_of_radii() -> None:
         np.testing.assert_allclose([spread.mean, spread.p95, spread.max], 1.0, atol=0.02)
 
 
-def test_largest_distance_counts_vertices_that_no_sample_meets() -> None:
+def test_the_largest_distance_includes_vertices_between_samples() -> None:
     spike = ball(5.0, 60)
     positions = spike.positions.copy()
     positions[int(positions[:, 2].argmax())] = [0, 0, 7]

@@ -1,4 +1,4 @@
-"""Builds without maps don't need the extra `maps`, and `--maps` names it before any work."""
+"""Builds without maps do not need the extra `maps`; `--maps` asks for it before any work."""
 
 import sys
 from pathlib import Path
@@ -26,13 +26,13 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def keys(out: Path) -> tuple[dict[str, str], str]:
-    """Return the names of a build's units, and that of its bundle."""
+    """Return the names of the folders of a build's units, and of its bundle."""
     folder = OutFolder(out)
     return folder.index(), str(folder.phases()["bundle"]["key"])
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_maps_are_refused_before_any_work_if_a_package_of_the_extra_is_missing(
+def test_maps_are_refused_before_any_work_if_a_package_is_missing(
     source: str,
     package: str,
     tmp_path: Path,
@@ -48,14 +48,14 @@ def test_maps_are_refused_before_any_work_if_a_package_of_the_extra_is_missing(
     assert not out.exists()
 
 
-def test_no_result_imports_a_package_of_maps_by_itself() -> None:
+def test_no_step_depends_on_a_package_for_maps_by_its_imports() -> None:
     named = libraries_of("BuildUnit", "WriteStage", "WriteBundle", "WriteReport")
     assert "numpy" in named
     assert not {"xatlas", "alktx2"} & named.keys()
 
 
 @pytest.mark.slow
-def test_a_build_without_maps_does_not_depend_on_the_packages_of_the_extra(
+def test_a_build_without_maps_does_not_depend_on_packages_for_maps(
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "out"
@@ -67,13 +67,13 @@ def test_a_build_without_maps_does_not_depend_on_the_packages_of_the_extra(
     monkeypatch.setattr(map_packages, "version_of", lambda package: "")
     assert main(command) == 0
     assert keys(out) == there
-    assert main([*command[:3], str(tmp_path / "anew"), "--workers", "0"]) == 0
-    assert keys(tmp_path / "anew")[0] == there[0]
-    assert main(["check", "--deep", "--workers", "0", str(tmp_path / "anew")]) == 0
+    assert main([*command[:3], str(tmp_path / "again"), "--workers", "0"]) == 0
+    assert keys(tmp_path / "again")[0] == there[0]
+    assert main(["check", "--deep", "--workers", "0", str(tmp_path / "again")]) == 0
 
 
 @pytest.mark.slow
-def test_another_version_of_a_package_of_the_extra_makes_results_with_maps_again(
+def test_another_version_of_a_package_for_maps_makes_results_with_maps_again(
     source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"

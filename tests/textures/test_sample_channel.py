@@ -1,4 +1,4 @@
-"""One channel's intensity painted on another's surface: from voxels to stage and bundle."""
+"""One channel's intensity is painted on another's surface, from voxels to stage and bundle."""
 
 import re
 from pathlib import Path
@@ -28,7 +28,7 @@ RED, GREEN = (0.8, 0.1, 0.0), (0.0, 0.6, 0.2)
 
 
 def test_paint_is_the_largest_value_down_to_the_stated_depth() -> None:
-    """A layer 3 um below a floor shows from 3 um on, by the painted channel's own window."""
+    """A layer 3 um below a floor shows from a depth of 3 um, by the painted channel's window."""
     voxels = np.full((20, 8, 8), 100, np.uint16)
     voxels[6] = 300  # the floor lies at z = 9
     at = zyx_to_xyz([[9.0, 4.0, 4.0]]).astype(np.float32)
@@ -49,7 +49,7 @@ def test_paint_is_the_largest_value_down_to_the_stated_depth() -> None:
     assert painted(3.0, (100, 200)) == 1
 
 
-def test_colours_mix_in_linear_light() -> None:
+def test_paint_colours_mix_in_linear_light() -> None:
     colors = PaintColors(RED, GREEN).mix(np.array([0, 255, 51], np.uint8))
     np.testing.assert_allclose(colors[:2], [RED, GREEN], atol=1e-6)
     np.testing.assert_allclose(colors[2], np.add(RED, 0.2 * np.subtract(GREEN, RED)), atol=1e-6)
@@ -59,7 +59,7 @@ def test_colours_mix_in_linear_light() -> None:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ball, `body`, whose right half bears `marker`; `other` is the ball once more."""
+    """Build a ball, `body`, whose right half has `marker`; `other` is the same ball."""
     folder = tmp_path_factory.mktemp("paint")
     ball = phantoms.blurred_ball(SHAPE, (1.0, 1.0, 1.0), (20.0, 20.0, 20.0), 12.0, 1.0)
     half = ball * (np.arange(SHAPE[2]) > 20)
@@ -75,12 +75,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _sides(positions: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which vertices lie well inside the bare half, and which in the painted one."""
+    """Return which vertices lie well within the bare half, and which within the painted half."""
     return positions[:, 0] < 17, positions[:, 0] > 24
 
 
 @pytest.mark.slow
-def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
+def test_a_unit_holds_the_paint_at_vertices_and_texels(built: Path) -> None:
     out_folder = OutFolder(built)
     assert out_folder.plan().settings.paint == {"body": "marker"}
     directory = out_folder.unit_dir("r0_c0/body", out_folder.index()["r0_c0/body"])
@@ -102,7 +102,7 @@ def test_unit_knows_the_paint_at_vertices_and_texels(built: Path) -> None:
 
 
 @pytest.mark.slow
-def test_stage_shows_the_paint_and_leaves_other_channels_to_be_recoloured(built: Path) -> None:
+def test_the_stage_shows_the_paint_and_other_channels_can_be_recoloured(built: Path) -> None:
     stage = Usd.Stage.Open(str(built / "stage/stage.usda"))
     assert validate_stage(built / "stage/stage.usda") == []
     tile = stage.GetPrimAtPath("/Specimen/Tiles/r0_c0")
@@ -144,7 +144,7 @@ def test_stage_shows_the_paint_and_leaves_other_channels_to_be_recoloured(built:
     assert plain.GetPath() == "/Specimen/Tiles/r0_c0/other/other_r0_c0_look.inputs:color"
 
 
-def test_bundle_shows_the_paint(built: Path) -> None:
+def test_the_bundle_shows_the_paint(built: Path) -> None:
     folder = built / "bundle/channels"
 
     def material(channel: str, level: int) -> tuple[dict, dict, list]:
@@ -173,7 +173,7 @@ def test_bundle_shows_the_paint(built: Path) -> None:
         ("body=0", "--paint body=body: expected another channel than its own"),
     ],
 )
-def test_wrong_paint_is_one_line(
+def test_an_error_about_paint_is_one_line(
     built: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], flag: str, message: str
 ) -> None:
     source = built.parent / "ball.ome.tif"
@@ -182,7 +182,7 @@ def test_wrong_paint_is_one_line(
 
 
 @pytest.mark.slow
-def test_report_tells_what_is_painted_how_dense_texels_are_and_how_like_levels_look(
+def test_the_report_shows_paint_texel_density_and_likeness_of_levels(
     built: Path,
 ) -> None:
     assert main(["report", str(built)]) == 0
@@ -193,8 +193,8 @@ def test_report_tells_what_is_painted_how_dense_texels_are_and_how_like_levels_l
     first, second = [row for row in cells if row and row[1:2] in (["lod0"], ["lod1"])][:2]
     assert first[2] == "0"
     assert first[-1] == "1: finer than lod1"
-    assert second[2:4] == ["1", "1"]  # tiles, um a texel
+    assert second[2:4] == ["1", "1"]  # tiles, um per texel
     assert second[-2] == "marker"
     (likeness,) = (row for row in cells if row and row[0] == "r0_c0/body")
-    assert len(likeness) == 9  # unit, level, five views, their mean, the front at a fixed size
+    assert len(likeness) == 9  # unit, level, five views, their mean, and the front at a fixed size
     assert float(likeness[-2]) > 0.9

@@ -1,4 +1,4 @@
-"""Charts: how dense, how far apart, where they end, and when a level goes without."""
+"""Charts: their density, their distance, their edges, and levels that get none."""
 
 from dataclasses import replace
 from typing import Any
@@ -22,7 +22,7 @@ from support.unwrapped import OPTIONS, SPACING, sphere, unwrapped
 
 
 def charts_of(mesh: Mesh) -> NDArray[np.int32]:
-    """Return the number of each triangle's chart: seams split vertices."""
+    """Return the number of each triangle's chart. Seams split vertices."""
     a, b, c = mesh.triangles.astype(np.int64).T
     ends = np.concatenate([a, b]), np.concatenate([b, c])
     links = coo_matrix((np.ones(len(ends[0])), ends), (len(mesh.positions),) * 2)
@@ -49,20 +49,20 @@ def areas(corners: NDArray[np.floating]) -> NDArray[np.floating]:
         ({"occlusion_um": -1.0}, "unwrap.occlusion_um is -1.0, expected a length in um"),
     ],
 )
-def test_options_out_of_range_are_wrong_usage(values: dict[str, Any], message: str) -> None:
+def test_options_out_of_range_are_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError) as raised:
         UnwrapOptions(**values).resolved(SPACING)
     assert message in str(raised.value)
 
 
-def test_open_lengths_follow_the_coarsest_spacing() -> None:
+def test_automatic_lengths_follow_the_coarsest_spacing() -> None:
     lengths = (OPTIONS.texel_um, OPTIONS.occlusion_um, OPTIONS.paint_um)
     assert lengths == pytest.approx((0.2, 1.6, 0.4))
     assert OPTIONS.resolved((1.0, 1.0, 1.0)) == OPTIONS
 
 
 @pytest.mark.parametrize("texel_um", [0.1, 0.25])
-def test_a_texel_spans_what_is_stated(texel_um: float) -> None:
+def test_a_texel_has_the_stated_length_on_the_surface(texel_um: float) -> None:
     done = unwrapped(simplify(sphere(), 0.1), replace(OPTIONS, texel_um=texel_um))
     height, width = done.size
     assert done.mesh.uvs is not None
@@ -73,13 +73,13 @@ def test_a_texel_spans_what_is_stated(texel_um: float) -> None:
     assert height % 8 == width % 8 == 0
 
 
-def test_texels_grow_where_the_map_would_be_too_large() -> None:
+def test_texels_grow_if_the_map_would_be_too_large() -> None:
     done = unwrapped(simplify(sphere(), 0.1), replace(OPTIONS, texel_um=0.05, max_texture=256))
     assert max(done.size) <= 256
     assert done.texel_um > 0.05
 
 
-def test_too_many_triangles_or_charts_go_without_and_say_so() -> None:
+def test_a_level_with_too_many_triangles_or_charts_gets_no_maps_and_a_reason() -> None:
     mesh = simplify(sphere(), 0.3)
     assert unwrap(mesh, replace(OPTIONS, max_triangles=10)) == (
         f"{len(mesh.triangles):,} triangles, more than 10"
@@ -96,7 +96,7 @@ def test_charts_do_not_overlap_and_fill_the_map() -> None:
     assert done.mesh.uvs.min() >= 0
     assert done.mesh.uvs.max() <= 1
     count = np.zeros(done.size, int)
-    for triangle in done.mesh.uvs[done.mesh.triangles] * (width, height):  # a plain rasteriser
+    for triangle in done.mesh.uvs[done.mesh.triangles] * (width, height):  # a simple rasterizer
         low, high = np.floor(triangle.min(axis=0)).astype(int), np.ceil(triangle.max(axis=0))
         u, v = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
         a, b, c = triangle
@@ -114,7 +114,7 @@ def test_charts_do_not_overlap_and_fill_the_map() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("padding", "levels"), [(3, 1), (6, 2), (12, 3)])
-def test_lookups_in_a_chart_meet_no_other_at_the_mip_levels_that_are_promised(
+def test_lookups_in_a_chart_read_no_other_chart_at_the_stated_mip_levels(
     padding: int, levels: int
 ) -> None:
     assert mip_levels_apart(padding) == levels
@@ -127,7 +127,7 @@ def test_lookups_in_a_chart_meet_no_other_at_the_mip_levels_that_are_promised(
     image = fill(chart[triangle][:, None], texel, done.size)[..., 0]  # as maps are filled
 
     height, width = done.size
-    # places on the charts' edges, from where lookups reach farthest
+    # Positions on the edges of charts, from which lookups reach farthest
     starts, ends = mesh.triangles.ravel(), np.roll(mesh.triangles, -1, axis=1).ravel()
     share = np.linspace(0, 1, 5)[:, None, None]
     places = mesh.uvs[starts] * share + mesh.uvs[ends] * (1 - share)
@@ -145,12 +145,12 @@ def test_lookups_in_a_chart_meet_no_other_at_the_mip_levels_that_are_promised(
                         row = np.clip(top + dy, 0, height - 1)
                         is_mixed |= image[row, np.clip(left + dx, 0, width - 1)] != own
         mixed.append(is_mixed.mean())
-    assert max(mixed[:levels]) < 0.002  # a texel's rounding, at corners
-    assert mixed[-1] > 0.001  # else this would show nothing
+    assert max(mixed[:levels]) < 0.002  # rounding of a texel at corners
+    assert mixed[-1] > 0.001  # otherwise the test would show nothing
 
 
-def test_no_chart_runs_over_a_sharp_edge() -> None:
-    """Our normals are smooth everywhere: they don't tell where a body is sharp."""
+def test_no_chart_crosses_a_sharp_edge() -> None:
+    """Our normals are smooth everywhere, so they do not show where a body is sharp."""
     cube = pv.Cube(x_length=4, y_length=4, z_length=4).triangulate().subdivide(3).clean()
     positions = np.asarray(cube.points, np.float32)
     radial = positions / np.linalg.norm(positions, axis=1, keepdims=True)
@@ -167,7 +167,7 @@ def test_no_chart_runs_over_a_sharp_edge() -> None:
         done.positions, axis=1, keepdims=True), atol=1e-6)  # fmt: skip
 
 
-def test_unwrapping_twice_gives_the_same() -> None:
+def test_unwrapping_twice_gives_the_same_result() -> None:
     first, second = (unwrapped(simplify(sphere(), 0.1)) for _ in range(2))
     assert first.mesh.uvs is not None
     assert second.mesh.uvs is not None
@@ -175,8 +175,8 @@ def test_unwrapping_twice_gives_the_same() -> None:
     np.testing.assert_array_equal(first.mesh.uvs, second.mesh.uvs)
 
 
-def test_an_atlas_outlives_its_unwrap_and_a_few_after() -> None:
-    """Destroying one whose worker thread is just falling asleep can hang for ever."""
+def test_an_atlas_is_kept_for_a_few_unwraps() -> None:
+    """Destroying an atlas whose worker thread is just falling asleep can hang forever."""
     mesh = simplify(sphere(sides=24), 0.2)
     for _ in range(unwrap_module.ATLASES_KEPT + 3):
         unwrap(mesh, OPTIONS)

@@ -1,4 +1,4 @@
-"""Tissue classes against the head phantom's truth, and against volumes of known classes."""
+"""Tissue classes, compared with the truth of the head phantom and of volumes of known classes."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def require_overlap(head: HeadPhantom, tissue: Tissue, least: float) -> None:
 
 @pytest.fixture(scope="module")
 def learned() -> tuple[HeadPhantom, Tissue]:
-    # neither seed nor shape nor bias are those of tests/bench/tissue.py
+    # Seed, shape and bias differ from those of tests/bench/tissue.py.
     head = make_head(shape=SMALL, noise=0.05, bias=0.5, seed=23)
     return head, learn_tissue(head.voxels, head.spacing_um, options=THREE)
 
@@ -58,9 +58,10 @@ def test_each_class_overlaps_the_truth_and_beats_multi_otsu(
 @pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("shape", "bias", "noise"),
-    [((112, 96, 96), 0.4, 0.08), ((112, 48, 96), 0.6, 0.05)],  # the second: y twice as coarse
+    # In the second case y is twice as coarse
+    [((112, 96, 96), 0.4, 0.08), ((112, 48, 96), 0.6, 0.05)],
 )
-def test_it_does_in_other_shapes_noises_and_biases(
+def test_classes_overlap_the_truth_in_other_shapes_noises_and_biases(
     shape: tuple[int, int, int], bias: float, noise: float
 ) -> None:
     head = make_head(shape=shape, noise=noise, bias=bias, seed=31)
@@ -68,7 +69,7 @@ def test_it_does_in_other_shapes_noises_and_biases(
 
 
 @pytest.mark.slow
-def test_probabilities_sum_to_one_in_the_mask_and_to_nothing_outside(
+def test_probabilities_sum_to_one_in_the_mask_and_to_zero_outside(
     learned: tuple[HeadPhantom, Tissue],
 ) -> None:
     tissue = learned[1]
@@ -77,9 +78,10 @@ def test_probabilities_sum_to_one_in_the_mask_and_to_nothing_outside(
     assert not total[~tissue.mask].any()
 
 
-def test_probabilities_are_what_they_say(learned: tuple[HeadPhantom, Tissue]) -> None:
-    """Of the voxels that are called a class with p, about a share p is of it, and the more the
-    larger p is: the expected calibration error of Naeini et al., AAAI 2015.
+def test_probabilities_are_calibrated(learned: tuple[HeadPhantom, Tissue]) -> None:
+    """Among voxels with probability p of a class, about a share p belongs to it.
+
+    The measure is the expected calibration error of Naeini et al., AAAI 2015.
     """
     head, tissue = learned
     brain = tissue.mask & np.isin(head.labels, (CSF, GREY, WHITE))
@@ -93,7 +95,7 @@ def test_probabilities_are_what_they_say(learned: tuple[HeadPhantom, Tissue]) ->
         assert (np.diff(found) > 0).all()
 
 
-def test_the_bias_field_found_leaves_half_of_it_at_most(
+def test_at_most_half_of_the_bias_field_remains(
     learned: tuple[HeadPhantom, Tissue],
 ) -> None:
     head, tissue = learned
@@ -104,7 +106,7 @@ def test_the_bias_field_found_leaves_half_of_it_at_most(
     assert left[inside].std() < truth[inside].std() / 2
 
 
-def test_the_mask_is_the_brain_with_its_fluid_and_no_scalp(
+def test_the_mask_is_the_brain_with_its_fluid_and_without_scalp(
     learned: tuple[HeadPhantom, Tissue],
 ) -> None:
     head, tissue = learned
@@ -121,7 +123,7 @@ def test_the_same_voxels_give_the_same_bytes(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", sweep([2, 3, 4], kept=[3]))
-def test_auto_finds_how_many_classes_there_are(count: int) -> None:
+def test_auto_finds_the_number_of_classes(count: int) -> None:
     voxels, labels = blobs(count)
     tissue = learn_tissue(
         voxels, (1000.0, 1000.0, 1000.0), options=TissueOptions(sample=15_000, bias_rounds=4)
@@ -132,8 +134,8 @@ def test_auto_finds_how_many_classes_there_are(count: int) -> None:
     assert (labels_of(tissue)[inner] == labels[inner]).mean() > 0.9
 
 
-def test_neighbours_far_away_vote_less() -> None:
-    """Planes of two classes in turn, seen through noise: votes across them are all wrong."""
+def test_neighbours_along_a_coarse_axis_count_less() -> None:
+    """Planes of two classes alternate, in noise, so the votes of planes beside them are wrong."""
     rng = np.random.default_rng(0)
     truth = np.zeros((16, 24, 24), int)
     truth[::2] = 1
@@ -155,11 +157,11 @@ def test_neighbours_far_away_vote_less() -> None:
     assert right[6.0].mean() > right[1.0].mean() + 0.05
 
 
-def test_a_hull_holds_its_volume() -> None:
+def test_a_filled_hull_has_its_volume() -> None:
     points, triangles = _icosphere(3)
     ball = Hull(20 * points + 30, triangles)
     filled = fill_hull(ball, (60, 60, 40), spacing_mm=(1.0, 1.0, 1.5))
-    # voxels that the surface passes count as inside: half a voxel more all round
+    # Voxels that the surface crosses count as inside, so the ball grows by half a voxel all round.
     assert filled.sum() * 1.5 == pytest.approx(4 / 3 * np.pi * 20.5**3, rel=0.05)
     assert filled[30, 30, 20]
     assert not filled[30, 30, 36]
@@ -170,7 +172,7 @@ def test_a_constant_volume_has_no_tissue() -> None:
         learn_tissue(np.full((8, 8, 8), 7, np.uint8), (1.0, 1.0, 1.0), options=THREE)
 
 
-def test_a_volume_without_a_brain_is_refused_in_a_line() -> None:
+def test_a_volume_without_a_brain_is_refused() -> None:
     voxels, _ = blobs(3)
     with pytest.raises(SourceError, match="no brain"):
-        learn_tissue(voxels, (100.0, 100.0, 100.0), options=THREE)  # 4 mm in all
+        learn_tissue(voxels, (100.0, 100.0, 100.0), options=THREE)  # 4 mm along each edge

@@ -1,4 +1,4 @@
-"""The head phantom: what it promises, on its voxels and on the DICOM series made of it."""
+"""The head phantom has its stated properties, in its voxels and in its DICOM series."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ def series(small: HeadPhantom, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 def middle_mm(mask: NDArray[np.bool_], head: HeadPhantom) -> NDArray[np.float64]:
-    """Return the centre of mass from the middle of the grid: to the front, down, to the left."""
+    """Return the centre of mass from the middle of the grid, in mm: to the front, down, left."""
     spacing = np.array(head.spacing_um) / 1000
     centre = np.array(np.nonzero(mask)).mean(axis=1) - (np.array(mask.shape) - 1) / 2
     return np.asarray(centre * spacing)
@@ -67,7 +67,7 @@ def middle_mm(mask: NDArray[np.bool_], head: HeadPhantom) -> NDArray[np.float64]
 def test_the_capsule_is_on_the_left_the_nose_in_front_and_the_neck_below(
     clean: HeadPhantom,
 ) -> None:
-    z, y, x = middle_mm(clean.voxels > 1.1 * WHITE_LEVEL, clean)  # of oil: the brightest
+    z, y, x = middle_mm(clean.voxels > 1.1 * WHITE_LEVEL, clean)  # oil, the brightest
     assert (z, y, x) == pytest.approx((12, -18, 76), abs=4)
     head = clean.labels != BACKGROUND
     assert middle_mm(head & (np.arange(len(head)) > len(head) - 6)[:, None, None], clean)[1] > 10
@@ -77,7 +77,7 @@ def test_the_capsule_is_on_the_left_the_nose_in_front_and_the_neck_below(
 
 
 def test_the_right_ventricle_is_the_larger(clean: HeadPhantom) -> None:
-    """Inside of the white matter only ventricles are dark."""
+    """Inside of the white matter only the ventricles are dark."""
     depth, height, width = clean.labels.shape
     box = np.s_[depth // 4 : 3 * depth // 4, height // 4 : height // 2]
     fluid = clean.labels[box] == CSF
@@ -87,7 +87,7 @@ def test_the_right_ventricle_is_the_larger(clean: HeadPhantom) -> None:
     assert right > 1.2 * left > 0
 
 
-def test_every_voxel_is_shared_out_whole_and_labelled_by_the_largest_share(
+def test_the_shares_of_a_voxel_sum_to_one_and_its_label_has_the_largest(
     head: HeadPhantom,
 ) -> None:
     np.testing.assert_allclose(head.fractions.sum(axis=0), 1, atol=1e-5)
@@ -102,12 +102,12 @@ def test_classes_have_their_signals_bias_and_noise(head: HeadPhantom, clean: Hea
         assert pure.sum() > 1000
         assert (clean.voxels[pure] == round(signal * WHITE_LEVEL)).all()
         values = head.voxels[pure] / head.bias[pure]
-        # Rician: at more than 6 sigma the mean is off by sigma^2 / (2 signal)
+        # Rician noise: above 6 sigma the mean is off by sigma^2 / (2 signal).
         shift = 50**2 / (2 * signal * WHITE_LEVEL)
         assert values.mean() == pytest.approx(signal * WHITE_LEVEL + shift, abs=3)
         assert (head.voxels[pure] - values.mean() * head.bias[pure]).std() == pytest.approx(50, 0.1)
     air = clean.fractions[BACKGROUND] > 0.999
-    # Rayleigh: the mean of the magnitude of noise alone
+    # Rayleigh noise: the mean magnitude without signal
     assert head.voxels[air].mean() == pytest.approx(50 * np.sqrt(np.pi / 2), rel=0.02)
     assert head.bias.min() == pytest.approx(0.9, abs=1e-3)
     assert head.bias.max() == pytest.approx(1.1, abs=1e-3)
@@ -125,7 +125,7 @@ def test_a_finer_grid_shows_the_same_head(clean: HeadPhantom) -> None:
         assert ml[0] == pytest.approx(ml[1], rel=0.03)
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_errors_name_the_wrong_argument() -> None:
     for found, message in (
         ({"shape": (4, 96, 96)}, "shape: found"),
         ({"noise": -0.1}, "noise: found -0.1"),
@@ -150,14 +150,14 @@ def test_the_series_reads_back_as_the_phantom(series: Path, small: HeadPhantom) 
     assert np.linalg.det(placement[:3, :3]) == pytest.approx(1)
     angle = np.degrees(np.arccos((np.trace(placement[:3, :3]) - 1) / 2))
     assert 5 < angle < 12
-    # the middle of the grid lies at the isocentre: world = (L, S, -P)
+    # The middle of the grid lies at the isocentre: world = (L, S, -P).
     z, y, x = ((n - 1) / 2 * h for n, h in zip(SMALL, small.spacing_um, strict=True))
     left, posterior, superior = ISOCENTRE_MM
     found = placement @ [x, -y, z, 1]
     assert found[:3] == pytest.approx(np.array([left, superior, -posterior]) * 1000, abs=0.1)
 
 
-def test_itk_finds_the_affine_that_was_written(series: Path, small: HeadPhantom) -> None:
+def test_itk_reads_the_affine_that_was_written(series: Path, small: HeadPhantom) -> None:
     names = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(series))
     image = sitk.ReadImage(names)
     depth, height, width = SMALL
@@ -165,7 +165,7 @@ def test_itk_finds_the_affine_that_was_written(series: Path, small: HeadPhantom)
     index = np.array([(0, 0, 0), (width - 1, height - 1, depth - 1), (3, 5, 7)])
     ours = index @ affine[:3, :3].T + affine[:3, 3]
     for place, (k, row, column) in zip(ours, index.tolist(), strict=True):
-        # ITK sorts along the normal, which may run against our slices
+        # ITK sorts along the normal, which may run against our slices.
         slices = [k, width - 1 - k]
         theirs = [image.TransformIndexToPhysicalPoint((column, row, int(s))) for s in slices]
         assert min(np.linalg.norm(np.array(t) - place) for t in theirs) < 1e-4
@@ -174,7 +174,7 @@ def test_itk_finds_the_affine_that_was_written(series: Path, small: HeadPhantom)
     assert any(np.array_equal(voxels[:: int(s)], stored) for s in (1, -1))
 
 
-def test_the_grid_is_turned_about_all_three_axes_by_orientation_alone(series: Path) -> None:
+def test_the_orientation_turns_the_grid_about_all_three_axes(series: Path) -> None:
     first = pydicom.dcmread(next(iter(sorted(series.iterdir()))))
     row, column = np.array(first.ImageOrientationPatient, float).reshape(2, 3)
     assert row @ column == pytest.approx(0, abs=1e-9)
@@ -183,7 +183,7 @@ def test_the_grid_is_turned_about_all_three_axes_by_orientation_alone(series: Pa
     assert all(TURN_DEG)
 
 
-def test_numbers_and_thickness_say_nothing_of_positions(series: Path) -> None:
+def test_instance_numbers_and_thickness_do_not_show_positions(series: Path) -> None:
     images = [pydicom.dcmread(file) for file in sorted(series.iterdir())]
     assert sorted(ds.InstanceNumber for ds in images) == list(range(1, SMALL[2] + 1))
     images.sort(key=lambda ds: ds.InstanceNumber)
@@ -200,7 +200,7 @@ def test_numbers_and_thickness_say_nothing_of_positions(series: Path) -> None:
     assert all(getattr(ds, name) == value for ds in images for name, value in IDENTITY.items())
 
 
-def test_the_bytes_repeat_and_another_seed_is_another_series(
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_series(
     small: HeadPhantom, series: Path, tmp_path: Path
 ) -> None:
     write_dicom(tmp_path / "head", make_head(shape=SMALL, seed=3))
@@ -214,7 +214,7 @@ def test_the_bytes_repeat_and_another_seed_is_another_series(
 
 
 @pytest.mark.slow
-def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
+def test_the_command_keeps_complete_series_and_overwrites_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "head"
@@ -222,7 +222,7 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
     before = {file: file.stat().st_mtime_ns for file in folder.iterdir()}
     write_head(folder, seed=2)
     assert {file: file.stat().st_mtime_ns for file in folder.iterdir()} == before
-    (folder / "IM0007.dcm").unlink()  # it lost a file: it is made again
+    (folder / "IM0007.dcm").unlink()  # a missing file makes the command write the series again
     write_head(folder, seed=2)
     assert {file.name for file in folder.iterdir()} == {file.name for file in before}
     with pytest.raises(OutputError, match=r"something else.*: choose another place$"):
@@ -238,7 +238,7 @@ def test_the_command_writes_it_again_at_no_cost_and_overwrites_nothing(
 
 
 @pytest.mark.slow
-def test_a_build_opens_path_traced_and_holds_nothing_of_the_patient(
+def test_a_build_is_first_path_traced_and_holds_nothing_about_the_patient(
     series: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -254,9 +254,9 @@ def test_a_build_opens_path_traced_and_holds_nothing_of_the_patient(
     assert [line for line in check(out) if not line.ok] == []
     image = pydicom.dcmread(series / "IM0001.dcm", stop_before_pixels=True)
     uids = [image[f"{what}InstanceUID"].value for what in ("SOP", "Study", "Series")]
-    # short digits (a time of day) are in any number
+    # Short digits, such as a time of day, occur in any number.
     words = [part for value in IDENTITY.values() for part in value.split("^") if len(part) > 6]
     captured = capfd.readouterr()
     told = {"stdout": captured.out, "stderr": captured.err}
     assert find(out, [*words, *uids], told) == []
-    assert find(series, words)  # they are there to be found
+    assert find(series, words)  # the words are in the series, where they can be found

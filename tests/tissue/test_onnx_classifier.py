@@ -1,4 +1,4 @@
-"""A network of the user's own: patches, blending, and what is wrong said in one line."""
+"""A user's network: patches, blending, and errors in one line."""
 
 import json
 import sys
@@ -23,7 +23,7 @@ def volume(shape: tuple[int, int, int] = (20, 30, 26)) -> np.ndarray[Any, Any]:
 
 
 def expected(voxels: np.ndarray[Any, Any], slopes: Sequence[float]) -> np.ndarray[Any, Any]:
-    """The softmax of the whole volume at once: a convolution of one voxel knows no patches."""
+    """Return the softmax of the whole volume at once; a convolution of one voxel has no patches."""
     from scipy import ndimage
 
     values = voxels.astype(np.float64)
@@ -40,7 +40,7 @@ def load(path: Path) -> Network:
 
 @pytest.mark.parametrize("has_softmax", [False, True])
 @pytest.mark.parametrize("patch", [(1, 1, 8, 8, 8), (1, 1, 16, 64, 9), (1, 1, "D", "H", "W")])
-def test_patches_blend_to_what_the_whole_would_be(
+def test_blended_patches_equal_the_result_of_the_whole_volume(
     tmp_path: Path, patch: Shape, has_softmax: bool
 ) -> None:
     path = write_model(tmp_path / "m.onnx", shape=patch, has_softmax=has_softmax)
@@ -53,14 +53,14 @@ def test_patches_blend_to_what_the_whole_would_be(
     assert apply_network(network, voxels).tobytes() == found.tobytes()
 
 
-def test_a_model_may_name_its_classes_and_leave_some_out(tmp_path: Path) -> None:
+def test_a_model_may_name_its_classes_and_hide_some(tmp_path: Path) -> None:
     path = write_model(tmp_path / "m.onnx", slopes=(0, 1, 2), names=["", "bone", "marrow"])
     network = load(path)
     assert network.classes == ("", "bone", "marrow")
     assert network.count == 2
 
 
-def test_a_network_is_known_by_its_bytes_and_not_by_its_name(tmp_path: Path) -> None:
+def test_the_settings_of_a_network_depend_on_its_bytes_and_not_its_name(tmp_path: Path) -> None:
     one = load(write_model(tmp_path / "Jane_Doe.onnx"))
     same = load(write_model(tmp_path / "b.onnx"))
     other = load(write_model(tmp_path / "c.onnx", slopes=(1, 2)))
@@ -72,7 +72,7 @@ def test_a_network_is_known_by_its_bytes_and_not_by_its_name(tmp_path: Path) -> 
     ("options", "message"),
     [
         ({"shape": (1, 2, 8, 8, 8)}, r"input 'voxels' is tensor\(float\) of shape"),
-        ({"shape": (1, 1, 9999, 8, 8)}, "asks for patches of 9999 x 8 x 8"),
+        ({"shape": (1, 1, 9999, 8, 8)}, "requires patches of 9999 x 8 x 8"),
         ({"slopes": (1.0,)}, "with K from 2 to 32"),
         ({"names": ["a"]}, "expected a JSON list of 2"),
         ({"names": "no JSON"}, "expected a JSON list of 2"),
@@ -80,7 +80,7 @@ def test_a_network_is_known_by_its_bytes_and_not_by_its_name(tmp_path: Path) -> 
         ({"slopes": (float("nan"), 1.0)}, "NaN or infinity"),
     ],
 )
-def test_what_does_not_fit_is_said_in_a_line(
+def test_the_error_for_an_unsuitable_model_is_one_line(
     tmp_path: Path, options: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(SourceError, match=message) as error:
@@ -88,7 +88,7 @@ def test_what_does_not_fit_is_said_in_a_line(
     assert "\n" not in str(error.value)
 
 
-def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_model_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "m.onnx"
     for content in (b"root:x:0:0:root:/root:/bin/bash\n", b"", b"GIF89a"):
         path.write_bytes(content)
@@ -97,7 +97,7 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
         assert str(error.value) == f"{path}: found another kind of file, expected an ONNX model"
 
 
-def test_without_onnxruntime_the_remedy_is_said(
+def test_without_onnxruntime_the_error_says_how_to_install_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "onnxruntime", None)

@@ -1,4 +1,4 @@
-"""The adaptive binarisation threshold, on histograms whose valley is known."""
+"""The adaptive binarisation threshold, on histograms whose valleys are known."""
 
 import io
 import json
@@ -55,7 +55,7 @@ def found(counts: NDArray[np.float64]) -> Threshold:
 
 
 def valley(bells: list[tuple[float, float, float]], low: float, high: float) -> float:
-    """Return where a sum of normal curves, meant over a window of 25 bins, is lowest."""
+    """Return the lowest point of a sum of normal curves after a moving mean of 25 bins."""
 
     def meant(x: float) -> float:
         return sum(
@@ -80,39 +80,39 @@ def test_the_window_is_a_tenth_of_the_histogram_s_length() -> None:
     spike = np.zeros(BINS)
     spike[100] = 25_000
     (filled,) = np.nonzero(smooth(spike))
-    assert (filled[0], filled[-1]) == (100 - 12, 100 + 12)  # 25 bins: the odd number next to 25.6
+    assert (filled[0], filled[-1]) == (100 - 12, 100 + 12)  # 25 bins: the odd number below 25.6
     assert smooth(spike).max() == 1000
-    # at the ends only the bins that exist count
+    # At the ends only the existing bins count.
     assert (smooth(np.full(BINS, 7.0)) == 7).all()
-    # two spikes nearer than the window are one peak
+    # Two spikes nearer than the window are one peak.
     near, far = (bell(100, 2, 10_000) + bell(100 + gap, 2, 10_000) for gap in (16, 60))
     assert len(found(near).peaks) == 1
     assert found(far).value == pytest.approx(130, abs=1)
 
 
-def test_it_lies_before_the_second_highest_of_three_peaks_whichever_stands_before() -> None:
-    """Air is highest, then white matter; the grey peak before it is lower than both."""
+def test_the_threshold_lies_before_the_second_highest_of_three_peaks() -> None:
+    """Air is highest, then white matter. The grey peak before that is lower than both."""
     bells = [(20.0, 8.0, 90_000.0), (120.0, 14.0, 20_000.0), (200.0, 14.0, 40_000.0)]
     threshold = found(sum(bell(*b) for b in bells))
     assert threshold.between == pytest.approx((120, 200), abs=2)
     assert threshold.value == pytest.approx(valley(bells, 120, 200), abs=1)
-    # grey higher than white: grey is the second-highest, and air lies before it
+    # If grey is higher than white, grey is the second-highest, and air lies before it.
     bells = [(20.0, 8.0, 90_000.0), (120.0, 14.0, 40_000.0), (200.0, 14.0, 20_000.0)]
     threshold = found(sum(bell(*b) for b in bells))
     assert threshold.between == pytest.approx((20, 120), abs=2)
 
 
-def test_of_equal_peaks_the_darker_is_the_higher() -> None:
+def test_the_darker_of_two_equal_peaks_counts_as_the_higher() -> None:
     one = bell(40, 8, 30_000)
     three = one + np.roll(one, 80) + np.roll(one, 160)
     threshold = found(three)
-    # highest is the darkest, second the middle one, the peak before that the darkest
+    # The darkest is the highest, the middle one the second, and the darkest lies before it.
     assert threshold.between == pytest.approx((40, 120), abs=1)
-    # equal counts all over the valley: in its middle
+    # Counts are equal all over the valley, so the threshold lies in its middle.
     assert threshold.value == pytest.approx(80, abs=1)
 
 
-def test_where_nothing_lies_before_the_second_highest_it_lies_behind_it() -> None:
+def test_without_a_peak_before_the_second_highest_the_threshold_lies_after_it() -> None:
     threshold = found(bell(70, 12, 30_000) + bell(190, 12, 90_000))
     assert threshold.reading == "no peak before"
     assert threshold.value == pytest.approx(130, abs=8)
@@ -125,7 +125,7 @@ def test_a_plateau_is_one_peak_at_its_middle() -> None:
     counts[150:200] = 6_000
     threshold = found(counts)
     assert threshold.peaks == pytest.approx((50, 175), abs=0.5)
-    # nothing at all between 92 and 138 once smoothed: in the middle
+    # Smoothed counts are 0 between 92 and 138, so the threshold lies in the middle.
     assert threshold.value == pytest.approx(115, abs=0.5)
 
 
@@ -134,8 +134,8 @@ def test_a_single_peak_is_cut_at_the_foot_of_its_longer_side() -> None:
     threshold = found(1e6 * np.exp(-AT / scale))
     assert threshold.reading == "single peak"
     assert len(threshold.between) == 1
-    # farthest below the chord from peak to end: where the slopes are equal. Meant over 25 bins an
-    # exponential keeps its shape; at its end only the 13 bins on one side are there
+    # The foot is farthest below the chord from peak to end, where the slopes are equal. A moving
+    # mean of 25 bins keeps the shape of an exponential; at its end only 13 bins on one side exist.
     half, top = 12.5 / scale, (1 - np.exp(-13 / scale)) / (13 / scale)
     slope = np.sinh(half) / half / scale
     foot = scale * np.log(slope / (top / BINS))
@@ -147,9 +147,10 @@ def test_a_flat_histogram_has_no_threshold(counts: NDArray[np.float64]) -> None:
     assert find_adaptive_threshold(histogram(counts)) is None
 
 
-def test_a_peak_is_one_however_low_beside_the_others() -> None:
-    """As in a head at 7 T: grey matter rises 4 % above the saddle before it, many times what
-    counting makes; white matter stands apart and is lower.
+def test_a_peak_counts_however_low_it_is_beside_others() -> None:
+    """A head at 7 T is an example. Grey matter rises 4 % above the saddle before it.
+
+    That is many times the noise of counting. White matter stands apart and is lower.
     """
     bells = [(0.0, 20.0, 5e6), (115.0, 25.0, 40_000.0), (200.0, 12.0, 50_000.0)]
     fat = 150_000 * np.exp(-AT / 80)
@@ -165,8 +166,8 @@ def test_a_peak_is_one_however_low_beside_the_others() -> None:
 
 
 @pytest.mark.parametrize(("rise", "count"), [(4.0, 1), (6.0, 2)])
-def test_a_rise_counts_from_five_deviations_of_counting_on(rise: float, count: int) -> None:
-    """Steps as broad as the window: its means are theirs. 25 bins, 1000 voxels in each."""
+def test_a_rise_counts_from_five_standard_deviations_of_counting(rise: float, count: int) -> None:
+    """Steps are as broad as the window, whose means equal them: 25 bins with 1000 voxels each."""
     deviation = np.sqrt(2 * 1000 / 25)
     top = 1000 + rise * deviation
     counts = np.concatenate(
@@ -179,8 +180,8 @@ def test_a_rise_counts_from_five_deviations_of_counting_on(rise: float, count: i
     assert low == pytest.approx(150, abs=2)
 
 
-def test_single_voxels_of_a_long_tail_make_no_peaks() -> None:
-    """1000 bins of an exponential, counted: few voxels beyond bin 300, then single ones."""
+def test_single_voxels_of_a_long_tail_are_no_peaks() -> None:
+    """An exponential is counted in 1000 bins: few voxels beyond bin 300, then single ones."""
     rng = np.random.default_rng(3)
     at = np.arange(1000)
     for _ in range(20):
@@ -189,8 +190,8 @@ def test_single_voxels_of_a_long_tail_make_no_peaks() -> None:
         assert threshold.reading == "single peak"
 
 
-def test_a_peak_has_at_least_the_height_of_a_voxel_that_chance_may_add() -> None:
-    """Over a window of 101 bins: 5 deviations of a height of 1 are 5 sqrt(2 / 101) = 0.70 a bin."""
+def test_a_peak_must_exceed_the_chance_of_a_single_voxel() -> None:
+    """In a window of 101 bins, 5 deviations of a height of 1 are 5 sqrt(2 / 101) = .70 per bin."""
     at = np.arange(1000)
     counts = np.where(at < 300, 1e6 * np.exp(-((at - 100) ** 2) / 800), 0)
     counts[800] = 60
@@ -199,8 +200,8 @@ def test_a_peak_has_at_least_the_height_of_a_voxel_that_chance_may_add() -> None
     assert len(found(counts).peaks) == 2
 
 
-def test_chance_makes_no_peaks() -> None:
-    """A flat bright tail of noise: 100 voxels a bin, each give or take its root."""
+def test_counting_noise_makes_no_peaks() -> None:
+    """The bright tail is flat, with 100 voxels per bin plus Poisson noise."""
     rng = np.random.default_rng(0)
     bells = [(30.0, 9.0, 50_000.0), (150.0, 20.0, 9_000.0)]
     clean = np.asarray(sum(bell(*b) for b in bells)) + 100
@@ -209,7 +210,7 @@ def test_chance_makes_no_peaks() -> None:
     assert all(len(found(rng.poisson(clean)).peaks) == 2 for _ in range(20))
 
 
-def test_gain_and_offset_carry_the_threshold_along() -> None:
+def test_the_threshold_follows_gain_and_offset() -> None:
     counts = bell(60, 12, 100_000) + bell(180, 20, 30_000)
     plain = find_adaptive_threshold(histogram(counts))
     moved = find_adaptive_threshold(histogram(counts, -1000, -1000 + 4 * BINS))
@@ -218,17 +219,17 @@ def test_gain_and_offset_carry_the_threshold_along() -> None:
     assert moved.value == pytest.approx(4 * plain.value - 1000)
 
 
-def test_bins_over_whole_numbers_hold_as_many_of_them_each() -> None:
-    every = np.arange(0, 1000, dtype=np.int16)  # 1000 numbers, 4 a bin
+def test_bins_of_integers_hold_equal_numbers_of_integers() -> None:
+    every = np.arange(0, 1000, dtype=np.int16)  # 1000 numbers, 4 in each bin
     made = make_histogram(every, (0, 999))
     assert made.counts == (4,) * 250
     assert made.bin_width == 4
     assert (made.low, made.high) == (-0.5, 999.5)
-    # of 70 numbers a bin each; what lies outside of the window is left out
+    # Each of 70 numbers has its bin, and values outside of the window are left out.
     made = make_histogram(every, (10.2, 80.0))
     assert made.counts == (1,) * 70
     assert made.levels[[0, -1]].tolist() == [11, 80]
-    # 256 equal bins of numbers with a point
+    # Real numbers have 256 equal bins.
     made = make_histogram(np.linspace(0, 1, 2561, dtype=np.float32)[:-1] + 1e-4, (0.0, 1.0))
     assert len(made.counts) == 256
     assert set(made.counts) <= {9, 10, 11}
@@ -238,7 +239,7 @@ def test_bins_over_whole_numbers_hold_as_many_of_them_each() -> None:
 
 
 def two_bodies() -> NDArray[np.uint16]:
-    """Air of 100, a ball of 1000, noise of 30: the valley is wide."""
+    """Return air of 100, a ball of 1000 and noise of 30, whose valley is wide."""
     rng = np.random.default_rng(1)
     z, y, x = np.ogrid[:24, :32, :40]
     ball = (z - 11.5) ** 2 + (y - 15.5) ** 2 + (x - 19.5) ** 2 < 9.5**2
@@ -254,7 +255,7 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
         statistics=statistics,
         level=SurfaceLevel(500.0, None, 1.0),
         confidence=0.9,
-        doubt="",
+        why_unclear="",
     )
     assert appearance.threshold is not None
     assert 250 < appearance.threshold < 850
@@ -274,13 +275,13 @@ def test_a_channel_has_a_threshold_and_a_ramp_at_it() -> None:
         statistics=flat,
         level=SurfaceLevel(7.0, None, 1.0),
         confidence=1.0,
-        doubt="",
+        why_unclear="",
     )
     assert bare.threshold is None
     assert THRESHOLD not in bare.transfer_functions
 
 
-def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
+def test_the_report_draws_the_threshold_beside_those_of_otsu_and_li() -> None:
     voxels = two_bodies()
     statistics = find_statistics(voxels, WindowOptions(0, 100))
     otsu, li = find_peers(statistics.values)
@@ -304,15 +305,15 @@ def test_the_report_draws_it_beside_otsu_s_and_li_s() -> None:
     assert draw_threshold(find_statistics(np.full(100, 7, np.uint8), WindowOptions())) is None
 
 
-def test_the_report_names_what_was_left_out_as_chance() -> None:
+def test_the_report_lists_peaks_that_may_be_chance() -> None:
     rng = np.random.default_rng(4)
     threshold = found(rng.poisson(bell(30, 9, 50_000) + bell(150, 20, 9_000) + 100).astype(float))
     assert threshold.chance
-    assert "are no peaks" in describe(threshold)
+    assert "may be due to chance" in describe(threshold)
     assert f"{threshold.chance[0]:.5g}" in describe(threshold)
     smooth_one = found(bell(60, 12, 100_000) + bell(180, 20, 60_000))
     assert smooth_one.chance == ()
-    assert "are no peaks" not in describe(smooth_one)
+    assert "may be due to chance" not in describe(smooth_one)
 
 
 def test_slices_are_black_below_the_threshold() -> None:
@@ -327,7 +328,7 @@ def test_slices_are_black_below_the_threshold() -> None:
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A build whose surface lies at the threshold, up to its bundle."""
+    """Return a build whose surface lies at the threshold, up to its bundle."""
     folder = tmp_path_factory.mktemp("threshold")
     source = phantoms.write_ome_zarr(folder / "ball.ome.zarr", [two_bodies()])
     out = folder / "out"
@@ -346,7 +347,7 @@ def manifest(bundle: Path) -> dict[str, object]:
 
 
 @pytest.mark.slow
-def test_the_adaptive_criterion_takes_it_in_every_tile(built: Path) -> None:
+def test_the_adaptive_criterion_uses_the_threshold_in_every_tile(built: Path) -> None:
     (found,) = read_survey(OutFolder(built)).values()
     threshold = found.appearance.threshold
     assert threshold is not None

@@ -47,18 +47,18 @@ def test_sparse_channel_keeps_its_few_bright_voxels() -> None:
     ("limit", "levels", "seen"),
     [
         (16_000_000, 2, (0, np.s_[2:14, 4:32, 8:32])),
-        (5000, 2, (1, np.s_[1:7, 2:16, 4:16])),  # too many voxels: the coarser level's
-        (5000, 1, (0, np.s_[2:14:2, 4:32, 8:32])),  # and where there is none, some planes
+        (5000, 2, (1, np.s_[1:7, 2:16, 4:16])),  # too many voxels: those of the coarser level
+        (5000, 1, (0, np.s_[2:14:2, 4:32, 8:32])),  # without a coarser level, some of the planes
     ],
 )
-def test_window_is_that_of_the_region_alone(
+def test_the_window_is_that_of_the_built_region(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     limit: int,
     levels: int,
     seen: tuple[int, tuple[slice, slice, slice]],
 ) -> None:
-    """The data are dim to the left and bright to the right; a part of the left is built."""
+    """The data are dim on the left and bright on the right, and a part of the left is built."""
     monkeypatch.setattr(window_task, "SURVEY_VOXELS", limit)
     fine = np.random.default_rng(0).integers(100, 200, (16, 40, 80)).astype(np.uint16)
     fine[:, :, 36:] *= 10
@@ -78,7 +78,7 @@ def test_window_is_that_of_the_region_alone(
     )
     assert channel["statistics"]["window"] == pytest.approx(expected)
     assert sum(channel["statistics"]["histogram"]) == pyramid[level][part].size
-    # the threshold is read from every voxel, however few tell the window
+    # The threshold is found on every voxel, even if few voxels give the window.
     low, high = channel["statistics"]["window"]
     whole = fine[2:14, 4:32, 8:32]
     inside = (whole >= low) & (whole <= high)
@@ -86,7 +86,7 @@ def test_window_is_that_of_the_region_alone(
 
 
 @pytest.mark.slow
-def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
+def test_the_threshold_follows_from_the_survey_if_there_are_too_many_voxels(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(window_task, "SURVEY_VOXELS", 4000)
@@ -105,7 +105,7 @@ def test_of_more_voxels_than_are_counted_the_survey_s_tell_the_threshold(
 
 @pytest.mark.parametrize("iso", [None, 0.0, 0.02, 0.3, 0.97, 1.0, 1.7])
 @pytest.mark.parametrize("histogram", [np.eye(1, 256, 0)[0], np.ones(256), np.eye(1, 256, 255)[0]])
-def test_every_function_is_legal_for_any_histogram(
+def test_every_function_is_valid_for_any_histogram(
     iso: float | None, histogram: np.ndarray
 ) -> None:
     functions = make_transfer_functions((1000 * histogram).astype(np.int64), iso)
@@ -122,7 +122,7 @@ def test_every_function_is_legal_for_any_histogram(
         assert np.isfinite(table).all()
 
 
-def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
+def test_the_sharp_function_becomes_opaque_at_the_iso_value() -> None:
     histogram = np.exp(-((np.arange(256) - 30) ** 2) / 50) * 1e5
     functions = make_transfer_functions(histogram.astype(np.int64), 0.5)
     sharp = evaluate(functions["sharp"])
@@ -133,7 +133,7 @@ def test_sharp_turns_opaque_at_the_iso_value_and_background_is_clear() -> None:
 
 
 @pytest.mark.parametrize("iso", [0.1, 0.3, 0.6])
-def test_a_volume_begins_near_its_surface_and_half_way_to_what_has_none(iso: float) -> None:
+def test_opacity_begins_near_a_surface_and_half_way_to_the_level_without_one(iso: float) -> None:
     background = np.exp(-((np.arange(256) - 8) ** 2) / 20) * 1e5
     histogram = (background + 50).astype(np.int64)
     opacity = evaluate(make_transfer_functions(histogram, iso)["default"])
@@ -145,7 +145,7 @@ def test_a_volume_begins_near_its_surface_and_half_way_to_what_has_none(iso: flo
     assert faint < 0.7 * near
 
 
-def test_look_has_the_level_with_the_backgrounds_mean() -> None:
+def test_the_appearance_has_the_level_plus_the_background_s_mean() -> None:
     statistics = find_statistics(np.arange(101, dtype=np.uint8), WindowOptions(0, 100))
     knots = ((0.0,), (0.0,), (0.0, 9.0))
     background = LatticeField(knots, np.array([[[5.0, 15.0]]]))
@@ -155,7 +155,7 @@ def test_look_has_the_level_with_the_backgrounds_mean() -> None:
         statistics=statistics,
         level=SurfaceLevel(20.0, background, 1.0),
         confidence=0.75,
-        doubt="",
+        why_unclear="",
     )
     assert appearance.surface == "clear"
     assert appearance.iso_value == 30
@@ -165,14 +165,14 @@ def test_look_has_the_level_with_the_backgrounds_mean() -> None:
     assert appearance.level.words == "20 above a background of 5 to 15"
 
 
-def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
+def test_without_a_surface_there_is_no_level_and_no_threshold() -> None:
     rng = np.random.default_rng(0)
     peaks = np.concatenate([rng.normal(60, 8, 20_000), rng.normal(180, 8, 9000)])
     statistics = find_statistics(peaks.round().astype(np.uint8), WindowOptions(0, 100))
     assert statistics.threshold is not None
     unsure, none = (
         make_appearance(
-            "CD31", (0, 1, 0), statistics=statistics, level=level, confidence=0.3, doubt=doubt
+            "CD31", (0, 1, 0), statistics=statistics, level=level, confidence=0.3, why_unclear=doubt
         )
         for level, doubt in ((SurfaceLevel(120.0, None, 1.0), ""), (None, "no clear surface"))
     )
@@ -187,7 +187,7 @@ def test_without_a_surface_nothing_begins_at_a_level_or_a_threshold() -> None:
 
 
 def _veil(functions: dict[str, OpacityPoints], noise: NDArray[np.float64], voxels: int) -> float:
-    """Return the opacity of a path of so many voxels through noise, by 'default'."""
+    """Return the opacity along a number of voxels of noise, by the function `default`."""
     absorbed = -np.log1p(-evaluate(functions["default"]))
     return 1 - float(np.exp(-voxels * (absorbed * noise / noise.sum()).sum()))
 
@@ -195,18 +195,18 @@ def _veil(functions: dict[str, OpacityPoints], noise: NDArray[np.float64], voxel
 def test_noise_of_the_air_does_not_veil_a_surface_just_above_it() -> None:
     x = np.arange(256.0)
     sigma = 10.0
-    air = x * np.exp(-(x**2) / (2 * sigma**2))  # Rayleigh: magnitudes of MR
+    air = x * np.exp(-(x**2) / (2 * sigma**2))  # Rayleigh noise, as in magnitudes of MR
     tissue = 0.3 * air.sum() * np.exp(-0.5 * ((x - 100) / 15) ** 2) / 37.6
     iso = 4.0 * sigma / 255
     histogram = (1e6 * (air + tissue) / air.sum()).astype(np.int64)
     functions = make_transfer_functions(histogram, iso, has_magnitudes=True)
     assert _veil(functions, air, 100) < 0.02
-    assert evaluate(functions["default"])[int(iso * 255) + 1] > 0.1  # the surface itself shows
+    assert evaluate(functions["default"])[int(iso * 255) + 1] > 0.1  # the surface itself is visible
 
 
-def test_noise_that_goes_on_above_the_surface_is_no_dust_before_it() -> None:
+def test_noise_that_continues_above_the_surface_does_not_show_as_dust() -> None:
     x = np.arange(256.0)
-    # magnitudes of a coil that hears some places better: a longer tail than any one of them has
+    # Magnitudes of a coil with uneven sensitivity have a longer tail than those at any one place.
     air = sum((x / s**2 * np.exp(-(x**2) / (2 * s**2)) for s in (5.0, 7.0, 9.0, 12.0)), 0 * x)
     air /= air.sum()
     tissue = 0.4 * np.exp(-0.5 * ((x - 110) / 20) ** 2) / 50
@@ -217,12 +217,12 @@ def test_noise_that_goes_on_above_the_surface_is_no_dust_before_it() -> None:
     )
     opacity = evaluate(functions["default"])
     assert air[opacity > 0].sum() < 0.3 * air[level + 1 :].sum()
-    assert (opacity[int(MAX_SHIFT * level) + 4 :] > 0.12).all()  # what is brighter shows as before
+    assert (opacity[int(MAX_SHIFT * level) + 4 :] > 0.12).all()  # brighter values show as before
     for points in functions.values():
-        assert (np.diff([x for x, _ in points]) > 0).all()  # as the stage's readers expect
+        assert (np.diff([x for x, _ in points]) > 0).all()  # as readers of the stage expect
 
 
-def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:
+def test_the_even_counts_of_an_edge_do_not_count_as_noise() -> None:
     x = np.arange(256.0)
     air = np.exp(-0.5 * ((x - 10) / 4) ** 2)
     edge = np.full(256, 0.02)  # voxels that lie partly in the body
@@ -232,7 +232,7 @@ def test_the_even_counts_of_an_edge_are_no_noise_above_the_surface() -> None:
     assert functions["default"][2] == (round(34 / 255, 4), AT_SURFACE_OF_MAGNITUDES)
 
 
-def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:
+def test_values_between_noise_and_a_far_surface_are_visible() -> None:
     x = np.arange(256.0)
     air = np.exp(-0.5 * ((x - 10) / 4) ** 2)
     start, opacity = make_transfer_functions(
@@ -242,9 +242,10 @@ def test_where_noise_ends_far_below_the_surface_what_is_between_shows() -> None:
     assert opacity == 0
 
 
-def test_a_peak_that_is_no_background_moves_nothing() -> None:
+def test_a_peak_of_tissue_does_not_count_as_background() -> None:
     x = np.arange(256.0)
-    tissue = np.exp(-0.5 * ((x - 150) / 30) ** 2)  # fills the picture: what is below is its flank
+    # The tissue fills the image, and lower values are its flank
+    tissue = np.exp(-0.5 * ((x - 150) / 30) ** 2)
     full = make_transfer_functions((1e6 * tissue).astype(np.int64), 0.3, has_magnitudes=True)[
         "default"
     ]

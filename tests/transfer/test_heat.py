@@ -1,4 +1,4 @@
-"""The heat map of a tracer: from dark red to the channel's colour, from the organs' level on."""
+"""The heat map of a tracer, from dark red to the channel's colour above the organs' level."""
 
 import numpy as np
 
@@ -22,31 +22,31 @@ def test_more_of_a_tracer_is_lighter_and_denser_at_every_gradient() -> None:
     np.testing.assert_allclose(inside[0], inside[-1])
 
 
-def test_a_veil_shows_the_body_round_the_organs_and_changes_their_heat_little() -> None:
+def test_a_veil_shows_the_body_around_the_organs_and_hardly_changes_their_colours() -> None:
     bare, veiled = (evaluate2d(heat_shapes(0.2, body)).astype(int) for body in (None, 0.05))
     body = veiled[:, int(0.07 * 255) : int(0.19 * 255), 3]
     assert (body > 0).all()
-    passed = (1 - body.max() / 255) ** 60  # of the light, by a body of 60 voxels
+    passed = (1 - body.max() / 255) ** 60  # share of the light that crosses a body of 60 voxels
     assert 0.5 < passed < 0.8
     assert (veiled[:, : int(0.05 * 255) - 1, 3] == 0).all()  # air
     organs = slice(int(0.28 * 255), None)
     assert np.abs(veiled[:, organs] - bare[:, organs]).max() <= 12
-    # a threshold within the organs parts no body from the air
+    # A threshold within the organs does not separate the body from the air.
     assert heat_shapes(0.2, 0.19) == heat_shapes(0.2) == heat_shapes(0.2, 0.3)
 
 
-def test_a_pet_opens_with_its_heat_map_at_the_level_of_its_organs() -> None:
+def test_a_pet_is_first_shown_by_its_heat_map_above_the_organs_level() -> None:
     rng = np.random.default_rng(0)
     voxels = np.concatenate([rng.gamma(1.2, 150, 90_000), rng.normal(4000, 500, 5_000)])
     statistics = find_statistics(voxels, WindowOptions())
     appearance = make_appearance(
         "PT", (1, 1, 1), statistics=statistics, level=SurfaceLevel(1500.0, None, 1.0),
-        confidence=1.0, doubt="", modality="PT",
+        confidence=1.0, why_unclear="", modality="PT",
     )  # fmt: skip
     assert appearance.function == "heat"
     shapes = appearance.transfer_2d.functions["heat"]
     assert appearance.iso_normalized is not None
     assert abs(shapes[0].values[0] - appearance.iso_normalized) < 1e-6
-    # where gradients are not known the same values show
+    # Programs without gradients show the same values.
     points = dict(appearance.transfer_functions["heat"])
     assert max(points.values()) > 0.4

@@ -1,4 +1,4 @@
-"""Gradient magnitudes against theory, and against what a shader samples."""
+"""Gradient magnitudes, compared with theory and with the samples of a shader."""
 
 import numpy as np
 import pytest
@@ -35,13 +35,13 @@ def coordinates(shape: tuple[int, int, int]) -> list[np.ndarray]:
 def test_a_ramp_has_its_slope_over_two_finest_voxels(slope: tuple[float, float, float]) -> None:
     field = sum(g * c for g, c in zip(slope, coordinates((12, 14, 16)), strict=True))
     steps = find_steps(to_eight_bits(np.asarray(field), (0, 1)), SPACING)
-    # both samples of a difference are rounded to half a step; the axes add as they do in a length
+    # Both samples of a difference are rounded to half a step. The axes add up as in a length.
     within = np.sqrt(sum((1 / h) ** 2 for h, g in zip(SPACING, slope, strict=True) if g))
     assert steps.shape == (10, 12, 14)
     assert np.abs(steps - 255 * 2 * np.linalg.norm(slope)).max() <= within + 1e-3
 
 
-def test_the_step_is_what_trilinear_samples_one_finest_voxel_to_either_side_give() -> None:
+def test_the_step_equals_that_of_trilinear_samples_one_finest_voxel_to_each_side() -> None:
     voxels = np.random.default_rng(1).integers(0, 256, (6, 7, 8)).astype(np.uint8)
     centres = np.indices(voxels.shape)[:, 1:-1, 1:-1, 1:-1].astype(float)
     squares = 0
@@ -57,26 +57,26 @@ def test_the_step_is_what_trilinear_samples_one_finest_voxel_to_either_side_give
 
 @pytest.mark.parametrize("sigma", [0.8, 1.5, 4.0])
 def test_a_blurred_edge_is_an_arc(sigma: float) -> None:
-    """Kindlmann & Durkin 1998; with central differences in place of the derivative."""
+    """Kindlmann & Durkin 1998, with central differences in place of the derivative."""
     low, high = 0.2, 0.8
     x = np.linspace(-6, 6, 1201)[:, np.newaxis] + np.arange(-1, 2)  # voxels at many phases
     field = low + (high - low) * norm.cdf(x / sigma)
     voxels = to_eight_bits(np.broadcast_to(field, (3, *field.shape)), (0, 1))
-    # only the middle plane's x differences count: y runs over the phases
+    # Only differences along x in the middle plane count. y runs over the phases.
     middle = voxels[1, :, 1] / 255
     steps = (voxels[1, :, 2].astype(float) - voxels[1, :, 0]) / 255
     seen = (middle > 0.25) & (middle < 0.75)
     z = np.sqrt(2) * erfinv(2 * (middle[seen] - low) / (high - low) - 1)
     exact = (high - low) * (norm.cdf(z + 1 / sigma) - norm.cdf(z - 1 / sigma))
     assert np.abs(steps[seen] - exact).max() <= 2.5 / 255
-    if sigma == 4.0:  # the derivative's own arc, which a wide edge comes near
+    if sigma == 4.0:  # the arc of the derivative, which a wide edge approaches
         smooth = 2 * (high - low) / (sigma * np.sqrt(2 * np.pi)) * np.exp(-((z / np.sqrt(2)) ** 2))
         assert np.abs(steps[seen] - smooth).max() <= 3 / 255
     one = np.repeat(voxels[:1, 600:601], 3, axis=1).repeat(3, axis=0)
     assert find_steps(one, (1, 1, 1))[0, 0, 0] / 255 == pytest.approx(steps[600], abs=1e-6)
 
 
-def test_every_inner_voxel_is_counted_at_its_value_and_row() -> None:
+def test_each_inner_voxel_is_counted_at_its_value_and_gradient() -> None:
     voxels = np.full((5, 6, 7), 40, np.uint8)
     counts = count_joint(voxels, (1, 1, 1), gradient_max=0.5)
     assert counts.shape == (ROWS, COLUMNS)
@@ -96,7 +96,7 @@ def test_thin_volumes_repeat_their_ends(shape: tuple[int, int, int]) -> None:
     assert counts.sum() == counts[0, 9] > 0
 
 
-def test_fine_rows_become_those_of_the_scale() -> None:
+def test_fine_rows_are_merged_into_those_of_the_scale() -> None:
     voxels = np.random.default_rng(2).integers(0, 120, (12, 20, 20)).astype(np.uint8)
     fine = count_joint(voxels, SPACING, gradient_max=STEEPEST, rows=FINE_ROWS)
     for gradient_max in (0.2, 0.55):
@@ -105,13 +105,13 @@ def test_fine_rows_become_those_of_the_scale() -> None:
             rebin(fine, gradient_max),
         )
         assert (direct.sum(axis=0) == coarse.sum(axis=0)).all()
-        # a fine row may lie across the border of two: never further
+        # A fine row may lie across the border of two rows, but no further.
         below = [counts.cumsum(axis=0) for counts in (direct, coarse)]
         assert (below[0][:-1] <= below[1][1:]).all()
         assert (below[1][:-1] <= below[0][1:]).all()
 
 
-def test_the_scale_ends_above_the_edges_and_not_at_a_hot_voxel() -> None:
+def test_the_scale_ends_above_the_edges_and_ignores_a_hot_voxel() -> None:
     edge = np.zeros((80, 80, 80), np.uint8)
     edge[:, :, 40:] = 102  # 0.4 of the window
     fine = count_joint(edge, (1, 1, 1), gradient_max=STEEPEST, rows=FINE_ROWS)
@@ -128,7 +128,7 @@ def test_a_constant_volume_has_a_scale() -> None:
     assert choose_gradient_max(np.zeros((FINE_ROWS, COLUMNS), np.int64)) == 0.05
 
 
-def test_the_picture_is_logarithmic_and_shows_single_voxels() -> None:
+def test_the_image_is_logarithmic_and_shows_single_voxels() -> None:
     counts = np.array([[0, 1, 99, 10**9]])
     picture = log_scaled(counts)
     assert picture.tolist() == [[0, 9, 57, 255]]  # 255 ln 2 / ln 1e9 = 8.5, 255 ln 100 / ln 1e9
@@ -136,7 +136,7 @@ def test_the_picture_is_logarithmic_and_shows_single_voxels() -> None:
     assert not log_scaled(np.zeros((2, 2), np.int64)).any()
 
 
-def test_boxes_lie_in_the_region_apart_and_hold_what_is_asked() -> None:
+def test_sampled_boxes_lie_apart_in_the_region_and_hold_the_requested_voxels() -> None:
     region = Box((5, 10, 20), (105, 1010, 2020))
     boxes = sample_boxes(region, 8_000_000)
     mask = np.zeros((21, 1001, 2001), np.uint8)  # every fifth plane
@@ -150,6 +150,6 @@ def test_boxes_lie_in_the_region_apart_and_hold_what_is_asked() -> None:
     assert sample_boxes(region, 10**9) == [region]
 
 
-def test_eight_bits_are_those_of_the_units() -> None:
+def test_voxels_are_converted_to_eight_bits_by_the_window() -> None:
     values = np.array([-5.0, 0, 9.99, 10, 20, 30, 110, 111], np.float32)
     assert to_eight_bits(values, (10, 110)).tolist() == [0, 0, 0, 0, 26, 51, 255, 255]

@@ -1,4 +1,4 @@
-"""Each transfer function that a build makes has a title and a sentence, which the viewer shows."""
+"""Each transfer function of a build has a title and an explanation, which the viewer shows."""
 
 import pkgutil
 import re

@@ -1,4 +1,4 @@
-"""Two-dimensional transfer functions: the table, the stage, the bundle, the viewer's twin."""
+"""Two-dimensional transfer functions: the table, the stage, the bundle and the viewer's copy."""
 
 import json
 import shutil
@@ -41,7 +41,7 @@ from support.phantoms import as_counts, blurred_ball, write_ome_tiff
 
 RECTANGLE = Shape("rectangle", (0.25, 1.0), (0.25, 1.0), 0.625, (1.0, 0.5, 0.0), 0.5, 1.0)
 TRIANGLE = Shape("triangle", (0.0, 1.0), (0.0, 1.0), 0.5, (0.0, 0.0, 1.0), 1.0, 1.0)
-# a look with a 2D function, whose numbers float32 does not hold exactly
+# An appearance with a 2D function whose numbers float32 cannot hold exactly
 SHAPES: Shapes = (
     Shape("triangle", (0.2, 0.7), (0.1, 0.9), 0.45, (1.0, 0.3, 0.1), 0.35, 0.5),
     Shape("rectangle", (0.6, 0.95), (0.0, 0.2), 0.775, (1.0, 1.0, 1.0), 0.05, 0.25),
@@ -56,12 +56,12 @@ TILES = tuple(spheres.tile(column, APPEARANCES) for column in (0, 1))
 CD31 = "/Specimen/Channels/CD31"
 
 
-# The table. By hand, for values and gradients 0, 1/4, 1/2, 3/4, 1; see docs/transfer-functions.md.
+# The table, by hand, for values and gradients 0, 1/4, 1/2, 3/4, 1. See docs/transfer-functions.md.
 
 
-def test_a_rectangle_fades_to_its_edges_but_not_to_the_planes() -> None:
+def test_a_rectangle_fades_towards_its_edges_but_not_at_the_ends_of_the_plane() -> None:
     table = evaluate2d((RECTANGLE,), size=(5, 5))
-    # across: 0 at 1/4, 2/3 at 1/2, 1 on; up: 0 at 1/4, 2/3 at 1/2, 1 on; times half, times 255
+    # Across: 0 at 1/4, 2/3 at 1/2, then 1. Up: 0 at 1/4, 2/3 at 1/2, then 1. Times .5, times 255.
     assert table[..., 3].tolist() == [
         [0, 0, 0, 0, 0],
         [0, 0, 0, 0, 0],
@@ -82,21 +82,21 @@ def test_a_triangle_widens_from_its_tip() -> None:
     ]
 
 
-def test_shapes_that_overlap_share_the_colour_by_their_opacities() -> None:
-    # 1/3 of (1, 1/2, 0) and 1 of (0, 0, 1), by 4/3
+def test_overlapping_shapes_mix_their_colours_by_opacity() -> None:
+    # 1/3 of (1, 1/2, 0) plus 1 of (0, 0, 1), divided by 4/3
     assert evaluate2d((RECTANGLE, TRIANGLE), size=(5, 5))[4, 2].tolist() == [64, 32, 191, 255]
     half = replace(RECTANGLE, values=(0.0, 1.0), gradients=(0.0, 1.0))
-    # two of a half each absorb three quarters
+    # Two shapes that absorb a half each absorb three quarters together.
     assert (evaluate2d((half, half))[..., 3] == np.floor(0.75 * 255 + 0.5)).all()
 
 
-def test_no_shapes_are_clear_and_white() -> None:
+def test_without_shapes_the_table_is_clear_and_white() -> None:
     table = evaluate2d(())
     assert table.shape == (ROWS, COLUMNS, 4)
     assert (table == [255, 255, 255, 0]).all()
 
 
-def test_the_fall_back_is_a_transfer_function_that_shows_where_shapes_lie() -> None:
+def test_the_fallback_is_a_transfer_function_that_shows_the_shapes_values() -> None:
     points = fall_back(SHAPES)
     values = np.array(points)[:, 0]
     assert (values[0], values[-1]) == (0, 1)
@@ -121,7 +121,7 @@ def test_the_fall_back_is_a_transfer_function_that_shows_where_shapes_lie() -> N
         ({"color": (0.0, 9.0, 0.0)}, "color.g is 9, expected 0..1"),
     ],
 )
-def test_a_faulty_shape_is_told(change: dict[str, object], fault: str) -> None:
+def test_a_faulty_shape_is_reported(change: dict[str, object], fault: str) -> None:
     assert find_fault(TRIANGLE) == ""
     assert find_fault(replace(TRIANGLE, **change)).startswith(fault)
 
@@ -131,7 +131,7 @@ def random_shapes(seed: int) -> Shapes:
     shapes = []
     for i in range(rng.integers(1, 6)):
         ends = np.sort(rng.random((2, 2)), axis=1)
-        if rng.random() < 0.5:  # at the plane's own ends
+        if rng.random() < 0.5:  # at the ends of the plane
             ends[:, rng.integers(2)] = rng.integers(2)
             ends = np.sort(ends, axis=1)
         (v0, v1), (g0, g1) = ends.tolist()
@@ -171,12 +171,12 @@ def test_the_viewer_makes_the_same_bytes(tmp_path: Path) -> None:
         assert np.array_equal(table, evaluate2d(case)), case
 
 
-# The stage, and an artist's layer over it.
+# The stage, and an artist's layer over it
 
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The two tiles' stage with a 2D function, to be read only."""
+    """Write the stage of two tiles with a 2D function; tests only read it."""
     folder = tmp_path_factory.mktemp("stage")
     for tile in TILES:
         write_tile(folder, tile)
@@ -193,7 +193,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def edit(stage: Path, folder: Path, variant: str = NAME, **arrays: object) -> Path:
     """Return a layer over the stage that sets attributes `stereocell:...` in a variant of CD31.
 
-    gradientMax is no variant's: the stage has it outside of them.
+    gradientMax is set outside of variants, as in the stage.
     """
     layer = Sdf.Layer.CreateNew(str(folder / "edit.usda"))
     layer.subLayerPaths = [str(stage)]
@@ -211,14 +211,14 @@ def edit(stage: Path, folder: Path, variant: str = NAME, **arrays: object) -> Pa
     return folder / "edit.usda"
 
 
-def test_the_stage_gives_back_the_shapes_as_they_were(stage: Path) -> None:
+def test_the_stage_returns_the_shapes_unchanged(stage: Path) -> None:
     red, blue = read_appearances(open_stage(stage))
     assert red.transfer_2d == LOOK.transfer_2d
     assert list(red.transfer_functions) == ["default", NAME, "sharp"]
     assert blue.transfer_2d == TransferFunctions2d()
 
 
-def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) -> None:
+def test_attributes_that_an_artist_omits_have_their_defaults(stage: Path, tmp_path: Path) -> None:
     path = edit(
         stage,
         tmp_path,
@@ -232,7 +232,7 @@ def test_what_an_artist_leaves_out_has_its_default(stage: Path, tmp_path: Path) 
     assert red.chosen == "sharp"
 
 
-def test_emptied_shapes_leave_the_opacity_points(stage: Path, tmp_path: Path) -> None:
+def test_emptying_the_shapes_keeps_the_opacity_points(stage: Path, tmp_path: Path) -> None:
     empty = {"shapes": Vt.Vec4fArray(), "shapeKinds": Vt.TokenArray()}
     empty |= {"shapeTips": Vt.FloatArray(), "shapeSoftness": Vt.FloatArray()}
     path = edit(stage, tmp_path, **empty, shapeColors=Vt.Vec4fArray())
@@ -275,7 +275,7 @@ MANY = Vt.Vec4fArray([Gf.Vec4f(0, 1, 0, 1)] * (MAX_SHAPES + 1))
         ({"gradientMax": float("nan")}, "gradientMax: nan, expected it above 0"),
     ],
 )
-def test_a_faulty_edit_is_one_clear_line(
+def test_the_error_for_a_faulty_edit_is_one_line(
     stage: Path, tmp_path: Path, arrays: dict[str, object], message: str
 ) -> None:
     path = edit(stage, tmp_path, **dict(arrays))
@@ -284,12 +284,12 @@ def test_a_faulty_edit_is_one_clear_line(
     assert "\n" not in str(caught.value)
 
 
-# The bundle.
+# The bundle
 
 
 @pytest.fixture(scope="module")
 def bundle(stage: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Its bundle, to be read only."""
+    """Write the bundle of that stage; tests only read it."""
     out = tmp_path_factory.mktemp("bundle") / "bundle"
     write_bundle(stage, out, None, engine=Engine(0))
     return out
@@ -307,7 +307,7 @@ def picture(bundle: Path) -> NDArray[np.uint8]:
     return np.frombuffer(texels, np.uint8).reshape(ROWS, COLUMNS)
 
 
-def test_the_bundle_has_the_shapes_and_its_files_fit_their_schema(bundle: Path) -> None:
+def test_the_bundle_has_the_shapes_and_its_files_match_their_schema(bundle: Path) -> None:
     schema = Draft202012Validator(
         json.loads(schema_path("transfer2d.schema.json").read_text("utf-8"))
     )
@@ -316,7 +316,8 @@ def test_the_bundle_has_the_shapes_and_its_files_fit_their_schema(bundle: Path) 
     assert channel(bundle)["transfer_functions_2d"]["names"] == [NAME]
     found = functions(bundle)
     assert found["gradient_max"] == 0.37
-    assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: SHAPES}  # type: ignore[attr-defined]
+    # Type: ignore[attr-defined]
+    assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: SHAPES}
     blue = functions(bundle, "Hoechst 33342")
     assert blue["functions"] == {}
     assert channel(bundle, "Hoechst 33342")["transfer_functions_2d"]["names"] == []
@@ -329,14 +330,14 @@ def test_the_histogram_counts_the_volumes_of_all_tiles(bundle: Path) -> None:
     assert isinstance(counts, np.ndarray)
     assert functions(bundle)["most"] == counts.max()
     assert np.array_equal(picture(bundle), log_scaled(counts))
-    # 60 steps a um outside of the ball: 60 over two voxels of 0.5 um, along any direction
+    # Outside of the ball the field falls by 60 per um, which is 60 over two voxels of .5 um.
     row = round(60 / 255 / 0.37 * (ROWS - 1))
     middle = counts[:, 40:90].sum(axis=1)
     assert middle[row - 5 : row + 2].sum() > 0.8 * middle.sum()
 
 
-def test_what_the_page_waits_for_grows_little(bundle: Path) -> None:
-    """Shapes and histogram are files of their own; the manifest names one a channel."""
+def test_2d_functions_add_little_to_the_manifest(bundle: Path) -> None:
+    """Shapes and histogram are separate files, and the manifest has one name per channel."""
     for name in ("CD31", "Hoechst 33342"):
         text = json.dumps(
             {"transfer_functions_2d": channel(bundle, name)["transfer_functions_2d"]}, indent=1
@@ -357,10 +358,11 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
     )
     write_bundle(path, tmp_path / "bundle", None, engine=Engine(0))
     entry = channel(tmp_path / "bundle")
-    assert entry["transfer_function"] == NAME  # what is chosen in the layer
+    assert entry["transfer_function"] == NAME  # as chosen in the layer
     found = functions(tmp_path / "bundle")
     edited = Shape("rectangle", (0.1, 0.3), (0.2, 0.8), 0.2, (0, 1, 0), 0.6, 0)
-    assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: (edited,)}  # type: ignore[attr-defined]
+    # Type: ignore[attr-defined]
+    assert {name: shapes_from(s) for name, s in found["functions"].items()} == {NAME: (edited,)}
     assert found["gradient_max"] == 0.74
     counts = sum(
         count_joint(t.channels[0].volume, spheres.SPACING, gradient_max=0.74) for t in TILES
@@ -368,16 +370,18 @@ def test_an_edit_of_shapes_reaches_the_bundle(stage: Path, tmp_path: Path) -> No
     assert np.array_equal(picture(tmp_path / "bundle"), log_scaled(np.asarray(counts)))
 
 
-# All the way.
+# The whole way
 
 
 def line_of(out: Path) -> CheckLine:
-    """Return what `check` says of the 2D functions; it stops there."""
+    """Return the errors of `check` about 2D functions."""
     return next(line for line in check(out) if line.name == "2D transfer functions")
 
 
 @pytest.mark.slow
-def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Path) -> None:
+def test_a_build_suggests_the_boundary_or_gives_the_reason_for_none(
+    tmp_path: Path,
+) -> None:
     shape, spacing = (40, 48, 48), (0.5, 0.5, 0.5)
     center = tuple((n - 1) * h / 2 for n, h in zip(shape, spacing, strict=True))
     ball = as_counts(blurred_ball(shape, spacing, center, 7.0, 0.5), 300, 900)
@@ -395,7 +399,7 @@ def test_a_build_proposes_the_boundary_and_says_where_there_is_none(tmp_path: Pa
     appearance = ball.appearance
     (triangle,) = appearance.transfer_2d.functions[NAME]
     low, high = appearance.window
-    # half-way between the ball's and the background's counts
+    # Half-way between the ball's and the background's counts
     assert low + triangle.tip * (high - low) == pytest.approx(600, abs=20)
     assert flat.appearance.transfer_2d.functions == {}
     assert flat.statistics.suggested.reason == "materials found: 1, expected at least 2"

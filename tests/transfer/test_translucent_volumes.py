@@ -1,4 +1,4 @@
-"""Volumes of microscopes open translucent: light crosses them, and bodies show within others."""
+"""Volumes of microscopes are translucent at first: light crosses them, and shows inner bodies."""
 
 import numpy as np
 import pytest
@@ -27,13 +27,13 @@ def _opened(modality: str, *, has_surface: bool = True) -> Appearance:
         statistics=find_statistics(_stain(0.1), WindowOptions(0, 100)),
         level=SurfaceLevel(LEVEL, None, 1.0) if has_surface else None,
         confidence=1.0,
-        doubt="" if has_surface else "no clear surface",
+        why_unclear="" if has_surface else "no clear surface",
         modality=modality,
     )
 
 
 def _passed(filled: float, depth_voxels: float) -> float:
-    """Return the light that crosses the whole volume in the mean, 0..1, by the soft function."""
+    """Return the mean light, 0..1, that crosses the whole volume with the soft function."""
     statistics = find_statistics(_stain(filled), WindowOptions(0, 100))
     low, high = statistics.window
     histogram = np.asarray(statistics.histogram)
@@ -48,19 +48,17 @@ def _passed(filled: float, depth_voxels: float) -> float:
     ("modality", "function"),
     [("", "soft"), ("US", "default"), ("PT", "heat"), (SEGMENTATION, "default")],
 )
-def test_only_microscopes_have_volumes_that_open_translucent(modality: str, function: str) -> None:
+def test_only_volumes_of_microscopes_are_translucent_at_first(modality: str, function: str) -> None:
     assert _opened(modality).function == function
 
 
-def test_a_volume_without_a_surface_around_it_opens_as_a_body() -> None:
+def test_a_volume_without_a_surface_is_shown_as_a_body_at_first() -> None:
     assert _opened("", has_surface=False).function == "default"
 
 
 @pytest.mark.parametrize("depth_voxels", [40.0, 200.0])
 @pytest.mark.parametrize("filled", [0.05, 0.15])
-def test_light_crosses_a_volume_however_deep_and_full_it_is(
-    depth_voxels: float, filled: float
-) -> None:
+def test_light_crosses_volumes_of_any_depth_and_density(depth_voxels: float, filled: float) -> None:
     assert _passed(filled, depth_voxels) > 0.35
 
 
@@ -79,7 +77,7 @@ def test_the_deepest_volume_has_opacities_of_many_steps_of_8_bits() -> None:
     assert 255 * evaluate(deep)[-1] > 10
 
 
-def test_soft_opacity_begins_no_earlier_than_that_of_a_body() -> None:
+def test_the_soft_function_begins_where_the_default_one_does() -> None:
     histogram = np.bincount([10] * 900 + [200] * 100, minlength=256).astype(np.int64)
     functions = make_transfer_functions(histogram, 0.4)
     assert functions["soft"][1] == functions["default"][1]

@@ -1,1 +1,1 @@
-"""Filters from voxels to voxels: noise, background, minima and maxima of bricks."""
+"""Filters from voxels to voxels: noise, background, mip levels, and value ranges of bricks."""

@@ -1,15 +1,15 @@
-"""The background of a channel: smooth, dataset-wide, subtracted before iso-values are found.
+"""Find the background of a channel: smooth, dataset-wide, subtracted before iso-values are found.
 
-Stray light and autofluorescence lie under a stain and vary over a tile; one level can't serve both
-its bright and its dark side. Space is split into blocks as large as the largest bodies. A low
-percentile of a block's voxels is its background, as long as bodies leave that share free. The field
-is linear between the blocks' centres and on to the ends of what is built, so neighbouring tiles
-see the same value at the same place.
+Stray light and autofluorescence lie under a stain and vary over a tile, so one level does not suit
+both the bright and the dark side. Space is divided into blocks as large as the largest bodies. The
+background of a block is a low percentile of its voxels, provided that bodies leave this share free.
+The field is linear between the blocks' centres and continues to the ends of the region. So
+neighbouring tiles see the same value at the same place.
 
-Where the background rises within a block, a low percentile is that of its dark side. So what is
-found is subtracted, and the same is done again with what remains. Bodies on a ground that rises to
-three times their height: Dice .37 where the field was constant beyond the outermost centres, .93 on
-to the ends; with three passes in place of six it was .14 (docs/decisions/levels.md).
+Where the background rises within a block, a low percentile is that of the block's dark side. So the
+result is subtracted, and the same is repeated on the remainder. On bodies over a ground that rises
+to three times their height, Dice is .93. It was .14 with three passes instead of six, and .37 with
+a field that was constant beyond the outermost centres (docs/decisions/levels.md).
 """
 
 from itertools import pairwise, product
@@ -24,8 +24,8 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
-PERCENTILE = 15.0  # percent of a block's voxels that are at most the background
-SMOOTHING = 0.7  # sigma in blocks; lowers a block that a body fills completely
+PERCENTILE = 15.0  # percent of a block's voxels; the background is this percentile
+SMOOTHING = 0.7  # sigma in blocks; lowers the value of a block that a body fills completely
 PASSES = 6
 
 
@@ -40,12 +40,12 @@ def find_background(
 ) -> LatticeField:
     """Return the background of a channel, in voxel values.
 
-    field       (z, y, x), voxel values; covers `region` at any resolution
+    field       (z, y, x), voxel values, covering `region` at any resolution
     region      voxels of the level that is built
     spacing_um  (z, y, x), of the region's level
-    block_um    aim for the edge of a block; knots lie at the blocks' centres and at the ends
-    padding     bool (z, y, x), voxels of the field that take no part; None: all do
-    passes      fewer are enough for an estimate
+    block_um    approximate edge of a block; knots lie at the blocks' centres and at the ends
+    padding     bool (z, y, x), voxels of the field that are left out; None: none are
+    passes      number of passes; an estimate needs fewer
     """
     blocks = [
         max(1, min(n, ceil(size * step / block_um - 0.25)))
@@ -64,7 +64,8 @@ def find_background(
             sides = [(int(e[i]), int(e[i + 1])) for e, i in zip(edges, place, strict=True)]
             block = tuple(slice(*side) for side in sides)
             (z0, z1), (y0, y1), (x0, x1) = sides
-            # block by block: the whole field as float32 would set the peak memory of a small build
+            # The memory is bounded by one block: the whole field as float32 would be the peak of a
+            # small build.
             rest = field[block].astype(np.float32) - found.at(Box((z0, y0, x0), (z1, y1, x1)))
             if padding is not None:
                 rest = rest[~padding[block]]
@@ -84,7 +85,7 @@ def find_background(
 def _to_the_ends(lattice: LatticeField, shape: tuple[int, ...]) -> LatticeField:
     """Return the lattice with knots at the ends of the field, in line with the two next to them.
 
-    Beyond the outermost blocks' centres a lattice is constant, and a background seldom is.
+    A lattice is constant beyond its outermost knots, but a background seldom is.
     """
     values, axes = lattice.values, []
     for axis, (centres, n) in enumerate(zip(lattice.centres, shape, strict=True)):
@@ -102,7 +103,7 @@ def _to_the_ends(lattice: LatticeField, shape: tuple[int, ...]) -> LatticeField:
 
 
 def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the knots smoothed; those without a value take their neighbours'."""
+    """Return the knots smoothed. Knots without a value take those of their neighbours."""
     is_known = np.isfinite(knots)
     if not is_known.any():
         return np.zeros_like(knots)
@@ -113,6 +114,6 @@ def _smooth(knots: NDArray[np.float64]) -> NDArray[np.float64]:
         around = ndimage.gaussian_filter(weight, sigma, mode="nearest")
         if around.min() > 1e-6:
             break
-        sigma *= 2  # a gap wider than the filter
+        sigma *= 2  # there is a gap wider than the filter
     smoothed = ndimage.gaussian_filter(filled, sigma, mode="nearest") / around
     return np.asarray(smoothed, np.float64)

@@ -1,14 +1,16 @@
-"""Filters applied before a surface is extracted: hot voxels removed, noise smoothed.
+"""Filters applied before a surface is extracted: hot voxels are removed and noise is smoothed.
 
 A median of 3 x 3 voxels removes sheets of two voxels that lie across its plane, and a Gaussian of
-one voxel those of one and a half. So neither may move a value farther than noise explains. Even
-parts get about as smooth as without that bound, and a wall of half a voxel stays as long as it
-stands out of the noise. Hot voxels would stay as well, so the bound counts from a voxel that is
-clipped to the least and largest of 24 neighbours: those in the 3 x 3 x 3 voxels around it but the
-two straight across the plane of the images, since a camera's hot pixel is hot in all planes. Lines
-of one voxel pass that, and a hot voxel by itself does not. Two side by side are left to the
-cleaning of fragments: an earlier clip to the second largest in the plane removed them, and a third
-of the thin bone in a CT with voxels of 3 mm.
+one voxel removes sheets of one and a half. So neither may move a value farther than noise explains.
+Even parts become nearly as smooth as without this bound. A wall of half a voxel stays if it stands
+out of the noise.
+
+With the bound alone, hot voxels would stay as well. So the bound counts from a clipped value: each
+voxel is first clipped to the range of 24 of its 3 x 3 x 3 neighbours. The two neighbours straight
+across the plane of the images do not count, because a camera's hot pixel is hot in all planes.
+Lines of one voxel pass this clip, and a single hot voxel does not. Two hot voxels side by side are
+left to the removal of fragments. An earlier clip to the second largest value in the plane removed
+them, but also a third of the thin bone in a CT scan with voxels of 3 mm.
 """
 
 import numpy as np
@@ -25,19 +27,20 @@ from stereocell.model.image_plane import (
 from stereocell.model.spacing import Spacing
 from stereocell.model.volume import Volume
 
-HOT_VOXEL_REACH = 1  # voxels to each side, of the neighbours that a voxel is clipped to
-MEDIAN_REACH = 1  # voxels that the median reaches in the plane of the images
+# Voxels to each side; the clip of hot voxels looks at neighbours within this distance
+HOT_VOXEL_REACH = 1
+MEDIAN_REACH = 1  # voxels to each side in the plane of the images that the median uses
 SMOOTHING_REACH = 4.0  # radius of the Gaussian, in sigmas
 
 
 def denoise(volume: Volume, sigma_um: float, max_shift: float | None = None) -> NDArray[np.float32]:
     """Return the voxels after a 3 x 3 median in the plane of the images and a Gaussian.
 
-    The median removes hot voxels, which a Gaussian would spread. There is none where the spacings
-    in that plane differ too much.
+    The median removes hot voxels, which a Gaussian would spread. It is left out if the spacings in
+    that plane differ too much.
 
     sigma_um   sigma of the Gaussian; 0 turns it off
-    max_shift  by how much both may move a value, voxel values; None: by any
+    max_shift  largest change of a value by both filters, voxel values; None: no limit
     result     float32 (z, y, x), voxel values
     """
     return _filtered(volume, sigma_um, True, max_shift)
@@ -63,20 +66,20 @@ def _filtered(
 
 
 def median_reach(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
-    """Return how many voxels (z, y, x) the median reaches to each side; 0, 0, 0: there is none."""
+    """Return how many voxels (z, y, x) the median reaches to each side; 0, 0, 0: no median."""
     _, row, column = first_of_three(spacing_um, slice_axis)
     reach = MEDIAN_REACH if max(row, column) <= MAX_RATIO * min(row, column) else 0
     return back_of_three((0, reach, reach), slice_axis)
 
 
 def median_size(spacing_um: Spacing, slice_axis: int) -> tuple[int, int, int]:
-    """Return over how many voxels (z, y, x) the median is taken; 1, 1, 1: there is none."""
+    """Return the size (z, y, x) of the median in voxels; 1, 1, 1: no median."""
     z, y, x = (2 * reach + 1 for reach in median_reach(spacing_um, slice_axis))
     return z, y, x
 
 
 def gaussian(sigma: float) -> NDArray[np.float64]:
-    """Return the weights of a Gaussian of sigma voxels, which add up to 1: as SciPy has them."""
+    """Return the weights of a Gaussian, with a sum of 1, as in SciPy. sigma: voxels."""
     if sigma <= 0:
         return np.ones(1)
     radius = int(SMOOTHING_REACH * sigma + 0.5)

@@ -1,8 +1,8 @@
 """Data that a ray-marcher needs beside the voxels: mip levels, and the value range of each brick.
 
-Every mip level covers the same box: level k has max(1, n >> k) voxels along an axis of n. Where n
-is odd, a coarser voxel is the mean of the voxels that it covers, weighted by the share that it
-covers (polyphase box filter). Bricks follow min-max blocks, grown by one voxel on each side, since
+Every mip level covers the same box: level k has max(1, n >> k) voxels along an axis of n voxels. If
+n is odd, a coarser voxel is the mean of the voxels that it covers, weighted by the covered share
+(polyphase box filter). Bricks are min-max blocks, extended by one voxel on each side, because
 trilinear interpolation reaches that far.
 
 References
@@ -14,7 +14,7 @@ rendering", IEEE Visualization 1998.
 import numpy as np
 from numpy.typing import NDArray
 
-SKIP_BRICK = 8  # voxels along a brick's edge, a power of two; the viewer's build reads it here
+SKIP_BRICK = 8  # edge of a brick in voxels, a power of two; the viewer's build reads this line
 SMALLEST_LEVEL = 4  # voxels; the last mip level has no axis longer than this
 
 
@@ -41,9 +41,9 @@ def min_max_bricks(volume: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
     volume  uint8 (z, y, x)
 
-    Along an axis of n voxels there are ceil(n / SKIP_BRICK) bricks; brick b begins at voxel
-    i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume: a trilinear sample
-    between the outer faces of its own voxels reads no other.
+    Along an axis of n voxels there are ceil(n / SKIP_BRICK) bricks. Brick b begins at voxel
+    i = SKIP_BRICK * b and covers [i - 1, i + SKIP_BRICK], clipped to the volume. So a trilinear
+    sample between the outer faces of the brick's own voxels reads no other voxel.
     """
     low, high = volume, volume
     for axis in range(3):
@@ -85,6 +85,6 @@ def _reduce(ufunc: np.ufunc, values: NDArray[np.uint8], axis: int) -> NDArray[np
         ufunc(reduced[: len(part)], part, out=reduced[: len(part)])
     after = source[SKIP_BRICK::SKIP_BRICK]  # the first voxel of the next brick
     ufunc(reduced[: len(after)], after, out=reduced[: len(after)])
-    before = source[SKIP_BRICK - 1 : n - 1 : SKIP_BRICK]  # the last voxel of the brick before
+    before = source[SKIP_BRICK - 1 : n - 1 : SKIP_BRICK]  # the last voxel of the previous brick
     ufunc(reduced[1:], before, out=reduced[1:])
     return np.moveaxis(reduced, 0, axis)

@@ -1,14 +1,14 @@
-"""The noise of a channel, measured where its voxels stand: how far smoothing may move a value.
+"""Measure the noise of a channel on its own voxels. It limits how far smoothing may move a value.
 
-Along a thin wall values change slowly, and across it fast, so the slowest of four directions in the
-plane of the images shows noise and no structure. It is measured by the second difference, which an
-even slope leaves at 0. Photons have more noise where there are more of them, so voxels are split
-into ten classes by brightness. The noise is that of the noisiest class but two: each class holds a
-tenth of the voxels, and thin bright structures fill at most two. Even padding has no noise to
-measure, and is left out.
+Values change slowly along a thin wall and fast across it. So the slowest of four directions in the
+plane of the images shows noise and no structure. The measure is the second difference, which is 0
+on an even slope. Photon noise is larger where there are more photons, so voxels are divided into
+ten classes by brightness. The result is the noise of the third noisiest class: each class holds a
+tenth of the voxels, and thin bright structures fill at most two. Even padding has no noise that
+could be measured, and is left out.
 
-The volumes of `make bench-iso` that hold 1 % of bodies give the deviation of their noise within a
-tenth; a CT of a head gives 4 HU.
+On the volumes of `make bench-iso` that hold 1 % of bodies, the deviation found is within a tenth of
+the true one. On a CT scan of a head it is 4 HU.
 
 References
 J. Immerkaer, "Fast noise variance estimation", Computer Vision and Image Understanding 64(2), 1996
@@ -21,15 +21,16 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 CLASSES = 10
-NOISIEST = -3  # place of the class that is taken, by noise
-# Where even padding fills more than this share, all else are bodies and their edges: of vessels cut
-# out of a CT six classes in ten are edges. There the middle class is taken.
+NOISIEST = -3  # index of the class that is taken, after sorting by noise
+# Largest share of even padding, and the index of the class taken beyond it. Vessels cut out of a CT
+# scan are an example: bodies and their edges fill the rest, and six classes in ten are edges.
 MAX_EVEN, MIDDLE = 0.8, CLASSES // 2 - 1
-STRIDE = 8  # of so many slices one is looked at
-MASK_SHIFT = 0.4  # of a mask's step: under a half, so that each voxel stays on its side of the edge
-_ALONG = ((0, 1), (1, 0), (1, 1), (1, -1))  # pixels (row, column) from a voxel to its neighbour
-_KEPT = 0.75  # share of a class's differences, the least, whose mean is taken
-_OF_NORMAL = 0.43468  # that mean for noise of deviation 1
+STRIDE = 8  # one of this many slices is examined
+MASK_SHIFT = 0.4  # share of a mask's step; less than .5, so that no voxel changes its side
+# (row, column) from a pixel to its neighbour in each direction
+_ALONG = ((0, 1), (1, 0), (1, 1), (1, -1))
+_KEPT = 0.75  # share of a class's differences, the smallest ones, that are averaged
+_OF_NORMAL = 0.43468  # that average for normal noise of standard deviation 1
 
 
 class NoiseSample:
@@ -41,9 +42,9 @@ class NoiseSample:
         self._looked_at = 0
 
     def add(self, voxels: NDArray[Any], darkest: float | None = None) -> None:
-        """Look at some slices of a block (slice, row, column) of any number type.
+        """Add some slices of a block (slice, row, column) of any number type.
 
-        darkest  the value of padding; None: there is none
+        darkest  the value of padding; None: no padding
         """
         slices = voxels[len(voxels) % STRIDE // 2 :: STRIDE].astype(np.float32)
         if min(slices.shape) < 1 or min(slices.shape[1:]) < 3:
@@ -60,7 +61,7 @@ class NoiseSample:
         self._bright.append(bright[~is_padding])
 
     def deviation(self) -> float:
-        """Return the noise's standard deviation, voxel values; 0: there is none."""
+        """Return the standard deviation of the noise, voxel values; 0 if there is no noise."""
         measured = sum(map(len, self._least))
         if not measured:
             return 0.0
@@ -72,17 +73,17 @@ class NoiseSample:
 
 
 def find_max_shift(noise: float, deviations: float, mask: tuple[float, float] | None) -> float:
-    """Return how far smoothing may move a voxel's value, in voxel values.
+    """Return the largest change of a voxel's value by smoothing, in voxel values.
 
-    noise       its standard deviation, voxel values
-    deviations  of the noise, that a value may be moved by
-    mask        the only two values that the voxels have; None: they have more
+    noise       standard deviation, voxel values
+    deviations  largest change in standard deviations of the noise
+    mask        the two values of the voxels if they have only two; None: they have more
     """
     return deviations * noise if mask is None else MASK_SHIFT * (mask[1] - mask[0])
 
 
 def _second_difference(slices: NDArray[np.float32], row: int, column: int) -> NDArray[np.float32]:
-    """Return how far each inner pixel is from the mean of two opposite neighbours, doubled."""
+    """Return twice the distance of each inner pixel from the mean of two opposite neighbours."""
     height, width = slices.shape[1:]
 
     def shifted(down: int, right: int) -> NDArray[np.float32]:
@@ -92,7 +93,7 @@ def _second_difference(slices: NDArray[np.float32], row: int, column: int) -> ND
 
 
 def _typical(differences: NDArray[np.float32]) -> float:
-    """Return the deviation of noise that has such differences: the largest of them are edges."""
+    """Return the standard deviation of noise with such differences; the largest are edges."""
     if not len(differences):
         return 0.0
     kept = max(1, int(_KEPT * len(differences)))

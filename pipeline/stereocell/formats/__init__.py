@@ -1,1 +1,1 @@
-"""One codec for each file format. No codec depends on a build."""
+"""Codecs, one for each file format. No codec depends on a build."""

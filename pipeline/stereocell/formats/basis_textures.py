@@ -18,12 +18,13 @@ def encode_normal_map(image: NDArray[np.uint8]) -> bytes:
     image  uint8 (y, x, 3), tangent space
 
     Raises ValueError unless both sides are multiples of 4 (KHR_texture_basisu), and UsageError
-    without alktx2. One thread encodes, since the bytes depend on the number of threads. Size, mean
-    error of the normals in degrees, and time, on baked maps of smooth bodies (64 to 128 texels
-    wide) and of noisy cells (64 to 512):
+    without alktx2. One thread encodes, since the bytes depend on the number of threads.
+
+    The table has size, mean error of the normals in degrees, and time. The first pair of columns is
+    for maps of smooth bodies (64 to 128 texels wide), the second for noisy cells (64 to 512).
 
         UASTC, effort 1                 14 kB  1.3     43 kB  3.7   0.04 s
-        UASTC, effort 1, lambda 2        9 kB  1.9     40 kB  4.2   0.04 s, its blocks show
+        UASTC, effort 1, lambda 2        9 kB  1.9     40 kB  4.2   0.04 s  (blocks are visible)
         UASTC, effort 3                 15 kB  0.8     44 kB  1.9   0.09 s
         UASTC, effort 3, lambda 0.5     14 kB  0.9     44 kB  1.9   0.10 s  (chosen)
         UASTC, effort 3, lambda 1       12 kB  1.1     43 kB  2.1   0.10 s
@@ -48,7 +49,7 @@ def encode_occlusion_map(image: NDArray[np.uint8]) -> bytes:
     image  uint8 (y, x, 3), grey
 
     Raises ValueError unless both sides are multiples of 4, and UsageError without alktx2. Occlusion
-    varies slowly, so ETC1S's blocks don't show.
+    varies slowly, so the blocks of ETC1S are not visible.
     """
     return _encode_map(image, codec="etc1s", quality=_ETC1S_QUALITY, srgb=False, linear=True)
 

@@ -1,4 +1,4 @@
-"""A closed body with a name and a colour, as 3MF, OBJ and PLY have it."""
+"""A closed body with a name and a colour, as stored in 3MF, OBJ and PLY."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 class Body:
     """A triangle mesh.
 
-    srgb       bytes of its colour
+    srgb       colour, one byte for each of red, green and blue
     positions  float32 (n, 3), x, y, z, in the file's unit
     triangles  uint32 (m, 3), counter-clockwise from outside
-    filament   the number of the filament that a printer of several uses for it, from 1
+    filament   number of the filament in a printer with several, from 1
     """
 
     name: str

@@ -2,10 +2,12 @@
 
 docs/brick-stream.md describes the protocol and every byte. schemas/brick_stream.schema.json holds
 the messages, and the layouts below as data; a test compares them with this module. All numbers are
-little-endian. Each brick is a zstd frame of its own, named by the first 128 bits of the SHA-256 of
-that frame: a cache of bricks is addressed by content, and the client checks a brick before it
-unpacks it. Bricks differenced along x were 5 % larger than plain ones (7 T head, zstd 1 to 9), and
-zstd's level 9 saved 1 % of level 3's bytes in six times its time: plain, level 3.
+little-endian.
+
+Each brick is a separate zstd frame. Its name is the first 128 bits of the SHA-256 of that frame. So
+a cache of bricks is addressed by content, and the client checks a brick before it unpacks it.
+Bricks are stored without differences and at level 3. Differences along x made them 5 % larger (7 T
+head, zstd 1 to 9), and zstd's level 9 saved 1 % of the bytes in six times the time.
 """
 
 import hashlib
@@ -45,8 +47,8 @@ ENTRY = struct.Struct("<III")
 TABLE_FRAME, BRICKS_FRAME = 1, 2
 _ZSTD = 1
 _ZSTD_LEVEL = 3
-_MAX_TABLE_BYTES = 1 << 28  # most bytes of a table that is read
-_LONGEST_FRAME = 1 << 14  # most bytes of a brick's zstd frame; a brick has 18^3 bytes
+_MAX_TABLE_BYTES = 1 << 28  # largest number of bytes of a table that is read
+_LONGEST_FRAME = 1 << 14  # largest number of bytes of a brick's zstd frame; a brick has 18^3 bytes
 
 
 class BrickFormatError(StereoCellError):
@@ -58,7 +60,7 @@ class Table:
     """A tree without its bricks: header and node records.
 
     size         texels (z, y, x)
-    threshold    as in voxel_bvh.Bvh
+    threshold    see voxel_bvh.Bvh
     source       first 128 bits of the SHA-256 of the volume's KTX2 file
     nodes        records of RECORD (n,): the fields of voxel_bvh.NODE, and `length` (bytes) and
                  `hash` of the brick's zstd frame, zeros in empty nodes
@@ -73,7 +75,7 @@ class Table:
 
     @property
     def bytes(self) -> int:
-        """Length of the table in bytes: a file's bricks begin there."""
+        """Length of the table in bytes. In a file the bricks begin there."""
         return HEADER.size + self.nodes.nbytes
 
 
@@ -97,7 +99,7 @@ class Frame:
 
     kind      TABLE_FRAME or BRICKS_FRAME
     sequence  number of the frame
-    view      id of the view whose bricks it carries; 0 for tables
+    view      id of the view whose bricks the frame holds; 0 for tables
     parts     content, one part after the other
     """
 
@@ -113,7 +115,7 @@ def content_hash(data: bytes) -> bytes:
 
 
 def encode_tree(bvh: Bvh, source: bytes) -> bytes:
-    """Return a tree as a file holds it: header, node records, bricks in the nodes' order.
+    """Return a tree as the content of a file: header, node records, bricks in the nodes' order.
 
     source  first 128 bits of the SHA-256 of the volume's KTX2 file
     """
@@ -187,7 +189,7 @@ def _check_nodes(nodes: NDArray[np.void], levels: int, stored: int, brick_bytes:
     }
     for name, fault in faults.items():
         if fault.any():
-            raise BrickFormatError(f"node {fault.argmax()}: {name} breaks its rule")
+            raise BrickFormatError(f"node {fault.argmax()}: {name} is out of its range")
     if len(parents) != len(nodes) - 1 or (parents >= np.arange(1, len(nodes))).any():
         raise BrickFormatError(f"{len(parents)} children in a tree of {len(nodes)} nodes")
     bits = np.unpackbits(nodes["child_mask"][:, np.newaxis], axis=1, bitorder="little")
@@ -198,9 +200,9 @@ def _check_nodes(nodes: NDArray[np.void], levels: int, stored: int, brick_bytes:
         fits &= child[axis] == 2 * parent[axis].astype(np.int64) + (octant >> shift & 1)
     root = nodes[0]
     if root["level"] != levels - 1 or root["x"] or root["y"] or root["z"] or not fits.all():
-        raise BrickFormatError("nodes lie elsewhere than their parents say")
+        raise BrickFormatError("nodes lie outside of the places that their parents state")
     if np.count_nonzero(~is_empty) != stored or int(nodes["length"].sum()) != brick_bytes:
-        raise BrickFormatError("bricks don't add up to what the header says")
+        raise BrickFormatError("bricks do not add up to the numbers in the header")
 
 
 def encode_frame(frame: Frame) -> bytes:
@@ -218,9 +220,9 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def parse_message(text: str) -> dict[str, Any]:
-    """Return a client's message that fits its schema.
+    """Return a client's message that matches its schema.
 
-    Raises BrickFormatError for other text; the error is one line.
+    Raises BrickFormatError for other text, with an error of one line.
     """
     try:
         message = json.loads(text, parse_constant=_refuse_constant)
@@ -232,15 +234,16 @@ def parse_message(text: str) -> dict[str, Any]:
     validators = _validators()
     if not isinstance(kind, str) or kind not in validators:
         raise BrickFormatError(f"type: expected one of {', '.join(validators)}")
-    fault = next(validators[kind].iter_errors(message), None)  # finding all faults takes seconds
+    # Finding all faults would take seconds
+    fault = next(validators[kind].iter_errors(message), None)
     if fault is not None:
         where = _short(f"{fault.json_path}: {fault.validator}")
-        raise BrickFormatError(f"{kind}: {where} is not as the schema asks")
+        raise BrickFormatError(f"{kind}: {where} does not match the schema")
     return message
 
 
 def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a JSON number")
 
 
 def _short(text: str) -> str:

@@ -1,7 +1,7 @@
 """OpenEXR images: volumes as slice atlases, and transfer functions as lookup tables.
 
-An atlas lays the slices of a volume out in columns x rows, slice 0 at the upper left, as game
-engines import 3D textures. Its one channel is `Y`, which readers show as grey; a single `R` would
+An atlas lays the slices of a volume out in columns x rows, with slice 0 at the upper left, as game
+engines import 3D textures. Its only channel is `Y`, which readers show as grey; a single `R` would
 be red. Half floats hold steps of 1/255 so exactly that the same bytes are read back.
 
 Compression, 196 x 514 x 514 noisy voxels on 2 cores: PIZ 0.5 s and 31 MB; ZIP 1.3 s and 52 MB; RLE
@@ -24,7 +24,8 @@ from stereocell.transfer.opacity import evaluate
 
 _MAGIC = b"\x76\x2f\x31\x01"
 _OTHER_LAYOUTS = 0x200 | 0x800 | 0x1000  # bits of the version: tiles, deep data, several parts
-_ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}  # by compression
+# Rows of pixels in a chunk, by compression
+_ROWS_OF = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256}
 _LEVELS = (np.arange(256, dtype=np.float32) / 255).astype(np.float16)
 
 
@@ -33,8 +34,8 @@ def write_atlas(path: Path, volume: NDArray[np.uint8]) -> None:
 
     volume  uint8 (z, y, x), with its apron
 
-    The header holds the numbers to cut it again: `columns`, `rows`, `atlasSize` (x, y, z), `apron`.
-    Raises OutputError if the file can't be written.
+    The header holds the numbers for cutting it into slices: `columns`, `rows`, `atlasSize`
+    (x, y, z), `apron`. Raises OutputError if the file cannot be written.
     """
     depth, height, width = volume.shape
     columns = min(depth, max(1, round((depth * height / width) ** 0.5)))  # nearly square
@@ -62,7 +63,8 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header, channels = dict(file.header()), file.channels()
             image = np.array(channels["Y"].pixels) if "Y" in channels else None
-    except (RuntimeError, ValueError) as error:  # ValueError: the header is whole, pixels are not
+    # ValueError: the header is complete, but pixels are damaged
+    except (RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise StageError(f"{path}: can't be read as OpenEXR: {reason}") from error
     lacking = [key for key in ("columns", "rows", "atlasSize") if key not in header]
@@ -73,12 +75,12 @@ def read_atlas(path: Path) -> NDArray[np.uint8]:
     columns, rows = int(header["columns"]), int(header["rows"])
     if image.shape != (rows * height, columns * width) or not 0 < depth <= rows * columns:
         raise StageError(
-            f"{path}: {image.shape[1]} x {image.shape[0]} pixels don't hold "
-            f"{columns} x {rows} slices of {width} x {height}, {depth} of them used"
+            f"{path}: {image.shape[1]} x {image.shape[0]} pixels do not hold {depth} slices of "
+            f"{width} x {height} in {columns} x {rows} places"
         )
     if image.dtype == np.float16:
         sheet = _bytes_of_halves()[image.view(np.uint16)]
-    else:  # another program's
+    else:  # from another program
         sheet = _to_bytes(image)
     slices = sheet.reshape(rows, height, columns, width).transpose(0, 2, 1, 3)
     return np.ascontiguousarray(slices.reshape(-1, height, width)[:depth])
@@ -106,13 +108,13 @@ def read_rgb(path: Path) -> NDArray[np.float32]:
 
 @cache
 def _bytes_of_halves() -> NDArray[np.uint8]:
-    """Return the byte of each half float, by its bits: arithmetic takes four times as long."""
+    """Return the byte of each half float, by its bits. Arithmetic takes four times as long."""
     return _to_bytes(np.arange(1 << 16, dtype=np.uint16).view(np.float16))
 
 
 def _to_bytes(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Return 0..1 as 0..255; what is beyond, or no number, as its nearest end, or 0."""
-    with np.errstate(invalid="ignore"):  # of a half that is no number
+    """Return 0..1 as 0..255. Values beyond become the nearest end, and NaN becomes 0."""
+    with np.errstate(invalid="ignore"):  # a half float may be NaN
         known = np.nan_to_num(shares.astype(np.float32))
     return np.asarray(np.rint(known.clip(0, 1) * 255).astype(np.uint8))
 
@@ -120,17 +122,18 @@ def _to_bytes(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
 def check_exr(path: Path) -> None:
     """Raise StageError if a file is missing, is not OpenEXR, or was cut short.
 
-    It follows the chunk offsets (OpenEXR's "File Layout") and reads no pixels. The OpenEXR library
-    prints lines of its own before it raises for a file that was cut short. Tiled, deep and
-    multi-part files, which the pipeline never writes, are checked by their first bytes only.
+    The function follows the chunk offsets (OpenEXR's "File Layout") and reads no pixels. For a file
+    that was cut short, the OpenEXR library would print lines of its own before it raises an error.
+    Tiled, deep and multi-part files, which the pipeline never writes, are checked only by their
+    first bytes.
     """
     try:
         content = np.memmap(path, dtype=np.uint8, mode="r").data
         damage = _find_damage(content)
     except OSError as error:
         raise StageError(f"{path}: can't be read: {error.strerror or error}") from error
-    except ValueError:  # an empty file can't be mapped
-        damage = "it is empty"
+    except ValueError:  # an empty file cannot be mapped
+        damage = "the file is empty"
     except (struct.error, IndexError, KeyError):
         damage = "its header was cut short"
     if damage is not None:
@@ -158,10 +161,10 @@ def _find_damage(content: memoryview) -> str | None:
     count = (bottom - top) // rows + 1
     for offset in struct.unpack_from(f"<{count}Q", content, at + 1):
         if not at < offset <= len(content) - 8:
-            return f"it ends at byte {len(content)}, before its last rows"
+            return f"the file ends at byte {len(content)}, before its last rows"
         _, size = struct.unpack_from("<2i", content, offset)
         if size < 0 or offset + 8 + size > len(content):
-            return f"it ends at byte {len(content)}, expected {offset + 8 + size} or more"
+            return f"the file ends at byte {len(content)}, expected {offset + 8 + size} or more"
     return None
 
 
@@ -178,8 +181,8 @@ def write_lut(path: Path, points: OpacityPoints) -> None:
 
     points  (intensity, opacity) pairs, rising, 0..1
 
-    RGB is 1: a client multiplies it by the channel's colour. Column i is intensity i / 255. Raises
-    OutputError if the file can't be written.
+    RGB is 1, and a client multiplies it by the channel's colour. Column i is intensity i / 255.
+    Raises OutputError if the file cannot be written.
     """
     table = np.ones((1, 256, 4), dtype=np.float16)
     table[0, :, 3] = evaluate(points)
@@ -187,9 +190,9 @@ def write_lut(path: Path, points: OpacityPoints) -> None:
 
 
 def write_rgb(path: Path, image: NDArray[np.float32]) -> None:
-    """Write colours, linear (height, width, 3), as half floats, 65504 at most.
+    """Write colours, linear (height, width, 3), as half floats of at most 65504.
 
-    Raises OutputError if the file can't be written.
+    Raises OutputError if the file cannot be written.
     """
     largest = np.finfo(np.float16).max
     _write(path, {"RGB": image.clip(0, largest).astype(np.float16)}, {})

@@ -1,19 +1,19 @@
 """Write one mesh as a binary glTF 2.0 file that a phone decodes fast.
 
-The file is assembled here, since no package on PyPI writes EXT_meshopt_compression. It also uses
-KHR_mesh_quantization and, for baked maps, KHR_texture_basisu.
+This module assembles the file, because no package on PyPI writes EXT_meshopt_compression. It also
+uses KHR_mesh_quantization and, for baked maps, KHR_texture_basisu.
 
-No cracks between tiles. Neighbouring tiles have the vertices on their common plane as equal
-floats; the decoded positions must be equal too. So all files of a bundle share ONE lattice: a
-vertex becomes round(position / step), with the same `step` everywhere, a power of two in METRES.
-A file stores the 16-bit offset from its own origin, which is a lattice point as well, and its
-node has scale = step and translation = origin * step. Every factor is then a dyadic number, and
-a viewer's float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps (for
-tiles of 72 um: a step of 7.5 nm, specimens up to 125 mm from the world's origin). All levels of
-detail share it: a tile fits its neighbour at any pair of levels.
+There are no cracks between tiles. Neighbouring tiles have the vertices on their common plane as
+equal floats, and the decoded positions must be equal too. So all files of a bundle share ONE
+lattice: a vertex becomes round(position / step), with the same `step` everywhere, a power of two in
+METRES. A file stores 16-bit offsets from its own origin, which is a lattice point as well. Its node
+has scale = step and translation = origin * step. Every factor is then a dyadic number. A viewer's
+float32 `scale * q + translation` is exact while a coordinate is below 2^24 steps. For tiles of
+72 um that is a step of 7.5 nm, and specimens may reach 125 mm from the world's origin. All levels
+of detail share the lattice, so a tile fits its neighbour at any pair of levels.
 
-A small tile's coarsest level is a few kB, and half of that would be JSON: names and extras stand
-once, on the node, and nothing is written that is its default.
+The coarsest level of a small tile is a few kB, of which JSON could be half. So names and extras are
+written once, on the node, and default values are not written.
 """
 
 import json
@@ -36,18 +36,20 @@ from stereocell.model.mesh import Mesh
 from stereocell.model.version import GENERATOR
 
 _METRES_PER_UM = 1e-6
-_MAX_STEPS = 0xFFFF  # most steps along an axis: 16 bits
-_WANTED_STEPS = 1 << 14  # steps along an axis: a 20th of a voxel; more low bits don't compress
+_MAX_STEPS = 0xFFFF  # largest number of steps along an axis: 16 bits
+# Steps along an axis, a 20th of a voxel each; more low bits would not compress
+_WANTED_STEPS = 1 << 14
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _FLOAT = 5121, 5123, 5126
-AMBIENT_SHARE = 0.4  # share of ambient light in the viewer's room, about, 0..1
-_OF_COLOR = {"baseColorTexture"}  # maps that belong to the material's pbrMetallicRoughness
+AMBIENT_SHARE = 0.4  # approximate share of ambient light in the viewer's scene, 0..1
+_OF_COLOR = {"baseColorTexture"}  # maps that belong to the pbrMetallicRoughness of the material
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _CLAMP = 9729, 9987, 33071
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """The appearance of a surface: linear RGB, metallic, roughness, opacity and emitted light, all
-    0..1.
+    """The appearance of a surface: linear RGB, metallic, roughness, opacity and emitted light.
+
+    All values are 0..1.
     """
 
     color: tuple[float, float, float]
@@ -57,7 +59,7 @@ class Material:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def to_gltf(self, name: str) -> dict[str, Any]:
-        """Return the material as glTF describes it; defaults are left out."""
+        """Return the material as a glTF object without default values."""
         described: dict[str, Any] = {
             "name": name,
             "doubleSided": True,
@@ -76,7 +78,7 @@ class Material:
 
 @dataclass(frozen=True, slots=True)
 class Textures:
-    """Baked maps, KTX2 files of Basis Universal: normals and occlusion linear, colours in sRGB."""
+    """Baked maps as KTX2 files of Basis Universal: normals and occlusion linear, colours sRGB."""
 
     normal: bytes | None = None
     occlusion: bytes | None = None
@@ -85,7 +87,7 @@ class Textures:
 
 @dataclass(frozen=True, slots=True)
 class Glb:
-    """A whole .glb file, and the box of its decoded vertices (x, y, z) in metres, y up."""
+    """A complete .glb file, and the box of its decoded vertices (x, y, z) in metres, y up."""
 
     data: bytes
     min_m: tuple[float, float, float]
@@ -95,7 +97,7 @@ class Glb:
 def choose_step(extent_um: float) -> float:
     """Return the lattice step in metres for meshes whose longest edge is `extent_um` or less.
 
-    It is the smallest power of two for which 14 bits span the extent: 8192 to 16384 steps.
+    The step is the smallest power of two for which 14 bits span the extent: 8192 to 16384 steps.
     """
     if extent_um <= 0:
         return 2.0**-30
@@ -116,12 +118,13 @@ def encode_glb(
 
     mesh      positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3), normals
     step_m    step of the lattice in metres, see `choose_step`
-    extras    written on the one node
-    textures  UVs are written only with a map, tangents only with a normal map
-    features  what is known of the objects of a mesh that has some, by their number in the tile
+    extras    written on the only node
+    textures  UVs are written only if there is a map, and tangents only if it is a normal map
+    features  table of the objects, if the mesh has some, by their numbers in the tile
 
     Raises ValueError for a mesh without triangles, for one larger than 65535 steps along an axis,
-    for maps without UVs, for objects that share a triangle, and for more than 65536 of them.
+    and for maps without UVs. It does so too for objects that share a triangle, and for more than
+    65536 of them.
     """
     maps = _pick(textures or Textures())
     if len(mesh.triangles) == 0:
@@ -211,7 +214,7 @@ def encode_glb(
             }
         ]
     if features is not None:
-        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]  # not required: to draw
+        of_objects = ["EXT_mesh_features", "EXT_structural_metadata"]  # not required for drawing
         document["extensionsUsed"] = [*extensions, *of_objects]
         ids, metadata = describe_features(buffers, features, extras.get("channel", name))
         primitive["extensions"] = {"EXT_mesh_features": ids}
@@ -228,7 +231,7 @@ def _to_metres(point: NDArray[np.int64], step_m: float) -> tuple[float, float, f
 
 
 def _add_uvs(buffers: CompressedBuffers, uvs: NDArray[np.float32]) -> int:
-    """Store UVs, v downwards as in glTF; 16 bits unless some lie outside 0..1."""
+    """Store UVs, with v downwards as in glTF; in 16 bits unless some lie outside 0..1."""
     flipped = np.stack([uvs[:, 0], 1 - uvs[:, 1]], axis=1)
     if flipped.min() < 0 or flipped.max() > 1:
         floats = np.ascontiguousarray(flipped, dtype=np.float32)
@@ -250,11 +253,11 @@ def _pick(textures: Textures) -> dict[str, bytes]:
 
 
 def vertex_colors(mesh: Mesh, *, occlusion: bool = True) -> NDArray[np.uint8] | None:
-    """Return the factors of the base colour, uint8 (n, 3): the mesh's colours, darker where light
-    is occluded. None: the mesh has neither.
+    """Return the factors of the base colour, uint8 (n, 3), or None if the mesh has none.
 
-    glTF has no occlusion at vertices. An occlusion map dims ambient light only, while a factor of
-    the colour dims all light. So the occlusion is multiplied by the share of ambient light.
+    They are the mesh's colours, darker where light is occluded. glTF has no occlusion at vertices.
+    An occlusion map dims only ambient light, while a factor of the colour dims all light. So the
+    occlusion is multiplied by the share of ambient light.
     """
     openness = mesh.openness if occlusion else None
     if mesh.colors is None and openness is None:
@@ -297,7 +300,7 @@ def _unit(vectors: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 
 def padded(values: NDArray[Any]) -> NDArray[Any]:
-    """Return rows of 3 numbers with a zero appended: vertex strides are multiples of 4 bytes."""
+    """Return rows of 3 numbers with a zero appended, as vertex strides are multiples of 4 bytes."""
     return np.pad(values, ((0, 0), (0, 1)))
 
 

@@ -20,13 +20,14 @@ _TYPES = {
     5126: np.float32,
 }
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-_MAX_BYTES = 1 << 30  # bytes, largest decoded bufferView: its memory is allocated before decoding
+# Largest size of a decoded bufferView in bytes, checked before its memory is allocated
+_MAX_BYTES = 1 << 30
 _HEAD = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class DecodedMesh:
     """The mesh and material of a file as a viewer draws them.
 
     positions_m  float32 (n, 3), world space, metres (x, y, z)
@@ -37,9 +38,9 @@ class Drawn:
     maps         KTX2 files by their names in the material
     uvs          float64 (n, 2), v downwards, or None
     step_m       distance between two possible positions of a vertex, metres
-    objects      int64 (n,), which object of its tile a vertex is of, or None
-    paint        float64 (n,), intensity of the channel that is painted on it, 0..1, or None
-    opacity      of the material, 0..1
+    objects      int64 (n,), object of each vertex by its number in the tile, or None
+    paint        float64 (n,), painted intensity of a channel, 0..1, or None
+    opacity      opacity of the material, 0..1
     emission     linear RGB of the light that the material emits, 0..1
     """
 
@@ -57,8 +58,8 @@ class Drawn:
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def read_glb(path: Path) -> Drawn:
-    """Return the one mesh of a file. Raises CheckError for a file of another kind."""
+def read_glb(path: Path) -> DecodedMesh:
+    """Return the only mesh of a file. Raises CheckError for a file of another kind."""
     try:
         return _drawn(*_open(path.read_bytes()))
     except OSError as error:
@@ -70,14 +71,14 @@ def read_glb(path: Path) -> Drawn:
 def _open(data: bytes) -> tuple[dict[str, Any], bytes]:
     magic, version, length = _HEAD.unpack_from(data)
     if (magic, version, length) != (b"glTF", 2, len(data)):
-        raise ValueError("no glTF 2.0 of that length")
+        raise ValueError("not a glTF 2.0 file of the stated length")
     text_length, _ = _CHUNK.unpack_from(data, _HEAD.size)
     start = _HEAD.size + _CHUNK.size
     document = json.loads(data[start : start + text_length])
     return document, data[start + text_length + _CHUNK.size :]
 
 
-def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
+def _drawn(document: dict[str, Any], binary: bytes) -> DecodedMesh:
     (node,) = document["nodes"]
     (mesh,) = document["meshes"]
     (primitive,) = mesh["primitives"]
@@ -102,7 +103,7 @@ def _drawn(document: dict[str, Any], binary: bytes) -> Drawn:
     shading = material["pbrMetallicRoughness"]
     red, green, blue, opacity = shading["baseColorFactor"]
     emission = material.get("emissiveFactor", (0.0, 0.0, 0.0))
-    return Drawn(
+    return DecodedMesh(
         offsets * scale + translation,
         _decode(document, binary, primitive["indices"]).reshape(-1, 3).astype(np.int64),
         directions / float(np.iinfo(directions.dtype).max),

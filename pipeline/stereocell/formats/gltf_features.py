@@ -1,9 +1,9 @@
 """Name the objects in a .glb: EXT_mesh_features, and a table by EXT_structural_metadata.
 
 A vertex has the number of its object in the tile, `_FEATURE_ID_0`. glTF has no 32-bit vertex
-attributes, so a file names at most 65 536 objects. The table says the object's label and what else
-other clients style and pick by (CesiumJS: `${volume_um3} > 500`); every level of detail repeats
-it, so it is small.
+attributes, so a file has at most 65 536 objects. The table has the labels of objects, and columns
+by which other clients style and pick them (CesiumJS: `${volume_um3} > 500`). Every level of detail
+repeats the table, so it is small.
 """
 
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from stereocell.formats.meshopt import CompressedBuffers
 from stereocell.model.object_table import MISSING, Column
 
-MAX_OBJECTS = 1 << 16  # most objects of a file: 16 bits name them
-MAX_COLUMNS = 8  # most columns of a file, besides the label
+MAX_OBJECTS = 1 << 16  # largest number of objects in a file, which 16 bits can number
+MAX_COLUMNS = 8  # largest number of columns in a file, without the label
 _LABEL = "label"
 _UNSIGNED_SHORT = 5123
-_NO_NUMBER = float(np.finfo(np.float32).min)  # stands for NaN, which JSON has not
+_NO_NUMBER = float(np.finfo(np.float32).min)  # replaces NaN, which JSON does not have
 _NO_CATEGORY = 0xFFFF
-_ALIGNMENT = 8  # bytes, of property tables
+_ALIGNMENT = 8  # alignment of property tables in bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Features:
-    """A tile's objects in the order in which its meshes number them: labels and some columns."""
+    """A tile's objects in the order of their numbers in its meshes: labels and some columns."""
 
     labels: NDArray[np.uint64]
     columns: tuple[Column, ...]
@@ -38,20 +38,20 @@ def require_whole(
     name: str,
     features: Features | None,
 ) -> None:
-    """Raise ValueError where an object can't be named or isn't known, or a triangle is of two."""
+    """Raise ValueError if an object has no number or row, or a triangle has two objects."""
     if len(objects) and (objects.min() < 0 or objects.max() >= MAX_OBJECTS):
         raise ValueError(
-            f"{name} has objects {objects.min()} to {objects.max()}, and a file names "
-            f"{MAX_OBJECTS} at most: split the tile"
+            f"{name} has objects {objects.min()} to {objects.max()}, expected at most "
+            f"{MAX_OBJECTS} in a file: split the tile"
         )
     if features is not None and len(objects) and objects.max() >= len(features.labels):
         raise ValueError(
-            f"{name} has objects up to {objects.max()}, and {len(features.labels)} are known: "
-            "expected one row for each"
+            f"{name} has objects up to {objects.max()}, but {len(features.labels)} rows; expected "
+            "one row for each object"
         )
     owners = objects[triangles]
     if (owners != owners[:, :1]).any():
-        raise ValueError(f"{name} has a triangle between two objects: each has its own vertices")
+        raise ValueError(f"{name} has a triangle between two objects, expected separate vertices")
 
 
 def add_feature_ids(buffers: CompressedBuffers, objects: NDArray[np.int32]) -> int:
@@ -69,7 +69,7 @@ def describe_features(
     Raises ValueError for more than MAX_COLUMNS columns.
     """
     if len(features.columns) > MAX_COLUMNS:
-        raise ValueError(f"{len(features.columns)} columns in a file, {MAX_COLUMNS} at most")
+        raise ValueError(f"{len(features.columns)} columns in a file, expected up to {MAX_COLUMNS}")
     count = len(features.labels)
     is_wide = count > 0 and int(features.labels.max()) > np.iinfo(np.uint32).max
     labels = features.labels.astype("<u8" if is_wide else "<u4")
@@ -110,7 +110,7 @@ def _number(column: Column) -> dict[str, Any]:
 
 
 def _enum(column: Column) -> tuple[dict[str, Any], bytes]:
-    """Return the glTF enum of a column of categories, the last for objects without, and values."""
+    """Return the glTF enum of a column of categories and its values; the last one means missing."""
     missing = "none"
     while missing in column.categories:
         missing += "_"
@@ -125,7 +125,7 @@ def _enum(column: Column) -> tuple[dict[str, Any], bytes]:
 
 
 def _distinct(names: tuple[str, ...]) -> list[str]:
-    """Return names of which each is another, as an enum needs them."""
+    """Return the names, made different from one another as an enum requires."""
     found: dict[str, None] = {}
     for name in names:
         while name in found:

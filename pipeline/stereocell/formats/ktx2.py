@@ -1,11 +1,11 @@
-"""Write KTX 2.0 textures of volumes and tables: 8-bit texels, each mip level a zstd frame.
+"""Write KTX 2.0 textures of volumes and tables: 8-bit texels, and a zstd frame for each mip level.
 
 No package on PyPI writes 3D KTX2. This module follows the KTX 2.0 specification (Khronos, revision
 2.0.4) as far as these textures need it: 8-bit UNORM with 1, 2 or 4 components, one layer, one face.
-The data format descriptor holds `bytesPlane0` of the inflated data, as that revision asks; readers
-also know the older 0. Level data of a supercompressed file has no alignment.
+The data format descriptor states `bytesPlane0` of the inflated data, as that revision requires;
+readers also accept the older 0. Level data of a supercompressed file has no alignment.
 
-Only the finest level of such textures is read back; sizes are checked before memory is allocated.
+Only the finest level of such textures is read back. Sizes are checked before memory is allocated.
 """
 
 import struct
@@ -25,10 +25,10 @@ _LEVEL = struct.Struct("<3Q")
 _VK_FORMATS = {1: 9, 2: 16, 4: 37}  # components: R8_UNORM, R8G8_UNORM, R8G8B8A8_UNORM
 _COMPONENTS = {vk_format: components for components, vk_format in _VK_FORMATS.items()}
 _CHANNEL_TYPES = (0, 1, 2, 15)  # red, green, blue, alpha
-# by dimensions: texture x to the right, y down, z out of the picture, towards the viewer
+# Orientation by the number of dimensions: x to the right, y down, z towards the viewer
 _ORIENTATIONS = {2: "rd", 3: "rdo"}
 _ZSTD = 2
-_MAX_BYTES = 1 << 31  # most bytes of a level that is read
+_MAX_BYTES = 1 << 31  # largest number of bytes of a level that is read
 _ZSTD_LEVEL = 3  # 9 made noisy 8-bit volumes 1 to 2 % smaller and took 3 to 5 times as long
 
 
@@ -47,7 +47,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Ktx2:
-    """A whole KTX2 file and the places of its levels, finest first."""
+    """A complete KTX2 file and the positions of its levels, finest first."""
 
     data: bytes
     levels: tuple[Level, ...]
@@ -59,7 +59,7 @@ def encode_3d(levels: Sequence[NDArray[np.uint8]]) -> Ktx2:
     levels  finest first, each uint8 (z, y, x) or (z, y, x, components). Components: 1 (R8),
             2 (R8G8) or 4 (R8G8B8A8), UNORM
 
-    Raises ValueError where level k is not max(1, n >> k) texels along each axis, or not uint8.
+    Raises ValueError if level k is not max(1, n >> k) texels along each axis, or is not uint8.
 
     >>> volume = np.arange(4 * 6 * 8, dtype=np.uint8).reshape(4, 6, 8)
     >>> texture = encode_3d([volume, volume[::2, ::2, ::2]])
@@ -124,9 +124,9 @@ def _encode(levels: list[NDArray[np.uint8]], dimensions: int) -> Ktx2:
 
 
 def without_finest(data: bytes, dropped: int) -> Ktx2:
-    """Return a 3D texture as `encode_3d` wrote it without its finest levels; the frames stay.
+    """Return a 3D texture of `encode_3d` without its finest levels. The frames do not change.
 
-    Raises SourceError, without the file's name, if it has no level left then.
+    Raises SourceError, without the file's name, if no level would be left.
 
     >>> volume = np.arange(4 * 6 * 8, dtype=np.uint8).reshape(4, 6, 8)
     >>> whole = encode_3d([volume, volume[::2, ::2, ::2]])
@@ -139,7 +139,8 @@ def without_finest(data: bytes, dropped: int) -> Ktx2:
     if not 0 <= dropped < count:
         raise SourceError(f"{count} mip levels, expected more than {dropped}")
     kept = [_LEVEL.unpack_from(data, at + _LEVEL.size * k) for k in range(dropped, count)]
-    moved = _LEVEL.size * dropped  # bytes by which all behind the index lies nearer to the start
+    # Bytes by which everything after the index moves towards the start
+    moved = _LEVEL.size * dropped
     header[2:5] = (max(1, n >> dropped) for n in header[2:5])
     header[7] = len(kept)
     header[9] -= moved
@@ -161,7 +162,7 @@ def _describe(components: int) -> bytes:
     parts = [
         struct.pack("<III", 4 + size, 0, 2 | size << 16),
         struct.pack("<4B", 1, 1, 1, 0),  # colour model, primaries, transfer function, flags
-        bytes(4),  # texel block of 1 x 1 x 1 x 1, stored less one
+        bytes(4),  # texel block of 1 x 1 x 1 x 1, stored minus one
         struct.pack("<8B", components, *bytes(7)),  # bytesPlane
     ]
     for i in range(components):
@@ -177,10 +178,10 @@ def _key_value(key: str, value: str) -> bytes:
 def decode_finest(data: bytes) -> NDArray[np.uint8]:
     """Return level 0, uint8 (z, y, x, components); z is 1 in a 2D texture.
 
-    Raises SourceError, without the file's name, if `data` is no such texture.
+    Raises SourceError, without the file's name, if `data` is not such a texture.
     """
     if len(data) < len(_IDENTIFIER) + _HEADER.size + _LEVEL.size or data[:12] != _IDENTIFIER:
-        raise SourceError("no KTX 2.0 texture")
+        raise SourceError("not a KTX 2.0 texture")
     header = _HEADER.unpack_from(data, len(_IDENTIFIER))
     vk_format, _, width, height, depth, layers, faces, _, scheme = header[:9]
     components = _COMPONENTS.get(vk_format)
@@ -200,4 +201,4 @@ def decode_finest(data: bytes) -> NDArray[np.uint8]:
             raise SourceError(f"level 0 does not unpack to {size} bytes")
         return np.frombuffer(zstandard.decompress(frame), dtype=np.uint8).reshape(shape)
     except zstandard.ZstdError as error:
-        raise SourceError(f"level 0 is no zstd frame: {error}") from None
+        raise SourceError(f"level 0 is not a zstd frame: {error}") from None

@@ -1,7 +1,7 @@
-"""Images of the light from all around: latitude-longitude maps.
+"""Latitude-longitude maps: images of the light from all directions.
 
-Row 0 is the top (+y). Column 0 begins at -z and goes on over +x, as the OpenEXR documentation has
-it (https://openexr.com/en/latest/TechnicalIntroduction.html#environment-maps).
+Row 0 is the top (+y). Column 0 begins at -z and continues over +x, as in the OpenEXR documentation
+(https://openexr.com/en/latest/TechnicalIntroduction.html#environment-maps).
 """
 
 from pathlib import Path
@@ -16,14 +16,14 @@ from stereocell.model.errors import StageError
 
 Radiance = NDArray[np.float32]  # linear RGB (rows, columns, 3)
 
-MAX_COLUMNS = 512  # a volume or a rough surface shows no finer light
-_SUBSAMPLES = 4  # along each edge of a texel, where an image is turned
+MAX_COLUMNS = 512  # largest number of columns; a volume or a rough surface shows no finer light
+_SUBSAMPLES = 4  # number of samples along each edge of a texel when an image is turned
 
 
 def read_latlong(file: Path) -> Radiance:
     """Return an image of light (.exr, .hdr, .png, .jpg) with at most MAX_COLUMNS columns.
 
-    The values of .png and .jpg are sRGB's. Raises StageError for a file that can't be read.
+    The values of .png and .jpg are sRGB. Raises StageError for a file that cannot be read.
     """
     suffix = file.suffix.lower()
     if suffix == ".exr":
@@ -39,14 +39,14 @@ def read_latlong(file: Path) -> Radiance:
                 encoded = np.asarray(opened.convert("RGB"), np.float32) / 255
         except (UnidentifiedImageError, OSError) as error:
             raise StageError(
-                f"{file}: can't be read as an image, expected one as .exr, .hdr, .png or .jpg"
+                f"{file}: can't be read as an image, expected one in .exr, .hdr, .png or .jpg"
             ) from error
         image = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return _reduced(np.nan_to_num(image[..., :3], posinf=0.0, neginf=0.0).clip(0))
 
 
 def _reduced(image: NDArray[np.floating]) -> Radiance:
-    """Return the means of square blocks, so that MAX_COLUMNS are left; the last may be smaller."""
+    """Return means of square blocks, at most MAX_COLUMNS in a row; the last may be smaller."""
     factor = -(-image.shape[1] // MAX_COLUMNS)
     if factor == 1:
         return image.astype(np.float32)
@@ -57,7 +57,7 @@ def _reduced(image: NDArray[np.floating]) -> Radiance:
 
 
 def turned(image: Radiance, matrix: NDArray[np.float64]) -> Radiance:
-    """Return the image of a room that is turned.
+    """Return the image of light from a scene that is turned.
 
     matrix  (3, 3) from the image's axes to the world, for row vectors; its scale does not matter
     """
@@ -75,7 +75,7 @@ def turned(image: Radiance, matrix: NDArray[np.float64]) -> Radiance:
 
 
 def directions(rows: int, columns: int, down: float, along: float) -> NDArray[np.float64]:
-    """Return the unit vectors (rows, columns, 3) to a place in each texel; 0..1 from its corner."""
+    """Return unit vectors (rows, columns, 3) to a point of each texel, 0..1 from its corner."""
     tilt = ((np.arange(rows) + down) / rows * np.pi)[:, None]
     turn = ((np.arange(columns) + along) / columns * 2 * np.pi)[None, :]
     x, y, z = np.sin(tilt) * np.sin(turn), np.cos(tilt), -np.sin(tilt) * np.cos(turn)

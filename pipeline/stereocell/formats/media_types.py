@@ -1,4 +1,4 @@
-"""The media type that a host says of each file of a bundle."""
+"""The media type with which a host serves each file of a bundle."""
 
 from pathlib import PurePath
 
@@ -18,5 +18,5 @@ MEDIA_TYPES = {
 
 
 def media_type(file: PurePath) -> str:
-    """Return a file's media type by its ending."""
+    """Return a file's media type from its ending."""
     return MEDIA_TYPES.get(file.suffix, "application/octet-stream")

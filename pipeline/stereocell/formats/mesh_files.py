@@ -1,8 +1,8 @@
 """Write bodies as PLY or OBJ, by trimesh.
 
-The other formats have writers of our own. trimesh's 3MF lacks units, colours and slicers' lists of
-parts, and its glTF takes the whole scene in memory. STL is a step's result, too, and each worker of
-a build would take a second to import trimesh.
+The other formats have their own writers here. trimesh's 3MF lacks units, colours and slicers' lists
+of parts, and its glTF holds the whole scene in memory. STL is also the result of a step, and each
+worker of a build would need a second to import trimesh.
 """
 
 import math
@@ -19,7 +19,7 @@ _DIGITS = 9  # significant digits of a 32-bit float
 
 
 def write_ply(path: Path, bodies: Sequence[Body], *, unit: str) -> None:
-    """Write one binary mesh with a colour at each vertex; `unit` stands in a comment."""
+    """Write one binary mesh with a colour at each vertex. `unit` is written in a comment."""
     import trimesh  # slow to import
 
     meshes = [
@@ -33,14 +33,14 @@ def write_ply(path: Path, bodies: Sequence[Body], *, unit: str) -> None:
 
 
 def write_obj(path: Path, bodies: Sequence[Body], *, unit: str) -> None:
-    """Write path and path.with_suffix(".mtl"); names become identifiers, without spaces."""
+    """Write `path` and a .mtl file beside it. Names become identifiers, without spaces."""
     import trimesh  # slow to import
 
     scene = trimesh.Scene()
     for body in bodies:
         name = to_identifier(body.name)
-        look = trimesh.visual.material.SimpleMaterial(name=name, diffuse=body.srgb)
-        visual = trimesh.visual.TextureVisuals(material=look)
+        material = trimesh.visual.material.SimpleMaterial(name=name, diffuse=body.srgb)
+        visual = trimesh.visual.TextureVisuals(material=material)
         mesh = trimesh.Trimesh(body.positions, body.triangles, process=False, visual=visual)
         scene.add_geometry(mesh, geom_name=name)
     largest = max(float(np.abs(body.positions).max()) for body in bodies)

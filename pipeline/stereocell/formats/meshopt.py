@@ -1,4 +1,4 @@
-"""Lay out the buffers of a .glb with EXT_meshopt_compression, by the package meshopt."""
+"""Lay out the buffers of a .glb with EXT_meshopt_compression, using the package meshopt."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def reorder(
     triangles  uint32 (m, 3)
     objects    int32, the object of each vertex; the triangles are then grouped by object
     result     indices uint32 (3m,) into the kept vertices; kept vertices int64 (k,), in the order
-               of their first use. Unused vertices are left out
+               of their first use. Unused vertices are left out.
     """
     indices, order = _renumbered(np.asarray(triangles, dtype=np.uint32), is_reordered=True)
     if objects is None:
@@ -38,8 +38,8 @@ def _renumbered(
 class CompressedBuffers:
     """The compressed binary chunk (buffer 0) and the layout of its decoded data (buffer 1).
 
-    Buffer 1 has no data: it is EXT_meshopt_compression's fallback, which readers that know the
-    extension don't load.
+    Buffer 1 has no data. It is the fallback of EXT_meshopt_compression, which readers that know the
+    extension do not load.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class CompressedBuffers:
         self._accessors: list[dict[str, Any]] = []
 
     def add(self, data: bytes, *, alignment: int = 4) -> int:
-        """Store bytes as they are, at a multiple of `alignment`; return the bufferView's index."""
+        """Store bytes unchanged, at a multiple of `alignment`; return the bufferView's index."""
         start = self._align(alignment)
         self._views.append({"buffer": 0, **_offset(start), "byteLength": len(data)})
         self._data += data
@@ -75,7 +75,7 @@ class CompressedBuffers:
         accessor  its glTF properties without the count
         """
         count, stride = len(values), values.itemsize * values.shape[1]
-        # the extension needs version 0 of the vertex codec
+        # The extension requires version 0 of the vertex codec.
         encoded = meshopt.encode_gltf_buffer(values, "ATTRIBUTES", version=0)
         view = self._add_view(encoded, "ATTRIBUTES", count, stride)
         view["byteStride"] = stride
@@ -145,9 +145,9 @@ def _offset(start: int) -> dict[str, int]:
 
 
 def _octahedral(directions: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Return signed bytes (n, 4): x and y on the octahedron, the value of 1, the sign if any."""
+    """Return signed bytes (n, 4): x and y on the octahedron, the value of 1, and the sign or 0."""
     x, y, z = (directions[:, :3] / np.abs(directions[:, :3]).sum(axis=1, keepdims=True)).T
-    below = z < 0  # the lower half is folded over the upper one's edges
+    below = z < 0  # the lower half is folded over the edges of the upper half
     u = np.where(below, np.copysign(1 - np.abs(y), x), x)
     v = np.where(below, np.copysign(1 - np.abs(x), y), y)
     rest = [np.ones_like(u), directions[:, 3] if directions.shape[1] > 3 else np.zeros_like(u)]

@@ -1,6 +1,6 @@
-"""The head of an NRRD file, for voxels that are written behind it or lie in a file beside it.
+"""The head of an NRRD file, for voxels that follow it or are in a separate file.
 
-pynrrd writes the date into its files, and takes the voxels as a whole.
+pynrrd is not used, because it writes the date into its files and needs all voxels in memory.
 
 References: NRRD format definition, https://teem.sourceforge.net/nrrd/format.html
 """
@@ -19,10 +19,10 @@ _TYPES = {"uint8": "uint8", "uint16": "uint16", "int16": "int16"}
 def nrrd_head(
     grid: VoxelGrid, dtype: np.dtype[np.integer[Any]], names: Sequence[str], *, data_file: str = ""
 ) -> bytes:
-    """Return the head: voxels follow raw, x fastest, then y, z and channels.
+    """Return the head. Raw voxels follow, with x fastest, then y, z and channels.
 
-    names      of the channels, in their order
-    data_file  the name of the file that has the voxels; empty: they follow the head
+    names      names of the channels, in order
+    data_file  name of the file that holds the voxels; empty: they follow the head
     """
     many = len(names) > 1
     sizes = " ".join(map(str, [*grid.size, *([len(names)] if many else [])]))

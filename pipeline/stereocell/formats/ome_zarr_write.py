@@ -1,4 +1,7 @@
-"""Write channels of 8 bits as OME-Zarr 0.5 (Zarr v3), one level: https://ngff.openmicroscopy.org/0.5/"""
+"""Write channels of 8 bits as OME-Zarr 0.5 (Zarr v3) with one level.
+
+Reference: https://ngff.openmicroscopy.org/0.5/
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,11 +33,11 @@ def write_probabilities(
     volumes     uint8 (z, y, x), one for each channel
     channels    name and linear RGB (0..1) of each
     start       voxel (z, y, x) at which the volumes begin
-    shape       voxels (z, y, x) of the whole; it is 0 outside the volumes, which takes no room
+    shape       voxels (z, y, x) of the whole, which is 0 outside of the volumes and takes no space
     spacing_um  (z, y, x)
     origin_um   centre of voxel (0, 0, 0), (z, y, x)
 
-    The same arguments give the same bytes. The write is not atomic: the caller moves the folder.
+    The same arguments give the same bytes. The write is not atomic, so the caller moves the folder.
     """
     axes: list[dict[str, str]] = [{"name": "c", "type": "channel"}]
     axes += [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
@@ -61,7 +64,7 @@ def write_probabilities(
         }
     }
     files: dict[str, Buffer] = {}
-    # in memory first: zarr writes from threads of its own, which would outlive an exception
+    # In memory first, because zarr writes from its own threads, which would outlive an exception.
     group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
     array = group.create_array(
         "0",
@@ -82,6 +85,6 @@ def write_probabilities(
 
 
 def _hex(linear: Triple) -> str:
-    """Return RRGGBB, sRGB (IEC 61966-2-1)."""
+    """Return the colour as RRGGBB in sRGB (IEC 61966-2-1)."""
     bent = (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055 for v in linear)
     return "".join(f"{round(255 * v):02X}" for v in bent)

@@ -1,7 +1,8 @@
-"""Write many meshes as one glTF 2.0 file that any program opens: floats, and no extension.
+"""Write many meshes as one glTF 2.0 file of floats, without extensions, that any program opens.
 
-Vertices go to a file beside the target as meshes come, so that no more than one mesh is in memory.
-Other buffers pack them, by an extension that a reader must know: export/packed_gltf.py.
+Vertices are written to a file beside the target as meshes arrive, so that only one mesh is in
+memory at a time. Other buffers pack them by an extension that readers must know:
+export/packed_gltf.py.
 """
 
 import base64
@@ -24,18 +25,18 @@ from stereocell.storage.atomic_write import replacing
 
 _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT, _FLOAT = 5121, 5123, 5125, 5126
 _VERTICES, _INDICES = 34962, 34963  # bufferView.target
-_MAX_BYTES = 2**32 - 1  # largest size of a .glb in bytes: its length is a number of 32 bits
+_MAX_BYTES = 2**32 - 1  # largest size of a .glb in bytes, since its length is a number of 32 bits
 
 
 class Buffers(Protocol):
-    """Where the numbers of meshes are put."""
+    """A store for the numbers of meshes."""
 
     extensions: tuple[str, ...]
 
     def add_mesh(
         self, mesh: Mesh, positions: NDArray[np.float64], colors: NDArray[np.uint8] | None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Store a mesh; return its primitive, and what places its node.
+        """Store a mesh; return its primitive, and the properties that place its node.
 
         positions  float64 (n, 3), in metres
         colors     uint8 (n, 3), linear, or None
@@ -46,7 +47,7 @@ class Buffers(Protocol):
 
 
 class PlainBuffers:
-    """One buffer of floats, whose bytes are written as they come."""
+    """One buffer of floats, whose bytes are written as they arrive."""
 
     extensions: tuple[str, ...] = ()
 
@@ -125,10 +126,10 @@ class Document:
         *,
         occlusion: bool = True,
     ) -> None:
-        """Add a mesh below a group, which has one material for each appearance.
+        """Add a mesh to a group, in which each appearance has one material.
 
-        positions  float64 (n, 3), in metres, in place of the mesh's own
-        occlusion  darken its vertices where light is occluded
+        positions  float64 (n, 3), in metres, used in place of the mesh's own
+        occlusion  whether vertices are darker where light is occluded
         """
         if group not in self._groups:
             self._nodes.append({"name": group, "children": []})
@@ -145,7 +146,7 @@ class Document:
         self._nodes[self._groups[group]]["children"].append(len(self._nodes) - 1)
 
     def write(self, path: Path) -> None:
-        """Write .glb, or .gltf with its buffer inside it. Raises OutputError."""
+        """Write a .glb, or a .gltf with its buffer inside. Raises OutputError."""
         document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": GENERATOR},
             "scene": 0,
@@ -171,8 +172,8 @@ class Document:
                 length = 12 + 8 + len(text) + 8 + size
                 if length > _MAX_BYTES:
                     raise OutputError(
-                        f"{path}: {length} bytes, more than a .glb can have: expected a coarser "
-                        "--lod, fewer --tiles, or --compress meshopt"
+                        f"{path}: {length} bytes, more than a .glb can have. Use a coarser --lod, "
+                        "fewer --tiles, or --compress meshopt"
                     )
                 file.write(struct.pack("<4sII", b"glTF", 2, length))
                 file.write(struct.pack("<I4s", len(text), b"JSON") + text)

@@ -1,8 +1,8 @@
 """Write Neuroglancer's precomputed format: image chunks by scale, and meshes of several levels.
 
-A mesh file holds each level as one fragment, in a cell that is twice as large as the finer one's:
-the octree of the format, with one node a level. Draco's numbers are vertices on a grid of 16 bits
-in the cell.
+A mesh file holds each level as one fragment, in a cell twice as large as that of the finer level.
+That is the octree of the format with one node for each level. Draco's numbers are vertices on a
+grid of 16 bits in the cell.
 
 References: Neuroglancer, src/datasource/precomputed/{volume,meshes,segment_properties}.md
 """
@@ -33,14 +33,14 @@ class Level:
 
     @property
     def edge_nm(self) -> float:
-        """The length of an edge, about: what the level resolves."""
+        """The approximate length of an edge, which is what the level resolves."""
         a, b, c = self.positions[self.triangles].transpose(1, 0, 2)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
         return float(np.sqrt(2 * area / max(len(self.triangles), 1)))
 
 
 def write_info(folder: Path, content: dict[str, Any]) -> None:
-    """Write the `info` of a folder, which is made."""
+    """Create a folder and write its `info`."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "info").write_text(json.dumps(content, indent=1), encoding="utf-8", newline="\n")
 
@@ -89,7 +89,7 @@ def _write_chunks(folder: Path, values: NDArray[Any]) -> None:
 
 
 def write_meshes_info(folder: Path, names: dict[int, str]) -> None:
-    """Write what the meshes of a folder are, and their names by segment."""
+    """Write the description of the meshes of a folder, and their names by segment."""
     write_info(
         folder,
         {
@@ -109,7 +109,7 @@ def write_meshes_info(folder: Path, names: dict[int, str]) -> None:
 
 
 def write_mesh(folder: Path, segment: int, levels: Sequence[Level], encode: Encode) -> None:
-    """Write a mesh of one or more levels, finest first; `encode`: DracoPy's."""
+    """Write a mesh of one or more levels, finest first. encode: DracoPy's function."""
     places = np.concatenate([level.positions for level in levels])
     origin = np.floor(places.min(axis=0)).astype("<f4")
     shape = np.ceil(places.max(axis=0) - origin + 1).astype("<f4")
@@ -134,9 +134,10 @@ def write_mesh(folder: Path, segment: int, levels: Sequence[Level], encode: Enco
         struct.pack("<I", count),
         np.array(scales[1:], "<f4").tobytes(),
         np.zeros((count, 3), "<f4").tobytes(),  # offsets of vertices
-        np.ones(count, "<u4").tobytes(),  # fragments a level
+        np.ones(count, "<u4").tobytes(),  # number of fragments of each level
     ]
     for fragment in fragments:
-        manifest.append(struct.pack("<4I", 0, 0, 0, len(fragment)))  # where it is, and its bytes
+        # Position of the fragment, and its size in bytes
+        manifest.append(struct.pack("<4I", 0, 0, 0, len(fragment)))
     (folder / f"{segment}.index").write_bytes(b"".join(manifest))
     (folder / str(segment)).write_bytes(b"".join(fragments))

@@ -1,7 +1,7 @@
 """Write a mesh as binary STL, for slicers of 3D printers and mesh editors.
 
-STL has no unit: slicers read its numbers as mm. Closed tiles are in um, as everywhere, so they are
-1000 times as large in print; what `stereocell export` writes is in the unit that its head states.
+STL has no unit, and slicers read its numbers as mm. Closed tiles are in um, like everything else,
+so they are 1000 times as large in print. `stereocell export` writes the unit that the head states.
 """
 
 import struct
@@ -22,18 +22,18 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 
 
 def write_stl(path: Path, mesh: Mesh) -> None:
-    """Write the mesh in place of an older file.
+    """Write the mesh, and replace an older file.
 
     mesh  positions float32 (n, 3) in um (x, y, z), triangles uint32 (m, 3)
 
-    Raises OutputError if the file can't be written.
+    Raises OutputError if the file cannot be written.
     """
     with replacing(path) as file:
         _write(file, [(mesh.positions, mesh.triangles)], "um")
 
 
 def write_stl_file(path: Path, bodies: Sequence[Body], *, unit: str) -> None:
-    """Write bodies one after another; STL can't tell them apart, nor their colours."""
+    """Write bodies one after another. STL does not separate them, and has no colours."""
     _write(path, [(body.positions, body.triangles) for body in bodies], unit)
 
 
@@ -56,7 +56,7 @@ def _write(
 
 
 def check_stl(path: Path) -> None:
-    """Raise StageError if a file is missing, or its length doesn't fit its triangle count."""
+    """Raise StageError if a file is missing, or its length does not match its triangle count."""
     try:
         size = path.stat().st_size
         with path.open("rb") as file:

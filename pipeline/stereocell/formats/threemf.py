@@ -1,16 +1,16 @@
-"""Write bodies as 3MF: one object with a part a body, in the file's unit, with names and colours.
+"""Write bodies as 3MF: one object with a part for each body, with unit, names and colours.
 
-Slicers put each object on the bed by itself, so bodies of a specimen have to be one object. There
-are two ways to state its parts:
+Slicers put each object on the bed separately, so the bodies of a specimen have to be one object.
+There are two ways to state its parts:
 
     ranges      One mesh, and PrusaSlicer's list of the ranges of its triangles that are parts.
-                Bambu Studio and OrcaSlicer read that list, too, if the metadata "Application" has
-                the name of PrusaSlicer in it. Other programs see one mesh of coloured triangles.
-    components  A mesh a body, joined by the core specification's components, and Bambu Studio's
-                list of parts. PrusaSlicer takes components for objects.
+                Bambu Studio and OrcaSlicer read that list, too, if the metadata "Application"
+                contains the name of PrusaSlicer. Other programs see one mesh of coloured triangles.
+    components  A mesh for each body, joined by the core specification's components, and Bambu
+                Studio's list of parts. PrusaSlicer treats components as separate objects.
 
-trimesh writes neither colours nor units nor these lists, and a random UUID an object, where the
-same bodies have to give the same bytes. So dates are fixed, too.
+trimesh writes neither colours nor units nor these lists, and gives each object a random UUID. Here
+the same bodies have to give the same bytes, so dates are fixed, too.
 
 References
 ----------
@@ -33,7 +33,7 @@ from stereocell.formats.body import Body
 from stereocell.model.version import GENERATOR
 
 UNITS = {"um": "micron", "mm": "millimeter", "m": "meter"}
-_FILAMENTS = 16  # largest number of a filament; further bodies have the first one
+_FILAMENTS = 16  # largest number of a filament; further bodies get the first one
 _CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 _PACKAGE = "http://schemas.openxmlformats.org/package/2006"
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -51,14 +51,14 @@ _RELATIONS = (
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
 )
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-_ROWS = 10_000  # rows of numbers that are turned into text at a time
+_ROWS = 10_000  # number of rows that are turned into text at a time
 _MATERIALS, _WHOLE, _FIRST = 1, 2, 3  # IDs in the model: colours, the object, its first component
 
 
 def write_3mf(
     path: Path, bodies: Sequence[Body], *, title: str, unit: str, components: bool = False
 ) -> None:
-    """Write the bodies as parts of one object; `unit`: of their numbers, one of UNITS.
+    """Write the bodies as parts of one object. unit: of their numbers, one of UNITS.
 
     Where parts overlap, slicers print the later one.
     """
@@ -102,7 +102,7 @@ def _model(
 
 
 def _one_mesh(bodies: Sequence[Body], title: str) -> Iterator[str]:
-    """Yield one mesh of all bodies; vertices of a body follow each other, as PrusaSlicer needs."""
+    """Yield one mesh of all bodies. Vertices of a body are contiguous, as PrusaSlicer requires."""
     yield f'<object id="{_WHOLE}" name={_quoted(title)} type="model" pid="{_MATERIALS}" pindex="0">'
     yield "<mesh><vertices>\n"
     for body in bodies:
@@ -117,7 +117,7 @@ def _one_mesh(bodies: Sequence[Body], title: str) -> Iterator[str]:
 
 
 def _components(bodies: Sequence[Body], title: str) -> Iterator[str]:
-    """Yield a mesh a body, and the object that they are components of."""
+    """Yield a mesh for each body, and the object of which they are components."""
     for number, body in enumerate(bodies):
         yield f'<object id="{_FIRST + number}" name={_quoted(body.name)} type="model" '
         yield f'pid="{_MATERIALS}" pindex="{number}"><mesh><vertices>\n'
@@ -172,7 +172,7 @@ def _rows(form: str, rows: NDArray[np.float32] | NDArray[np.uint32]) -> Iterator
 
 
 def _text(text: str) -> str:
-    """Return the text; characters that XML can't have become U+FFFD."""
+    """Return the text with U+FFFD in place of characters that XML does not allow."""
     return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)
 
 

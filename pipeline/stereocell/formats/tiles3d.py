@@ -3,16 +3,17 @@
     root (no content)
       one child for each spatial tile: coarsest LOD -> ... -> lod0, each replacing the one before
 
-Lengths are metres. Tilesets are z-up where glTF is y-up: readers turn glTF's (x, y, z) into
-(x, -z, y), and the boxes here are turned the same way.
+Lengths are metres. Tilesets are z-up and glTF is y-up: readers turn glTF's (x, y, z) into
+(x, -z, y), and the boxes here are turned in the same way.
 
 The extras of each content hold its file's hash, so that a reader that trusts the tileset detects a
-damaged surface. 128 bits are enough for that, in base64url, named as in RFC 6920: "sha-256-128".
+damaged surface. The hash has 128 bits in base64url. Its name is that of RFC 6920: "sha-256-128".
 
-The first picture needs manifest.json, one tileset, and the coarsest LODs alone. So where tiles are
-many, the finer LODs of each are in a tileset of their own, `<tile>/finer.json`, which a reader
-fetches with the first of them; few tiles are one file: one request. Numbers are rounded, boxes
-outwards and errors upwards. Together: 242 tiles of four LODs took 328 kB, and now 112.
+The first image needs only manifest.json, one tileset, and the coarsest LODs. If there are many
+tiles, the finer LODs of each are therefore in a separate tileset, `<tile>/finer.json`. A reader
+fetches it when it needs the first of them. Few tiles are one file, and so one request. Numbers are
+rounded, boxes outwards and errors upwards. With all this, 242 tiles of four LODs take 112 kB
+instead of 328.
 """
 
 import base64
@@ -32,8 +33,9 @@ _METRES_PER_UM = 1e-6
 _NM_PER_METRE = 1e9
 CONTENT_HASH = "sha-256-128"  # key in the extras of a content
 _CONTENT_HASH_BYTES = 16
-_ROOT_ERROR = 100.0  # diagonals of the channel: so large that readers always draw something
-MAX_WHOLE_TILES = 64  # most tiles that one file describes with all LODs: 59 kB with four each
+_ROOT_ERROR = 100.0  # diagonals of the channel; so large that readers always draw something
+# Largest number of tiles that one file describes with all LODs; 59 kB with four LODs each
+MAX_WHOLE_TILES = 64
 TILESET = "tileset.json"
 _FINER = "finer.json"
 _UPWARDS = Context(prec=4, rounding=ROUND_CEILING)  # rounds up to four digits
@@ -46,8 +48,8 @@ class TileLod:
     """One .glb: its address from the tileset, and the box of its vertices.
 
     uri           `<tile>/<name>.glb`
-    sha256        of the file, hexadecimal
-    largest_um    the largest distance that was found between the LOD and the iso-surface
+    sha256        SHA-256 of the file, hexadecimal
+    largest_um    largest measured distance between the LOD and the iso-surface
     min_m, max_m  corners of the box (x, y, z), metres, y up
     """
 
@@ -59,7 +61,7 @@ class TileLod:
 
 
 def content_hash(sha256: str) -> str:
-    """Return the hash in a content's extras, of a file with this SHA-256 (hexadecimal)."""
+    """Return the hash for a content's extras, from the SHA-256 of its file (hexadecimal)."""
     start = bytes.fromhex(sha256)[:_CONTENT_HASH_BYTES]
     return base64.urlsafe_b64encode(start).rstrip(b"=").decode()
 
@@ -69,9 +71,8 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
 
     tiles  the LODs of each tile, finest first, at least one each
 
-    `tileset.json` describes up to MAX_WHOLE_TILES tiles alone; if there are more, it refers to the
-    other files. A coarser LOD never gets a smaller geometricError than a finer one, as readers
-    require.
+    Up to MAX_WHOLE_TILES tiles, `tileset.json` is the only file. With more tiles it refers to the
+    others. A coarser LOD never has a smaller geometricError than a finer one, as readers require.
     """
     boxes = [_Box.around(lods) for lods in tiles]
     whole = _Box.holding(boxes)
@@ -90,7 +91,7 @@ def make_tilesets(tiles: Sequence[Sequence[TileLod]]) -> dict[str, bytes]:
         address = f"{folder}/{_FINER}"
         files[address] = compact_json(_tileset(_nested(finer), coarsest["geometricError"]))
         sha256 = hashlib.sha256(files[address]).hexdigest()
-        # this tile has no surface of its own: the LODs of its JSON file replace the coarsest
+        # This tile has no surface of its own. The LODs of its JSON file replace the coarsest one.
         holder = _tile(box, coarsest["geometricError"], address, sha256)
         children.append(_nested([holder, coarsest]))
     root = {
@@ -135,14 +136,14 @@ def _nested(tiles: list[dict[str, Any]]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Box:
-    """Corners (x, y, z), y up, in whole nm; edges are even, so that the centre is whole too."""
+    """Corners (x, y, z), y up, in whole nm. Edges are even, so that the centre is whole too."""
 
     low: tuple[int, ...]
     high: tuple[int, ...]
 
     @classmethod
     def around(cls, lods: Sequence[TileLod]) -> "_Box":
-        """Return the box of all LODs, rounded outwards: a tile's box contains its children's."""
+        """Return the box of all LODs, rounded outwards. A tile's box contains its children's."""
         lows = zip(*(lod.min_m for lod in lods), strict=True)
         highs = zip(*(lod.max_m for lod in lods), strict=True)
         return cls._evened(
@@ -152,7 +153,7 @@ class _Box:
 
     @classmethod
     def holding(cls, boxes: Sequence["_Box"]) -> "_Box":
-        """Return the box that contains all of these."""
+        """Return the box that contains all of these boxes."""
         return cls._evened(
             [min(axis) for axis in zip(*(box.low for box in boxes), strict=True)],
             [max(axis) for axis in zip(*(box.high for box in boxes), strict=True)],
@@ -171,11 +172,11 @@ class _Box:
         """Return centre and half axes in metres, z up, 12 numbers."""
         centre = [(a + b) // 2 for a, b in zip(self.low, self.high, strict=True)]
         half = [(b - a) // 2 for a, b in zip(self.low, self.high, strict=True)]
-        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # the shortest decimals
+        cx, cy, cz = (n / _NM_PER_METRE for n in centre)  # gives the shortest decimals
         hx, hy, hz = (n / _NM_PER_METRE for n in half)
         return [cx, 0 - cz, cy, hx, 0, 0, 0, hz, 0, 0, 0, hy]
 
 
 def _round_up(error: float) -> float:
-    """Return the error with four significant digits, never smaller."""
+    """Return the error with four significant digits, never smaller than given."""
     return float(_UPWARDS.create_decimal(repr(error)))

@@ -1,4 +1,4 @@
-"""Take finer levels out of a tileset that `tiles3d.make_tilesets` has made."""
+"""Remove finer levels from a tileset of `tiles3d.make_tilesets`."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -10,12 +10,12 @@ _LOD = re.compile(r"lod(\d+)\.glb$")
 
 
 def is_surface(path: str) -> bool:
-    """Return whether a path is that of a level's surface."""
+    """Return whether a path is that of a level's surface file."""
     return _LOD.search(path) is not None
 
 
 def surfaces(tile: Tile) -> Iterator[tuple[str, int]]:
-    """Yield the address and the level of each surface of a tile and of those below it."""
+    """Yield the address and the level of each surface of a tile and its descendants."""
     uri = tile.get("content", {}).get("uri", "")
     if found := _LOD.search(uri):
         yield uri, int(found[1])
@@ -24,7 +24,7 @@ def surfaces(tile: Tile) -> Iterator[tuple[str, int]]:
 
 
 def inlined(tile: Tile, read: Callable[[str], Tile], below: str = "") -> Tile:
-    """Return a tile with the tilesets that it names in their places.
+    """Return a tile with the tilesets that it names in place of their names.
 
     read  returns the root of the tileset at an address
     """
@@ -41,11 +41,11 @@ def inlined(tile: Tile, read: Callable[[str], Tile], below: str = "") -> Tile:
 
 
 def without_finer(tile: Tile, finest: int) -> Tile:
-    """Return a tile without the surfaces that are finer than a level; its own surface stays."""
+    """Return a tile without surfaces finer than a level. Its own surface stays."""
     children = tile.get("children", [])
     if "content" in tile:
         children = [one for one in children if any(lod >= finest for _, lod in surfaces(one))]
     made = {key: value for key, value in tile.items() if key != "children"}
     if children:
         return {**made, "children": [without_finer(one, finest) for one in children]}
-    return {**made, "geometricError": 0.0}  # nothing finer takes its place
+    return {**made, "geometricError": 0.0}  # nothing finer replaces it

@@ -1,4 +1,4 @@
-"""Walk the tilesets of a bundle, and the external tilesets that they name."""
+"""Walk through the tilesets of a bundle, and the external tilesets that they name."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,8 @@ from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
 _JSON = ".json"
-_MAX_CHARACTERS = 1024  # most characters of an address: no file system has longer names
+# Largest number of characters of an address; no file system has longer names
+_MAX_CHARACTERS = 1024
 _REMEDY = "run `stereocell bundle OUT`"
 
 
@@ -19,11 +20,11 @@ class Content:
     """A file that a tileset names: a surface, or an external tileset.
 
     tileset  the JSON file that names it
-    path     its path in the bundle
-    named    its entry in that file: `uri`, `extras`
+    path     path in the bundle
+    named    entry in that file: `uri`, `extras`
     error_m  geometricError of its tile, metres
     limit_m  geometricError of the tile's parent, metres
-    boxes    of the tile, its parent and so on: 12 numbers each, metres, z up
+    boxes    boxes of the tile, its parent and so on: 12 numbers each, metres, z up
     """
 
     tileset: Path
@@ -42,12 +43,12 @@ class Content:
 def walk(bundle: Path, tileset: Path, tile_id: str | None = None) -> Iterator[Content]:
     """Yield each content of a tileset, and of the tilesets that it names, coarse ones first.
 
-    bundle   the folder that must contain all files
-    tile_id  only files in this tile's folder are yielded; None: all
+    bundle   folder that must contain all files
+    tile_id  only files in this tile's folder are yielded; None: all files
 
     An external tileset is yielded before it is opened. Raises StereoCellError, which names the
-    file, where a tileset is missing or invalid, or names a file outside `bundle` or a tileset that
-    was already visited.
+    file, if a tileset is missing or invalid, names a file outside of `bundle`, or names a tileset
+    that was already visited.
     """
     place = _place(tileset)
     yield from _walk_file(_place(bundle), tileset, tile_id, None, (), {place})
@@ -59,7 +60,7 @@ def _walk_file(
     tile_id: str | None,
     parent_m: float | None,
     around: tuple[tuple[float, ...], ...],
-    met: set[Path],
+    visited: set[Path],
 ) -> Iterator[Content]:
     content = read_json(tileset, None, _REMEDY)
     try:
@@ -71,8 +72,8 @@ def _walk_file(
             error_m = float(tile["geometricError"])
             if "transform" in tile:
                 raise CheckError(
-                    f"{tileset}: found a tile with a transform, expected none: surfaces lie in the "
-                    "world"
+                    f"{tileset}: found a tile with a transform, expected none: surfaces are in "
+                    "world space"
                 )
             boxes = (tuple(float(n) for n in tile["boundingVolume"]["box"]), *holding)
             waiting += [(child, error_m, boxes) for child in reversed(tile.get("children", ()))]
@@ -80,7 +81,10 @@ def _walk_file(
                 continue
             uri = tile["content"]["uri"]
             if len(uri) > _MAX_CHARACTERS:
-                raise CheckError(f"{tileset}: {uri:.80}...: over {_MAX_CHARACTERS} characters")
+                raise CheckError(
+                    f"{tileset}: {uri:.80}... is too long, expected up to {_MAX_CHARACTERS} "
+                    "characters"
+                )
             path = tileset.parent / uri
             place = _place(path)
             if not place.is_relative_to(bundle):
@@ -90,14 +94,14 @@ def _walk_file(
             found = Content(tileset, path, tile["content"], error_m, limit_m, boxes)
             yield found
             if found.is_tileset:
-                if place in met:
+                if place in visited:
                     raise CheckError(f"{tileset}: {uri} is a tileset that was named before")
-                met.add(place)
-                yield from _walk_file(bundle, path, tile_id, error_m, boxes, met)
+                visited.add(place)
+                yield from _walk_file(bundle, path, tile_id, error_m, boxes, visited)
     except (AttributeError, KeyError, OSError, TypeError, ValueError) as error:
-        raise CheckError(f"{tileset}: no 3D Tiles tileset: {error!r:.200}") from error
+        raise CheckError(f"{tileset}: not a 3D Tiles tileset: {error!r:.200}") from error
 
 
 def _place(path: Path) -> Path:
-    """Return the path without links; for links in a circle, some path."""
+    """Return the path without links; if links form a circle, some path."""
     return Path(os.path.realpath(path))

@@ -9,21 +9,22 @@ io/GridDescriptor.cc, io/Compression.h and tree/*.h (MPL-2.0; read, not copied).
   topology  buffer count, background, root -> 32^3 nodes of 128^3 -> 16^3 nodes of 8^3 -> leaves
   values    a code (0: only active values are stored, the rest is background), then the numbers
 
-Both trees are Tree_float_5_4_3. What equals the background is inactive and costs a bit a voxel.
+Both trees are Tree_float_5_4_3. Voxels equal to the background are inactive, and cost a bit each.
 
-density   zero is background. Saved as half floats: a half has 11 bits, so that steps of 1/255 are
-          read back exactly. Each leaf's active values are compressed as zlib does, by libdeflate
-          at level 1. Of three stains of 512 x 512 x 64 voxels, 92 to 97 % active, 94.8 MB of
-          halves: 1.8 s and 45.6 MB (zlib level 1 2.6 s and 46.7 MB; its Huffman codes alone 1.8 s
-          and 52.7 MB; zlib-ng 1.2 s and 64.2 MB; Blosc with LZ4 .6 s and 86.6 MB); a crop of real
-          light-sheet data, 98 % active, is 28 % smaller than without.
-measured  the least value is background. Saved as floats, which hold all of 16 bits, where halves
-          hold whole numbers up to 2048. Compressed by Blosc with LZ4, as OpenVDB's own files are:
-          bytes of equal weight lie together. Light-sheet data of 16 bits: 1.82 bytes a voxel and
-          .010 s of CPU a million (zlib 1.90 and .126; zstd in Blosc 1.53 and .057, which not every
-          OpenVDB reads); a cyclic stain 1.49 and .007.
+density   The background is 0. Values are half floats, whose 11 bits hold steps of 1/255 exactly.
+          The active values of each leaf are compressed as by zlib, by libdeflate at level 1.
+          Three stains of 512 x 512 x 64 voxels, 92 to 97 % active, are 94.8 MB of half floats.
+          This takes 1.8 s and 45.6 MB. Others: zlib level 1 2.6 s and 46.7 MB; its Huffman codes
+          alone 1.8 s and 52.7 MB; zlib-ng 1.2 s and 64.2 MB; Blosc with LZ4 .6 s and 86.6 MB. A
+          crop of real light-sheet data, 98 % active, becomes 28 % smaller by compression.
+measured  The background is the least value. Values are floats, which hold all numbers of 16 bits;
+          half floats hold whole numbers only up to 2048. They are compressed by Blosc with LZ4, as
+          in OpenVDB's own files, with bytes of equal weight side by side. Light-sheet data of 16
+          bits takes 1.82 bytes per voxel and .010 s of CPU per million voxels. Others: zlib 1.90
+          and .126; zstd in Blosc 1.53 and .057, which not every OpenVDB reads. A cyclic stain takes
+          1.49 and .007.
 
-vdb_read.py reads what is written here.
+vdb_read.py reads files that are written here.
 """
 
 import hashlib
@@ -66,8 +67,8 @@ _Leaves = tuple[NDArray[Any], NDArray[np.int64]]
 class _Grid:
     """A grid to write.
 
-    voxels  (x, y, z), the grid's numbers, or with `is_half` uint8
-    first   index (i, j, k) of the first of them
+    voxels  (x, y, z), the grid's numbers; uint8 if `is_half`
+    first   index (i, j, k) of the first voxel
     """
 
     name: str
@@ -86,18 +87,19 @@ def write_vdb(
     measured: NDArray[Any] | None = None,
     apron: int = 0,
 ) -> None:
-    """Write a file with the grid `density`, which is `density` / 255, and with `measured`, if any.
+    """Write a file with the grid `density`, which is `density` / 255, and maybe `measured`.
 
     density     uint8 (z, y, x), image rows downwards
     first_um    centre of its voxel (0, 0, 0), (z, y, x)
     spacing_um  (z, y, x)
-    measured    (z, y, x), of numbers that float32 holds: `apron` voxels before the density's first
-                along each axis, and as many as it has after
+    measured    (z, y, x), numbers that float32 can hold. It has `apron` voxels more than the
+                density at the start of each axis, and any number at the end
+    apron       see `measured`
 
     Grid index (i, j, k) is world (x, y, z), in both grids. Rows are reversed, so that j grows
-    upwards like the world's y, and the transform has positive scales only: some clients take a
-    negative scale for a mirror. The same input gives the same bytes: the UUID is a hash of the
-    grids. Raises OutputError if the file can't be written.
+    upwards like the world's y, and the transform has only positive scales: some clients treat a
+    negative scale as a mirror. The same input gives the same bytes, because the UUID is a hash of
+    the grids. Raises OutputError if the file cannot be written.
 
     >>> import tempfile
     >>> from stereocell.formats.vdb_read import read_vdb_head
@@ -133,8 +135,9 @@ def _upwards(voxels: NDArray[Any]) -> NDArray[Any]:
 def check_vdb(path: Path) -> None:
     """Raise StageError if a file is missing, is not OpenVDB, or ends before its grids do.
 
-    It reads the offsets at which the grids end, not the grids. A file without these offsets, or of
-    a format before 222, is checked by its first bytes only: other programs may have written it.
+    The function reads the offsets at which the grids end, not the grids. A file without these
+    offsets, or of a format before 222, is checked only by its first bytes, because other programs
+    may have written it.
     """
     try:
         with path.open("rb") as file:
@@ -156,17 +159,17 @@ def _find_damage(file: BinaryIO, size: int) -> str | None:
         return None
     file.read(36)  # UUID
     (entries,) = struct.unpack("<I", file.read(4))
-    for _ in range(3 * entries):  # name, type and value, each behind its length
+    for _ in range(3 * entries):  # name, type and value, each after its length
         _skip_text(file)
     (grids,) = struct.unpack("<i", file.read(4))
     if grids < 1:
-        return "it holds no grid"
+        return "the file holds no grid"
     for _ in range(grids):
         for _ in range(3):  # name, tree type, instance parent
             _skip_text(file)
         _, _, end = struct.unpack("<3q", file.read(24))
         if end > size:
-            return f"it ends at byte {size}, expected {end} or more"
+            return f"the file ends at byte {size}, expected {end} or more"
         if end < file.tell():
             return f"a grid ends at byte {end}, before it begins"
         file.seek(end)
@@ -179,7 +182,7 @@ def _skip_text(file: BinaryIO) -> None:
 
 
 def _encode(grid: _Grid, transform: bytes, at: int) -> bytes:
-    """Return one grid with its descriptor, to stand at a place of the file."""
+    """Return one grid with its descriptor, for a position in the file."""
     values, origins = _cut_leaves(grid)
     active = values != grid.background
     masks = np.packbits(active, axis=1, bitorder="little")
@@ -214,7 +217,7 @@ def _cut_leaves(grid: _Grid) -> _Leaves:
     """Return the non-empty leaves (n, 512) and their origins (n, 3) in leaves, in tree order."""
     before = [first % LEAF for first in grid.first]
     shape = [-(-(a + n) // LEAF) for a, n in zip(before, grid.voxels.shape, strict=True)]
-    # as the voxels lie in memory, with x innermost: copied along their rows
+    # Voxels are copied along their rows, in the order of memory with x innermost.
     padded = np.full([n * LEAF for n in shape[::-1]], grid.background, grid.voxels.dtype).T
     inner = tuple(slice(a, a + n) for a, n in zip(before, grid.voxels.shape, strict=True))
     padded[inner] = grid.voxels
@@ -232,7 +235,7 @@ def _cut_leaves(grid: _Grid) -> _Leaves:
 
 def _topology(grid: _Grid, origins: NDArray[np.int64], masks: NDArray[np.uint8]) -> bytes:
     """Return the tree without the values of its leaves."""
-    nothing = b"" if grid.is_half else bytes(8)  # floats have a length even where there are none
+    nothing = b"" if grid.is_half else bytes(8)  # floats have a length even without values
     roots = _runs(origins // (NODE4 * NODE5))
     parts = [struct.pack("<ifII", 1, float(grid.background), 0, len(roots))]
     for start, stop in roots:
@@ -283,12 +286,12 @@ def _buffers(
 
 
 def _pack_halves(numbers: NDArray[Any]) -> bytes:
-    """Return half floats as zlib has them."""
+    """Return half floats in the format of zlib."""
     return bytes(deflate_encode(numbers.tobytes(), _DEFLATE_LEVEL))
 
 
 def _pack_floats(numbers: NDArray[Any]) -> bytes:
-    """Return float32 in a frame of Blosc."""
+    """Return float32 numbers in a Blosc frame."""
     return bytes(blosc.compress(numbers, b"lz4", _LZ4_LEVEL, _SHUFFLE))
 
 

@@ -1,7 +1,7 @@
 """Read OpenVDB files: the heads of their grids, and the measured voxels that vdb.py writes.
 
-Formats before 222 have another layout of the head. Of values, only the layout of vdb.py is read: no
-tiles of one value in the tree, inactive voxels are background, floats in frames of Blosc.
+Formats before 222 have another layout of the head. Values are read only in the layout of vdb.py:
+the tree has no tiles of one value, inactive voxels are background, and floats are in Blosc frames.
 """
 
 import struct
@@ -29,17 +29,17 @@ from stereocell.model.errors import StageError
 
 _MAPS = {"ScaleTranslateMap", "UniformScaleTranslateMap"}
 _MASK_BYTES = LEAF**3 // 8  # bytes of a leaf's mask: a bit for each voxel
-_FRAME_HEAD = 16  # bytes of a frame of Blosc before its numbers; at 4 stands what they unpack to
+_FRAME_HEAD = 16  # bytes of a Blosc frame before its numbers; at byte 4 is their size when unpacked
 
 
 @dataclass(frozen=True, slots=True)
 class VdbGrid:
-    """One grid. Its map is None if it is not a plain scale and shift.
+    """One grid. spacing and origin are None if its map is not a plain scale and shift.
 
     spacing  float64 (3,), distance between voxels along x, y, z, in the file's units
     origin   float64 (3,), centre of voxel (0, 0, 0), x, y, z, in the file's units
-    tree     its type
-    start    the byte at which it begins, behind its descriptor; `blocks`: its leaves; `end`
+    tree     type of the tree
+    start    byte at which the grid begins, after its descriptor; `blocks`: its leaves; `end`
     """
 
     name: str
@@ -52,7 +52,7 @@ class VdbGrid:
 
 
 def read_vdb_head(path: Path) -> list[VdbGrid]:
-    """Return the grids of a file, in its order; none for an unknown format.
+    """Return the grids of a file, in order; none for an unknown format.
 
     Raises StageError if the file is missing or damaged.
     """
@@ -85,14 +85,14 @@ def _read_grids(file: BinaryIO, count: int) -> Iterator[VdbGrid]:
         if _text(file) in _MAPS:
             numbers = np.frombuffer(file.read(48), dtype="<f8")
             origin, spacing = numbers[:3], numbers[3:]
-        # if two grids share a name, a counter follows it after a separator
+        # If two grids have the same name, a counter follows it after a separator.
         yield VdbGrid(name.split("\x1e")[0], spacing, origin, tree, start, blocks, end)
         file.seek(end)
 
 
 def _skip_metadata(file: BinaryIO) -> None:
     (entries,) = struct.unpack("<I", file.read(4))
-    for _ in range(3 * entries):  # name, type and value, each behind its length
+    for _ in range(3 * entries):  # name, type and value, each after its length
         _text(file)
 
 
@@ -102,17 +102,17 @@ def _text(file: BinaryIO) -> str:
 
 
 class VdbValues:
-    """The numbers of one grid of floats; the file is mapped, and a leaf is unpacked when asked for.
+    """The numbers of one grid of floats. The file is mapped, and leaves are unpacked on request.
 
-    Raises StageError, here and in all methods, for a file that is missing, damaged, or of another
-    layout than vdb.py's.
+    Raises StageError, here and in all methods, for a file that is missing, damaged, or in a layout
+    different from that of vdb.py.
     """
 
     def __init__(self, path: Path, name: str) -> None:
         self.path = path
         grid = next((grid for grid in read_vdb_head(path) if grid.name == name), None)
         if grid is None or grid.spacing is None or grid.origin is None or grid.tree != TREE:
-            raise StageError(f"{path}: no grid {name!r} of floats, expected one of measured voxels")
+            raise StageError(f"{path}: found no grid {name!r} of floats, expected measured voxels")
         self.grid = grid
         self._spacing, self._origin = grid.spacing, grid.origin
         try:
@@ -126,7 +126,7 @@ class VdbValues:
     ) -> NDArray[np.float32]:
         """Return the voxels of a box, (z, y, x), image rows downwards.
 
-        low_um  centre of its lowest voxel, (x, y, z); `size`: its voxels (x, y, z)
+        low_um  centre of the lowest voxel of the box, (x, y, z); `size`: its voxels (x, y, z)
         """
         low = np.rint((np.array(low_um) - self._origin) / self._spacing).astype(np.int64)
         first = low // LEAF
@@ -144,7 +144,7 @@ class VdbValues:
         at = self._behind_map()
         buffers, self._background, tiles, roots = struct.unpack_from("<ifII", self._data, at)
         if buffers != 1 or tiles:
-            raise ValueError("tiles of one value, expected leaves alone")
+            raise ValueError("tiles of one value, expected only leaves")
         at += 16
         origins = [np.zeros((0, 3), np.int64)]
         for _ in range(roots):
@@ -155,7 +155,7 @@ class VdbValues:
                 origins.append(corner + node * NODE4 + inside)
                 at += len(inside) * _MASK_BYTES
         if at != self.grid.blocks:
-            raise ValueError("its tree does not end where its leaves begin")
+            raise ValueError("the tree does not end where its leaves begin")
         self._origins = np.concatenate(origins)
         self._starts = []
         for _ in range(len(self._origins)):
@@ -163,7 +163,7 @@ class VdbValues:
             (size,) = struct.unpack_from("<q", self._data, at + _MASK_BYTES + 1)
             at += _MASK_BYTES + 9 + abs(size)
         if at != self.grid.end:
-            raise ValueError("its leaves do not end where it does")
+            raise ValueError("the leaves do not end where the grid does")
 
     def _behind_map(self) -> int:
         with self.path.open("rb") as file:
@@ -176,12 +176,12 @@ class VdbValues:
             return file.tell() + 18 * 8
 
     def _children(self, at: int, edge: int) -> tuple[NDArray[np.int64], int]:
-        """Return the places of a node's children, (n, 3), in their order, and where it ends."""
+        """Return the positions of a node's children, (n, 3), in order, and where the node ends."""
         count = edge**3 // 8
         masks = np.frombuffer(self._data, np.uint8, 2 * count, at)
         end = at + 2 * count + 9
         if masks[count:].any() or bytes(self._data[end - 9 : end]) != ONLY_ACTIVE_VALUES + bytes(8):
-            raise ValueError("tiles of one value, expected leaves alone")
+            raise ValueError("tiles of one value, expected only leaves")
         places = np.flatnonzero(np.unpackbits(masks[:count], bitorder="little"))
         return np.stack(np.unravel_index(places, (edge,) * 3), axis=1).astype(np.int64), end
 
@@ -202,9 +202,9 @@ class VdbValues:
         if bytes(self._data[at : at + 1]) != ONLY_ACTIVE_VALUES:
             raise ValueError("inactive values, expected background")
         if size > 0:
-            # before memory is taken
+            # The size is checked before memory is allocated.
             if size < _FRAME_HEAD or struct.unpack_from("<2I", packed, 4)[0] != wanted:
-                raise ValueError("a leaf of another size than its mask says")
+                raise ValueError("a leaf has another size than its mask states")
             packed = blosc.decompress(packed)
         values = np.full(LEAF**3, self._background, np.float32)
         values[active] = np.frombuffer(packed, "<f4", wanted // 4)

@@ -2,14 +2,15 @@
 
 A leaf is a brick of 16^3 texels with one texel of its neighbours on every side, so that trilinear
 sampling inside it needs no other brick. Coarser nodes are the averaged bricks of a mip pyramid on
-the same grid: node (x, y, z) of level l covers 16 * 2^l texels along an axis. So the hierarchy is
-an octree, not a binary tree: its nodes are the mip bricks that a client draws until finer ones
-arrive (Crassin et al.), and each child has eight times its parent's detail. A binary tree would
-have every second level without a mip level; the octree saves a sixth of its payloads. There are no
-pointers: nodes are stored breadth first, the children of a node side by side.
+the same grid: node (x, y, z) of level l covers 16 * 2^l texels along an axis.
 
-Texels that the threshold makes invisible are not stored: a node is empty if every texel that can
-be sampled in it is at or below the threshold. It is one record without a brick and without
+So the hierarchy is an octree, not a binary tree. Its nodes are the mip bricks that a client draws
+until finer ones arrive (Crassin et al.), and each child has eight times its parent's detail. In a
+binary tree every second level would have no mip level, and the octree saves a sixth of its data.
+There are no pointers: nodes are stored breadth first, with the children of a node side by side.
+
+Texels that the threshold makes invisible are not stored. A node is empty if every texel that can be
+sampled in it is at or below the threshold. It is then one record without a brick and without
 children.
 
 References
@@ -24,10 +25,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-STREAM_BRICK = 16  # texels along a leaf's edge, without the apron; the viewer's build reads it
+# Texels along a leaf's edge, without the apron; the viewer's build reads this line
+STREAM_BRICK = 16
 STORED = STREAM_BRICK + 2  # texels along a stored brick's edge
 EMPTY = 1  # flag: no brick; every texel is `constant`
-_SLAB = 1 << 18  # texels compared at once: they stay in the cache
+_SLAB = 1 << 18  # number of texels that are compared together, so that they stay in the cache
 
 NODE = np.dtype(
     [
@@ -54,20 +56,20 @@ class Bvh:
     """The tree of one volume.
 
     size       texels (z, y, x) of the volume, with the apron
-    threshold  largest invisible intensity, 0..254; -1: all are visible
+    threshold  largest invisible intensity, 0..254; -1: all texels are visible
     nodes      records of NODE (n,), breadth first from the root (coarsest level) to the leaves:
                level        0: a leaf; a texel of level l averages 2^l texels along an axis
                flags        EMPTY or 0
                child_mask   bit x + 2 y + 4 z: that child is in the table. The children of a node
-                            follow one another in the order of their bits, behind the children of
-                            the node before
+                            follow one another in the order of their bits, after the children of
+                            the previous node
                constant     mean of the texels in its box, rounded
-               x, y, z      its box is [x, x + 1) * 16 * 2^level texels, cut at the volume's end
+               x, y, z      its box is [x, x + 1) * 16 * 2^level texels, cut off at the volume's end
                min, max     range of all values that are sampled in its box, from its own brick or
                             any below (an empty node is sampled as `constant`)
-               error_max    largest absolute difference between its brick, interpolated
-                            trilinearly at the centres of the texels in its box, and these texels;
-                            rounded up. 0 in leaves and empty nodes
+               error_max    largest absolute difference between the texels in its box and its brick,
+                            interpolated trilinearly at their centres; rounded up. 0 in leaves and
+                            empty nodes
                error_rms    root mean square of that difference
     bricks     uint8 (n, 18, 18, 18), (z, y, x): one for each node that is not empty, in order
     """
@@ -82,11 +84,11 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
     """Return the tree of a volume.
 
     volume     uint8 (z, y, x)
-    threshold  largest invisible intensity, 0..254; -1: all are visible
+    threshold  largest invisible intensity, 0..254; -1: all texels are visible
 
-    A coarse texel is the mean of the texels of its cell inside the volume; the last one stands for
-    missing ones. Means are exact, and rounded once. Outside the volume bricks repeat the nearest
-    texel, as GL_CLAMP_TO_EDGE does. Raises ValueError for an empty or oversized volume.
+    A coarse texel is the mean of the texels of its cell inside the volume; the last texel replaces
+    missing ones. Means are exact, and rounded once. Outside of the volume bricks repeat the nearest
+    texel, like GL_CLAMP_TO_EDGE. Raises ValueError for an empty or oversized volume.
 
     >>> volume = np.zeros((20, 20, 20), np.uint8)
     >>> volume[4:8, 4:8, 4:8] = 200
@@ -142,7 +144,7 @@ def build(volume: Bytes3, threshold: int) -> Bvh:
 def upsampling(level: int, count: int) -> Floats:
     """Return the weights that interpolate a brick's row at finest texel centres.
 
-    level   of the brick
+    level   level of the brick
     count   finest texels along the box's axis
     result  float32 (count, 18)
 
@@ -165,10 +167,10 @@ def _make_pyramid(volume: Bytes3) -> list[Bytes3]:
 
 
 def _halve(values: NDArray[np.uint8] | Floats, axis: int) -> Floats:
-    """Return the means of neighbours along an axis; a last one without a neighbour stays.
+    """Return the means of neighbours along an axis. A last one without a neighbour stays.
 
-    Exact: texels of level l are multiples of 1/8^l below 256, which float32 represents up to level
-    5; at deeper levels the error is below 1e-4.
+    The means are exact up to level 5: texels of level l are multiples of 1/8^l below 256, which
+    float32 represents. At deeper levels the error is below 1e-4.
     """
     taken = [slice(None)] * 3
     taken[axis] = slice(0, None, 2)
@@ -201,7 +203,7 @@ def _cell_means(volume: Bytes3, levels: int) -> list[Bytes3]:
 
 
 def _pad(level: Bytes3, grid: tuple[int, ...]) -> Bytes3:
-    """Return the texels of a level's bricks: with an apron, and whole bricks at the end."""
+    """Return the texels of a level's bricks, with an apron, and with whole bricks at the end."""
     widths = [(1, g * STREAM_BRICK + 1 - n) for g, n in zip(grid, level.shape, strict=True)]
     return np.pad(level, widths, mode="edge")
 
@@ -252,7 +254,7 @@ def _children(
 def _error(
     brick: Bytes3, level: int, place: NDArray[np.int64], volume: Bytes3
 ) -> tuple[int, float]:
-    """Return the largest and the root mean square difference of a brick to its texels."""
+    """Return the largest and the root mean square difference of a brick from its texels."""
     edge = STREAM_BRICK << level
     z0, y0, x0 = (int(n) * edge for n in place)
     box = volume[z0 : z0 + edge, y0 : y0 + edge, x0 : x0 + edge]
@@ -266,7 +268,7 @@ def _error(
         flat = difference.ravel()
         largest = max(largest, flat.max(), -flat.min())
         squares += float(np.dot(flat, flat))
-    # float32 errs by some 1e-5 where the difference is a whole number
+    # float32 is off by about 1e-5 where the difference is a whole number.
     return int(np.ceil(min(float(largest) - 1e-3, 255))), float(np.sqrt(squares / box.size))
 
 

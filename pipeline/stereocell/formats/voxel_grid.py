@@ -1,4 +1,4 @@
-"""Where the voxels of an exported volume lie, as image formats say it."""
+"""Positions of the voxels of an exported volume, as image formats state them."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ class VoxelGrid:
     size        voxels (x, y, z)
     spacing     float64 (3,), distance of neighbours along each axis, in `unit`
     origin      float64 (3,), centre of voxel (0, 0, 0), in `unit`
-    direction   float64 (3, 3), a column an axis: its unit vector
+    direction   float64 (3, 3); each column is the unit vector of an axis
     unit        um, mm or m
-    is_patient  places are DICOM's: to the left, to the back, upwards
+    is_patient  whether positions are DICOM's: towards the left, the back and upwards
     """
 
     size: tuple[int, int, int]
@@ -27,7 +27,7 @@ class VoxelGrid:
 
     @property
     def affine(self) -> NDArray[np.float64]:
-        """Return the matrix (4, 4) of an index (i, j, k, 1) to its place."""
+        """The matrix (4, 4) from an index (i, j, k, 1) to its position."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.direction * self.spacing
         matrix[:3, 3] = self.origin

@@ -1,1 +1,1 @@
-"""From voxels to a surface: iso-value, distance field, repair, extraction."""
+"""From voxels to a surface: iso-value, distance field, repair and extraction."""

@@ -1,4 +1,4 @@
-"""The levels of a volume that fits into memory, in one call: for a notebook or a script."""
+"""Find the levels of a volume that fits into memory, for a notebook or a script."""
 
 from dataclasses import dataclass
 
@@ -29,18 +29,20 @@ from stereocell.model.lattice_field import LatticeField
 from stereocell.model.tiling import Box
 from stereocell.model.volume import Volume
 
-_BODIES = ("CT", "MR")
-_BLOCK = 64  # finest voxels: blocks of the background, as `surface.background_um` has them
+_CALIBRATED = ("CT", "MR")
+# Size of the background's blocks, in finest spacings; the same as the default of
+# `surface.background_um`
+_BLOCK_VOXELS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class ArrayLevels:
     """The levels of one volume.
 
-    below   mean of the background that is subtracted, voxel values; 0: none is
-    field   float32 (z, y, x), voxel values: denoised, and above the background if
-            `levels.subtracts`; a surface lies where it has the value of a level
-    levels  `levels.clear` are those that a surface can be relied on at, outermost first
+    below   mean of the subtracted background, in voxel values; 0 if none is subtracted
+    field   float32 (z, y, x), voxel values: denoised, and less the background if
+            `levels.subtracts`; the surface of a level lies where the field has the level's value
+    levels  `levels.clear` are the levels whose surfaces can be relied on, outermost first
     """
 
     field: NDArray[np.float32]
@@ -52,8 +54,8 @@ class ArrayLevels:
 class ArrayEvidence:
     """The evidence for the levels of one volume.
 
-    background  voxel values, knots in voxels along (slice, row, column); None: none was looked for
-    max_shift   by how much smoothing may move a value of the surface, voxel values; None: by any
+    background  voxel values, knots in voxels along (slice, row, column); None: not estimated
+    max_shift   largest change of a value by smoothing, in voxel values; None: no limit
     """
 
     counting: Counting
@@ -69,7 +71,7 @@ def find_array_levels(
 
     volume        voxels (z, y, x) of any number type
     smoothing_um  sigma of the Gaussian; None: the finest spacing
-    modality      DICOM's code; of CT and MR no background is subtracted
+    modality      DICOM's code; no background is subtracted from CT and MR
 
     >>> z, y, x = np.mgrid[:32, :32, :32] - 15.5
     >>> ball = np.where(z**2 + y**2 + x**2 < 100, 1000, 100).astype(np.uint16)
@@ -89,15 +91,15 @@ def find_array_levels(
     sigma = finest_um if smoothing_um is None else smoothing_um
     field, below = denoise(turned, sigma, found.max_shift), 0.0
     if levels.subtracts and found.background is not None:
-        under = found.background.at(Box((0, 0, 0), turned.voxels.shape))
-        field, below = field - under, float(under.mean(dtype=np.float64))
+        background = found.background.at(Box((0, 0, 0), turned.voxels.shape))
+        field, below = field - background, float(background.mean(dtype=np.float64))
     return ArrayLevels(np.ascontiguousarray(slices_back(field, axis)), levels, below)
 
 
 def gather_array_evidence(
     volume: Volume, *, smoothing_um: float | None = None, modality: str = ""
 ) -> ArrayEvidence:
-    """Return what a volume shows of its levels; the arguments are those of `find_array_levels`."""
+    """Return the evidence for a volume's levels. The arguments are those of `find_array_levels`."""
     axis = find_slice_axis(volume.slice_axis, volume.spacing_um)
     spacing = first_of_three(volume.spacing_um, axis)
     voxels = slices_first(volume.voxels, axis)
@@ -112,9 +114,13 @@ def gather_array_evidence(
     max_shift = find_max_shift(noise.deviation(), SurfaceOptions().max_shift, None)
     scale, scale_above, lattice = Scale.of(voxels, padding), None, None
     whole = Box((0, 0, 0), voxels.shape)
-    if modality not in _BODIES:
+    if modality not in _CALIBRATED:
         lattice = find_background(
-            voxels, whole, spacing_um=spacing, block_um=_BLOCK * min(spacing), padding=padding
+            voxels,
+            whole,
+            spacing_um=spacing,
+            block_um=_BLOCK_VOXELS * min(spacing),
+            padding=padding,
         )
         scale_above = scale.above(lattice)
     counting = Counting(scale, scale_above, darkest)

@@ -1,12 +1,15 @@
-"""How much of what varies in a channel varies along the axes alone, as light does and no body.
+"""Detect channels that show uneven light and no bodies: their values vary along the axes alone.
 
 Light that falls off with depth, a ramp, stripes and vignetting are nearly sums of a function of z,
-one of y and one of x. Bodies are not: in the volumes of `make bench-iso` their means along the axes
-explain at most .45 of the variance, and .86 to 1.0 in fields of nothing, and of nothing but
-texture, under such light. A slab of tissue between two dark ends does vary along z alone, but up
-and down; an edge of tissue along an axis does as well, but lies between two peaks (a valley of .6
-and deeper in 20 such volumes; light makes none). Fields of different brightness side by side look
-just as such an edge does: they are not told from one.
+one of y and one of x. Bodies are not. In the volumes of `make bench-iso` the means along the axes
+explain at most .45 of the variance. In empty fields and pure texture under such light they explain
+.86 to 1.0.
+
+A slab of tissue between two dark ends varies along z alone as well, but its values rise and fall
+again. An edge of tissue across an axis also varies along one axis only, but its level lies in a
+valley between two peaks of the histogram. The valley was .6 and deeper in 20 such volumes, and
+light makes none. Fields of different brightness side by side look like such an edge and cannot be
+distinguished from it.
 """
 
 from collections.abc import Sequence
@@ -15,18 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-MAX_LIGHT = 0.85  # share of the variance, beyond which all is light
-_ONE_WAY = 1.25  # way up and down along z over its range, up to which the values only rise or fall
-_BLUR = 8  # planes averaged before that way is measured: noise goes up and down everywhere
+# Share of the variance along the axes; a channel with more shows light, not bodies
+MAX_LIGHT = 0.85
+# Sum of all rises and falls along z over the range; up to this, values only rise or only fall
+_ONE_WAY = 1.25
+# Planes averaged before rises and falls are summed, since noise rises and falls everywhere
+_BLUR = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Profiles:
-    """Sums over a tile's voxels in each plane across an axis, but for its padding.
+    """Sums over a tile's voxels in each plane across an axis. Padding is left out.
 
     start   voxels (z, y, x) at which the tile begins
-    sums    float64, of the values, by z, by y and by x
-    counts  int64, of the voxels, likewise
+    sums    float64, sums of the values by z, by y and by x
+    counts  int64, numbers of voxels by z, by y and by x
     """
 
     start: tuple[int, int, int]
@@ -37,7 +43,7 @@ class Profiles:
     def of(
         cls, field: NDArray[np.float32], kept: NDArray[np.bool_], start: tuple[int, int, int]
     ) -> "Profiles":
-        """Return the profiles of a tile's field (z, y, x) where `kept`, bool of the same shape."""
+        """Return a tile's profiles over the voxels of `field` (z, y, x) that are `kept` (bool)."""
         are_all = bool(kept.all())
         values = np.ascontiguousarray(field) if are_all else np.where(kept, field, np.float32(0))
         sz, sy, sx = (values.sum(axis=axes, dtype=np.float64) for axes in _ACROSS)
@@ -56,9 +62,10 @@ def share_of_light(
 ) -> float:
     """Return the share of the variance that the means along the axes explain, 0..1.
 
-    tiles     of the whole dataset, of the values that levels are looked for in
-    plain     the same of the field as it is: a background that is subtracted waves along z
-    variance  of those values without noise
+    tiles     all tiles of the dataset; profiles of the field in which levels are looked for
+    plain     all tiles; profiles of the field before subtraction, because a subtracted background
+              rises and falls along z
+    variance  of the values in which levels are looked for, without noise
     """
     if not tiles or not variance > 0:
         return 0.0
@@ -72,7 +79,7 @@ def share_of_light(
 
 
 def _means(tiles: Sequence[Profiles], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the mean of each plane across an axis that has voxels, and their number."""
+    """Return the mean and the number of voxels of each plane across an axis that has voxels."""
     length = max(tile.start[axis] + len(tile.sums[axis]) for tile in tiles)
     sums, counts = np.zeros(length), np.zeros(length)
     for tile in tiles:

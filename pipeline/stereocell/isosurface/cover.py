@@ -1,10 +1,10 @@
-"""How well a surface holds the voxels that the source has above its level.
+"""Measure how well a surface encloses the source's voxels above its level.
 
-A surface's stated distances are measured on the filtered field, and say nothing about what the
-filter removed. So the solid is compared with the voxels as they were read, too.
+The stated distances of a surface are measured on the filtered field, so they do not show what the
+filter removed. Therefore the solid is also compared with the voxels as they were read.
 
-All voxels are compared, also where only some planes of them carry the surface. The solid is linear
-between those planes, and beyond the last one it is as there.
+All voxels are compared, even if only some planes of voxels carry the surface. The solid is linear
+between these planes, and constant beyond the last one.
 """
 
 from typing import Any
@@ -30,11 +30,12 @@ def measure_cover(
 ) -> Cover:
     """Return how the solid of one tile covers the source's voxels above the level.
 
-    voxels      as read, (z, y, x), of the lattice's window
-    distance    float32 of the repaired solid, positive inside, of the thinned lattice's window
+    voxels      (z, y, x) as read, the lattice's window
+    distance    float32 of the repaired solid, positive inside, the thinned lattice's window
     step        voxels (z, y, x) between planes that carry the surface
-    iso         above the background, voxel values
-    holder      what is left out of the surface, and of the count; None: nothing is
+    iso         level above the background, voxel values
+    background  voxel values; None: none was subtracted
+    holder      pieces that are left out of the surface, and so of the count; None: nothing is
     """
     own = tuple(
         slice(a - low, b - low)
@@ -54,7 +55,7 @@ def measure_cover(
 def between_planes(field: NDArray[np.float32], lattice: Lattice, step: Step) -> NDArray[np.float32]:
     """Return a field of the thinned lattice's window at all of the tile's own points.
 
-    It is linear between two planes of the thinned lattice, and beyond the last one as there.
+    The field is linear between two planes of the thinned lattice, and constant beyond the last one.
     """
     first = lattice.thinned(step).window.start
     for axis in range(3):

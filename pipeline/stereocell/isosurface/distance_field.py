@@ -1,4 +1,4 @@
-"""The distance field of an iso-surface: each voxel's distance to it, to first order."""
+"""The distance field of an iso-surface: the first-order distance of each voxel to the surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ def gradient_magnitude(field: NDArray[np.float32], spacing_um: Spacing) -> NDArr
     spacing_um  (z, y, x)
     result      float32 (z, y, x), voxel values per um
 
-    A result depends on the voxel's neighbours alone, bit by bit.
+    Each result depends on the voxel's neighbours alone, and is the same bit by bit in every tile.
     """
     return measure_slopes(np.ascontiguousarray(field), np.array(spacing_um, np.float64))
 
@@ -34,8 +34,8 @@ def signed_distance(
     value_range  dataset-wide, voxel values; bounds the division where the field is flat
     result       float32 (z, y, x), um
 
-    The distance is (f - iso) / |grad f|. It is exact to a fraction of a voxel near the surface, and
-    clipped to two of the coarsest spacings: farther away it means nothing.
+    The distance is (f - iso) / |grad f|. It is exact to a fraction of a voxel near the surface. It
+    is clipped to two of the coarsest spacings, because it is not reliable farther away.
 
     >>> ramp = np.linspace(0, 8, 9, dtype=np.float32)[None, None] * np.ones((3, 3, 1), np.float32)
     >>> signed_distance(ramp, np.float32(3.5), spacing_um=(1, 1, 1), value_range=8)[1, 1].round(2)
@@ -48,7 +48,7 @@ def signed_distance(
 
 
 def to_distance(above: NDArray[np.float32], *, spacing_um: Spacing, value_range: float) -> None:
-    """Replace a field above its iso-value by the distance, in place: see `signed_distance`.
+    """Replace a field less its iso-value by the distance, in place: see `signed_distance`.
 
     above        float32 (z, y, x), voxel values less the iso-value; afterwards um
     spacing_um   (z, y, x)

@@ -1,17 +1,19 @@
 """Choose a channel's level by the edges that its surface would follow.
 
-The coarea formula turns the integrals over the iso-surfaces, area and total gradient, into
-histograms over the voxels, so that one pass scores every level; the tiles' histograms add up to the
-channel's. The criteria are those of Pekar, Wiemker & Hempel: area, total gradient, mean gradient
-(total / area), and between them total / sqrt(area). As published they fail on real stacks: the mean
-grows with brightness and cuts only the cores of the brightest cells, the total follows the noise.
+By the coarea formula the integrals over the iso-surfaces, area and total gradient, become
+histograms over the voxels. So one pass scores every level, and the tiles' histograms add up to the
+channel's.
 
-`edges` counts only gradients steeper than noise: a voxel's weight is 1 - n / g^2, where g is its
-gradient and n is NOISE_FACTOR times the mean square gradient of the tile's dim part. The weighted
-total finds the edges of bodies of any brightness; among the levels near its maximum, total /
-sqrt(area) chooses one. That last step keeps the volume of a blurred ball: r f(r) is a blur in one
-dimension, so |f'| r, which is total / sqrt(area) as a function of the level's radius r, has its
-maximum at the true radius R but for s^4 / R^3 (s is the blur's sigma).
+The criteria are those of Pekar, Wiemker & Hempel: area, total gradient and mean gradient (total /
+area), and between them total / sqrt(area). As published they fail on real stacks. The mean grows
+with brightness and cuts only the cores of the brightest cells. The total follows the noise.
+
+`edges` counts only gradients steeper than noise. The weight of a voxel is 1 - n / g^2, where g is
+its gradient and n is NOISE_FACTOR times the mean square gradient of the tile's dim part. The
+weighted total finds the edges of bodies of any brightness. Among the levels near its maximum,
+total / sqrt(area) chooses one. This last choice keeps the volume of a blurred ball, where r f(r) is
+a blur in one dimension. At a level of radius r, total / sqrt(area) is |f'| r. This has its maximum
+at the true radius R, except for an error of s^4 / R^3, where s is the blur's sigma.
 
 References
 V. Pekar, R. Wiemker & D. Hempel, "Fast detection of meaningful isosurfaces for volume data
@@ -27,20 +29,23 @@ from scipy import ndimage
 from stereocell.isosurface.level_histogram import BINS, LevelHistogram, Scale
 from stereocell.isosurface.options import CRITERIA, Criterion, IsoValueOptions
 
-NOISE_FACTOR = 8.0  # multiple of noise's mean g^2 that edges exceed; 3 to 16 choose alike
-DIM_PERCENTILE = 40.0  # percent of the voxels, the dimmest: noise is measured there, free of edges
-CHI = 0.789  # median over mean of a chi-square of three: of noise's squared gradient
-EDGES_SHARE = 0.70  # share of the largest total from which a level can be chosen, 0..1
-PEAK_SHARE = 0.75  # share of the best score, 0..1: levels above it are fitted with a parabola
-_SMOOTHING = 0.03  # sigma as a share of the levels: bins with few voxels are noisy
+# Multiple of the noise's mean g^2 that edges exceed; 3 to 16 choose the same levels
+NOISE_FACTOR = 8.0
+# Percent of the voxels, dimmest first: noise is measured there, because they have no edges
+DIM_PERCENTILE = 40.0
+# Median / mean of a chi-square distribution of 3 degrees: the squared gradient of noise
+CHI = 0.789
+EDGES_SHARE = 0.70  # share of the largest total, 0..1, that a level needs to be chosen
+PEAK_SHARE = 0.75  # share of the best score, 0..1; a parabola is fitted to the scores above it
+_SMOOTHING = 0.03  # sigma as a share of the number of levels: bins with few voxels are noisy
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeSums:
     """Sums over a tile's voxels in the bins of a scale.
 
-    areas   float64 (BINS,), gradient magnitudes: the surface's area at each level
-    totals  float64 (BINS,), their squares: the total gradient over that surface
+    areas   float64 (BINS,), sums of the gradient magnitudes: the surface's area at each level
+    totals  float64 (BINS,), sums of their squares: the total gradient over that surface
     """
 
     areas: NDArray[np.float64]
@@ -57,14 +62,14 @@ def gather_edges(
     scale: Scale,
     criterion: Criterion,
 ) -> EdgeSums:
-    """Return a tile's sums.
+    """Return a tile's sums over the voxels that are counted.
 
-    field   float32, any shape: the voxels that take part, voxel values
+    field   float32, any shape: voxel values
     slopes  float32, the same shape: their gradient magnitudes, voxel values per um
     """
     if not field.size:
         return EdgeSums(np.zeros(BINS), np.zeros(BINS))
-    # in shares of the values' range per um: squares of large voxel values overflow float32
+    # The unit is the values' range per um, because squares of large voxel values overflow float32.
     slopes = slopes / np.float32(scale.high - scale.low)
     weights = slopes
     if criterion.discounts_noise:
@@ -81,9 +86,9 @@ def gather_edges(
 def choose_by_edges(
     sums: EdgeSums, histogram: LevelHistogram, *, options: IsoValueOptions
 ) -> float | None:
-    """Return the level of the largest score, in voxel values; None where none separates anything.
+    """Return the level of the largest score, in voxel values; None if no level separates anything.
 
-    histogram  of the same voxels, in the same bins
+    histogram  of the voxels of `sums`, in the same bins
     """
     criterion = CRITERIA[options.criterion]
     low, high = histogram.quantile(0.0), histogram.quantile(options.clip_percentile / 100)
@@ -91,7 +96,7 @@ def choose_by_edges(
         return None
     edges = np.linspace(low, high, options.bins + 1)
     area, total = (
-        # even levels: a density needs no division by the widths of the scale's bins
+        # The levels are even, so their density needs no division by the widths of the scale's bins.
         ndimage.gaussian_filter1d(
             np.diff(np.interp(edges, histogram.edges[1:], np.cumsum(values))),
             _SMOOTHING * options.bins,
@@ -108,12 +113,12 @@ def choose_by_edges(
 
 
 def _peak(levels: NDArray[np.float64], score: NDArray[np.float64]) -> float:
-    """Return the top of the parabola fitted to the curve around the best level.
+    """Return the top of the parabola that is fitted to the curve around the best level.
 
-    The fit takes the levels around the best whose score is above PEAK_SHARE without a break;
-    weights fall to 0 at its ends. The peak is broad and the histograms are noisy, since a small
-    body has few voxels on its edge: the single best level is off by up to a tenth of the body's
-    height.
+    The fit takes the unbroken run of levels around the best whose scores are above PEAK_SHARE. The
+    weights fall to 0 at its ends. The single best level would be off by up to a tenth of the body's
+    height: the peak is broad, and the histograms are noisy, since a small body has few voxels on
+    its edge.
     """
     best = int(score.argmax())
     low = np.flatnonzero(score < PEAK_SHARE)

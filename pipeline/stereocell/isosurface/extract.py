@@ -1,9 +1,9 @@
 """Extract the triangles of the iso-surface from a window of voxels, without cracks between tiles.
 
-Neighbouring tiles share a plane of lattice points, and each extracts its own cells only. The field
-depends on dataset-wide numbers and on voxels inside the halo alone, so both tiles see the same
-values on the common plane. The vertices there are equal bit by bit: positions are found in lattice
-units and moved into the world in float64, by the same arithmetic for every tile.
+Neighbouring tiles share a plane of lattice points, and each tile extracts its own cells only. The
+field depends only on dataset-wide numbers and on voxels inside the halo, so both tiles see the same
+values on the common plane. The vertices there are equal bit by bit: their positions are computed in
+lattice units and moved into the world in float64, by the same arithmetic in every tile.
 
 Triangles come from VTK's Flying Edges.
 
@@ -21,13 +21,13 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import zyx_to_xyz
 
-# Least absolute value, as a share of the distance's clip: values nearer to zero are moved to it,
-# since a vertex on a lattice point would make degenerate triangles.
+# Least absolute value, as a share of the distance's clip. Values nearer to zero are moved to it,
+# because a vertex on a lattice point would make degenerate triangles.
 SNAP = 0.01
 # Least distance of a crossing on a cut plane from the ends of its lattice edge, as a share of the
 # edge. Simplification and fairing may not move vertices there, so a nearer crossing would leave
 # short edges and sharp triangles. The 1st percentile of lod0's smallest angles, on tiles of nuclei
-# and of membranes, is 13 and 15 degrees; it is 9 and 11 at .05. At .25 the shading of 1 % of the
+# and of membranes, is 13 and 15 degrees; at .05 it is 9 and 11. At .25 the shading of 1 % of the
 # cut's points differed by 3 degrees between neighbours.
 RIM_SNAP = 0.2
 
@@ -38,13 +38,13 @@ def extract_surface(
     """Return the surface distance = 0 between the lattice's own points; empty if there is none.
 
     distance  float32 (z, y, x), um, positive inside; covers `lattice.window`
-    cut_as    the lattice at whose ends tiles are cut, if it differs from `lattice`; the surface
-              follows that lattice there
+    cut_as    the lattice whose cuts the surface follows at its ends, if it differs from `lattice`
     result    positions float32 (n, 3) in world um (x, y, z), triangles, normals
 
-    The mesh is open where another tile follows. Where the region ends, flat caps close it,
-    `lattice.cap` spacings past the outermost points; without a cap it is open there, too. Normals
-    come from the field's gradient; halos make them continuous across tiles. A cap's are its own.
+    The mesh is open where another tile follows. At the region's ends flat caps close it,
+    `lattice.cap` spacings past the outermost points. Without a cap it is open there, too. Normals
+    come from the field's gradient, and halos make them continuous across tiles. The normals of a
+    cap point straight outwards.
 
     >>> from stereocell.model.tiling import Box
     >>> z, y, x = np.mgrid[:9, :9, :9]
@@ -62,7 +62,7 @@ def extract_surface(
         (int(lattice.cap is not None and a == low), int(lattice.cap is not None and b == high))
         for a, b, low, high in zip(own.start, own.stop, region.start, region.stop, strict=True)
     ]
-    # where the lattice ends with the region, the window does too: both get the same margin
+    # Where the lattice ends with the region, the window ends too, and both get the same margin.
     margin = np.array([low for low, _ in cap])
     distance = np.pad(distance, cap, constant_values=-limit)
     box = [
@@ -92,10 +92,10 @@ def extract_surface(
 
 
 def _flatten_caps(points: NDArray[np.float64], lattice: Lattice) -> NDArray[np.float64]:
-    """Move the points of caps onto planes, in place; return their normals, (n, 3), else zeros.
+    """Move the points of caps onto planes, in place, and return normals (n, 3); zeros off the caps.
 
-    A vertex past the outermost points lies between one of these and the padding. It stays on its
-    edge of the lattice, so the triangles stay sound.
+    A vertex past the outermost points lies on a lattice edge between one of these points and the
+    padding. It stays on that edge, so the triangles stay valid.
 
     points  float64 (n, 3), (z, y, x) in lattice units
     """
@@ -115,9 +115,9 @@ def _snapped(
     cuts: list[tuple[int, int]],
     snap: np.float32,
 ) -> NDArray[np.float32]:
-    """Return the values of a box, a copy, with those that are near zero moved off it.
+    """Return a copy of the values of a box, in which values near zero are moved away from it.
 
-    cuts  axis and place of the planes where tiles meet; those beside the box are left out
+    cuts  axis and place of the planes where tiles meet; planes beside the box are ignored
     """
     values = distance[tuple(slice(*ends) for ends in box)].copy()
     move_off_zero(values, snap)
@@ -137,9 +137,10 @@ def _least_on_plane(
     at: int,
     snap: np.float32,
 ) -> NDArray[np.float32]:
-    """Return the least absolute values on a plane of the box that RIM_SNAP asks for.
+    """Return the least absolute values that RIM_SNAP requires on a plane of the box.
 
-    It reads one point past the box: all tiles that share a point of the plane see all its edges.
+    The function reads one point past the box, so that all tiles that share a point of the plane see
+    all edges at that point.
     """
     wide = [slice(max(low - 1, 0), high + 1) for low, high in box]
     wide[axis] = slice(at, at + 1)
@@ -162,7 +163,7 @@ def _least_on_plane(
 
 def _flying_edges(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Return points (x, y, z) in lattice units and triangles of values = 0."""
-    # VTK takes a tenth of a second to import, and a plan extracts no surface
+    # Importing VTK takes a tenth of a second, and a plan extracts no surface.
     from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D

@@ -1,15 +1,16 @@
-"""Find what a CT scanner holds a body with: its table, a head holder, straps; to be left out.
+"""Find the equipment that holds a body in a CT scan (table, head holder, straps) to leave it out.
 
 At the level of skin such a piece is a solid like the body, and often touches it. But it is a sheet
 or a bar: thinner than the body, long, and joined to it by a small part of its surface. So the body
-is what lies near its own cores, voxels deep inside; what is left is apart where it is long and
-hardly joined. An ear or a nose is short, a face that the volume's end cuts is joined by its cut.
+is the part near its own cores, which are voxels deep inside. Any other piece is equipment if it is
+long and hardly joined to the body. An ear or a nose is short. A face that the volume's end cuts is
+joined to that end by its cut.
 
-Some bodies are sheets themselves: a dry skull, a shell with something thick in it, an animal's
-ears and tail. So a holder is smaller than what it holds, comes in through the volume's end, is not
-within the body, and is no bone. A table may be as dense as bone and larger than the ribs. But the
-bones of a soft body lie in flesh, and a table lies in air. Lungs count as a part of the body that
-is round them: the wall of a chest alone would be a sheet, too.
+Some bodies are sheets themselves: a dry skull, a shell with something thick in it, an animal's ears
+and tail. So a holder must also be smaller than the body, reach the volume's end, lie outside of the
+body, and not be bone. A table may be as dense as bone and larger than the ribs, but the bones of a
+soft body lie in flesh, and a table lies in air. Lungs count as a part of the body around them,
+because the wall of a chest alone would be a sheet, too.
 """
 
 from typing import Any
@@ -23,44 +24,47 @@ from scipy import ndimage
 from stereocell.isosurface.holder import Holder
 from stereocell.isosurface.holder_pieces import (
     BONE_HU,
-    comes_in,
-    complete,
+    add_attached,
     dense_share,
     is_within,
     joined_share,
     kind_of,
     places_of,
+    reaches_end,
     sizes_in_words,
 )
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
 SKIN_HU = -300.0
-MIN_HU = -500.0  # darkest voxel, at most: else the values are no Hounsfield units
-_DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1  # depth of a core; at most this share of the body's side
-_CORE_SHARE = 0.02  # least share of the largest core's voxels: arms and legs have own cores
-_SLACK = 1.5  # coarsest spacings that the body reaches beyond a core's depth
-_LENGTH = 8.0  # depths: diagonal of the box of a piece that is apart, at least
-# A piece with a larger share of the body's voxels than its kind allows belongs to the body (a dry
-# skull round something soft is larger than it), and so does one with a larger share of its surface
-# joined to the body or to the volume's end.
+# The darkest voxel of a CT is at most this; otherwise values are not Hounsfield units
+MIN_HU = -500.0
+# Depth of a core in um, and its largest share of the body's shortest side
+_DEPTH_UM, _DEPTH_SHARE = 12_000.0, 0.1
+# Least share of the largest core's voxels that another core has: arms and legs have their own cores
+_CORE_SHARE = 0.02
+_SLACK = 1.5  # coarsest spacings by which the body reaches beyond a core's depth
+_LENGTH = 8.0  # depths of a core: least diagonal of a holder's box
+# Largest share of the body's voxels, and largest share of the surface that is joined to the body or
+# to the volume's end, for each kind of piece. A piece above either limit belongs to the body: a dry
+# skull around something soft is larger than it.
 _LIMITS: dict[str, tuple[float, float]] = {
     "plain": (0.5, 0.18),
     "bone": (0.5, 0.18),
     "table": (1.0, 0.5),
     "metal": (1.0, 0.5),
 }
-_MAX_DENSE_SHARE = 0.5  # share of a body's voxels as dense as bone: one with more of them is bone
-_LUNG_HU = -960.0  # mean of a hollow from which on it is lung; air has -1000
-_ENCLOSED = 0.3  # share of a lung's surface that lies at the body as it is found without lungs
-_CELLS = 1 << 22  # most cells of the mask that is kept
+_MAX_DENSE_SHARE = 0.5  # share of a body's voxels as dense as bone; a body with more is bone itself
+_LUNG_HU = -960.0  # least mean of a hollow that is lung; air has -1000
+_ENCLOSED = 0.3  # least share of a lung's surface that lies at the body found without lungs
+_CELLS = 1 << 22  # largest number of cells of the stored mask
 
 
 def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holder | None:
-    """Return what is to be left out of a CT; None: nothing is.
+    """Return the pieces of a CT scan that are left out; None if there are none.
 
-    voxels      (z, y, x), Hounsfield units; they cover `region` at any resolution
-    spacing_um  (z, y, x), of these voxels
+    voxels      (z, y, x), Hounsfield units, covering `region` at any resolution
+    spacing_um  (z, y, x), of `voxels`
     region      voxels of the level that is built
     """
     solid = voxels > SKIN_HU
@@ -76,7 +80,7 @@ def find_holder(voxels: NDArray[Any], spacing_um: Spacing, region: Box) -> Holde
     found, pieces = _pieces_outside(voxels, solid, body, spacing, depth)
     if not pieces:
         return None
-    # as far as it is blurred, and not into what stays
+    # The blurred rim is left out too, but not where it belongs to what stays.
     kept = solid & ~found
     wide = ndimage.binary_dilation(found, iterations=2) & ~ndimage.binary_dilation(kept)
     return Holder(region, _cells_of(wide | found, kept), sizes_in_words(pieces))
@@ -89,9 +93,9 @@ def _pieces_outside(
     spacing: NDArray[np.float64],
     depth: float,
 ) -> tuple[NDArray[np.bool_], list[NDArray[np.float64]]]:
-    """Return where the pieces lie that are no part of the body, and each one's size, um.
+    """Return where the pieces outside of the body lie, and the size of each, um.
 
-    body  what lies near its own cores; pieces that belong to it are added
+    body  the part near its own cores; pieces that turn out to belong to it are added in place
     """
     labels = cc3d.connected_components(solid & ~body, connectivity=26)
     is_soft = dense_share(voxels, body) <= _MAX_DENSE_SHARE
@@ -99,9 +103,9 @@ def _pieces_outside(
     waiting: list[tuple[int, tuple[slice, ...], NDArray[np.float64], float]] = []
     for number, near, ends in places_of(labels):
         size = (ends[:, 1] - ends[:, 0] + 1) * spacing
-        is_long = np.linalg.norm(size) >= _LENGTH * depth and comes_in(ends, voxels.shape)
+        is_long = np.linalg.norm(size) >= _LENGTH * depth and reaches_end(ends, voxels.shape)
         piece = labels[near] == number
-        # a small piece may be metal, and nothing else that is looked for
+        # A small piece is of interest only if it may be metal.
         may_be = is_long or float(voxels[near][piece].max()) > BONE_HU
         kind = kind_of(voxels[near], piece, solid[near], is_soft=is_soft) if may_be else "plain"
         most, most_joined = _LIMITS[kind]
@@ -119,7 +123,7 @@ def _pieces_outside(
         sizes.append(size)
     if sizes:
         depth_voxels = depth**3 / float(np.prod(spacing))
-        found = complete(found, voxels, labels, body, depth_voxels=depth_voxels)
+        found = add_attached(found, voxels, labels, body, depth_voxels=depth_voxels)
     return found, sizes
 
 
@@ -129,10 +133,10 @@ def _body(
     spacing: NDArray[np.float64],
     depth: float,
 ) -> NDArray[np.bool_] | None:
-    """Return what lies near the cores; None: nothing is so thick.
+    """Return the part of the solid near its cores; None if nothing is thick enough.
 
-    A core is a place deep inside. Where there are soft ones, a dense one beside them is a solid
-    table: bones are not so thick, and lie in flesh.
+    A core is a place deep inside. A dense core beside soft ones is a solid table, because bones are
+    thinner and lie in flesh.
     """
     found = _near_cores(voxels, solid, spacing, depth)
     if found is None:
@@ -147,8 +151,9 @@ def _body(
 def _lungs(
     voxels: NDArray[Any], solid: NDArray[np.bool_], body: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return the hollows that the body encloses in the slices across an axis, and that hold more
-    than air. The foam of a table is enclosed by its shell alone.
+    """Return the hollows that the body encloses within slices, and that hold more than air.
+
+    The foam of a table does not count, because only the table's own shell encloses it.
     """
     hollow = np.zeros(solid.shape, bool)
     for axis in range(3):
@@ -161,7 +166,7 @@ def _lungs(
     labels = cc3d.connected_components(hollow, connectivity=6)
     counts = np.bincount(labels.ravel())
     means = np.bincount(labels.ravel(), weights=voxels.ravel()) / np.maximum(counts, 1)
-    # faces of hollow voxels by the number of the hollow: those at the body, and at anything solid
+    # Numbers of faces of each hollow, by its label: at the body, and at anything solid
     at_body, at_solid = np.zeros((2, len(counts)))
     for axis in range(3):
         moved = [np.moveaxis(a, axis, 0) for a in (labels, body, solid)]
@@ -180,7 +185,7 @@ def _near_cores(
     spacing: NDArray[np.float64],
     depth: float,
 ) -> NDArray[np.bool_] | None:
-    """Return what lies near the cores of a solid; None: nothing is so thick."""
+    """Return the part of a solid near its cores; None if nothing is thick enough."""
     inside = edt.edt(solid, anisotropy=tuple(spacing), black_border=False)
     deep = inside > depth
     if 0 < dense_share(voxels, deep) <= _MAX_DENSE_SHARE:
@@ -196,13 +201,13 @@ def _near_cores(
         solid & (away <= depth + _SLACK * spacing.max()), connectivity=26
     )
     holds = np.zeros(int(near.max()) + 1, bool)
-    holds[np.unique(near[core])] = True  # what is near and not joined is none of it
+    holds[np.unique(near[core])] = True  # parts near a core that are not joined to it do not count
     holds[0] = False
     return np.asarray(holds[near])
 
 
 def _cells_of(mask: NDArray[np.bool_], kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the mask in fewer cells; one that holds a part of what stays is left in."""
+    """Return the mask in fewer cells. A cell that holds a part of what stays is not in the mask."""
     factor = 1
     while np.prod([-(-n // factor) for n in mask.shape]) > _CELLS:
         factor += 1

@@ -1,4 +1,4 @@
-"""Pieces of a CT that belong to no body, and are left out of its surface and its volume."""
+"""Pieces of a CT scan that do not belong to the body, and are left out of surface and volume."""
 
 import base64
 import zlib
@@ -19,8 +19,8 @@ class Holder:
     """Pieces that are left out.
 
     region  voxels (z, y, x) of the level that is built
-    mask    bool (z, y, x), cells that cover the region evenly: True near such a piece
-    pieces  each one's size, for people
+    mask    bool (z, y, x), cells that cover the region evenly: True near a piece that is left out
+    pieces  the size of each piece, as text
     """
 
     WORDS: ClassVar[str] = "as no part of the body (a table, holder, pad or cable)"
@@ -34,16 +34,20 @@ class Holder:
         return self._at(_indices(box))
 
     def left_out_of(self, voxels: NDArray[Any], box: Box) -> NDArray[Any]:
-        """Return voxels (z, y, x) of a box with air in place of what is left out, same dtype."""
+        """Return a box's voxels (z, y, x) with air at the left-out places, in the same dtype."""
         return self.left_out_at(voxels, _indices(box))
 
     def left_out_at(self, voxels: NDArray[Any], places: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        """Return the same of voxels on a grid. places: its coordinates along z, y, x, in voxels."""
+        """Return a grid's voxels with air at the left-out places.
+
+        voxels  (z, y, x)
+        places  coordinates of the grid along z, y and x, in voxels of the region's level
+        """
         air = np.minimum(voxels, np.asarray(AIR_HU).astype(voxels.dtype))
         return np.where(self._at(places), air, voxels)
 
     def around(self, box: Box) -> "Holder | None":
-        """Return the same if it leaves out voxels of a box, else None."""
+        """Return this holder if it leaves out voxels of a box, else None."""
         return self if self.at(box).any() else None
 
     def _at(self, places: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
@@ -56,7 +60,7 @@ class Holder:
         return np.asarray(self.mask[np.ix_(*cells)])
 
     def to_json(self) -> dict[str, Any]:
-        """Return the same as texts and numbers; the mask as bits by zlib in base64."""
+        """Return the holder as JSON values; the mask as bits, compressed by zlib, in base64."""
         packed = zlib.compress(np.packbits(self.mask).tobytes(), 6)
         return {
             "region": [list(self.region.start), list(self.region.stop)],
@@ -67,7 +71,7 @@ class Holder:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "Holder":
-        """Return what `to_json` was given."""
+        """Return the holder from the result of `to_json`."""
         shape = tuple(content["shape"])
         bits = np.frombuffer(zlib.decompress(base64.b64decode(content["mask"])), np.uint8)
         count = int(np.prod(shape, dtype=np.int64))
@@ -77,7 +81,7 @@ class Holder:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, *_: Any) -> Any:
-        """Let pydantic read and write it as `from_json` and `to_json` do."""
+        """Let pydantic read by `from_json` and write by `to_json`."""
         from pydantic_core import core_schema
 
         return core_schema.no_info_plain_validator_function(

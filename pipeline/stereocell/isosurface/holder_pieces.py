@@ -1,4 +1,4 @@
-"""Judge the pieces of a CT that lie apart from its body: a table, a bone, a cable, an ear."""
+"""Judge the pieces of a CT scan that lie apart from the body: a table, a bone, a cable, an ear."""
 
 from collections.abc import Iterator
 from typing import Any, Literal
@@ -9,19 +9,20 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 BONE_HU = 500.0
-_BONE_SHARE = 0.1  # largest share of a soft holder's voxels above BONE_HU; five had .02
-# HU from which on a voxel is metal, as in the cables and electrodes of a cardiogram (3000); of
-# bone it is enamel alone
+_BONE_SHARE = 0.1  # largest share of a soft holder's voxels above BONE_HU; five holders had .02
+# HU from which a voxel is metal, as in a cardiogram's cables and electrodes (3000). In the body
+# only enamel is as dense.
 _METAL_HU = 2200.0
-_RING = (2, 3)  # voxels from dense ones, between which flesh or air is looked for
-_IN_AIR = 0.35  # share of that ring that is solid: dense voxels with less of it lie in air
-_MIN_DIRECTIONS = 4  # directions of six in which most of a piece inside the body sees the body
-_FOAM_HU = -700.0  # darkest foam or cloth by which a holder goes on
+_RING = (2, 3)  # voxels: inner and outer distance of the ring around dense voxels that is examined
+_IN_AIR = 0.35  # share of that ring that is solid; dense voxels with a smaller share lie in air
+# A piece lies within the body if most of its voxels have body on at least so many of six sides
+_MIN_DIRECTIONS = 4
+_FOAM_HU = -700.0  # darkest foam or cloth that continues a holder
 _NO_FLESH_HU = -120.0  # a piece with 95 % of its voxels below holds no flesh, not even fat
-# Volumes in cubed depths of a core: a piece of less volume goes with the holder that it touches,
-# and so does metal of less volume that lies at the skin
+# Volumes in cubed depths of a core. A piece smaller than _CRUMB is removed with the holder that it
+# touches, and so is metal smaller than _CLIP at the skin.
 _CRUMB, _CLIP = 0.1, 1.0
-_SHOWN = 3  # most pieces whose sizes are listed
+_SHOWN = 3  # largest number of pieces whose sizes are listed
 
 Kind = Literal["plain", "bone", "table", "metal"]
 
@@ -34,7 +35,7 @@ def dense_share(voxels: NDArray[Any], within: NDArray[np.bool_]) -> float:
 def places_of(
     labels: NDArray[Any],
 ) -> Iterator[tuple[int, tuple[slice, ...], NDArray[np.int64]]]:
-    """Yield each piece's number, the box round it with a margin, and its ends; largest first."""
+    """Yield each piece's number, the box around it with a margin, and its ends; largest first."""
     measures = cc3d.statistics(labels, no_slice_conversion=True)
     counts = np.asarray(measures["voxel_counts"], np.int64)
     boxes = np.asarray(measures["bounding_boxes"], np.int64).reshape(-1, 3, 2)
@@ -50,9 +51,9 @@ def places_of(
 def kind_of(
     voxels: NDArray[Any], piece: NDArray[np.bool_], solid: NDArray[np.bool_], *, is_soft: bool
 ) -> Kind:
-    """Return whether a piece is of soft material, is or has a bone, or is dense and lies in air.
+    """Return the kind of a piece: soft, bone (or holding bone), or dense and lying in air.
 
-    is_soft  whether the body is of flesh: then a dense piece that lies in air is no bone of it
+    is_soft  whether the body is of flesh; then a dense piece in air is not one of its bones
     """
     if dense_share(voxels, piece) <= _BONE_SHARE:
         return "plain"
@@ -66,8 +67,8 @@ def kind_of(
     return "metal" if float(voxels[piece].max()) > _METAL_HU else "table"
 
 
-def comes_in(ends: NDArray[np.int64], shape: tuple[int, ...]) -> bool:
-    """Return whether a piece reaches the volume's end: nothing holds it within."""
+def reaches_end(ends: NDArray[np.int64], shape: tuple[int, ...]) -> bool:
+    """Return whether a piece reaches the volume's end."""
     return bool((ends[:, 0] == 0).any() or (ends[:, 1] == np.array(shape) - 1).any())
 
 
@@ -95,12 +96,12 @@ def joined_share(
         for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             joined += area * np.count_nonzero(along[here] & others[there])
             free += area * np.count_nonzero(along[here] & air[there])
-        # the cut-out has a margin but where the volume ends
+        # The cut-out has no margin where the volume ends.
         joined += area * (np.count_nonzero(along[0]) + np.count_nonzero(along[-1]))
     return joined / (joined + free) if joined + free else 1.0
 
 
-def complete(
+def add_attached(
     found: NDArray[np.bool_],
     voxels: NDArray[Any],
     labels: NDArray[Any],
@@ -108,14 +109,16 @@ def complete(
     *,
     depth_voxels: float,
 ) -> NDArray[np.bool_]:
-    """Return a holder with all that hangs on it, so that no half of it stays.
+    """Return a holder with everything attached to it, so that no half of it stays.
 
-    A pad is as faint as the level of skin, which cuts it to pieces. They hang together by what is
-    fainter still. Pieces that hold no flesh go with it, and crumbs; an ear in a head rest stays.
+    A pad is as faint as the level of skin, which cuts it into pieces. Voxels that are fainter still
+    connect them. Pieces without flesh and small crumbs are removed with the holder. An ear in a
+    head rest stays.
 
     found         voxels of the holder
+    voxels        (z, y, x), Hounsfield units
     labels        pieces apart from the body, by number
-    body          the body; metal at its skin that hangs on the holder is taken out of it
+    body          the body; metal at its skin that touches the holder is removed from it, in place
     depth_voxels  a core's depth cubed, in voxels
     """
     counts = np.bincount(labels.ravel())
@@ -126,9 +129,9 @@ def complete(
         stays[number] = has_flesh and counts[number] > _CRUMB * depth_voxels
     blocked = ndimage.binary_dilation(body, np.ones((3, 3, 3), bool)) | stays[labels]
     faint = cc3d.connected_components(found | ((voxels > _FOAM_HU) & ~blocked), connectivity=26)
-    hangs = np.zeros(int(faint.max()) + 1, bool)
-    hangs[np.unique(faint[found])] = True
-    whole = np.asarray(hangs[faint])
+    is_attached = np.zeros(int(faint.max()) + 1, bool)
+    is_attached[np.unique(faint[found])] = True
+    whole = np.asarray(is_attached[faint])
     clips = _clips(whole, voxels, body, depth_voxels)
     body &= ~clips
     return whole | clips
@@ -137,7 +140,7 @@ def complete(
 def _clips(
     found: NDArray[np.bool_], voxels: NDArray[Any], body: NDArray[np.bool_], depth_voxels: float
 ) -> NDArray[np.bool_]:
-    """Return small pieces of metal at the body's skin that touch what is left out: electrodes."""
+    """Return small pieces of metal at the skin, such as electrodes, that touch left-out pieces."""
     dense = cc3d.connected_components(body & (voxels > BONE_HU), connectivity=26)
     touched = np.unique(dense[ndimage.binary_dilation(found, iterations=2)])
     is_clip = np.zeros(int(dense.max()) + 1, bool)
@@ -149,7 +152,7 @@ def _clips(
 
 
 def sizes_in_words(sizes: list[NDArray[np.float64]]) -> tuple[str, ...]:
-    """Return the sizes (z, y, x) of pieces in um, largest first, for people."""
+    """Return the sizes (z, y, x) of pieces as text in mm, largest first. sizes: um."""
     largest = sorted(sizes, key=lambda size: (-float(np.prod(size)), *size))
     words = [
         " x ".join(f"{length / 1000:.0f}" for length in size) + " mm (z, y, x)"

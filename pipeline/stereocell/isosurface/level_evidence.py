@@ -1,6 +1,6 @@
-"""What one tile tells about its channel's level: histograms, slopes at each value, noise, padding.
+"""Gather one tile's evidence for its channel's levels: histograms, slopes, noise and padding.
 
-Every number is a sum over voxels, so that tiles, in any cut, add up to the whole dataset.
+Every number is a sum over voxels, so the sums of all tiles are those of the dataset in any cut.
 """
 
 from dataclasses import dataclass, replace
@@ -21,25 +21,25 @@ from stereocell.isosurface.options import Criterion
 from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.model.spacing import Spacing
 
-MAX_PADDING = 0.8  # share of the voxels: padding that covers more is the ground, without noise
-# Voxels along a row of an image between the two values whose difference is noise: beyond the
-# denoising
+MAX_PADDING = 0.8  # share of the voxels; padding that covers more is ground without noise
+# Voxels along a row of an image between two values whose difference counts as noise: more than
+# denoising reaches
 LAG = 4
 HALO = (1, 1, LAG)  # voxels (slice, row, column) around a tile that its evidence reads
 NOISE_BINS = 1024
-_PLANES = 16  # planes counted at once
-_FINITE = 255 << 6  # upper 15 bits of the first float32 that is no finite number
+_PLANES = 16  # number of planes that are counted together
+_FINITE = 255 << 6  # upper 15 bits of the first float32 that is not finite
 Slices = tuple[slice, slice, slice]
-_NOISE_LEAST = 1e-6  # share of the scale's range: the first bin of differences
+_NOISE_LEAST = 1e-6  # share of the scale's range: end of the first bin of differences
 
 
 @dataclass(frozen=True, slots=True)
 class Sums:
-    """Sums over a tile's voxels in the bins of a scale, but for its padding.
+    """Sums over a tile's voxels in the bins of a scale. Padding is left out.
 
-    counts   int64 (BINS,), voxels
-    slopes   float64 (BINS,), gradient magnitudes, voxel values per um
-    squares  float64 (BINS,), squares of their shares of the scale, per um^2
+    counts   int64 (BINS,), numbers of voxels
+    slopes   float64 (BINS,), sums of gradient magnitudes, voxel values per um
+    squares  float64 (BINS,), sums of squared gradients as shares of the scale's range, per um^2
     """
 
     counts: NDArray[np.int64]
@@ -54,15 +54,15 @@ class Sums:
 
 @dataclass(frozen=True, slots=True)
 class TileEvidence:
-    """One tile's part of what its channel's level is found on.
+    """One tile's part of the evidence for its channel's levels.
 
-    plain        of the denoised field
-    padding      of its padding, in the same field
-    above        of the field above the background; None: the channel has none
-    differences  int64 (NOISE_BINS,), how often the field differs by so much LAG voxels further
-    profiles     of the field along the axes, and of that above the background
-    neighbours   of the voxels as read
-    edges        of the field, and of that above the background, where a criterion scores edges
+    plain        sums of the denoised field
+    padding      sums of the denoised field over the padding
+    above        sums of the field above the background; None: the channel has no background
+    differences  int64 (NOISE_BINS,), counts of differences between voxels LAG apart along a row
+    profiles     along the axes, of the field and of the field above the background
+    neighbours   sums over neighbouring voxels as read
+    edges        of the field and of the field above the background, if a criterion scores edges
     """
 
     plain: Sums
@@ -85,12 +85,12 @@ class TileEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """How all tiles of a channel are counted.
+    """The scales by which all tiles of a channel are counted.
 
-    scale        of the values
-    scale_above  of the values above the background; None: none is tried
-    darkest      the channel's least value, that of its padding; None: it has none
-    mask         the only two values that its voxels have; None: they have more
+    scale        for the values
+    scale_above  for the values above the background; None: no background is tried
+    darkest      the channel's least value, which is that of its padding; None: no padding
+    mask         the channel's two values if it has only two; None: it has more
     """
 
     scale: Scale
@@ -112,31 +112,34 @@ def denoising_reach(sigma_um: float, spacing_um: Spacing, slice_axis: int) -> tu
 def find_padding(
     voxels: NDArray[Any], darkest: float | None, reach: tuple[int, int, int]
 ) -> NDArray[np.bool_]:
-    """Return which voxels are padding, or so near to it that denoising mixes them, bool.
+    """Return the voxels that are padding, or that denoising mixes with padding, as a mask (bool).
 
-    voxels   (slice, row, column), as read, and so is the result
+    voxels   (slice, row, column), as read; the mask has the same axes
     darkest  the channel's least value; None: the channel has no padding
     reach    voxels (slice, row, column) that denoising reaches
 
-    Padding are runs of the darkest value as long as the reach on both sides in plane: a stitched
-    mosaic's corners, a scanner's circle, a border. Single dark voxels of a noisy dark end are none.
+    Padding consists of runs of the darkest value that extend as far as the reach on both sides in
+    plane: corners of a stitched mosaic, a scanner's circle, a border. Single dark voxels at the
+    dark end of noise are not padding.
     """
     dark = np.zeros(voxels.shape, bool) if darkest is None else voxels == darkest
     if not dark.any():
         return dark
     size = (1, *(min(2 * r + 1, n) for r, n in zip(reach[1:], voxels.shape[1:], strict=True)))
-    if not _has_run(dark, (size[2] + 1) // 2):  # at an end of a row half of the size is enough
+    # At the end of a row a run of half the size is enough
+    if not _has_run(dark, (size[2] + 1) // 2):
         return np.zeros(voxels.shape, bool)
     flat = ndimage.minimum_filter(dark.view(np.uint8), size, mode="nearest")
     if not flat.any():
         return flat.view(bool)
-    # back to the run's own ends, and on to where it is mixed with what lies beside it
+    # Grow back to the run's own ends, and further to where denoising mixes it with its
+    # surroundings.
     wide = tuple(4 * r + 1 if axis else 2 * r + 1 for axis, r in enumerate(reach))
     return ndimage.maximum_filter(flat, wide, mode="nearest").view(bool)
 
 
 def _has_run(flags: NDArray[np.bool_], length: int) -> bool:
-    """Return whether so many flags stand side by side along x."""
+    """Return whether `length` flags are set side by side along x."""
     known = 1
     while known < length and flags.any():
         onward = min(known, length - known)
@@ -158,25 +161,27 @@ def gather_evidence(
 ) -> TileEvidence:
     """Return a tile's evidence.
 
-    All axes are (slice, row, column): `slices_first` turns a volume so.
+    All axes are (slice, row, column), as `slices_first` returns them.
 
-    field        denoised, float32, voxel values, of a window around the tile: HALO voxels more each
-                 way, where the data has them
+    field        denoised, float32, voxel values, of a window around the tile: HALO voxels more on
+                 each side, where the data has them
     padding      bool, the same window, as `find_padding` returns it
-    own          the tile in the window
+    own          the tile within the window
     voxels       as read, the same window
     spacing_um   of the three axes
+    counting     scales of the channel
     start        voxels of the dataset at which the tile begins
-    background   float32, broadcasts over the window, voxel values; None: none is tried
-    criterion    the one that scores edges; None: none does
+    background   float32, broadcasts over the window, voxel values; None: no background is tried
+    criterion    the criterion that scores edges; None: levels follow from histograms
 
-    With the halo, the sums over all tiles are those of the whole dataset, however it is cut.
+    With the halo, the sums over all tiles are those of the dataset, however it is cut.
     """
     if background is not None:
         background = np.broadcast_to(background, field.shape)
     parts = []
     first, stop = own[0].start, own[0].stop
-    for z in range(first, stop, _PLANES):  # copies of the whole would be five times the field
+    # Limits the memory: copies of the whole would be five times the field
+    for z in range(first, stop, _PLANES):
         low = max(z - HALO[0], 0)
         part = slice(low, min(z + _PLANES + HALO[0], len(field)))
         inner = (slice(z - low, min(z + _PLANES, stop) - low), *own[1:])
@@ -240,9 +245,10 @@ def _binned(
     spacing_um: Spacing,
     scale: Scale,
 ) -> tuple[Sums, Sums]:
-    """Return the sums over the voxels that are no padding, and over padding."""
+    """Return the sums over the voxels that are not padding, and over those that are."""
     table, step = scale.table()
-    span = np.float32(scale.high - scale.low)  # squares of large values overflow float32
+    # Unit of the slopes, because squares of large values overflow float32
+    span = np.float32(scale.high - scale.low)
     kept, out = sum_by_value(
         field,
         padding,
@@ -278,7 +284,7 @@ def _box_of(own: Slices) -> NDArray[np.int64]:
 def noise_edges(scale: Scale) -> NDArray[np.float64]:
     """Return the ends of the bins of differences, float64 (NOISE_BINS + 1,), voxel values.
 
-    The first begins at 0, and the others grow by the same factor.
+    The first bin begins at 0, and the others grow by a constant factor.
     """
     edges = (scale.high - scale.low) * np.geomspace(_NOISE_LEAST, 1.0, NOISE_BINS + 1)
     edges[0] = 0.0

@@ -1,8 +1,8 @@
-"""A histogram of field values that many tiles add up to, and the levels that it shows.
+"""A histogram of field values that is summed over tiles, and the levels that it shows.
 
-Its bins are narrow near the channel's usual values and grow with the distance beyond (even in the
-inverse hyperbolic sine of the value): a few voxels of 60 000 leave the difference of 100 and 110
-visible. Counts are whole numbers, so that their sum over the tiles is the same in any order.
+Its bins are narrow near the channel's usual values and grow with the distance from them: they are
+even in the inverse hyperbolic sine of the value. So a few voxels of 60 000 leave the difference of
+100 and 110 visible. Counts are whole numbers, so their sum over tiles is the same in any order.
 
 References
 C. H. Li & P. K. S. Tam, "An iterative algorithm for minimum cross entropy thresholding", Pattern
@@ -21,18 +21,18 @@ from scipy import ndimage
 from stereocell.model.lattice_field import LatticeField
 
 BINS = 4096
-INSIDE = 0.6  # quantile of the voxels above a level that is the height of the bodies
-OUTSIDE = 0.5  # quantile of the voxels below it that is the height of what surrounds them
-DARK = 0.05  # quantile that is the dark end, from which distances are measured in noise
-_LOWEST_QUANTILE = 0.001  # quantile that Li's threshold counts from: it wants values above 0
-_FINE = 1 << 16  # even bins that values are put into first: faster than a hyperbolic sine of each
-_SPREAD = 90.0  # range over the distance from the middle at which bins begin to grow
+INSIDE = 0.6  # quantile of the voxels above a level that counts as the height of the bodies
+OUTSIDE = 0.5  # quantile of the voxels below a level that counts as the height of the surroundings
+DARK = 0.05  # quantile that counts as the dark end, from which values are measured in noise
+_LOWEST_QUANTILE = 0.001  # quantile that is 0 for Li's threshold, which needs values above 0
+_FINE = 1 << 16  # number of even bins in a first pass: faster than a hyperbolic sine for each value
+_SPREAD = 90.0  # range of the values over the distance from the middle at which bins begin to grow
 _STEPS = 200
 _CLOSE = 1e-4  # share of the contrast; a smaller step ends a search
-_STEP = 0.02  # step of the stabilised axis; its unit is twice the noise at the dark end
-_SIGMA = 0.15  # smoothing along that axis
+_STEP = 0.02  # step of the stabilised axis, whose unit is twice the noise at the dark end
+_SIGMA = 0.15  # sigma of the smoothing along the stabilised axis
 DIP = 0.7  # largest height of a valley, as a share of the lower of its two peaks
-_FLAT = 1.5  # multiple of a valley's least height up to which it is a valley
+_FLAT = 1.5  # multiple of a valley's least height up to which voxels belong to the valley
 _ENDS = (0.0002, 0.9999)  # quantiles between which peaks are looked for
 
 
@@ -46,12 +46,13 @@ class Scale:
 
     @classmethod
     def of(cls, voxels: NDArray[Any], padding: NDArray[np.bool_]) -> "Scale":
-        """Return the scale for fields whose voxels these represent, any shape, any number type.
+        """Return the scale for the fields of a channel from a sample of its voxels.
 
-        padding  bool, the same shape; the middle is that of the others
+        voxels   any shape, any number type
+        padding  bool, the same shape; the middle is the median of the other voxels
 
-        The field is smoother than its voxels, so nearly all of it lies within their range; a few
-        hot voxels lie beyond, and count at the end.
+        The field is smoother than its voxels, so nearly all of it lies within their range. A few
+        hot voxels lie beyond and are counted in the last bin.
         """
         low, high = (float(v) for v in np.percentile(voxels, (0.001, 99.999)))
         middle = float(np.median(voxels[~padding] if padding.any() else voxels))
@@ -73,7 +74,7 @@ class Scale:
         return np.asarray(edges, np.float64)
 
     def bins_of(self, values: NDArray[np.float32]) -> NDArray[np.int16]:
-        """Return each value's bin, int16 of the same shape; a value beyond an end counts there."""
+        """Return each value's bin, int16 of the same shape. Outer values count in the end bins."""
         table, step = self.table()
         place = values - np.float32(self.low)
         place /= np.float32(step)
@@ -81,7 +82,7 @@ class Scale:
         return table[place.astype(np.uint16)]
 
     def table(self) -> tuple[NDArray[np.int16], float]:
-        """Return the bin of each even step from `low` on, int16, and the step, voxel values."""
+        """Return the bin of each of _FINE even steps from `low`, int16, and the step's width."""
         step = (self.high - self.low) / _FINE
         fine = self.low + (np.arange(_FINE) + 0.5) * step
         table = np.clip(np.searchsorted(self.edges(), fine, "right") - 1, 0, BINS - 1)
@@ -92,10 +93,10 @@ class Scale:
 class Valley:
     """A gap between two peaks, in voxel values.
 
-    value       where it is lowest
-    low, high   where it ends: beyond, the histogram rises
-    peak        the upper of its two peaks
-    dip         its least height as a share of the lower peak, 0..1
+    value       the lowest point
+    low, high   the ends of the valley; the histogram rises beyond them
+    peak        the upper one of the two peaks
+    dip         the least height as a share of the lower peak, 0..1
     """
 
     value: float
@@ -107,7 +108,10 @@ class Valley:
 
 @dataclass(frozen=True)
 class LevelHistogram:
-    """Voxel counts, float64 (BINS,), in bins with these ends, float64 (BINS + 1,), voxel values."""
+    """Voxel counts, float64 (BINS,), in bins whose ends are `edges`, float64 (BINS + 1,).
+
+    The edges are in voxel values.
+    """
 
     counts: NDArray[np.float64]
     edges: NDArray[np.float64]
@@ -131,25 +135,25 @@ class LevelHistogram:
         return float(np.average((self.centres - mean) ** 2, weights=self.counts))
 
     def between(self, low: float, high: float) -> "LevelHistogram":
-        """Return the histogram of the voxels above `low` and up to `high` alone."""
+        """Return the histogram of only the voxels above `low` and up to `high`."""
         kept = (self.centres > low) & (self.centres <= high)
         return LevelHistogram(np.where(kept, self.counts, 0.0), self.edges)
 
     def above(self, level: float) -> "LevelHistogram":
-        """Return the histogram of the voxels above a level alone."""
+        """Return the histogram of only the voxels above a level."""
         return self.between(level, np.inf)
 
     def below(self, level: float) -> "LevelHistogram":
-        """Return the histogram of the voxels at or below a level alone."""
+        """Return the histogram of only the voxels at or below a level."""
         return self.between(-np.inf, level)
 
     def quantile(self, share: float) -> float:
-        """Return the value that `share` (0..1) of the voxels lie below; NaN without a voxel."""
+        """Return the value below which the share (0..1) of the voxels lies; NaN without a voxel."""
         sums = np.cumsum(self.counts)
         return float(np.interp(share * sums[-1], sums, self.centres)) if sums[-1] else np.nan
 
     def width_at(self, value: float) -> float:
-        """Return the width of the bin that a value lies in, in voxel values."""
+        """Return the width of the bin that holds a value, in voxel values."""
         at = int(np.clip(np.searchsorted(self.edges, value) - 1, 0, len(self.counts) - 1))
         return float(self.edges[at + 1] - self.edges[at])
 
@@ -173,10 +177,10 @@ class LevelHistogram:
         return level + least
 
     def half_height(self, *, start: float | None = None) -> float:
-        """Return the level half-way between what it has inside and outside; NaN where none has.
+        """Return the level half-way between the values inside and outside; NaN if there is none.
 
-        The search begins at `start`, by default Li's threshold. Each step goes half of the way, so
-        that it doesn't swing between two levels.
+        The search begins at `start`, by default Li's threshold. Each step is halved, so that the
+        search does not swing between two levels.
         """
         level = self.li_threshold() if start is None else start
         for _ in range(_STEPS):
@@ -195,9 +199,9 @@ class LevelHistogram:
 
         noise  sigma of the field's noise at the dark end, voxel values
 
-        Along the axis asinh((value - dark) / 2 noise) the peaks of dim and of bright voxels are of
-        like width: near the dark end it is even, far from it a logarithm. A peak counts where the
-        histogram falls to DIP of it on the way to a higher one.
+        On the axis asinh((value - dark) / 2 noise) the peaks of dim and bright voxels have similar
+        widths: the axis is linear near the dark end, and logarithmic far from it. A peak counts if
+        the histogram falls to DIP of its height on the way to a higher peak.
         """
         values, height = self._smoothed(noise)
         widths = np.gradient(values) if len(values) > 1 else values
@@ -205,7 +209,7 @@ class LevelHistogram:
         for left, right in pairwise(_peaks(height)):
             part = height[left : right + 1]
             least = float(part.min())
-            # by voxels a step of value: a blurred edge has as many at every height
+            # Voxels per step of value: a blurred edge has the same number at every height.
             density = part / widths[left : right + 1]
             flat = left + np.flatnonzero(
                 (density <= _FLAT * density.min()) | (part <= _FLAT * least)
@@ -222,7 +226,7 @@ class LevelHistogram:
         return valleys
 
     def outline(self, noise: float, points: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the histogram along that axis for a chart: voxel values, and heights up to 1."""
+        """Return the histogram on the stabilised axis: voxel values, and heights scaled to 1."""
         values, height = self._smoothed(noise)
         if not len(height):
             return (), ()
@@ -234,7 +238,7 @@ class LevelHistogram:
         )
 
     def _smoothed(self, noise: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return voxel values and smoothed heights along that axis; empty where it is none."""
+        """Return voxel values and heights on the stabilised axis; empty if all values are equal."""
         nothing = np.zeros(0)
         dark = self.quantile(DARK)
         axis = np.arcsinh((self.edges - dark) / (2 * noise))
@@ -250,7 +254,10 @@ class LevelHistogram:
 
 
 def _peaks(height: NDArray[np.float64]) -> list[int]:
-    """Return the peaks that stand out, rising; the least of a pair goes while their gap is flat."""
+    """Return the peaks that stand out, rising.
+
+    The lower one of two peaks is removed as long as the gap between them is shallow.
+    """
     padded = np.concatenate([[-np.inf], height, [-np.inf]])
     rises, falls = height >= padded[:-2], height > padded[2:]
     peaks = [int(k) for k in np.flatnonzero(rises & falls & (height > 0))]

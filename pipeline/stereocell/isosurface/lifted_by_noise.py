@@ -1,12 +1,13 @@
-"""How many voxels noise alone lifts above a level: they are no structure that a surface leaves out.
+"""Estimate how many voxels noise alone lifts above a level. They are not structure that is missing.
 
-Each voxel is its denoised value and noise. So the histogram of the denoised values, which the
-level was found on, gives the number of voxels that noise is expected to lift above the level.
+Each voxel is its denoised value plus noise. So the histogram of the denoised values, on which the
+level was found, gives the number of voxels that noise is expected to lift above the level.
 
-Far below the level nothing but noise does so. Near it a thin wall that the filters flattened has
-the same values as the rim of a thick body, so both are counted apart. On thin shells of 1 to 3
-voxels with noise of up to a tenth of their height, FAR finds their loss within .05 of the true one;
-on nuclei in noise of a third of their height the loss is 2 %, where 88 % lie outside of the solid.
+Far below the level only noise lifts voxels. Near the level, a thin wall that the filters flattened
+has the same values as the rim of a thick body, so near and far voxels are counted apart. FAR was
+tuned on shells of 1 to 3 voxels with noise of up to a tenth of their height. It finds the missing
+share of these shells to within .05. On nuclei in noise of a third of their height the share found
+is 2 %, although 88 % of the voxels above the level lie outside of the solid.
 """
 
 from dataclasses import dataclass
@@ -15,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-FAR = 0.5  # deviations of the noise below the level, from which a denoised value is far from it
+# Standard deviations of the noise; a denoised value is far if it is this much below the level
+FAR = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Lifted:
     """Expected numbers of voxels that noise lifts above a level.
 
-    far   of those whose denoised value lies far below the level
-    near  of the others below the level
+    far   among voxels with a denoised value far below the level
+    near  among voxels with a denoised value below the level, but not far below
     """
 
     far: float
@@ -36,11 +38,11 @@ class Lifted:
 def count_lifted(
     counts: NDArray[np.int64], edges: NDArray[np.float64], *, level: float, noise: float
 ) -> Lifted:
-    """Return how many voxels noise lifts above a level.
+    """Return how many voxels noise is expected to lift above a level.
 
-    counts  voxels by their denoised value, (n,)
-    edges   ends of these bins, (n + 1,), rising, voxel values
-    noise   standard deviation, voxel values; 0: there is none
+    counts  number of voxels by denoised value, (n,)
+    edges   ends of the bins of `counts`, (n + 1,), rising, voxel values
+    noise   standard deviation, voxel values; 0: no noise
     """
     if not noise > 0:
         return Lifted(0.0, 0.0)

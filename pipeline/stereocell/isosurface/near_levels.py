@@ -1,34 +1,34 @@
-"""The levels beside a channel's own: its surface could lie there instead by a little."""
+"""List the other levels at which a channel's surface could lie almost as well."""
 
 from collections.abc import Sequence
 
 from stereocell.isosurface.level import Level, clear_of
 
 MAX_NEAR = 3
-MARK = "+b"  # stands after a level that counts from the background, as flags have it
-ABOVE_BACKGROUND = f" ({MARK}: above the background)"  # explains it, at the end of a line
-# Confidence from which a doubtful level is named beside a surface that is unsure. Below, hardly
-# anything speaks for it.
+MARK = "+b"  # suffix of a level above the background, also in flags
+ABOVE_BACKGROUND = f" ({MARK}: above the background)"  # explains MARK at the end of a line
+# Least confidence, 0..1, at which an unclear level is listed beside an unsure surface. Hardly any
+# evidence supports levels below it.
 LIKELY = 0.2
-_ALIKE = 0.03  # share of the contrast: levels nearer to one another are one
+_ALIKE = 0.03  # share of the contrast; levels nearer to one another count as one
 
 
 def find_near_levels(
-    ladder: Sequence[Level], taken: float | None, *, is_unsure: bool
+    levels: Sequence[Level], taken: float | None, *, is_unsure: bool
 ) -> tuple[Level, ...]:
-    """Return the levels that are clear too, or fall short of it by a little, outermost first.
+    """Return the other levels that are clear or nearly clear, outermost first.
 
-    Beside a surface that is unsure the likely ones count as well.
+    If the surface is unsure, levels with a confidence of at least LIKELY are listed as well.
 
-    ladder  all levels that were found, outermost first
+    levels  all levels that were found, outermost first
     taken   the surface's level; None: there is no surface
     """
-    clear = clear_of(ladder)
-    if taken is None and clear:  # the channel holds nothing, however clear its levels look
+    clear = clear_of(levels)
+    if taken is None and clear:  # the channel has no surface, although its levels look clear
         return ()
     near = [
         level
-        for level in ladder
+        for level in levels
         if level in clear or level.is_nearly_clear or (is_unsure and level.confidence >= LIKELY)
         if taken is None or abs(level.value - taken) > _ALIKE * level.contrast
     ]
@@ -36,10 +36,10 @@ def find_near_levels(
 
 
 def words_of(levels: Sequence[Level], mark: str = "", digits: int = 5) -> str:
-    """Return levels with the share of the voxels inside: `402 (7% of the voxels), 1675 (0.9%)`.
+    """Return text for levels and the voxels inside: `402 (7% of the voxels), 1675 (0.9%)`.
 
-    mark    stands after each value: `+b` where it counts from the background
-    digits  of each value
+    mark    suffix of each value: `+b` if it counts from the background
+    digits  significant digits of each value
     """
     first, *others = (
         f"{float(f'{level.value:.{digits}g}'):.5g}{mark} ({_percent(level.share)}"

@@ -1,10 +1,10 @@
-"""Whether neighbouring voxels have anything to do with one another, as they are measured.
+"""Measure whether neighbouring voxels, as read, are correlated.
 
-A microscope's image is blurred, so that what is there reaches into several voxels; a camera's noise
-is drawn for each by itself. Denoised, both have grains. The correlation of neighbours in plane was
-at most .003 in empty fields of five cameras, of counted photons and of a clipped detector, where
-light is even; at least .045 on all volumes with bodies of `make bench-iso`, as of 1 % of membranes
-at 10 photons.
+A microscope's image is blurred, so each structure reaches into several voxels. A camera's noise is
+independent in each voxel. After denoising both look grainy. The correlation of neighbours in plane
+was at most .003 in empty fields under even light: of five cameras, of counted photons, and of a
+clipped detector. It was at least .045 in all volumes with bodies of `make bench-iso`, which include
+1 % of membranes at 10 photons.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MIN_KINSHIP = 0.01  # correlation below which there is nothing but noise
+MIN_CORRELATION = 0.01  # correlation of neighbours; a channel below it holds only noise
 _Slices = tuple[slice, slice, slice]
 
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """Sums over a tile's voxels but for its padding, of values less the scale's middle.
+    """Sums over a tile's voxels, as values less the scale's middle. Padding is left out.
 
     voxels  count, sum and sum of squares, float64 (3,)
-    pairs   of neighbours along y and along x: count and sum of products, float64 (2, 2)
+    pairs   neighbours along y and along x: count and sum of products, float64 (2, 2)
     """
 
     voxels: NDArray[np.float64]
@@ -39,9 +39,10 @@ class Neighbours:
     ) -> "Neighbours":
         """Return the sums of a tile.
 
-        voxels   (z, y, x), as read, of a window around the tile; padding, bool, the same
-        own      the tile in the window
-        scale    least, middle and largest value: beyond the ends are hot voxels
+        voxels   (z, y, x), as read, of a window around the tile
+        padding  bool, the same window
+        own      the tile within the window
+        scale    least, middle and largest value; hot voxels beyond the ends are clipped
         """
         low, middle, high = scale
         single, pairs = np.zeros(3), np.zeros((2, 2))
@@ -62,11 +63,11 @@ class Neighbours:
         return cls(single, pairs)
 
 
-def kinship(tiles: Sequence[Neighbours]) -> float:
-    """Return the correlation of neighbouring voxels, the larger one of those along y and along x.
+def neighbour_correlation(tiles: Sequence[Neighbours]) -> float:
+    """Return the correlation of neighbouring voxels: the larger of those along y and along x.
 
-    The lines that a microscope scans may differ from one another by more than what is there.
-    1 where it is not known: without tiles or pairs, or where all voxels are alike.
+    The larger one counts because a microscope's scan lines may differ by more than the structures.
+    The correlation is 1 if it is unknown: without tiles or pairs, or if all voxels are equal.
     """
     if not tiles:
         return 1.0

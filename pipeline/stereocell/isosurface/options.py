@@ -1,4 +1,4 @@
-"""Settings of the iso-value and of the surface. Light to import: every command reads them."""
+"""Settings of the iso-value and of the surface. Every command imports them, so imports are few."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,11 +22,11 @@ from stereocell.model.spacing import Spacing
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """A way to choose the iso-value by edges: the level with the largest score.
+    """A way to choose the iso-value by edges: the level with the largest score is taken.
 
-    score            of a level's surface, by its total gradient and its area, float64 (bins,) each
-    discounts_noise  whether noise's part is taken out of the gradients first, and levels with a
-                     small total can't be chosen
+    score            maps a level's total gradient and area, float64 (bins,) each, to its score
+    discounts_noise  whether the noise's part is first removed from the gradients, and levels with a
+                     small total gradient are excluded
     """
 
     score: Callable[[Any, Any], Any]
@@ -41,17 +41,17 @@ CRITERIA = {
     "pekar-total": Criterion(lambda total, area: total),
     "pekar-area": Criterion(lambda total, area: area),
 }
-RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the ladder's levels, outermost first
-APART = "apart"  # the first rung whose components are many: that of cells in their tissue
+RUNGS = {"outer": 0, "inner": 1, "third": 2}  # names of the levels, outermost first
+APART = "apart"  # the level that shows the most separate components: cells in tissue
 CONNECTED = "connected"  # the lowest level that keeps vessels connected and floods nothing
-NO_SURFACE = "none"  # no level has a surface: the channel is drawn as a volume alone
+NO_SURFACE = "none"  # no surface at any level: the channel is drawn only as a volume
 SCOPES = ("channel", "tile")
 
 
 def parse_level(where: str, given: float | str) -> tuple[float, bool]:
-    """Return a given iso-value, and whether it counts from the background: `162+b`.
+    """Return a given iso-value, and whether it counts from the background as in `162+b`.
 
-    Raises UsageError for what is neither.
+    Raises UsageError if the value is neither.
     """
     number, plus, rest = str(given), "", ""
     if isinstance(given, str):
@@ -77,30 +77,35 @@ class IsoValueOptions:
 
     criterion: str = setting(
         LADDER,
-        f"{LADDER}: by histograms of all tiles; {', '.join(CRITERIA)}: by edges; {ADAPTIVE}: the "
-        "channel's threshold",
+        f"{LADDER}: by the levels of all tiles' histograms; {', '.join(CRITERIA)}: by edges; "
+        f"{ADAPTIVE}: by the channel's threshold",
         flag=Flag(
             "--iso-criterion", "how iso-values are found: ladder (default), edges, adaptive, ..."
         ),
     )
     scope: str = setting(
         "channel",
-        "channel: one level for all tiles; tile: each tile's own, near the channel's",
-        flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: each its own"),
+        "channel: one level for all tiles; tile: a level for each tile, near the channel's",
+        flag=Flag("--iso-scope", "channel (default): one level for all tiles; tile: one for each"),
     )
     rung: str = setting(
         "outer",
-        f"which clear level has the surface: {', '.join(RUNGS)}; {APART}: the first whose largest "
-        "components hold under a quarter of all, or the least of it where cells touch; "
-        f"{CONNECTED}: the lowest at which vessels hang together and nothing else is inside; "
-        f"{NO_SURFACE}: no level has one",
+        f"clear level that has the surface: {', '.join(RUNGS)}; {APART}: the one with the most "
+        "components, if the largest hold under a quarter of its voxels (two thirds where many "
+        f"cells touch); {CONNECTED}: the lowest at which vessels are connected and nothing else "
+        f"is inside; {NO_SURFACE}: no level",
     )
-    bins: int = setting(256, "levels that a criterion of edges tries", bounds=Bounds(16, 65536))
+    bins: int = setting(256, "levels that a criterion of edges compares", bounds=Bounds(16, 65536))
     clip_percentile: float = setting(
-        99.99, "brighter voxels (hot pixels) are left out there", bounds=Bounds(0, 100)
+        99.99,
+        "percentile of the voxels up to which a criterion of edges looks for levels; hot pixels "
+        "are brighter",
+        bounds=Bounds(0, 100),
     )
     min_area_share: float = setting(
-        0.02, "of the largest surface; leaves out specks there", bounds=Bounds(0, 1)
+        0.02,
+        "share of the largest surface's area; a criterion of edges ignores smaller ones (specks)",
+        bounds=Bounds(0, 1),
     )
 
     def __post_init__(self) -> None:
@@ -120,25 +125,25 @@ class IsoValueOptions:
 
 
 WRAPS = ("voxels", "alpha-wrap")
-# `auto` sizes of fragments and cavities count in spacings of the coarsest axis, of which one is
-# taken for STEP_FINEST finest at most; no size is under LEAST_COARSEST coarsest
+# `auto` sizes of fragments and cavities are multiples of the coarsest spacing, which counts as at
+# most STEP_FINEST finest spacings. No size is less than LEAST_COARSEST coarsest spacings.
 STEP_FINEST, LEAST_COARSEST = 3.0, 1.5
-# A preset's size of bodies holds up to this share of the field of view's longest edge: a head of
-# 250 mm has no bodies of 10 mm that matter, and a finger of 60 mm has
+# Largest share of the field of view's longest edge that a preset's size of bodies may have. In a
+# head of 250 mm no bodies under 10 mm matter, but in a finger of 60 mm they do.
 FIELD_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceOptions:
-    """Lengths in um; `auto` follows the voxel spacing."""
+    """Settings of a channel's surface. Lengths are in um, and `auto` follows the voxel spacing."""
 
     smoothing_um: float | str = setting(
         AUTO, "sigma of the Gaussian; auto: the finest spacing", bounds=LENGTH_UM
     )
     max_shift: float = setting(
         2.0,
-        "the Gaussian moves a value by no more than so many deviations of the noise, so that thin "
-        "structures stay; 0: by any",
+        "largest change of a value by the Gaussian, in standard deviations of the noise; it keeps "
+        "thin structures; 0: no limit",
         bounds=Bounds(0, 1e6),
     )
     alpha_um: float | str = setting(
@@ -147,94 +152,96 @@ class SurfaceOptions:
         bounds=LENGTH_UM,
     )
     max_alpha_um: float | str = setting(
-        AUTO, "what auto alpha may reach; auto: 2 coarsest spacings", bounds=LENGTH_UM
+        AUTO, "largest alpha that auto may choose; auto: 2 coarsest spacings", bounds=LENGTH_UM
     )
     offset_um: float | str = setting(
         0.0,
-        "how far outside the surface lies: volumes grow by it; auto: a tenth of alpha",
+        "distance by which the surface moves outward, so that volumes grow; auto: a tenth of alpha",
         bounds=LENGTH_UM,
     )
     grid_um: float = setting(
         0.0,
-        "planes of voxels so far apart carry the surface; 0: all; .42 alpha shows what alpha does",
+        "distance between planes of voxels that carry the surface; 0: all planes do; .42 alpha "
+        "shows what alpha does",
         bounds=LENGTH_UM,
     )
     max_thin: float = setting(
         0.05,
-        "share of a channel's voxels above its level in structures too thin for planes grid_um "
-        "apart; where there are more, all planes carry its surface; 1: planes grid_um apart do",
+        "largest share of a channel's voxels above its level that may lie in structures too thin "
+        "for planes grid_um apart; with more of them all planes carry the surface; 1: no limit",
         bounds=Bounds(0, 1),
     )
     max_faces: int = setting(
         5_000_000,
-        "voxel faces of a unit's surface: where noise or a sponge has more, planes farther apart "
-        "carry the channel's surface",
+        "largest number of voxel faces of a unit's surface; where noise or a sponge has more, "
+        "planes farther apart carry the channel's surface",
         bounds=COUNT,
     )
     max_share: float = setting(
         0.5,
-        "share of the specimen that a channel's surface may hold beside smaller ones of others; "
-        "beyond it the channel is a volume alone; 1: each has its surface",
+        "largest share of the specimen inside a channel's surface, if surfaces of other channels "
+        "are smaller; a channel with more is drawn only as a volume; 1: no limit",
         bounds=Bounds(0, 1),
     )
     body_um: float = setting(
         0.0,
-        "size of the least bodies that matter, which presets state; counts up to a twentieth of "
-        "the field of view's longest edge; 0: the voxel spacing tells it",
+        "size of the smallest bodies that matter, set by presets; at most a twentieth of the field "
+        "of view's longest edge is used; 0: sizes follow from the voxel spacing",
         bounds=LENGTH_UM,
     )
     min_diagonal_um: float | str = setting(
         AUTO,
-        "smaller fragments go; auto: body_um, and without it 3 coarsest spacings, of 3 finest at "
-        "most",
+        "smaller fragments are dropped; auto: body_um, or without it 3 coarsest spacings (at most "
+        "9 finest)",
         bounds=LENGTH_UM,
     )
     max_fragment_um: float | str = setting(
         AUTO,
-        "fragments up to this go as well if they are under half the mean of the channel's "
-        "components, by diagonal or by triangles; auto: 6 coarsest spacings, of 3 finest at most, "
-        "and at most twice body_um or a given min_diagonal_um; 0: none do",
+        "fragments up to this size are dropped too if they have under half the mean diagonal or "
+        "triangles of the channel's components; auto: 6 coarsest spacings (at most 18 finest), and "
+        "at most twice body_um or a given min_diagonal_um; 0: none are",
         bounds=LENGTH_UM,
     )
     max_cavity_um: float | str = setting(
         AUTO,
-        "smaller cavities fill; auto: 4 coarsest spacings, of 3 finest at most",
+        "smaller cavities are filled; auto: 4 coarsest spacings (at most 12 finest)",
         bounds=LENGTH_UM,
     )
     wrap: str = setting(
         "voxels",
-        "how gaps are closed: voxels, or alpha-wrap (a single tile; package pymeshlab)",
+        "how gaps are closed: voxels, or alpha-wrap (single tiles only; package pymeshlab)",
         flag=Flag(
-            "--wrap", "how gaps are closed: voxels (default), alpha-wrap (pymeshlab, one tile)"
+            "--wrap", "how gaps are closed: voxels (default), or alpha-wrap (pymeshlab, one tile)"
         ),
     )
     closed_tiles: bool = setting(
         False,
-        "whether the stage gets a closed STL of every tile and channel, in um",
+        "whether the stage gets a closed STL file of each tile and channel, in um",
         flag=Flag(
             "--closed-tiles",
-            "also a closed STL of every tile and channel, for printing and booleans",
+            "also write a closed STL file of each tile and channel, for printing and booleans",
         ),
     )
     caps: bool = setting(
         True,
-        "whether flat caps close surfaces at the block's faces; without, they are open there",
+        "whether flat caps close surfaces at the block's faces; otherwise they are open there",
         flag=Flag(
             "--caps",
-            "flat caps close surfaces at the block's faces (default); --no-caps leaves them open",
+            "close surfaces at the block's faces by caps (default); --no-caps leaves them open",
         ),
     )
     keep_holder: bool = setting(
         False,
-        "whether a CT's table, head holder, pads and cables, apart from the body, are built too",
+        "whether a CT scan's table, head holder, pads and cables are built with the body",
         flag=Flag(
             "--keep-holder",
-            "build a CT's table, holder, pads and cables too (default: they are left out)",
+            "build a CT scan's table, holder, pads and cables too (default: they are left out)",
         ),
     )
     background_um: float | str = setting(
         AUTO,
-        "blocks of the background, as large as the largest bodies; auto: 64 finest; 0: none",
+        "size of the blocks in which the background is estimated, at least that of the largest "
+        "bodies; auto: 64 finest spacings; 0: no background is subtracted",
         bounds=LENGTH_UM,
     )
 
@@ -242,15 +249,16 @@ class SurfaceOptions:
         require_bounds("surface", self)
 
     def resolved(self, spacing_um: Spacing, field_um: float = inf) -> "SurfaceOptions":
-        """Return the options with lengths in place of `auto`, but for alpha and offset.
+        """Return the options with lengths in place of `auto`, except for alpha and offset.
 
-        field_um  longest edge of the field of view
+        spacing_um  (z, y, x)
+        field_um    longest edge of the field of view
 
-        `auto` alpha and offset follow from the connected components. Raises UsageError for a value
-        out of range.
+        Alpha and offset of `auto` follow from the connected components. Raises UsageError for a
+        value out of range.
         """
         coarsest = max(spacing_um)
-        # thick slices say nothing of how large a body is; a speck of one slice is one all the same
+        # Thick slices do not show how large bodies are, but a speck of one slice is still a speck.
         step, least = min(coarsest, STEP_FINEST * min(spacing_um)), LEAST_COARSEST * coarsest
         diagonal, fragment = 3 * step, 6 * step
         if self.body_um:
@@ -276,6 +284,6 @@ class SurfaceOptions:
             length_um(f"surface.{key}", getattr(self, key), 0.0)
         if self.offset_um != AUTO and float(self.offset_um) > coarsest:
             raise UsageError(
-                f"surface.offset_um is {self.offset_um:g}, expected at most a voxel ({coarsest:g})"
+                f"surface.offset_um is {self.offset_um:g}, expected at most {coarsest:g} (a voxel)"
             )
         return replace(self, **lengths)

@@ -2,12 +2,12 @@
 
 All three steps work on the signed distance of a window (tile + halo). Neighbouring tiles must
 decide alike on a component near their common plane. So only components that lie wholly inside the
-window are dropped or filled, and only up to a size that the halo covers (`reach_um`): a tile that
-sees part of such a component near the plane sees all of it.
+window are dropped or filled, and only up to a size that the halo covers (`reach_um`). A tile that
+sees part of such a component near the plane then sees all of it.
 
 Gaps are closed on voxels, by a ball of radius alpha. Alpha is the size of the gaps that are
-bridged, and offset the distance of the surface from the solid, as in an alpha wrap over triangles;
-voxels take a fraction of its time.
+bridged, and offset is the distance of the surface from the solid, as in an alpha wrap of triangles.
+Working on voxels takes a fraction of its time.
 
 References
 C. Portaneri, M. Rouxel-Labbe, M. Hemmer, D. Cohen-Steiner & P. Alliez, "Alpha wrapping with an
@@ -29,15 +29,15 @@ Distance = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class RepairOptions:
-    """What is cleaned, lengths in um.
+    """How a solid is cleaned. Lengths are in um.
 
-    alpha_um         radius of the ball that closes gaps; 0: none are closed
-    min_diagonal_um  fragments of a smaller diagonal are dropped
-    max_cavity_um    cavities of a smaller diagonal are filled
-    min_faces        fragments of fewer triangles are dropped too,
-    max_fragment_um  if their diagonal is under this
-    offset_um        distance by which the surface moves outward; at most a voxel, since farther
-                     away the field is no distance
+    alpha_um         radius of the ball that closes gaps; 0: gaps stay open
+    min_diagonal_um  fragments with a smaller diagonal are dropped
+    max_cavity_um    cavities with a smaller diagonal are filled
+    min_faces        fragments with fewer triangles are dropped too, ...
+    max_fragment_um  ... if their diagonal is less than this
+    offset_um        distance by which the surface moves outward; at most a voxel, because the field
+                     is not a distance farther away
     """
 
     alpha_um: float
@@ -48,7 +48,7 @@ class RepairOptions:
     offset_um: float = 0.0
 
     def reach_um(self, spacing_um: Spacing) -> float:
-        """Return how far, in um, a voxel's result depends on others: the halo must cover it."""
+        """Return the distance in um on which a voxel's result depends; the halo must cover it."""
         closing = 2 * self.alpha_um + 2 * max(spacing_um) if self.alpha_um > 0 else 0.0
         fragment = max(self.min_diagonal_um, self.max_fragment_um)
         return closing + fragment + self.max_cavity_um + 2 * max(spacing_um)
@@ -56,7 +56,7 @@ class RepairOptions:
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """The cleaned distance float32 (z, y, x) in um, positive inside, and the counts of changes."""
+    """The cleaned distance, float32 (z, y, x) in um, positive inside, and the number of changes."""
 
     distance: Distance
     fragments_dropped: int
@@ -81,8 +81,8 @@ def repair(distance: Distance, spacing_um: Spacing, *, options: RepairOptions) -
 
 
 def _drop_fragments(distance: Distance, spacing_um: Spacing, options: RepairOptions) -> int:
-    """Set small solids inside the window far outside, and return their number."""
-    # 26-connected: a fragment that touches a neighbour by a corner belongs to it
+    """Set small solids inside the window to far outside, and return their number."""
+    # Connectivity 26: a fragment that touches a neighbour by a corner belongs to the neighbour.
     components = find_components(distance > 0, spacing_um, 26)
     small = components.diagonal_um < options.min_diagonal_um
     doubtful = ~small & (components.diagonal_um < options.max_fragment_um)
@@ -93,7 +93,7 @@ def _drop_fragments(distance: Distance, spacing_um: Spacing, options: RepairOpti
         return 0
     gone = components.mask_of(small)
     if options.offset_um > 0:
-        # just outside a fragment the distance is barely negative: the offset would restore it
+        # Just outside a fragment the distance is barely negative, and the offset would restore it.
         near = ndimage.maximum_filter(gone.view(np.uint8), 3, mode="constant")
         kept = components.mask_of(~small).view(np.uint8)
         near &= ~ndimage.maximum_filter(kept, 3, mode="constant") & 1
@@ -103,9 +103,9 @@ def _drop_fragments(distance: Distance, spacing_um: Spacing, options: RepairOpti
 
 
 def _fill_cavities(distance: Distance, spacing_um: Spacing, max_diagonal_um: float) -> int:
-    """Set small cavities far inside, and return their number.
+    """Set small cavities to far inside, and return their number.
 
-    A cavity is a hole that no path joins to the outside.
+    A cavity is a hole that no path connects to the outside.
     """
     holes = find_components(distance <= 0, spacing_um, 6)
     small = holes.whole & (holes.diagonal_um < max_diagonal_um)
@@ -115,8 +115,8 @@ def _fill_cavities(distance: Distance, spacing_um: Spacing, max_diagonal_um: flo
 
 
 def _close(distance: Distance, spacing_um: Spacing, alpha_um: float) -> None:
-    """Add to the solid the voxels that a ball of radius alpha, rolling outside, cannot reach.
+    """Add to the solid the voxels that a ball of radius alpha cannot reach from outside.
 
-    The added part lies one voxel inside, so that smooth parts of the surface stay where they are.
+    The added part lies one voxel below the surface, so smooth parts of the surface do not move.
     """
     close_gaps(distance, np.array(spacing_um, np.float64), alpha_um, float(max(spacing_um)))

@@ -1,16 +1,18 @@
-"""Choose how a channel's surface is repaired: the gaps that are bridged, the fragments that go.
+"""Choose how a channel's surface is repaired: which gaps are closed and which fragments dropped.
 
-The rule of the first paper uses a channel's connected components in all its tiles. Fragments go
-that have less than half the mean number of triangles, or half the mean diagonal. Then alpha, the
-size of the gaps that are bridged, follows from the means D (diagonal) and F (triangles) of the
-others. D / sqrt(F) is the length of a triangle's side times a factor of shape, larger for plain
-bodies than for frayed ones. ALPHA_SIDES times it is .6 um on nuclei in voxels of .28 x .14 x .14
-um, .35 on membranes, .3 on vessels, 10.5 on a real brain's cells in voxels of 5 x 2 x 2 um (the
-paper took 1 um). It stays between a coarsest spacing and `surface.max_alpha_um`. An offset of
-`auto` is OFFSET_SHARE of alpha.
+The rule is that of the first paper, and uses a channel's connected components in all its tiles.
+Fragments are dropped if they have less than half the mean number of triangles, or less than half
+the mean diagonal. Alpha, the size of the gaps that are closed, then follows from the means D
+(diagonal) and F (triangles) of the other components. D / sqrt(F) is the length of a triangle's side
+times a factor of shape, which is larger for smooth bodies than for noisy ones.
 
-A unit sees no more of a fragment than its halo holds: the rule applies to fragments up to a length
-that the plan allows for, and larger ones stay.
+ALPHA_SIDES times D / sqrt(F) is .6 um on nuclei in voxels of .28 x .14 x .14 um, .35 on membranes
+and .3 on vessels. It is 10.5 on a real brain's cells in voxels of 5 x 2 x 2 um. The paper took 1
+um. Alpha is kept between one coarsest spacing and `surface.max_alpha_um`. An offset of `auto` is
+OFFSET_SHARE of alpha.
+
+A unit sees only as much of a fragment as its halo holds. So the rule applies to fragments up to a
+length that the plan allows for, and larger ones stay.
 """
 
 from collections.abc import Iterable, Mapping
@@ -30,25 +32,29 @@ from stereocell.model.lattice import Step
 from stereocell.model.settings import AUTO
 from stereocell.model.spacing import Spacing
 
-SHARE = 0.5  # share of a mean below which a fragment goes
+SHARE = 0.5  # share of a mean; a fragment below it is dropped
 ALPHA_SIDES = 6.0  # alpha in units of D / sqrt(F)
-MIN_ALPHA = 1.0  # least alpha in coarsest spacings: nearer voxels have no gap between them
-REACH = 2  # voxels: a branch reaches farther from the vessels at a higher level, a thicker wall not
-MAIN_SHARE = 0.02  # of the largest component's voxels: components with fewer are not the main ones
-OFFSET_SHARE = 0.1  # offset as a share of alpha, as the paper's 0.1 um of 1 um
+MIN_ALPHA = 1.0  # least alpha in coarsest spacings, since nearer voxels have no gap between them
+# Voxels. What a lower level adds within this distance of a vessel only thickens its wall; what it
+# adds farther away is a branch.
+REACH = 2
+MAIN_SHARE = 0.02  # least voxels of a main component, as a share of the largest component's
+OFFSET_SHARE = 0.1  # offset as a share of alpha; the paper has 0.1 um for 1 um
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentSums:
-    """Sums over a tile's connected components: over all of them, and over those the rule keeps.
+    """Sums over a tile's connected components. `kept_*` are sums over those that the rule keeps.
 
-    voxels, largest          of all components, specks included; of the largest
-    large_voxels             of all components but specks
-    thin_voxels              those of them that are too thin for the planes that carry the surface
-    main_voxels              of the main components: at least MAIN_SHARE as large as the largest
-    new_voxels, apart_voxels of them, beside the main components at a higher level, where one is
-                             given: farther than REACH voxels from these; in components that touch
-                             none of these
+    count, faces, diagonal_um  of the components that are not specks
+    voxels          of all components, specks included
+    largest         of the largest component
+    large_voxels    of the components that are not specks
+    thin_voxels     part of large_voxels that is too thin for the planes that carry the surface
+    main_voxels     of the main components: at least MAIN_SHARE as large as the largest
+    new_voxels      part of main_voxels in components that touch main components at a higher level,
+                    but farther than REACH voxels from these; 0 without a higher level
+    apart_voxels    part of main_voxels in components that touch no main component at that level
     """
 
     count: int
@@ -78,10 +84,10 @@ def sum_components(
 
     inside           bool (z, y, x)
     spacing_um       (z, y, x)
-    min_diagonal_um  smaller components are left out: noise has more of them than a tile has bodies,
-                     so they would decide the means
+    min_diagonal_um  components with a smaller diagonal (specks) are left out: noise has more of
+                     them than a tile has bodies, and they would dominate the means
     step             voxels (z, y, x) between planes that carry the surface
-    higher           bool (z, y, x): {field > a higher iso-value}, to tell what `inside` adds to it
+    higher           bool (z, y, x), {field > a higher iso-value}: shows what `inside` adds to it
     """
     components = find_components(inside, spacing_um, 26)
     large = components.diagonal_um >= min_diagonal_um
@@ -115,15 +121,15 @@ def _is_main(components: Components) -> NDArray[np.bool_]:
 def _added(
     components: Components, higher: NDArray[np.bool_], spacing_um: Spacing
 ) -> tuple[int, int]:
-    """Return `new_voxels` and `apart_voxels` of ComponentSums."""
+    """Return `new_voxels` and `apart_voxels` of `ComponentSums`."""
     above = find_components(higher, spacing_um, 26)
     before, main = above.mask_of(_is_main(above)), components.mask_of(_is_main(components))
     labels, count = cc3d.connected_components(main, connectivity=26, return_N=True)
     touches = np.zeros(count + 1, bool)
     touches[labels[before & main]] = True
-    hangs = touches[labels]
+    is_connected = touches[labels]
     around = ndimage.binary_dilation(before, np.ones((3, 3, 3), bool), REACH)
-    return int((hangs & ~around).sum()), int((main & ~hangs).sum())
+    return int((is_connected & ~around).sum()), int((main & ~is_connected).sum())
 
 
 def choose_repair(
@@ -136,7 +142,8 @@ def choose_repair(
     """Return how a channel's surface is repaired.
 
     tiles       the ComponentSums of each tile, as dictionaries
-    most        the upper bounds: the units' halo covers them
+    most        upper bounds; the units' halo covers them
+    surface     settings; `auto` values follow from the tiles
     spacing_um  (z, y, x)
     """
     sums = list(tiles)
@@ -152,13 +159,13 @@ def choose_repair(
     if surface.alpha_um == AUTO:
         alpha = most.alpha_um
         faces = sum(tile["kept_faces"] for tile in sums)
-        if faces:  # solids that fill their tiles have none
+        if faces:  # tiles that are filled by a solid have none
             diagonal = sum(tile["kept_diagonal_um"] for tile in sums) / kept
             faces /= kept
             alpha = ALPHA_SIDES * diagonal / faces**0.5
         least = MIN_ALPHA * max(spacing_um)
         options = replace(options, alpha_um=min(max(alpha, least), most.alpha_um))
-    wraps_triangles = surface.wrap == "alpha-wrap"  # that wrap knows no offset of 0
+    wraps_triangles = surface.wrap == "alpha-wrap"  # this wrap cannot have an offset of 0
     if surface.offset_um == AUTO or (wraps_triangles and not options.offset_um):
         options = replace(options, offset_um=OFFSET_SHARE * options.alpha_um)
     return options

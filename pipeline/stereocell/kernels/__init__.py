@@ -1,1 +1,1 @@
-"""Loops over voxels and triangles, compiled once a machine by numba; no file, no other package."""
+"""Loops over voxels and triangles that numba compiles once on each machine."""

@@ -1,9 +1,9 @@
-"""Where compiled kernels are kept, and whether all are there. Light to import: it leaves numba out.
+"""Where compiled kernels are cached, and whether all of them are. Imports do not include numba.
 
-The place is the first of these that can be written: the folder that NUMBA_CACHE_DIR names,
-`__pycache__` beside the kernels, the user's cache. Inside it each module has a folder, named by a
-hash of the module and of the kernels that it imports: numba itself would not see that a callee in
-another file has changed.
+The place is the first of these that can be written: the folder named by NUMBA_CACHE_DIR,
+`__pycache__` beside the kernels, or the user's cache. It holds one folder for each module. The
+folder's name is a hash of the module and of the kernels that it imports, because numba does not
+notice that a called function in another file has changed.
 """
 
 import hashlib
@@ -26,7 +26,10 @@ _IMPORT = re.compile(r"^from stereocell\.kernels\.(\w+) import", re.MULTILINE)
 
 @cache
 def find_home() -> Path | None:
-    """Return the place; None: none can be written, and each process compiles what it needs."""
+    """Return the place of the cache, or None if no folder can be written.
+
+    Without a place each process compiles the kernels that it needs.
+    """
     named = os.environ.get("NUMBA_CACHE_DIR")
     for home in [Path(named)] if named else [_HERE / "__pycache__", _user_cache()]:
         with suppress(OSError, RuntimeError):
@@ -38,24 +41,24 @@ def find_home() -> Path | None:
 
 @cache
 def cache_folder(module: str) -> Path | None:
-    """Return the folder of a module's compiled kernels; None: there is no place."""
+    """Return the folder of a module's compiled kernels, or None if there is no place."""
     home, name = find_home(), module.rpartition(".")[2]
     return home and home / f"{_PREFIX}{name}-{_digest(_reach(name))}"
 
 
 def are_compiled() -> bool:
-    """Return whether this machine's place has all kernels, or there is none."""
+    """Return whether all kernels are compiled on this machine, or there is no place for them."""
     mark = _mark()
     return mark is None or mark.exists()
 
 
 def compile_in_process() -> None:
-    """Compile all kernels in a process of its own; a kernel that fails does so again in use."""
+    """Compile all kernels in another process. If one fails, its next use raises the error."""
     subprocess.run([sys.executable, "-m", __package__], check=False, capture_output=True)
 
 
 def mark_compiled() -> None:
-    """Note that all kernels are compiled, and remove what older versions of them left."""
+    """Record that all kernels are compiled, and remove those of older versions."""
     home, mark = find_home(), _mark()
     if home is None or mark is None:
         return
@@ -81,7 +84,7 @@ def _digest(modules: set[str], *more: str) -> str:
 
 
 def _reach(name: str) -> set[str]:
-    """Return a module of this package and those of it that it imports."""
+    """Return the module and all modules of this package that it imports."""
     found, waiting = set[str](), [name]
     while waiting:
         name = waiting.pop()
@@ -92,7 +95,7 @@ def _reach(name: str) -> set[str]:
 
 
 def _processor() -> str:
-    """Return what code is compiled for: numba compiles anew for another processor's features."""
+    """Return the processor's features: numba compiles again for other features."""
     with suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
         return next((line for line in lines if line.startswith(("flags", "Features"))), "")

@@ -1,8 +1,8 @@
-"""Close a solid by a ball that rolls outside of it: exact distances, in a band around it only.
+"""Close a solid by a ball that rolls outside of it, using exact distances in a band around it.
 
-Squared distances are found plane by plane: along x by two sweeps, along y and z as the least over
-the few rows and planes within reach. Planes out of reach are forgotten, so a window is never held
-as distances.
+Squared distances are computed plane by plane: by two sweeps along x, and along y and z as the
+minimum over the few rows and planes within reach. Planes out of reach are overwritten, so the
+distances of a whole window are never in memory together.
 
 References
 P. F. Felzenszwalb & D. P. Huttenlocher, "Distance transforms of sampled functions", Theory of
@@ -23,10 +23,12 @@ Mask = NDArray[np.bool_]
 def _square_in_plane(
     solid: Mask, out: Field, lines: Field, reach: int, hy: float, hx: float, far: float
 ) -> None:
-    """Write each pixel's squared distance from the nearest solid one of its plane, at most `far`.
+    """Write the squared distance of each pixel from the nearest solid pixel in its plane.
 
-    reach  rows that are looked at on each side
-    lines  (height, width): memory to work in
+    solid  (height, width)
+    out    (height, width), written; values are at most `far`
+    lines  (height, width), working memory
+    reach  number of rows that are examined on each side
     """
     height, width = solid.shape
     square = np.float32(hx) * np.float32(hx)
@@ -58,7 +60,7 @@ def _square_in_plane(
 def _least_over_planes(
     ring: Field, z: int, depth: int, y: int, reach: int, hz: float, least: Field
 ) -> None:
-    """Write the squared distance of each voxel of a row from what the planes within reach hold."""
+    """Write the squared distance of each voxel of a row from the solid in all planes in reach."""
     copy_row(ring[z % len(ring), y], least)
     for j in range(1, reach + 1):
         away = np.float32(j) * np.float32(j) * np.float32(hz) * np.float32(hz)
@@ -71,17 +73,17 @@ def _least_over_planes(
 
 @kernel
 def close_gaps(distance: Field, steps: NDArray[np.float64], radius: float, inset: float) -> None:
-    """Add to a solid what a ball rolling outside can't reach, in place.
+    """Add to a solid, in place, the voxels that a ball rolling outside cannot reach.
 
     distance  float32 (z, y, x), um, positive inside
-    steps     (z, y, x), um
-    radius    of the ball, um
-    inset     um; the added part lies this much inside, and counts as far as that, and twice as far
-              outside
+    steps     spacing (z, y, x), um
+    radius    radius of the ball, um
+    inset     um; the surface of the added part lies this much inside. Its distance is clipped to
+              `inset` inside and to twice `inset` outside.
     """
     nz, ny, nx = distance.shape
     hz, hy, hx = steps
-    # balls beside the window touch it: centres are looked for in a margin as well
+    # The centre of a ball that touches the window may lie in a margin around it.
     mz, my, mx = int(radius / hz) + 2, int(radius / hy) + 2, int(radius / hx) + 2
     depth, height, width = nz + 2 * mz, ny + 2 * my, nx + 2 * mx
     is_centre = np.empty((depth, height, width), np.bool_)

@@ -1,36 +1,40 @@
-r"""Half-edge collapses: a vertex u moves onto a neighbour v, and the triangles at their edge go.
+r"""Half-edge collapses: a vertex u moves onto a neighbour v, and their edge's triangles vanish.
 
        r2------r1                r2------r1
       /  \  1  /  \             /  `-. 1   \        ring of u: triangles 0 ... 5, and their
      / 2  \   / 0  \           /  2   `-.   \       outer corners v, r1 ... r5, its neighbours
    r3------ u ----- v   ->   r3----------`-- v
-     \ 3  /   \ 5  /           \  3   .-'   /       triangles 0 and 5 are gone,
-      \  /  4  \  /             \  .-' 4   /        the others have v in the place of u
+     \ 3  /   \ 5  /           \  3   .-'   /       triangles 0 and 5 are removed,
+      \  /  4  \  /             \  .-' 4   /        the others have v in place of u
        r4------r5                r4------r5
 
-A collapse costs the quadric error of its target (kernels/quadrics.py). Cheap collapses come first,
-in a few classes of cost rather than by a queue. Each is sound by itself:
+The price of a collapse is the quadric error of its target (kernels/quadrics.py). Cheap collapses
+come first, in a few classes of cost rather than by a queue. A collapse is allowed only if all of
+these hold:
 
-- the two ends have in common what their edge has (the link condition): topology stays. In a surface
-  these are two neighbours
-- each triangle turns by less than 60 degrees, or was a sliver of a surface and faces as its
-  surroundings do
-- no triangle gets sharper than the bound, or than .6 of the sharpest one around
-- no triangle comes to lie in a cut plane
-- a vertex of a cap, the flat end of a body, moves within its plane alone: caps of several channels
-  keep their order, since each stays flat
-- the vertex, and all that went into it, are near the new triangles: distances add up
+- The two ends share exactly the neighbours that their edge has (the link condition), which keeps
+  the topology. In a surface these are two neighbours.
+- Each triangle turns by less than 60 degrees. A sliver of a surface may turn further if it then
+  faces as its surroundings do.
+- No triangle gets sharper than the bound. If triangles around u are sharper already, the bound is
+  .6 of the sharpest angle.
+- No triangle comes to lie in a cut plane.
+- A vertex of a cap, the flat end of a body, moves only within its plane. So each cap stays flat,
+  and the caps of several channels stay in their order.
+- The vertex, and all vertices that were merged into it, are near the new triangles. The distances
+  of successive collapses are added.
 
 Interfaces between objects share lines and corners. A vertex within an interface moves onto any
-neighbour, one of a line along its line only and stays near that, a corner stays.
+neighbour. A vertex of a line moves only along the line and stays near it. A corner stays.
 
-A surface is worked on block by block, each of some thousand vertices near one another, and at last
-as a whole, for what became possible at the blocks' seams. Most time goes into waiting for memory:
-passes over the whole mesh, in the order of its planes, take nearly twice as long.
+A surface is processed block by block, each of some thousand vertices near one another. At last it
+is processed as a whole, for collapses that are possible at the seams of the blocks. Most of the
+time is spent on waiting for memory: passes over the whole mesh, in the order of its planes, take
+nearly twice as long.
 
-After a try in which triangles came to cross, more vertices are locked, and all is tried again. The
-earlier collapses are replayed without checks, except around newly locked vertices: the result
-differs there alone, and takes a third of the time.
+If triangles cross after a try, more vertices are locked and the mesh is simplified again. The
+earlier collapses are replayed without checks, except around newly locked vertices. The result
+differs only there, and takes a third of the time.
 
 References
 M. Garland & P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997.
@@ -63,30 +67,30 @@ from stereocell.kernels.rings import NEIGHBOURS, Flags, Mesh, Ring, make_mesh, m
 from stereocell.kernels.surface_rings import fill_fans, find_cheapest_in_fan, stamp_fan
 from stereocell.kernels.triangles import Points
 
-PASSES = 4  # passes over one class; the last class has LAST
+PASSES = 4  # largest number of passes over one class of cost; the last class has LAST
 LAST = 40
-SHARPER = 0.36  # square of the least share of the sharpest angle, .6: 1 - cos goes with the square
-BLOCK = 4096  # vertices that are worked on together
+SHARPER = 0.36  # square of .6, the least share of the sharpest angle: 1 - cos grows as its square
+BLOCK = 4096  # vertices that are processed together
 
 
 class Limits(NamedTuple):
     """How far a collapse may go."""
 
-    stray: float  # errors; largest distance of a vertex from the result, added up over collapses
-    sharpest: float  # cosine of the smallest angle that a triangle may get
-    block: int  # vertices that are finished, in all classes of cost, before the next ones
+    stray: float  # largest distance of a vertex from the result, summed over collapses, in errors
+    sharpest: float  # cosine of the smallest angle that a triangle may have
+    block: int  # vertices that go through all classes of cost before the next ones do
 
 
 class Work(NamedTuple):
     """Arrays that the collapses of one mesh of n vertices share."""
 
-    ring: Ring  # of the vertex that may move
-    other: Ring  # of the neighbour onto which it may move
+    ring: Ring  # ring of the vertex that may move
+    other: Ring  # ring of the neighbour onto which it may move
     costs: NDArray[np.int16]  # (n,), class of cost of each vertex
     touched: Ints  # (n,), the last pass in which a vertex's ring has changed
     waiting: Ints  # (n + 1,), vertices of one pass
-    differs: Flags  # (n,), vertices whose ring is not as it was in the try before
-    made: Ints  # (n, 2), each collapse: a vertex, and the one onto which it has moved
+    differs: Flags  # (n,), vertices whose ring differs from the ring in the earlier try
+    made: Ints  # (n, 2), collapses: a vertex, and the one onto which it has moved
 
 
 def collapse(
@@ -100,20 +104,20 @@ def collapse(
     past: Ints,
     caps: NDArray[np.uint8] | None = None,
 ) -> tuple[Ints, Flags, Ints]:
-    """Return a surface's triangles by the vertices that are left, int32 (m, 3), and which are left.
+    """Collapse a surface; return its triangles, a mask of those that are left, and the collapses.
 
-    And the collapses, int32 (k, 2): a vertex, and the one onto which it has moved.
-
-    at         float64 (n, 3); near the origin, for the quadrics' sake
+    at         float64 (n, 3), near the origin, because quadrics lose digits far from it
     triangles  int32 (m, 3)
-    locked     bool (n,), vertices that stay; those of borders stay anyway, and those whose
-               triangles make no single fan
+    locked     bool (n,), vertices that stay. Vertices of borders stay as well, and so do those
+               whose triangles do not form a single fan.
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
-    errors     float64 (n,), largest root of the mean squared distance from the planes; it is the
-               same for all vertices of a body
+    errors     float64 (n,), largest root of the mean squared distance from the planes; equal for
+               all vertices of a connected component
     stray, sharpest  see `Limits`
-    past       collapses of a try before, with fewer locked vertices; (0, 2): there was none
-    caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are none
+    past       int32 (k, 2), collapses of an earlier try with fewer locked vertices; (0, 2) without
+    caps       uint8 (n,), a bit for each cap that a vertex lies in; None: there are no caps
+    result     triangles int32 (m, 3) by the vertices that are left; bool (m,), triangles that are
+               left; int32 (k, 2), collapses: a vertex, and the one onto which it has moved
     """
     n, m = len(at), len(triangles)
     limits = Limits(stray, sharpest, BLOCK)
@@ -151,10 +155,10 @@ def collapse_interfaces(
     orders: NDArray[np.int8],
     past: Ints,
 ) -> tuple[Ints, Flags, Ints]:
-    """Return what `collapse` does, of the triangles of all interfaces; they keep their places.
+    """Collapse the triangles of all interfaces between objects; see `collapse` for the result.
 
     errors  float64 (n,), may differ between neighbours
-    orders  int8 (n,), see `find_orders`; corners stay, and vertices of lines stay on them
+    orders  int8 (n,), see `find_orders`; corners stay, and vertices of lines stay on their lines
     """
     mesh = make_mesh(len(at), len(triangles), on_line=orders == ON_LINE, errors=errors)
     mesh.stays[:] = locked | (orders == CORNER)
@@ -164,7 +168,7 @@ def collapse_interfaces(
 def _run(
     mesh: Mesh, at: Points, triangles: Ints, past: Ints, limits: Limits
 ) -> tuple[Ints, Flags, Ints]:
-    """Return what `collapse` does, for a surface that has its edges, or interfaces."""
+    """Return the result of `collapse` for a surface with edges, or for interfaces."""
     n, is_a_surface = len(at), len(mesh.on_line) == 0
     work = Work(
         ring=make_ring(n, is_surface=is_a_surface),
@@ -193,7 +197,7 @@ def collapse_in_place(mesh: Mesh, triangles: Ints, past: Ints, work: Work, limit
     find_costs(mesh, work)
     n, block, turn = len(mesh.at), limits.block, 0
     blocks = -(-n // block) if n > block and len(past) == 0 else 0
-    for number in range(blocks + 1):  # the last one is the whole
+    for number in range(blocks + 1):  # the last one is the whole mesh
         is_last = number == blocks
         low, high = (0, n) if is_last else (number * block, min((number + 1) * block, n))
         for limit in range(CLASSES + 1):
@@ -219,7 +223,7 @@ def collapse_in_place(mesh: Mesh, triangles: Ints, past: Ints, work: Work, limit
 
 @step
 def list_waiting(low: int, high: int, limit: int, work: Work) -> int:
-    """Write the vertices whose class of cost is at most the limit; return how many there are."""
+    """Write the vertices whose class of cost is at most the limit; return their number."""
     waits = 0
     for u in range(low, high):
         work.waiting[waits] = u
@@ -229,7 +233,7 @@ def list_waiting(low: int, high: int, limit: int, work: Work) -> int:
 
 @step
 def replay(mesh: Mesh, past: Ints, work: Work) -> int:
-    """Make the collapses of a try before again, where no ring differs; return how many."""
+    """Repeat the collapses of an earlier try where no ring differs; return their number."""
     ring, differs, made = work.ring, work.differs, 0
     for i in range(len(past)):
         u, v = past[i, 0], past[i, 1]
@@ -260,9 +264,10 @@ def find_costs(mesh: Mesh, work: Work) -> None:
 
 @step
 def try_collapse(u: int, limit: int, mesh: Mesh, work: Work, limits: Limits) -> int:
-    """Move u onto its cheapest neighbour for which that is sound; return this neighbour, or -1.
+    """Move u onto its cheapest neighbour for which the collapse is allowed.
 
     limit  highest class of cost
+    result this neighbour, or -1 if there is none
     """
     ring, costs = work.ring, work.costs
     costs[u] = NEVER
@@ -295,7 +300,7 @@ def try_collapse(u: int, limit: int, mesh: Mesh, work: Work, limits: Limits) -> 
 
 @step
 def update_costs(v: int, limit: int, mesh: Mesh, work: Work, turn: int) -> None:
-    """Write new classes of cost of v, onto which the ring's vertex has moved, and around it."""
+    """Write new classes of cost for v, onto which the ring's vertex has moved, and its ring."""
     ring, costs = work.ring, work.costs
     if not mesh.stays[v]:
         costs[v] = find_cost_after(v, limit, mesh, ring)
@@ -306,7 +311,7 @@ def update_costs(v: int, limit: int, mesh: Mesh, work: Work, turn: int) -> None:
             continue
         cost = max(class_of(price_of(mesh.quadrics, w, mesh.at, v)), limit)
         costs[w] = min(costs[w], cost)
-        if costs[w] == NEVER:  # a collapse that was refused may be sound now
+        if costs[w] == NEVER:  # a collapse that was refused before may be allowed now
             costs[w] = min(limit + 1, CLASSES)
 
 
@@ -327,7 +332,7 @@ def find_cost_after(v: int, limit: int, mesh: Mesh, ring: Ring) -> int:
 def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
     """Write the price of moving u onto each neighbour; return the number of the cheapest.
 
-    A price is infinite where u would leave its line, or its cap.
+    The price is infinite where u would leave its line or its cap.
     """
     cheapest, least, own = 0, np.inf, mesh.caps[u]
     for j in range(ring.sizes[NEIGHBOURS]):
@@ -344,7 +349,7 @@ def price_neighbours(u: int, mesh: Mesh, ring: Ring) -> int:
 
 @step
 def find_cheapest(ring: Ring) -> int:
-    """Return the number of the neighbour of the least price, the first of several."""
+    """Return the number of the neighbour with the least price; of equal ones, the first."""
     cheapest = 0
     for j in range(1, ring.sizes[NEIGHBOURS]):
         if ring.price[j] < ring.price[cheapest]:

@@ -1,6 +1,6 @@
-"""Compile all kernels that are not in the cache yet: by a call of each, on a tetrahedron.
+"""Compile all kernels that are not in the cache, by calling each of them on a tetrahedron.
 
-Two processes do it side by side, a half each: numba compiles on one core.
+Two processes compile half of them each, because numba compiles on one core.
 """
 
 import subprocess
@@ -12,7 +12,7 @@ from stereocell.kernels.cache_place import mark_compiled
 from stereocell.kernels.closing import close_gaps
 from stereocell.kernels.collapse import collapse, collapse_interfaces
 from stereocell.kernels.critical import find_critical
-from stereocell.kernels.crossings import find_doubtful, find_maybe_flat, find_spread
+from stereocell.kernels.crossings import find_candidates, find_maybe_flat, find_spread
 from stereocell.kernels.depth_buffer import find_visible
 from stereocell.kernels.flips import flip_edges
 from stereocell.kernels.gradients import divide_by_slopes, measure_slopes, move_off_zero
@@ -20,7 +20,7 @@ from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_
 from stereocell.kernels.half_edges import (
     count_fans,
     find_first,
-    label_bodies,
+    label_vertices,
     lie_within,
     match_twins,
     measure_areas,
@@ -35,6 +35,14 @@ from stereocell.kernels.half_edges import (
     sum_normals,
 )
 from stereocell.kernels.interface_rings import find_orders
+from stereocell.kernels.interfaces import (
+    bound_objects,
+    couple,
+    least_of_objects,
+    press,
+    slope_volumes,
+    smooth_interfaces,
+)
 from stereocell.kernels.level_sums import count_differences, sum_by_value
 from stereocell.kernels.near_order import order_triangles, order_vertices
 from stereocell.kernels.nearest import find_nearest, find_sides
@@ -44,38 +52,30 @@ from stereocell.kernels.slopes import find_downhill
 from stereocell.kernels.smoothing import smooth_in_place
 from stereocell.kernels.union_find import label_pairs
 from stereocell.kernels.visibility import cast_rays
-from stereocell.kernels.walls import (
-    bound_objects,
-    couple,
-    least_of_objects,
-    press,
-    slope_volumes,
-    smooth_walls,
-)
 from stereocell.kernels.xxhash import xxh32
 
-OF_MESHES = "of-meshes"  # the argument of the process that compiles these
+OF_MESHES = "of-meshes"  # argument of the process that compiles the kernels of meshes
 _CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float64)
 _TWINS = [11, 6, 3, 2, 8, 9, 1, 10, 4, 5, 7, 0]  # twin of each half-edge of _TRIANGLES
 _TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32)
 
 
 def compile_all() -> None:
-    """Compile all kernels, for arrays of the types that the package gives them."""
+    """Compile all kernels for the array types that the package passes to them."""
     command = [sys.executable, "-m", __package__, OF_MESHES]
     with subprocess.Popen(command) as other:
         compile_others()
     if other.returncode:
-        raise SystemExit(other.returncode)  # it has said why
+        raise SystemExit(other.returncode)  # the other process has printed the reason
     mark_compiled()
 
 
 def compile_of_meshes() -> None:
-    """Compile those that simplify and mend; they take half of the time."""
+    """Compile the kernels that simplify and repair meshes. They take half of the time."""
     at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
     twins = match_twins(triangles, 4)
     count_fans(triangles, twins, 4)
-    labels, bodies = label_bodies(triangles, 4)
+    labels, bodies = label_vertices(triangles, 4)
     label_pairs(np.arange(2), np.arange(2), 2)
     measure_volumes(at, triangles, labels, bodies)
     measure_areas(at, triangles, twins, labels, bodies)
@@ -99,7 +99,7 @@ def compile_of_meshes() -> None:
 
 
 def compile_others() -> None:
-    """Compile those of grids, distances and voxels."""
+    """Compile the kernels of grids, distances and voxels."""
     at, triangles, flags = _CORNERS, _TRIANGLES, np.ones(4, bool)
     twins = np.array(_TWINS, np.int32)
     low, high = bound_boxes(at, triangles)
@@ -115,10 +115,10 @@ def compile_others() -> None:
     press(*entries, own, np.ones(1))
     bound_objects(at, triangles, sides, 2)
     least_of_objects(triangles, sides, own, 1.0, 4)
-    smooth_walls(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
+    smooth_interfaces(at, np.arange(5, dtype=np.int32), triangles[:, 0].copy(), own, 0.5)
     find_critical(np.zeros((3, 3, 3), np.int32), 1)
     spread = find_spread(at, triangles)
-    find_doubtful(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
+    find_candidates(at, triangles, flags, spread, low, high, first, listed, origin, edge, shape)
     cells = first, listed, origin, edge, shape
     _, nearest, parts = find_nearest(at, at, triangles, *cells, np.full(4, -1, np.int32), 0)
     find_sides(at, nearest, parts, at, triangles, twins)

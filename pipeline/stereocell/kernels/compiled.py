@@ -1,10 +1,10 @@
-"""How kernels are compiled: by numba, once a machine and version, without fast math.
+"""How kernels are compiled: by numba, once for each machine and version, without fast math.
 
-A kernel is a function of arrays and numbers that loops over voxels, vertices or triangles where
-array expressions would take several times the time and memory. It runs in one thread, and rounds as
-IEEE 754 says: nothing is fused or put into another order, so a result has the same bytes on
-processors with other vector units. Functions whose last bit depends on the C library (cosines,
-logarithms) decide nothing in a kernel.
+A kernel is a function of arrays and numbers that loops over voxels, vertices or triangles, where
+array expressions would take several times the time and memory. It runs in one thread and rounds by
+IEEE 754. No operations are fused or reordered, so a result has the same bytes on processors with
+other vector units. A kernel's decisions never depend on functions whose last bit depends on the C
+library (cosines, logarithms).
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from stereocell.kernels.cache_place import cache_folder
 F = TypeVar("F", bound=Callable[..., Any])
 
 _CONFIG: Any = numba.config
-# wrappers for programs in C, which call none of them, would be compiled as well
+# Without this option, wrappers for C programs would be compiled that are never called.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
@@ -27,16 +27,16 @@ def kernel(function: F) -> F:
 
 
 def in_place(function: F) -> F:
-    """Compile a kernel that makes no array, so that numba need not count references to arrays.
+    """Compile a kernel that creates no array, so that numba need not count references to arrays.
 
-    Its arrays may come in a NamedTuple. Each access to one would be counted otherwise, by atomic
+    Its arrays may come in a NamedTuple. numba would otherwise count each access to one by atomic
     operations, and the collapse would take twice the time.
     """
     return _cached(numba.njit(_nrt=False, **_OPTIONS)(function), function)
 
 
 def step(function: F) -> F:
-    """Compile a small function into each kernel that calls it, as `in_place` does."""
+    """Compile a small function into each kernel that calls it, with the options of `in_place`."""
     return numba.njit(forceinline=True, _nrt=False, **_OPTIONS)(function)
 
 

@@ -1,7 +1,7 @@
-"""Copies of rows and planes by loops.
+"""Copy rows and planes by loops.
 
-For a slice that is assigned, numba compiles all of its broadcasting and that one's messages, which
-takes 1.5 s a kernel: as long as most kernels as a whole.
+For an assignment to a slice numba compiles all of its broadcasting and error messages. That takes
+1.5 s for each kernel, which is as long as most kernels take in all.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ from stereocell.kernels.compiled import part
 
 @part
 def copy_row(source: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Write a row (x,) into another of its length."""
+    """Copy a row (x,) into another of the same length."""
     for x in range(len(out)):
         out[x] = source[x]
 
 
 @part
 def copy_plane(source: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    """Write a plane (y, x) into another of its shape."""
+    """Copy a plane (y, x) into another of the same shape."""
     for y in range(len(out)):
         copy_row(source[y], out[y])

@@ -1,4 +1,4 @@
-"""Places where a label touches itself by an edge or a corner of voxels alone."""
+"""Find places where a label touches itself only by an edge or a corner of voxels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 
-WIDTH = 8  # voxels of a place at most
+WIDTH = 8  # largest number of voxels of a place
 
 
 @part
@@ -19,13 +19,14 @@ def _note(found: NDArray[np.int64], count: int, a: int, b: int, c: int, d: int) 
 
 @kernel
 def find_critical(labels: Ints, most: int) -> tuple[NDArray[np.int64], int]:
-    """Return at most so many places, int64 (k, 8), and how many there are.
+    """Return the places, int64 (k, 8), of which at most `most`, and their total number.
 
     labels  int32 (z, y, x), 0 outside
 
-    A place is flat numbers of voxels: two of one label, then those around of others, -1 to the end.
-    It is a square of 2 x 2 with a label on one diagonal only, or a cube of 2 x 2 x 2 with a label
-    at two opposite corners only, or everywhere but there (then its first voxel stands twice).
+    A place lists flat indices of voxels: two of one label, then voxels around them of other labels,
+    then -1 to the end. There are three kinds of place: a square of 2 x 2 with the label on one
+    diagonal only; a cube of 2 x 2 x 2 with the label at two opposite corners only; and a cube with
+    the label everywhere except at two opposite corners, whose first voxel is listed twice.
     """
     depth, height, width = labels.shape
     flat = labels.ravel()
@@ -50,7 +51,7 @@ def find_critical(labels: Ints, most: int) -> tuple[NDArray[np.int64], int]:
                     continue
                 for corner in range(4):
                     p = i + (corner // 2) * steps[1] + (corner % 2) * steps[2]
-                    # the opposite corner
+                    # o is the corner opposite p.
                     o = i + steps[0] + (1 - corner // 2) * steps[1] + (1 - corner % 2) * steps[2]
                     a, b, rest = flat[p], flat[o], -1
                     is_lone, is_hole = a == b and a > 0, True

@@ -1,8 +1,8 @@
-"""Pairs of triangles that may meet, by a uniform grid and by floats that know their error.
+"""Find pairs of triangles that may intersect, by a uniform grid and bounds of rounding errors.
 
-A pair is left out only where floats are sure that it does not meet. All others are returned, for
-exact tests (meshes/self_intersections.py): few are, on meshes that touch themselves nowhere.
-
+A pair is left out only if floating-point arithmetic proves that it does not intersect. All other
+pairs go to exact tests (meshes/self_intersections.py). Meshes that touch themselves nowhere have
+few of them.
 References
 J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
 predicates", Discrete & Computational Geometry 18, 1997. doi:10.1007/PL00009321
@@ -15,11 +15,11 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 from stereocell.kernels.triangles import Points, Triple, doubled_area
 
-# relative errors of the determinants of orient3d and orient2d: Shewchuk's bounds A
+# Relative errors of the determinants of orient3d and orient2d: Shewchuk's bounds A
 ERROR_3D = (7 + 56 * 2.0**-53) * 2.0**-53
 ERROR_2D = (3 + 16 * 2.0**-53) * 2.0**-53
 UNSURE = 2  # value of a sign that is not certain
-FACING = 1e-6  # least cosine of two normals that says on which side of an edge triangles lie
+FACING = 1e-6  # least cosine of two normals that shows on which side of an edge the triangles lie
 
 
 @part
@@ -34,7 +34,7 @@ def _sign(
     wy: float,
     wz: float,
 ) -> int:
-    """Return the sign of the volume of three ways, differences of points each, or UNSURE."""
+    """Return the sign of the volume of three vectors (differences of points), or UNSURE."""
     p1, p2, q1, q2, r1, r2 = vy * wz, vz * wy, vz * wx, vx * wz, vx * wy, vy * wx
     volume = ux * (p1 - p2) + uy * (q1 - q2) + uz * (r1 - r2)
     size = (abs(p1) + abs(p2)) * abs(ux) + (abs(q1) + abs(q2)) * abs(uy)
@@ -46,7 +46,7 @@ def _sign(
 
 @part
 def _orient(at: Points, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of the volume of a, b, c, d, or UNSURE."""
+    """Return the sign of the volume of the tetrahedron a, b, c, d, or UNSURE."""
     ux, uy, uz = at[a, 0] - at[d, 0], at[a, 1] - at[d, 1], at[a, 2] - at[d, 2]
     vx, vy, vz = at[b, 0] - at[d, 0], at[b, 1] - at[d, 1], at[b, 2] - at[d, 2]
     wx, wy, wz = at[c, 0] - at[d, 0], at[c, 1] - at[d, 1], at[c, 2] - at[d, 2]
@@ -55,7 +55,7 @@ def _orient(at: Points, a: int, b: int, c: int, d: int) -> int:
 
 @part
 def _one_side(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) -> bool:
-    """Return whether d, e, f lie on one side of the plane of a, b, c, for sure."""
+    """Return whether d, e, f certainly lie on one side of the plane of a, b, c."""
     side = _orient(at, a, b, c, d)
     if side == UNSURE or side != _orient(at, a, b, c, e):
         return False
@@ -64,7 +64,7 @@ def _one_side(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) -> boo
 
 @part
 def _may_pierce(at: Points, p: int, q: int, u: int, v: int, w: int) -> bool:
-    """Return whether the segment pq may meet the triangle uvw."""
+    """Return whether the segment pq may intersect the triangle uvw."""
     side = _orient(at, u, v, w, p)
     if side != UNSURE and side == _orient(at, u, v, w, q):
         return False
@@ -76,7 +76,7 @@ def _may_pierce(at: Points, p: int, q: int, u: int, v: int, w: int) -> bool:
 
 @part
 def _turn(at: Points, a: int, b: int, c: int, j: int, k: int) -> int:
-    """Return the sign of the area of a, b, c as seen along an axis, on j and k; or UNSURE."""
+    """Return the sign of the area of a, b, c, projected on the axes j and k, or UNSURE."""
     p = (at[a, j] - at[c, j]) * (at[b, k] - at[c, k])
     q = (at[a, k] - at[c, k]) * (at[b, j] - at[c, j])
     if abs(p - q) <= ERROR_2D * (abs(p) + abs(q)):
@@ -86,7 +86,7 @@ def _turn(at: Points, a: int, b: int, c: int, j: int, k: int) -> int:
 
 @part
 def _is_beyond(at: Points, a: int, b: int, c: int, d: int, e: int, f: int, j: int, k: int) -> bool:
-    """Return whether, as seen along an axis, d, e, f surely lie beyond a side of a, b, c."""
+    """Return whether d, e, f certainly lie beyond a side of a, b, c, projected on j and k."""
     for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
         own = _turn(at, p, q, r, j, k)
         if own != UNSURE and (
@@ -100,7 +100,10 @@ def _is_beyond(at: Points, a: int, b: int, c: int, d: int, e: int, f: int, j: in
 
 @part
 def _are_seen_apart(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) -> bool:
-    """Return whether two triangles surely lie apart as seen along an axis, of one plane too."""
+    """Return whether two triangles are certainly disjoint in a projection along an axis.
+
+    This decides pairs of triangles in one plane, too.
+    """
     for j, k in ((0, 1), (1, 2), (2, 0)):
         if _is_beyond(at, a, b, c, d, e, f, j, k) or _is_beyond(at, d, e, f, a, b, c, j, k):
             return True
@@ -109,7 +112,7 @@ def _are_seen_apart(at: Points, a: int, b: int, c: int, d: int, e: int, f: int) 
 
 @part
 def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
-    """Return whether two triangles without a common corner may meet."""
+    """Return whether two triangles without a common corner may intersect."""
     a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
     d, e, f = triangles[j, 0], triangles[j, 1], triangles[j, 2]
     if _one_side(at, a, b, c, d, e, f) or _one_side(at, d, e, f, a, b, c):
@@ -126,9 +129,9 @@ def _may_meet_apart(at: Points, triangles: Ints, i: int, j: int) -> bool:
 
 @part
 def _are_cones_seen_apart(at: Points, v: int, a: int, b: int, c: int, d: int) -> bool:
-    """Return whether a side at v of the triangle (v, a, b) surely separates it from (v, c, d).
+    """Return whether a side at v of the triangle (v, a, b) certainly separates it from (v, c, d).
 
-    The triangles are looked at along each axis, so this decides triangles of one plane too.
+    The triangles are projected along each axis, so this decides triangles in one plane, too.
     """
     for j, k in ((0, 1), (1, 2), (2, 0)):
         for p, q in ((a, b), (b, a)):
@@ -142,7 +145,7 @@ def _are_cones_seen_apart(at: Points, v: int, a: int, b: int, c: int, d: int) ->
 
 @part
 def _may_meet_at_corner(at: Points, v: int, a: int, b: int, c: int, d: int) -> bool:
-    """Return whether the triangles (v, a, b) and (v, c, d) may meet beside v."""
+    """Return whether the triangles (v, a, b) and (v, c, d) may intersect away from v."""
     p, q = _orient(at, v, c, d, a), _orient(at, v, c, d, b)
     if p != UNSURE and p == q:
         return False
@@ -158,7 +161,7 @@ def _may_meet_at_corner(at: Points, v: int, a: int, b: int, c: int, d: int) -> b
 
 @part
 def _may_fold(at: Points, u: int, v: int, a: int, b: int) -> bool:
-    """Return whether two triangles at the edge uv, with the tips a and b, may overlap."""
+    """Return whether two triangles with the common edge uv and the tips a and b may overlap."""
     if _orient(at, u, v, a, b) != UNSURE:
         return False
     ex, ey, ez = at[v, 0] - at[u, 0], at[v, 1] - at[u, 1], at[v, 2] - at[u, 2]
@@ -172,9 +175,9 @@ def _may_fold(at: Points, u: int, v: int, a: int, b: int) -> bool:
 
 @part
 def _may_meet(at: Points, triangles: Ints, i: int, j: int) -> bool:
-    """Return whether two triangles may meet beside their common corners."""
+    """Return whether two triangles may intersect away from their common corners."""
     common, p, q = 0, 0, 0
-    own, other = 7, 7  # bits of the corners that are not common
+    own, other = 7, 7  # bits of the corners that are not shared
     for k in range(3):
         for l in range(3):  # noqa: E741
             if triangles[i, k] == triangles[j, l]:
@@ -188,7 +191,7 @@ def _may_meet(at: Points, triangles: Ints, i: int, j: int) -> bool:
         c, d = triangles[j, (q + 1) % 3], triangles[j, (q + 2) % 3]
         return _may_meet_at_corner(at, triangles[i, p], a, b, c, d)
     if common == 2 and own in (1, 2, 4) and other in (1, 2, 4):
-        k, l = own >> 1, other >> 1  # noqa: E741  1, 2, 4 to 0, 1, 2
+        k, l = own >> 1, other >> 1  # noqa: E741  maps 1, 2, 4 to 0, 1, 2
         u, v = triangles[i, (k + 1) % 3], triangles[i, (k + 2) % 3]
         return _may_fold(at, u, v, triangles[i, k], triangles[j, l])
     return True
@@ -198,10 +201,12 @@ def _may_meet(at: Points, triangles: Ints, i: int, j: int) -> bool:
 def _is_seen_as_fan(
     at: Points, v: int, size: int, start: int, onward: Ints, stamp: Ints, n: Triple, r: Triple
 ) -> bool:
-    """Return whether all triangles of v turn one way along n, and go round once, for sure.
+    """Return whether the triangles of v certainly form one fan around it, seen along n.
 
-    onward  of each neighbour the next one, where stamp is v
-    r       no neighbour is likely to lie towards it
+    Each triangle then turns the same way, and together they go around v once.
+
+    onward  the next neighbour after each neighbour, where stamp is v
+    r       a direction in which no neighbour is likely to lie
     """
     ax, ay, az = at[start, 0] - at[v, 0], at[start, 1] - at[v, 1], at[start, 2] - at[v, 2]
     past = _sign(n[0], n[1], n[2], r[0], r[1], r[2], ax, ay, az)
@@ -221,10 +226,10 @@ def _is_seen_as_fan(
 
 @kernel
 def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
-    """Return at which vertices all triangles lie side by side, for sure, bool (n,).
+    """Return the vertices whose triangles certainly lie side by side, as bool (n,).
 
-    Along some direction they are seen as a fan that goes round the vertex once. So any two of them
-    have nothing in common but their common corners and what lies between those.
+    Seen along some direction, the triangles form a fan that goes around the vertex once. So any two
+    of them share nothing but their common corners and the edge between these.
     """
     count = len(at)
     first, place = np.zeros(count + 1, np.int32), np.zeros(count, np.int32)
@@ -234,7 +239,8 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
     for v in range(count):
         first[v + 1] += first[v]
         place[v] = first[v]
-    ends = np.empty((3 * len(triangles), 2), np.int32)  # of the sides opposite to each vertex
+    # Ends of the side opposite to the vertex in each of its triangles
+    ends = np.empty((3 * len(triangles), 2), np.int32)
     for t in range(len(triangles)):
         for k in range(3):
             v = triangles[t, k]
@@ -265,7 +271,7 @@ def find_spread(at: Points, triangles: Ints) -> NDArray[np.bool_]:
 
 
 @kernel
-def find_doubtful(
+def find_candidates(
     at: Points,
     triangles: Ints,
     fresh: NDArray[np.bool_],
@@ -278,20 +284,24 @@ def find_doubtful(
     edge: float,
     shape: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Return the pairs of triangles (n, 2) that may meet, each with a fresh one.
+    """Return the pairs of triangles (n, 2) that may intersect and have a changed one.
 
-    spread                              vertices whose triangles meet nowhere else: `find_spread`
+    fresh                               bool (m,), triangles that have changed
+    spread                              vertices from `find_spread`, where triangles do not
+                                        intersect
     low, high                           corners of the triangles' boxes
-    first, listed, origin, edge, shape  of their grid: kernels/grid.py
+    first, listed, origin, edge, shape  grid of the triangles, see kernels/grid.py
     """
     nx, ny, _ = shape
     found, count = np.empty((1024, 2), np.int64), 0
     most = 1
     for c in range(len(first) - 1):
         most = max(most, first[c + 1] - first[c])
-    # a cell's own, side by side: their boxes, corners, and along which axes they start in the cell
+    # For the triangles of one cell, side by side in memory: their boxes and corners, and the axes
+    # along which their boxes start in the cell
     boxes, corners = np.empty((most, 6)), np.empty((most, 3), np.int32)
-    round_corners = np.empty((most, 3), np.int32)  # -1 where triangles may meet elsewhere
+    # -1 if triangles may intersect away from this corner
+    round_corners = np.empty((most, 3), np.int32)
     starts, due = np.empty(most, np.int8), np.empty(most, np.bool_)
     for c in range(len(first) - 1):
         size = first[c + 1] - first[c]
@@ -314,8 +324,8 @@ def find_doubtful(
             )  # fmt: skip
             a, b, d = corners[p, 0], corners[p, 1], corners[p, 2]
             for q in range(p + 1, size):
-                # only in the cell that holds the least corner of the common box; all at once, since
-                # a processor guesses wrong at every other of these
+                # A pair counts only in the cell with the least corner of the common box. All tests
+                # are evaluated without branches, because half of them would be mispredicted.
                 is_near = ((starts[p] | starts[q]) == 7) & (due[p] | due[q])
                 is_near &= (boxes[q, 0] <= x1) & (boxes[q, 1] <= y1) & (boxes[q, 2] <= z1)
                 is_near &= (boxes[q, 3] >= x0) & (boxes[q, 4] >= y0) & (boxes[q, 5] >= z0)
@@ -340,7 +350,7 @@ def find_doubtful(
 
 @kernel
 def find_maybe_flat(at: Points, triangles: Ints) -> NDArray[np.bool_]:
-    """Return whether the corners of each triangle may lie on a line, bool (m,)."""
+    """Return the triangles whose corners may lie on a line, as bool (m,)."""
     maybe = np.empty(len(triangles), np.bool_)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

@@ -1,4 +1,4 @@
-"""The triangle that is nearest to the eye, at each pixel of a picture."""
+"""Find the triangle nearest to the eye at each pixel of an image."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,13 @@ def find_visible(
     triangle_of: NDArray[np.int64],
     weights_of: NDArray[np.float64],
 ) -> None:
-    """Write each pixel's nearest triangle, its barycentric weights and its depth.
+    """Write the nearest triangle of each pixel, its barycentric weights and its depth.
 
-    frames       (m, 10), of each triangle: corner a (x, y), pixels; edges a to b and a to c; twice
-                 the area; the heights over the edges opposite a, b and c
-    depth        (m, 3), larger is nearer
+    frames       (m, 10), for each triangle: corner a (x, y) in pixels; edges a to b and a to c;
+                 twice the area; the heights over the edges opposite a, b and c
+    depth        (m, 3), depth at each corner; larger is nearer
     low, high    (m, 2), first and last pixel (x, y) near each triangle
-    nearest      (height, width), minus infinity where nothing is seen
+    nearest      (height, width), depth; minus infinity where no triangle is visible
     triangle_of  (height, width)
     weights_of   (height, width, 3)
     """

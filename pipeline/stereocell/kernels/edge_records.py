@@ -1,14 +1,14 @@
-"""Half-edges in records: eight numbers a triangle, its three corners, a gap, three twins, a gap.
+"""Half-edges in records of eight numbers a triangle: three corners, a gap, three twins, a gap.
 
-A walk round a vertex goes from triangle to triangle, and waits for memory at each one. A record
-lies within one line of the cache, corners and twins together. Half-edge 8 t + k goes from corner k
-of triangle t to the next one.
+A walk around a vertex goes from triangle to triangle and waits for memory at each of them. A record
+lies within one cache line, with corners and twins together. Half-edge 8 t + k goes from corner k of
+triangle t to the next corner.
 """
 
 from stereocell.kernels.compiled import part
 from stereocell.kernels.half_edges import Ints
 
-RECORD = 8  # numbers a triangle
+RECORD = 8  # numbers per triangle
 TWIN = 4  # numbers from a half-edge's start to its twin
 
 
@@ -26,7 +26,7 @@ def behind(h: int) -> int:
 
 @part
 def fill_records(triangles: Ints, twins: Ints, leaving: Ints, edges: Ints) -> None:
-    """Write the records, int32 (8 m,), and in place of `leaving` its half-edges as they are there.
+    """Write the records, int32 (8 m,), and renumber the half-edges of `leaving` accordingly.
 
     triangles  int32 (m, 3)
     twins      int32 (3 m,), see `match_twins`
@@ -45,7 +45,7 @@ def fill_records(triangles: Ints, twins: Ints, leaving: Ints, edges: Ints) -> No
 
 @part
 def count_common(h: int, edges: Ints, stamp: Ints, tick: int) -> tuple[int, int]:
-    """Return how many neighbours of the target carry the stamp, and how many it has.
+    """Return how many neighbours of the target have the stamp, and how many neighbours it has.
 
     h  the half-edge to the target
     """
@@ -56,7 +56,7 @@ def count_common(h: int, edges: Ints, stamp: Ints, tick: int) -> tuple[int, int]
         valence += 1
         common += stamp[edges[ahead(g)]] == tick
         onward = edges[behind(g) + TWIN]
-        if onward < 0:  # the border: its other end, and then the other way round
+        if onward < 0:  # a border: count its other end, then go around the other way
             valence += 1
             common += stamp[edges[behind(g)]] == tick
             g = start
@@ -72,9 +72,10 @@ def count_common(h: int, edges: Ints, stamp: Ints, tick: int) -> tuple[int, int]
 
 @part
 def join(h: int, v: int, out: Ints, size: int, edges: Ints, leaving: Ints) -> None:
-    """Move the start of half-edge h onto its end, v, and take its two triangles out.
+    """Move the start of half-edge h onto its end, v, and remove the two triangles at this edge.
 
-    out  the half-edges that leave the start, and their number
+    out   half-edges that leave the start
+    size  number of these half-edges
     """
     g = edges[h + TWIN]
     a, b = edges[behind(h)], edges[behind(g)]

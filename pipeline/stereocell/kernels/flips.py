@@ -1,4 +1,4 @@
-"""Flip the common edge of two triangles, where that makes the sharper of them less sharp.
+"""Flip the common edge of two triangles if that widens the sharpest angle of the two.
 
 References
 C. L. Lawson, "Transforming triangulations", Discrete Mathematics 3, 1972.
@@ -13,13 +13,14 @@ from stereocell.kernels.half_edges import Ints, count_fans, following, match_twi
 from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_cosine
 
 ROUNDS = 8
-GAIN = 1e-3  # least growth of the smallest angle, by its cosine
-TURN = 0.5  # squared cosine of the largest turn of a triangle from the two's mean: 45 degrees
+GAIN = 1e-3  # least gain in the smallest angle, as a difference of cosines
+# Squared cosine of the largest turn of a triangle from the mean normal of both: 45 degrees
+TURN = 0.5
 
 
 @part
 def _are_joined(a: int, b: int, h: int, twins: Ints, corner: Ints) -> bool:
-    """Return whether an edge ab is there already; h leaves a."""
+    """Return whether the edge ab exists already; half-edge h leaves a."""
     g = h
     while True:
         if corner[following(g)] == b or corner[preceding(g)] == b:
@@ -38,19 +39,19 @@ def _are_joined(a: int, b: int, h: int, twins: Ints, corner: Ints) -> bool:
 
 
 @part
-def _moves_far(at: Points, u: int, v: int, a: int, b: int, most: float) -> bool:
-    """Return whether the lines uv and ab are farther apart than that."""
+def _moves_far(at: Points, u: int, v: int, a: int, b: int, max_distance: float) -> bool:
+    """Return whether the lines uv and ab are more than max_distance apart."""
     ex, ey, ez = at[v, 0] - at[u, 0], at[v, 1] - at[u, 1], at[v, 2] - at[u, 2]
     fx, fy, fz = at[b, 0] - at[a, 0], at[b, 1] - at[a, 1], at[b, 2] - at[a, 2]
     x, y, z = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
     length = np.sqrt(x * x + y * y + z * z)
     away = x * (at[a, 0] - at[u, 0]) + y * (at[a, 1] - at[u, 1]) + z * (at[a, 2] - at[u, 2])
-    return not abs(away) <= most * length or length <= 0
+    return not abs(away) <= max_distance * length or length <= 0
 
 
 @part
 def _folds(at: Points, u: int, v: int, a: int, b: int) -> bool:
-    """Return whether the triangles (a, u, b) and (b, v, a) face another way than those at uv."""
+    """Return whether the triangles (a, u, b) and (b, v, a) face away from those at the edge uv."""
     px, py, pz = doubled_area(at, u, v, a)
     qx, qy, qz = doubled_area(at, v, u, b)
     x, y, z = px + qx, py + qy, pz + qz
@@ -65,7 +66,7 @@ def _folds(at: Points, u: int, v: int, a: int, b: int) -> bool:
 
 @part
 def _pair(twins: Ints, is_due: NDArray[np.bool_], h: int, g: int) -> None:
-    """Make two half-edges twins, or the first a border's."""
+    """Make two half-edges twins, or make h a border if g is negative."""
     twins[h] = g
     if g >= 0:
         twins[g] = h
@@ -82,20 +83,21 @@ def flip_edges(
     errors: Points,
     sharp: float,
 ) -> int:
-    """Flip edges of sharp triangles, in place; return how many.
+    """Flip edges of sharp triangles, in place; return the number of flips.
 
     at         float64 (n, 3)
-    triangles  int32 (m, 3); boundary edges stay
-    locked     bool (n,), vertices whose edges, and those opposite to them, stay
+    triangles  int32 (m, 3); edges of borders stay
+    locked     bool (n,); an edge stays if a vertex of its two triangles is locked
     planes     uint8 (n,), a bit for each cut plane that a vertex lies in
-    caps       uint8 (n,), the same of caps, whose edges stay in them
-    errors     float64 (n,), largest distance by which the surface moves at a vertex
+    caps       uint8 (n,), a bit for each cap that a vertex lies in; edges of caps stay in them
+    errors     float64 (n,), largest distance by which the surface may move at a vertex
     sharp      cosine of the angle below which a triangle is sharp
     """
     corner = triangles.ravel()
     twins = match_twins(triangles, len(at))
     leaving, valence = count_fans(triangles, twins, len(at))
-    for v in range(len(at)):  # a border's vertex may be left with one triangle, others with three
+    # A vertex of a border may keep one triangle; other vertices keep three.
+    for v in range(len(at)):
         if leaving[v] >= 0 and valence[v] > 0 and twins[leaving[v]] < 0:
             valence[v] += 2
     is_due = np.ones(len(triangles), np.bool_)

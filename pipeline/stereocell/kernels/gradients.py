@@ -1,4 +1,4 @@
-"""Slopes of a field by central differences, one-sided at the ends, and distances made of them."""
+"""Slopes of a field by central differences, one-sided at the ends, and distances from slopes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ def square_slopes(
 ) -> None:
     """Write the squared slope at each pixel of a row of a plane.
 
-    before, behind  the planes beside it, or the plane itself where there is none
-    factors, ends   1 / (2 h) by axis (z, y, x), 1 / h at the ends; factors[0] is the plane's own
+    before, behind  the planes beside it, or the plane itself at the ends
+    factors, ends   1 / (2 h) by axis (z, y, x), and 1 / h for the ends; factors[0] suits this plane
     """
     height, width = plane.shape
     row, above, below = plane[y], plane[max(y - 1, 0)], plane[min(y + 1, height - 1)]
@@ -58,7 +58,7 @@ def measure_slopes(field: Field, steps: Row) -> Field:
 
 @kernel
 def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> None:
-    """Replace f by f / (|grad f| + least), clipped to +- limit, in place."""
+    """Replace f by f / (|grad f| + least), clipped to +- limit, in place. f is (z, y, x)."""
     depth, height, width = field.shape
     ends, factors = 1 / steps, 0.5 / steps
     before, plane, squares = field[0].copy(), field[0].copy(), np.empty(width)
@@ -78,7 +78,7 @@ def divide_by_slopes(field: Field, steps: Row, least: float, limit: float) -> No
 
 @kernel
 def move_off_zero(values: Field, least: np.float32) -> None:
-    """Give values (z, y, x) nearer to zero than that its size, in place; zero becomes negative."""
+    """Move values (z, y, x) nearer to zero than `least` to +- least, in place; zero becomes -."""
     for z in range(values.shape[0]):
         for y in range(values.shape[1]):
             row = values[z, y]

@@ -1,7 +1,7 @@
-"""A uniform grid of boxes: which triangles lie in a cell of space.
+"""A uniform grid of boxes that lists the triangles in each cell of space.
 
-Cells are numbered along x first and z last, as surfaces of voxels (z, y, x) come: cells that follow
-one another have triangles that do.
+Cells are numbered along x first and z last, in the order in which surfaces of voxels (z, y, x) are
+extracted. So successive cells hold successive triangles.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ def bound_boxes(at: Points, triangles: Ints) -> tuple[Points, Points]:
 
 @kernel
 def bound_all(low: Points, high: Points) -> tuple[Points, Points]:
-    """Return the least and the largest corner of all boxes together, float64 (3,) each."""
+    """Return the least and the largest corner of all boxes, float64 (3,) each."""
     least, most = np.full(3, np.inf), np.full(3, -np.inf)
     for t in range(len(low)):
         for k in range(3):
@@ -42,12 +42,12 @@ def find_near(
     edge: float,
     shape: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Return which boxes touch a cell that a chosen one touches; see `list_by_cell`."""
+    """Return the boxes that touch a cell which a chosen box touches; see `list_by_cell`."""
     cells = np.zeros((shape[0], shape[1], shape[2]), np.bool_)
     near = chosen.copy()
-    for is_asking in (False, True):
+    for is_reading in (False, True):
         for t in range(len(low)):
-            if chosen[t] == is_asking:
+            if chosen[t] == is_reading:
                 continue
             x0, x1 = int((low[t, 0] - origin[0]) / edge), int((high[t, 0] - origin[0]) / edge)
             y0, y1 = int((low[t, 1] - origin[1]) / edge), int((high[t, 1] - origin[1]) / edge)
@@ -55,7 +55,7 @@ def find_near(
             for x in range(x0, x1 + 1):
                 for y in range(y0, y1 + 1):
                     for z in range(z0, z1 + 1):
-                        if is_asking:
+                        if is_reading:
                             near[t] |= cells[x, y, z]
                         else:
                             cells[x, y, z] = True
@@ -66,13 +66,13 @@ def find_near(
 def list_by_cell(
     low: Points, high: Points, origin: Points, edge: float, shape: NDArray[np.int64]
 ) -> tuple[Ints, Ints]:
-    """Return triangles in lists by the cells that their boxes touch.
+    """Return the triangles, listed by the cells that their boxes touch.
 
     low, high  (m, 3), corners of the boxes
     origin     (3,), least corner of the grid
-    edge       of a cell
-    shape      (3,), cells
-    result     the place of each cell's first entry, and one more (cells + 1,); triangles (entries,)
+    edge       edge length of a cell
+    shape      (3,), number of cells along each axis
+    result     index of each cell's first entry, and the total (cells + 1,); triangles (entries,)
     """
     nx, ny, nz = shape
     first = np.zeros(nx * ny * nz + 1, np.int32)
@@ -101,7 +101,7 @@ def list_by_cell(
 
 @kernel
 def count_entries(low: Points, high: Points, origin: Points, edge: float) -> int:
-    """Return in how many cells the boxes lie, all together; arguments as of `list_by_cell`."""
+    """Return the number of cells that the boxes touch, summed over boxes; see `list_by_cell`."""
     total = 0
     for t in range(len(low)):
         cells = 1

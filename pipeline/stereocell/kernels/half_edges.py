@@ -1,4 +1,4 @@
-"""Triangles as half-edges: half-edge 3 t + k goes from corner k of triangle t to the next one."""
+"""Triangles as half-edges: half-edge 3 t + k goes from corner k of triangle t to the next."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,8 @@ from stereocell.kernels.triangles import Points, doubled_area, smallest_angle_co
 from stereocell.kernels.union_find import link, number_components
 
 Ints = NDArray[np.int32]
-BORDER, CROWDED = -1, -2  # no twin: none is there; several are, or one that is wound alike
+# No twin: the edge has one triangle; it has several, or two of opposite winding
+BORDER, CROWDED = -1, -2
 
 
 @part
@@ -32,7 +33,7 @@ def match_twins(triangles: Ints, count: int) -> Ints:
     """
     corner = triangles.ravel()
     edges = len(corner)
-    first = np.zeros(count + 1, np.int32)  # half-edges, in lists by their lower vertex
+    first = np.zeros(count + 1, np.int32)  # half-edges, listed by their lower vertex
     for h in range(edges):
         first[min(corner[h], corner[following(h)]) + 1] += 1
     for v in range(count):
@@ -63,10 +64,10 @@ def match_twins(triangles: Ints, count: int) -> Ints:
 
 @kernel
 def count_fans(triangles: Ints, twins: Ints, count: int) -> tuple[Ints, Ints]:
-    """Return an outgoing half-edge of each vertex, or -1, and the number of triangles it has.
+    """Return an outgoing half-edge of each vertex, or -1, and its number of triangles.
 
-    The number is negative where these make more than one fan. The half-edge of a border's vertex
-    is its fan's first: it has no twin.
+    The number is negative if the triangles form more than one fan. For a vertex of a border the
+    half-edge is the first of its fan, which has no twin.
     """
     corner = triangles.ravel()
     leaving, valence = np.full(count, -1, np.int32), np.zeros(count, np.int32)
@@ -78,13 +79,13 @@ def count_fans(triangles: Ints, twins: Ints, count: int) -> tuple[Ints, Ints]:
     for v in range(count):
         if leaving[v] < 0:
             continue
-        h, met = leaving[v], 1
+        h, seen = leaving[v], 1
         while True:
             h = twins[preceding(h)]
-            if h < 0 or h == leaving[v] or met > valence[v]:
+            if h < 0 or h == leaving[v] or seen > valence[v]:
                 break
-            met += 1
-        if met != valence[v]:
+            seen += 1
+        if seen != valence[v]:
             valence[v] = -valence[v]
     return leaving, valence
 
@@ -93,7 +94,7 @@ def count_fans(triangles: Ints, twins: Ints, count: int) -> tuple[Ints, Ints]:
 def find_fixed(
     locked: NDArray[np.bool_], corner: Ints, twins: Ints, valence: Ints
 ) -> NDArray[np.bool_]:
-    """Return which vertices no collapse moves: locked ones, borders', and those without one fan."""
+    """Return the vertices that no collapse moves: locked, on a border, or without a single fan."""
     fixed = locked | (valence <= 0)
     for h in range(len(corner)):
         if twins[h] < 0:
@@ -102,10 +103,10 @@ def find_fixed(
 
 
 @kernel
-def label_bodies(triangles: Ints, count: int) -> tuple[Ints, int]:
-    """Return the connected body of each vertex, int32 (count,), and their number.
+def label_vertices(triangles: Ints, count: int) -> tuple[Ints, int]:
+    """Return the connected component of each vertex, int32 (count,), and their number.
 
-    Bodies are numbered by their first vertices.
+    Components are numbered by their first vertices.
     """
     parent = np.arange(count).astype(np.int32)
     for t in range(len(triangles)):
@@ -116,9 +117,9 @@ def label_bodies(triangles: Ints, count: int) -> tuple[Ints, int]:
 
 @kernel
 def measure_volumes(at: Points, triangles: Ints, labels: Ints, bodies: int) -> Points:
-    """Return the signed volume of each body (bodies,): the sum of tetrahedra from the origin.
+    """Return the signed volume of each component (bodies,): the sum of tetrahedra from the origin.
 
-    Of an open body it is a number whose differences, while its border stays, are volumes.
+    The volume of an open component has no meaning, but its changes do while its border stays.
     """
     volumes = np.zeros(bodies)
     for t in range(len(triangles)):
@@ -130,7 +131,7 @@ def measure_volumes(at: Points, triangles: Ints, labels: Ints, bodies: int) -> P
 
 @kernel
 def find_first(triangles: Ints, labels: Ints, bodies: int) -> Ints:
-    """Return the first triangle of each body (bodies,), or -1: it has none."""
+    """Return the first triangle of each component (bodies,), or -1 if it has none."""
     first = np.full(bodies, -1, np.int32)
     for t in range(len(triangles) - 1, -1, -1):
         first[labels[triangles[t, 0]]] = t
@@ -141,13 +142,13 @@ def find_first(triangles: Ints, labels: Ints, bodies: int) -> Ints:
 def measure_windings(
     at: Points, normals: NDArray[np.float32], triangles: Ints, labels: Ints, zero: Points
 ) -> tuple[Points, Points, Points, Points]:
-    """Return what tells how each body is wound, for its triangles' doubled areas A.
+    """Return sums that show how each component is wound, over its triangles' doubled areas A.
 
-    zero  (bodies, 3), a place on each axis for each body
+    zero  (bodies, 3), a position on each axis for each component
 
-    First (bodies,), the sum of A times the corners' normals. Then (bodies, 3), for each axis k,
-    that of A_k times the height of the corners above zero_k: by Gauss's law six volumes. Last the
-    least and the largest corner of each body's box (bodies, 3).
+    The first sum (bodies,) is of A times the corners' normals. The second (bodies, 3) has, for each
+    axis k, A_k times the height of the corners above zero_k; by Gauss's law this is six times the
+    volume. The last two are the least and the largest corner of each component's box (bodies, 3).
     """
     along, volumes = np.zeros(len(zero)), np.zeros((len(zero), 3))
     low, high = np.full((len(zero), 3), np.inf), np.full((len(zero), 3), -np.inf)
@@ -178,7 +179,7 @@ def measure_triangles(at: Points, triangles: Ints) -> Points:
 
 @kernel
 def measure_sides(at: Points, triangles: Ints) -> Points:
-    """Return the lengths of all triangles' sides (3 m,)."""
+    """Return the lengths of the sides of all triangles (3 m,)."""
     sides = np.empty(3 * len(triangles))
     for t in range(len(triangles)):
         for k in range(3):
@@ -190,7 +191,7 @@ def measure_sides(at: Points, triangles: Ints) -> Points:
 
 @kernel
 def measure_sharpest(at: Points, triangles: Ints) -> Points:
-    """Return the cosine of the smallest angle of each triangle (m,), 1 where it has no area."""
+    """Return the cosine of the smallest angle of each triangle (m,); 1 if it has no area."""
     cosines = np.empty(len(triangles))
     for t in range(len(triangles)):
         cosines[t] = smallest_angle_cosine(at, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -201,7 +202,7 @@ def measure_sharpest(at: Points, triangles: Ints) -> Points:
 def measure_areas(
     at: Points, triangles: Ints, twins: Ints, labels: Ints, bodies: int
 ) -> tuple[Points, NDArray[np.bool_]]:
-    """Return the area of each body, and whether it is open; (bodies,)."""
+    """Return the area of each component, and whether it is open; (bodies,)."""
     areas, is_open = np.zeros(bodies), np.zeros(bodies, np.bool_)
     for t in range(len(triangles)):
         a, b, c = triangles[t]
@@ -214,7 +215,7 @@ def measure_areas(
 
 @kernel
 def measure_boxes(at: Points, labels: Ints, bodies: int) -> Points:
-    """Return the sides of the box of each body's vertices (bodies, 3)."""
+    """Return the side lengths of the box of each component's vertices (bodies, 3)."""
     low, high = np.full((bodies, 3), np.inf), np.full((bodies, 3), -np.inf)
     for v in range(len(at)):
         body = labels[v]
@@ -228,10 +229,10 @@ def measure_boxes(at: Points, labels: Ints, bodies: int) -> Points:
 def lie_within(
     low: Points, high: Points, asked: NDArray[np.int64], outer: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Return which of the boxes that are asked for lie in one of the outer boxes, bool (k,).
+    """Return which of the asked boxes lie within one of the outer boxes, bool (k,).
 
     low, high     (b, 3), corners of all boxes
-    asked, outer  their numbers
+    asked, outer  indices of boxes
     """
     within = np.zeros(len(asked), np.bool_)
     for i in range(len(asked)):
@@ -250,7 +251,7 @@ def lie_within(
 def renumber_corners(
     triangles: NDArray[np.uint32], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the vertices that triangles use, in order (k,), and the triangles by their places."""
+    """Return the used vertices in order (k,), and the triangles by their indices among these."""
     place = np.zeros(count, np.uint32)
     for t in range(len(triangles)):
         for k in range(3):
@@ -271,7 +272,7 @@ def renumber_corners(
 
 @kernel
 def sum_normals(at: Points, triangles: Ints) -> Points:
-    """Return the unit normal of each vertex (n, 3), weighted by area; 0 where there is none."""
+    """Return the unit normal of each vertex (n, 3), weighted by area; 0 if it has none."""
     normals = np.zeros_like(at)
     for t in range(len(triangles)):
         a, b, c = triangles[t]
@@ -293,7 +294,7 @@ def sum_normals(at: Points, triangles: Ints) -> Points:
 def sum_gains(
     at: Points, triangles: Ints, labels: Ints, bodies: int, moves: Points
 ) -> NDArray[np.float64]:
-    """Return by how much each body's volume grows, to first order, if its vertices move (n, 3)."""
+    """Return the first-order change of each component's volume if its vertices move (n, 3)."""
     gains = np.zeros(bodies)
     for t in range(len(triangles)):
         a, b, c = triangles[t]

@@ -1,7 +1,7 @@
 """Rings of interfaces between objects: sheets that share edges and vertices.
 
-Three interfaces and more meet in a line, lines in a corner. The half-edges that leave a vertex make
-a list: the TWIN of each is the next one that leaves the same vertex, or -1.
+Three or more interfaces meet in a line, and lines meet in a corner. The half-edges that leave a
+vertex form a list: the TWIN of each is the next one that leaves the same vertex, or -1.
 """
 
 import numpy as np
@@ -22,11 +22,11 @@ from stereocell.kernels.rings import (
 )
 from stereocell.kernels.surface_rings import VALENCE
 
-WITHIN, ON_LINE, CORNER = 0, 1, 2  # where a vertex is: within one interface, on a line, in a corner
+WITHIN, ON_LINE, CORNER = 0, 1, 2  # kinds of vertices: within one interface, on a line, in a corner
 
 
 def find_orders(triangles: Ints, n: int) -> NDArray[np.int8]:
-    """Return where each of n vertices is: WITHIN, ON_LINE or CORNER, int8 (n,)."""
+    """Return the kind of each of n vertices: WITHIN, ON_LINE or CORNER, int8 (n,)."""
     orders = np.full(n, CORNER, np.int8)
     _write_orders(triangles, make_mesh(n, len(triangles)), make_ring(n, is_surface=False), orders)
     return orders
@@ -43,7 +43,7 @@ def _write_orders(triangles: Ints, mesh: Mesh, ring: Ring, orders: NDArray[np.in
 
 @step
 def _find_order(ring: Ring) -> int:
-    """Return where the ring's vertex is: WITHIN, ON_LINE or CORNER."""
+    """Return the kind of the ring's vertex: WITHIN, ON_LINE or CORNER."""
     ends, degree, seen, count = 0, 0, ring.marks, ring.sizes[NEIGHBOURS]
     for j in range(count):
         if ring.shared[j] < 2:
@@ -54,7 +54,7 @@ def _find_order(ring: Ring) -> int:
             ends, degree = ends + 1, ring.shared[j]
     if ends not in (0, 2):
         return CORNER
-    # neighbours that do not hang together belong to sheets that meet in this point alone
+    # Neighbours that are not connected belong to sheets that touch only in this point.
     for j in range(count):
         seen[j] = j == 0
     changes, known = True, 1
@@ -84,7 +84,7 @@ def fill_sheets(mesh: Mesh, triangles: Ints) -> None:
 
 @step
 def collect_triangles(u: int, mesh: Mesh, ring: Ring) -> bool:
-    """Write the triangles around u; return whether there is room for all."""
+    """Write the triangles around u; return whether there is space for all."""
     size, h = 0, mesh.start[u]
     while h >= 0:
         if mesh.is_left[h // RECORD]:
@@ -115,10 +115,10 @@ def collect_neighbours(ring: Ring) -> None:
 
 @step
 def check_sheets_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
-    """Return whether the ends of an edge have in common what the edge has.
+    """Return whether the ends of an edge share exactly the neighbours that the edge has.
 
     chosen  number of the edge's far end among the neighbours
-    other   room for the ring of the far end
+    other   working memory for the ring of the far end
     """
     v, shared, seen = ring.near[chosen], ring.shared[chosen], ring.marks
     if not collect_triangles(v, mesh, other):
@@ -152,7 +152,7 @@ def find_beyond(v: int, ring: Ring) -> int:
 
 @step
 def join_sheets(mesh: Mesh, ring: Ring, v: int) -> None:
-    """Put v in the place of the ring's vertex, and take the triangles that have both out."""
+    """Replace the ring's vertex by v, and remove the triangles that have both."""
     last = mesh.start[v]
     while mesh.edges[last + TWIN] >= 0:
         last = mesh.edges[last + TWIN]
@@ -164,7 +164,7 @@ def join_sheets(mesh: Mesh, ring: Ring, v: int) -> None:
         mesh.edges[h] = v
         mesh.edges[last + TWIN], mesh.edges[h + TWIN] = h, -1
         last = h
-    h, before = mesh.start[v], -1  # the list of v loses the triangles that are gone
+    h, before = mesh.start[v], -1  # remove the triangles that are gone from the list of v
     while h >= 0:
         onward = mesh.edges[h + TWIN]
         if mesh.is_left[h // RECORD]:

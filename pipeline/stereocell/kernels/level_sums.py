@@ -1,4 +1,4 @@
-"""Sums over voxels by their value, which a channel's level is found on, in one pass."""
+"""Sums over voxels by their value, in one pass; a channel's levels are found on them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,7 +7,7 @@ from stereocell.kernels.compiled import kernel
 from stereocell.kernels.gradients import Field, Row, square_slopes
 
 Flags = NDArray[np.bool_]
-Box = NDArray[np.int64]  # first and end (3, 2) of the voxels that are counted, in a window
+Box = NDArray[np.int64]  # first and end (3, 2) of the voxels in a window that are counted
 
 
 @kernel
@@ -22,13 +22,16 @@ def sum_by_value(
     span: np.float32,
     bins: int,
 ) -> Row:
-    """Return sums over voxels in bins, of those that are no padding and of padding (2, bins, 3).
+    """Return sums in bins (2, bins, 3), over the voxels outside of padding and over padding.
 
-    steps      spacing (z, y, x)
-    table      the bin of each even step from `low` on; a value beyond an end counts there
-    span       what slopes are shares of
+    field, padding  (z, y, x), a window around the voxels that are counted
+    steps           spacing (z, y, x)
+    table           the bin of each even step from `low`; values beyond an end count in the end bins
+    low, step       least value and step of the table
+    span            unit of the slopes in the third sum
 
-    The three are the voxels' number, their slopes, and the squares of these as shares.
+    The three sums are the number of voxels, their slopes, and their squared slopes in units of
+    span.
     """
     depth, _, width = field.shape
     ends, factors = 1 / steps, 0.5 / steps
@@ -55,10 +58,10 @@ def sum_by_value(
 def count_differences(
     field: Field, padding: Flags, own: Box, lag: int, first: NDArray[np.int16], edges: Row
 ) -> Box:
-    """Return how often the field differs by so much `lag` voxels further along x.
+    """Return a histogram of the differences between voxels `lag` apart along x.
 
-    first  the bin in which the numbers begin that have the same upper 15 bits as float32
-    edges  ends of the bins, rising; a larger difference counts in the last one
+    first  first bin of the float32 numbers that have the same upper 15 bits
+    edges  ends of the bins, rising; larger differences count in the last bin
     """
     counts, bins = np.zeros(len(edges) - 1, np.int64), len(edges) - 1
     width = max(min(own[2, 1], field.shape[2] - lag) - own[2, 0], 0)

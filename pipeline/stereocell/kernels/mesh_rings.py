@@ -1,4 +1,4 @@
-"""Rings of either kind of mesh: how surfaces and interfaces differ in a collapse."""
+"""Rings of surfaces and of interfaces: one function for each step in which they differ."""
 
 from stereocell.kernels.compiled import step
 from stereocell.kernels.interface_rings import (
@@ -13,13 +13,13 @@ from stereocell.kernels.surface_rings import check_fan_link, collect_fan, join_f
 
 @step
 def is_surface(mesh: Mesh) -> bool:
-    """Return whether the mesh is a surface; else it is interfaces."""
+    """Return whether the mesh is a surface; otherwise it consists of interfaces."""
     return len(mesh.on_line) == 0
 
 
 @step
 def collect_ring(u: int, mesh: Mesh, ring: Ring) -> bool:
-    """Write the ring of u; return whether there is room for it, and it is not empty."""
+    """Write the ring of u; return whether there is space for it and it is not empty."""
     if is_surface(mesh):
         return collect_fan(u, mesh, ring)
     if not collect_triangles(u, mesh, ring):
@@ -30,9 +30,9 @@ def collect_ring(u: int, mesh: Mesh, ring: Ring) -> bool:
 
 @step
 def collect_again(u: int, v: int, mesh: Mesh, ring: Ring) -> int:
-    """Write of the ring of u what its move onto v needs; return the number of v among neighbours.
+    """Write the part of u's ring that moving it onto v needs; return v's number among neighbours.
 
-    Of a vertex within an interface, that is its triangles, and v alone.
+    For a vertex within an interface these are its triangles and v.
     """
     if not is_surface(mesh) and not mesh.on_line[u]:
         collect_triangles(u, mesh, ring)
@@ -58,9 +58,9 @@ def mark_ring(u: int, mesh: Mesh, ring: Ring, marks: Flags) -> None:
 
 @step
 def check_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
-    """Return whether topology stays when the ring's vertex moves onto the chosen neighbour.
+    """Return whether moving the ring's vertex onto the chosen neighbour keeps the topology.
 
-    other  room for the ring of the neighbour
+    other  working memory for the ring of the neighbour
     """
     if is_surface(mesh):
         return check_fan_link(mesh, ring, chosen)
@@ -69,7 +69,7 @@ def check_link(mesh: Mesh, ring: Ring, chosen: int, other: Ring) -> bool:
 
 @step
 def move_onto(u: int, chosen: int, mesh: Mesh, ring: Ring, strayed: float) -> None:
-    """Let u become the chosen neighbour; what went into u is at most `strayed` from the result."""
+    """Merge u into the chosen neighbour. `strayed` is the largest distance of u from the result."""
     v = ring.near[chosen]
     mesh.at[v, 3] = max(mesh.at[v, 3], strayed)
     if is_surface(mesh):

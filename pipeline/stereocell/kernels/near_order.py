@@ -1,7 +1,7 @@
-"""An order of vertices and triangles in which those that are near each other stand together.
+"""An order of vertices and triangles in which near ones follow each other.
 
-Along a curve through cells of space, cell by cell (Z-order): whatever goes over a part of the
-order finds its neighbours in the cache.
+The order follows a curve through cells of space (Z-order). A loop over part of the order then finds
+the neighbours in the cache.
 
 References
 G. M. Morton, "A computer oriented geodetic data base and a new technique in file sequencing",
@@ -14,12 +14,12 @@ from stereocell.kernels.compiled import kernel, part
 from stereocell.kernels.half_edges import Ints
 from stereocell.kernels.triangles import Points
 
-BITS = 6  # bits of a cell's place along an axis: 64 cells along the longest side of the box
+BITS = 6  # bits of a cell's index along an axis: 64 cells along the longest side of the box
 
 
 @part
 def _spread(place: int) -> int:
-    """Return the number with two zeros before each of its bits."""
+    """Return the number with two zeros inserted before each of its bits."""
     code = 0
     for bit in range(BITS):
         code |= (place >> bit & 1) << (3 * bit)
@@ -28,7 +28,7 @@ def _spread(place: int) -> int:
 
 @part
 def _sort(keys: Ints, count: int) -> Ints:
-    """Return the places of the keys, 0 to count - 1, from the least on; equal ones in order."""
+    """Return the indices of the keys in rising order of key; equal keys keep their order."""
     first = np.zeros(count + 1, np.int32)
     for key in keys:
         first[key + 1] += 1
@@ -43,7 +43,7 @@ def _sort(keys: Ints, count: int) -> Ints:
 
 @kernel
 def order_vertices(at: Points) -> Ints:
-    """Return the vertices, int32 (n,), cell by cell; those of a cell in their own order.
+    """Return the vertices, int32 (n,), cell by cell; within a cell they keep their order.
 
     at  float64 (n, 3)
     """
@@ -68,7 +68,7 @@ def order_triangles(triangles: Ints, place: Ints) -> Ints:
     """Return the triangles, int32 (m,), in the order of their first vertices.
 
     triangles  int32 (m, 3)
-    place      int32 (n,), of each vertex in its order
+    place      int32 (n,), index of each vertex in the order of vertices
     """
     keys = np.empty(len(triangles), np.int32)
     for t in range(len(triangles)):

@@ -23,14 +23,15 @@ def find_nearest(
 ) -> tuple[Points, NDArray[np.int64], NDArray[np.int8]]:
     """Return the distance of each point (n,), the nearest triangle, and its part (see `closest`).
 
-    first, listed        of the grid: kernels/grid.py
-    origin, edge, shape  of the grid; it holds all triangles
-    seen                 int32 (m,), of each triangle the number of the last point that looked at it
-    tick                 the first point's number: larger than all in `seen`, but for triangles that
-                         are left out, whose numbers no point reaches
+    points               (n, 3)
+    first, listed        triangles by cell, see kernels/grid.py
+    origin, edge, shape  of the grid, which holds all triangles
+    seen                 int32 (m,), for each triangle the number of the last point that examined it
+    tick                 number of the first point, larger than all in `seen`. Triangles that are
+                         left out have numbers that no point reaches.
 
-    Cells are searched in shells around the point, until nothing beyond can be nearer. Of triangles
-    at one distance the first that is met is returned.
+    Cells are searched in shells around the point, until no triangle beyond can be nearer. The
+    first of several triangles at the same distance is returned.
     """
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     parts = np.empty(len(points), np.int8)
@@ -38,7 +39,7 @@ def find_nearest(
     nx, ny, nz = shape
     largest = max(nx, max(ny, nz))
     for i in range(len(points)):
-        beyond = 0.0  # squared distance from the grid
+        beyond = 0.0  # squared distance of the point from the grid
         for k in range(3):
             inside[k] = min(max(points[i, k], origin[k]), origin[k] + shape[k] * edge)
             beyond += (points[i, k] - inside[k]) ** 2
@@ -65,7 +66,8 @@ def find_nearest(
                             )  # fmt: skip
                             if square < best:
                                 best, triangle, where = square, t, side
-            margin = np.inf  # from the grid's nearest point to what was not searched
+            # Distance from the grid's nearest point to the cells that are not searched yet
+            margin = np.inf
             for k in range(3):
                 start = origin[k] + (centre[k] - reach) * edge
                 margin = min(margin, inside[k] - start)
@@ -78,7 +80,7 @@ def find_nearest(
 
 @part
 def _unit_normal(at: Points, triangles: Ints, t: int) -> Triple:
-    """Return the unit normal of a triangle; 0 where it has no area."""
+    """Return the unit normal of a triangle; 0 if it has no area."""
     x, y, z = doubled_area(at, triangles[t, 0], triangles[t, 1], triangles[t, 2])
     length = max(np.sqrt(x * x + y * y + z * z), 1e-300)
     return x / length, y / length, z / length
@@ -102,7 +104,11 @@ def find_sides(
     triangles: Ints,
     twins: Ints,
 ) -> NDArray[np.bool_]:
-    """Return whether each point lies inside, bool (n,): by the pseudonormal at its nearest point.
+    """Return which points lie inside, bool (n,), by the pseudonormal at their nearest points.
+
+    points          (n, 3)
+    nearest, parts  of `find_nearest`
+    at, triangles   a closed mesh, with its `twins` from `match_twins`
 
     References
     J. A. Baerentzen & H. Aanaes, "Signed distance computation using the angle weighted

@@ -1,7 +1,8 @@
-"""Quadric errors: how far a vertex would be from the planes of the triangles that it stands for.
+"""Quadric errors: the distance of a vertex from the planes of the triangles that it represents.
 
-A price is the mean squared distance of a position from these planes, in squared errors: 1 is as far
-as a vertex may be. Prices fall into a few classes of cost, the cheapest of which go first.
+A price is the mean squared distance of a position from these planes. Its unit is the square of the
+largest allowed error, so a price above 1 is not allowed. Prices fall into a few classes of cost,
+and the cheapest class is processed first.
 
 References
 M. Garland & P. S. Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997.
@@ -15,13 +16,13 @@ from stereocell.kernels.triangles import Points, doubled_area
 
 CLASSES = 6  # number of classes of cost
 NEVER = 32000  # class of a vertex that has no collapse
-SURE = 1 - 1e-9  # share of a class's bound: a lower price, even rounded, is in no higher class
+SURE = 1 - 1e-9  # share of a class's bound; a lower price is in no higher class even after rounding
 
 
 @part
 def price_of(quadrics: Points, u: int, at: Points, v: int) -> float:
-    """Return the mean squared distance of v from u's planes, in squared errors."""
-    # indexed by numbers: a view of a row would be counted, by operations that are atomic
+    """Return the mean squared distance of v from u's planes, in squares of u's error."""
+    # Elements are indexed singly, because references to a view of a row would be counted.
     x, y, z = at[v, 0], at[v, 1], at[v, 2]
     square = quadrics[u, 0] * x * x + quadrics[u, 1] * y * y + quadrics[u, 2] * z * z
     square += quadrics[u, 9]

@@ -1,7 +1,7 @@
-"""Thin out the vertices that a surface has on a plane, where another plane cuts it.
+"""Thin out the vertices that a surface has on a plane where it is cut.
 
-The surface is one on both sides of the plane, and a vertex of the plane moves onto its neighbour
-along the curve in which the plane cuts the surface: each side by itself is as sound as the whole.
+The surface continues on both sides of the plane. A vertex in the plane moves onto its neighbour
+along the curve in which the plane cuts the surface. So each side alone is as valid as the whole.
 """
 
 import numpy as np
@@ -21,13 +21,13 @@ from stereocell.kernels.surface_rings import (
 )
 from stereocell.kernels.triangles import Points
 
-STEPS = 4  # steps in which the error grows up to its bound: flat parts go first
-PASSES = 6  # passes over one step
-SHARPER = 0.1  # square of the least share of the sharpest angle: 1 - cos goes with the square
+STEPS = 4  # number of steps in which the error grows to its bound, so that flat parts go first
+PASSES = 6  # largest number of passes over one step
+SHARPER = 0.1  # square of the least share of the sharpest angle, since 1 - cos grows as its square
 
 
 @part
-def _way_to(at: Points, u: int, p: int, n: int) -> float:
+def _distance_to_segment(at: Points, u: int, p: int, n: int) -> float:
     """Return the distance of u from the segment pn."""
     along, square = 0.0, 0.0
     for k in range(3):
@@ -52,16 +52,16 @@ def _is_on_curve(h: int, edges: Ints, sides: NDArray[np.int8]) -> bool:
 
 @part
 def _farthest(at: Points, u: int, p: int, q: int, curves: Ints, leaving: Ints) -> float:
-    """Return the largest distance from the segment pq of u, and of those that went beside it.
+    """Return the largest distance from the segment pq, of u and of the vertices merged around it.
 
     curves   int32 (n, 2), the two neighbours that each vertex had along the curve
-    leaving  negative where a vertex has gone
+    leaving  negative for vertices that were merged
     """
-    most = _way_to(at, u, p, q)
+    most = _distance_to_segment(at, u, p, q)
     for k in range(2):
         past, here = u, curves[u, k]
         while leaving[here] < 0:
-            most = max(most, _way_to(at, here, p, q))
+            most = max(most, _distance_to_segment(at, here, p, q))
             onward = curves[here, 0] if curves[here, 1] == past else curves[here, 1]
             past, here = here, onward
     return most
@@ -76,15 +76,16 @@ def thin_rim(
     error: float,
     sharpest: float,
 ) -> Ints:
-    """Return the vertex onto which each vertex moves, int32 (n,); most stay.
+    """Return the vertex onto which each vertex moves, int32 (n,); most of them are themselves.
 
     at         float64 (n, 3)
     triangles  int32 (m, 3); vertices of borders stay
-    sides      int8 (n,): -1 or 1 beside the plane, 0 in it
-    planes     uint8 (n,), a bit for each cut plane that a vertex lies in, this one and others
+    sides      int8 (n,): -1 or 1 beside the plane, 0 in the plane
+    planes     uint8 (n,), a bit for each cut plane that a vertex lies in, including this one
     locked     bool (n,), vertices that stay
-    error      largest distance of a vertex from the curve that is left
-    sharpest   cosine of the smallest angle that a triangle may get, unless those around are sharper
+    error      largest distance of a vertex from the remaining curve
+    sharpest   cosine of the smallest angle that a triangle may have; if triangles around are
+               sharper already, the bound is lower
     """
     n = len(at)
     mesh = make_mesh(n, len(triangles), planes=planes)
@@ -110,7 +111,7 @@ def thin_in_place(
     """Write the vertex onto which each vertex moves; see `thin_rim`.
 
     curves   int32 (n, 2), written: the two neighbours that each vertex had along the curve
-    touched  int32 (n,), of zeros: the last pass in which a vertex's ring has changed
+    touched  int32 (n,), zeros; the last pass in which a vertex's ring has changed
     """
     find_curves(mesh, sides, curves)
     turn = 0
@@ -150,7 +151,7 @@ def thin_in_place(
 
 @step
 def find_curves(mesh: Mesh, sides: NDArray[np.int8], curves: Ints) -> None:
-    """Write each vertex's two neighbours along the curve; where several curves meet it stays."""
+    """Write the two neighbours of each vertex along the curve. Vertices of several curves stay."""
     for t in range(len(mesh.is_left)):
         for h in range(RECORD * t, RECORD * t + 3):
             u = mesh.edges[h]
@@ -162,7 +163,7 @@ def find_curves(mesh: Mesh, sides: NDArray[np.int8], curves: Ints) -> None:
 
 @step
 def find_on_curve(u: int, mesh: Mesh, ring: Ring, sides: NDArray[np.int8]) -> tuple[int, int]:
-    """Write the ring of u; return the places of its two neighbours on the curve, or (-1, -1)."""
+    """Write the ring of u; return the indices of its two neighbours on the curve, or (-1, -1)."""
     if not collect_fan(u, mesh, ring):
         return -1, -1
     count, first, second = 0, -1, -1

@@ -1,4 +1,4 @@
-"""Whether the triangles around a vertex stay sound when it moves onto a neighbour."""
+"""Check whether the triangles around a vertex stay valid when it moves onto a neighbour."""
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from stereocell.kernels.triangles import (
 )
 
 TURN = 0.25  # squared cosine of the largest turn of a triangle: 60 degrees
-SLIVER = 0.9945  # cosine of 6 degrees: the normal of a sharper triangle says little
+SLIVER = 0.9945  # cosine of 6 degrees; the normal of a sharper triangle is not reliable
 
 
 @step
 def measure_ring(u: int, mesh: Mesh, ring: Ring, by_area: bool) -> tuple[Triple, float]:
-    """Return the sum of the doubled areas around u, or 0, and the cosine of the sharpest angle."""
+    """Return the sum of the doubled areas around u, and the cosine of the sharpest angle.
+
+    by_area  whether areas are summed; otherwise the sum is 0
+    """
     worst, sum_x, sum_y, sum_z = 0.0, 0.0, 0.0, 0.0
     for k in range(ring.sizes[TRIANGLES]):
         a, b = ring.first[k], ring.second[k]
@@ -33,10 +36,10 @@ def measure_ring(u: int, mesh: Mesh, ring: Ring, by_area: bool) -> tuple[Triple,
 
 @step
 def check_normals(u: int, v: int, mesh: Mesh, ring: Ring, form: tuple[Triple, float]) -> bool:
-    """Return whether the triangles around u may have v in its place.
+    """Return whether v may take the place of u in the triangles around u.
 
-    form  sum of the doubled areas around u, by which slivers are judged that turn (0: none may);
-          and the largest cosine of a smallest angle
+    form  sum of the doubled areas around u, by which the turn of slivers is judged (0: no sliver
+          may turn), and the largest allowed cosine of a smallest angle
     """
     at, planes, ((sum_x, sum_y, sum_z), allowed) = mesh.at, mesh.planes, form
     length = sum_x * sum_x + sum_y * sum_y + sum_z * sum_z
@@ -63,9 +66,9 @@ def check_normals(u: int, v: int, mesh: Mesh, ring: Ring, form: tuple[Triple, fl
 
 @step
 def measure_stray(u: int, v: int, mesh: Mesh, ring: Ring) -> float:
-    """Return the distance of u, and all that went into it, from the result once u is at v.
+    """Return the distance of u, and of all vertices merged into it, from the result at v.
 
-    The result is the triangles that take the place of u's, or the line that u is on.
+    The result is the triangles that replace those of u, or the line that u is on.
     """
     at = mesh.at
     if not is_surface(mesh) and mesh.on_line[u]:

@@ -1,4 +1,4 @@
-"""Arrays that a collapse works in: a mesh that changes in place, and the ring of one vertex."""
+"""Arrays for collapses: a mesh that is changed in place, and the ring of one vertex."""
 
 from typing import Any, NamedTuple
 
@@ -11,44 +11,46 @@ from stereocell.kernels.triangles import Points
 
 Flags = NDArray[np.bool_]
 
-MAX_NEIGHBOURS = 512  # neighbours of a vertex of a surface that is looked at
-MAX_TRIANGLES = 96  # triangles of a vertex of interfaces that is looked at
+MAX_NEIGHBOURS = 512  # largest number of neighbours of a surface's vertex that may move
+MAX_TRIANGLES = 96  # largest number of triangles of a vertex of interfaces that may move
 CACHE_LINE = 64  # bytes
-TRIANGLES, NEIGHBOURS, STAMP = 0, 1, 2  # places in Ring.sizes
+TRIANGLES, NEIGHBOURS, STAMP = 0, 1, 2  # indices into Ring.sizes
 
 
 class Mesh(NamedTuple):
-    """A surface or interfaces, of n vertices and m triangles."""
+    """A surface or a set of interfaces, with n vertices and m triangles."""
 
-    at: Points  # float64 (n, 4): position, um; largest distance from here of what came here, um
+    # float64 (n, 4), um: position, and the largest distance from it of vertices merged into it
+    at: Points
     quadrics: Points  # float64 (n, 12): kernels/quadrics.py
     edges: Ints  # int32 (8 m,): kernels/edge_records.py
     start: Ints  # int32 (n,), a half-edge that leaves each vertex, or -1
-    is_left: Flags  # bool (m,), triangles that no collapse has taken
+    is_left: Flags  # bool (m,), triangles that no collapse has removed
     stays: Flags  # bool (n,), vertices that no collapse moves
-    on_line: Flags  # interfaces: bool (n,), vertices of lines; a surface: (0,)
+    on_line: Flags  # bool (n,), vertices on lines of interfaces; (0,) for a surface
     planes: NDArray[np.uint8]  # uint8 (n,), a bit for each cut plane that a vertex lies in
-    caps: NDArray[np.uint8]  # uint8 (n,), the same of caps: a vertex moves within its caps alone
+    caps: NDArray[np.uint8]  # uint8 (n,), a bit for each cap; a vertex moves only within its caps
     errors: Points  # float64 (n,), largest root of the mean squared distance from the planes
 
 
 class Ring(NamedTuple):
-    """The triangles around a vertex, and its neighbours; the arrays have room for the most."""
+    """The triangles around a vertex and its neighbours. The arrays have space for the most."""
 
-    out: Ints  # half-edge of each triangle that leaves the vertex
+    out: Ints  # the half-edge of each triangle that leaves the vertex
     first: Ints  # next corner of each triangle
     second: Ints  # last corner of each triangle
-    near: Ints  # neighbours; the first corners in a surface
+    near: Ints  # neighbours; in a surface the same as `first`
     shared: Ints  # interfaces: number of triangles at the edge to each neighbour
     price: Points  # price of moving onto each neighbour
     marks: Ints  # interfaces: marks of neighbours
-    slot: Ints  # interfaces: int32 (n,), place among the neighbours of vertices with the last stamp
-    stamp: Ints  # int32 (n,)
+    # Interfaces: int32 (n,), index among the neighbours, of vertices with the last stamp
+    slot: Ints
+    stamp: Ints  # int32 (n,), the last ring that each vertex was a neighbour in
     sizes: Ints  # int32 (3,): number of triangles, number of neighbours, last stamp
 
 
 def make_ring(n: int, *, is_surface: bool) -> Ring:
-    """Return room for a ring in a mesh of n vertices."""
+    """Return arrays for a ring in a mesh of n vertices."""
     most = MAX_NEIGHBOURS if is_surface else MAX_TRIANGLES
     first, room = np.empty(most, np.int32), 0 if is_surface else 2 * most
     return Ring(
@@ -76,7 +78,7 @@ def make_mesh(
 ) -> Mesh:
     """Return a mesh of n vertices and m triangles without positions and edges.
 
-    numpy makes the arrays, since it asks for large pages.
+    numpy allocates the arrays, because it asks for large pages.
     """
     return Mesh(
         at=_zeros(4 * n, np.float64).reshape(n, 4),
@@ -93,7 +95,7 @@ def make_mesh(
 
 
 def _zeros(size: int, kind: type[np.float64 | np.int32]) -> NDArray[Any]:
-    """Return zeros that start where a line of the cache does."""
+    """Return zeros that start at the start of a cache line."""
     numbers = CACHE_LINE // np.dtype(kind).itemsize
     room = np.zeros(size + numbers, kind)
     start = -room.ctypes.data % CACHE_LINE // room.itemsize

@@ -1,4 +1,4 @@
-"""Connected components of a mask by its runs: rows of voxels along x, which a row has few of.
+"""Connected components of a mask, by its runs: contiguous voxels along x, few in each row.
 
 K. Wu, E. Otoo & K. Suzuki, "Optimizing two-pass connected-component labeling algorithms", Pattern
 Analysis and Applications 12, 2009. doi:10.1007/s10044-008-0109-y
@@ -16,36 +16,36 @@ Mask = NDArray[np.bool_]
 
 @kernel
 def find_runs(mask: Mask) -> tuple[NDArray[np.int64], Ints, Ints]:
-    """Return the place of the first run of each row (rows + 1,), and where runs start and stop.
+    """Return the index of the first run of each row (rows + 1,), and where runs start and stop.
 
-    mask  bool (z, y, x); rows follow each other by y, and then by z
+    mask  bool (z, y, x); rows are ordered by z and then by y
     """
     depth, height, width = mask.shape
     first = np.zeros(depth * height + 1, np.int64)
     count = 0
     for z in range(depth):
         for y in range(height):
-            row, was = mask[z, y], False
+            row, was_set = mask[z, y], False
             for x in range(width):
-                count += row[x] & (not was)
-                was = row[x]
+                count += row[x] & (not was_set)
+                was_set = row[x]
             first[z * height + y + 1] = count
     start, stop = np.empty(count, np.int32), np.empty(count, np.int32)
     place = 0
     for z in range(depth):
         for y in range(height):
-            row, was = mask[z, y], False
+            row, was_set = mask[z, y], False
             if first[z * height + y + 1] == place:
                 continue
             for x in range(width):
-                if row[x] != was:
-                    if was:
+                if row[x] != was_set:
+                    if was_set:
                         stop[place] = x
                         place += 1
                     else:
                         start[place] = x
-                    was = row[x]
-            if was:
+                    was_set = row[x]
+            if was_set:
                 stop[place] = width
                 place += 1
     return first, start, stop
@@ -55,11 +55,12 @@ def find_runs(mask: Mask) -> tuple[NDArray[np.int64], Ints, Ints]:
 def join_runs(
     first: NDArray[np.int64], start: Ints, stop: Ints, height: int, by_corners: bool
 ) -> tuple[Ints, Ints, int]:
-    """Return the component of each run, from 0 on, how many voxels touch those of the rows before
-    by a face, and the number of components.
+    """Return the components of runs.
 
-    height      rows of a plane
-    by_corners  whether voxels that share an edge or a corner are joined, too
+    height      number of rows in a plane
+    by_corners  whether voxels that share only an edge or a corner are connected, too
+    result      component of each run, from 0 on; number of its voxels that share a face with a
+                voxel of an earlier row; number of components
     """
     parent = np.arange(len(start)).astype(np.int32)
     touching = np.zeros(len(start), np.int32)
@@ -96,8 +97,10 @@ def measure_components(
     count: int,
     shape: tuple[int, int, int],
 ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-    """Return boxes (count, 6): least and largest voxel (z, y, x); voxels; and faces of voxels that
-    have a voxel of the array beyond that isn't the component's (count,).
+    """Return the boxes, voxels and faces of components.
+
+    result  boxes (count, 6), least and largest voxel (z, y, x); numbers of voxels (count,); numbers
+            of their faces (count,) towards voxels of the array outside of the component
     """
     depth, height, width = shape
     boxes = np.empty((count, 6), np.int32)

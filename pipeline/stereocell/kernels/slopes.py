@@ -1,4 +1,4 @@
-"""Directions in which a field falls, at points between its voxels."""
+"""Directions of steepest descent of a field, at points between its voxels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ def find_downhill(
     """Return the unit vector of steepest descent at each point, float32 (n, 3), (z, y, x).
 
     field    float32 (z, y, x), at least 2 voxels each way
-    at       float64 (n, 3), voxels (z, y, x); points beyond the ends take the end's
+    at       float64 (n, 3), voxels (z, y, x); points beyond the ends are moved to the ends
     spacing  (z, y, x)
 
     Slopes are central differences at voxels, one-sided at the ends, and linear in between.

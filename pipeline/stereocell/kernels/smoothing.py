@@ -1,4 +1,7 @@
-"""A median in plane and a Gaussian, both bounded, in one pass over the planes and in place."""
+"""A median in plane and a Gaussian, in one pass over the planes and in place.
+
+The change of each value by both together can be limited.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +17,7 @@ Weights = NDArray[np.float64]
 
 @part
 def _order_columns(above: Row, here: Row, below: Row, low: Row, mid: Row, high: Row) -> None:
-    """Put columns of three pixels in order, from the second place of low, mid and high on."""
+    """Sort columns of three pixels into low, mid and high, from their second element on."""
     for x in range(len(here)):
         p, q, r = above[x], here[x], below[x]
         p, q = min(p, q), max(p, q)
@@ -25,10 +28,10 @@ def _order_columns(above: Row, here: Row, below: Row, low: Row, mid: Row, high: 
 
 @part
 def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) -> None:
-    """Write the median of the 3 x 3 pixels around each pixel; edges repeat.
+    """Write the median of the 3 x 3 pixels around each pixel; pixels at the edges are repeated.
 
-    Columns of three are put in order. The median of nine is the median of three: of the largest of
-    the low ones, the median of those in the middle, and the least of the high ones.
+    Columns of three are sorted first. The median of nine is then the median of three numbers: the
+    largest of the low ones, the median of the middle ones, and the least of the high ones.
 
     References
     A. W. Paeth, "Median finding on a 3 x 3 grid", Graphics Gems, 1990, 171-175
@@ -51,9 +54,9 @@ def _find_median(plane: Field, out: Field, low: Field, mid: Field, high: Field) 
 
 @part
 def _find_extremes(plane: Field, least: Field, most: Field, low: Row, high: Row) -> None:
-    """Write the least and largest of each pixel's eight neighbours.
+    """Write the least and the largest of each pixel's eight neighbours.
 
-    Beyond an edge the plane is mirrored. low, high: (width + 2,), memory to work in.
+    Beyond an edge the plane is mirrored. low, high: (width + 2,), working memory.
     """
     height, width = plane.shape
     for y in range(height):
@@ -74,12 +77,12 @@ def _find_extremes(plane: Field, least: Field, most: Field, low: Row, high: Row)
 
 @part
 def _clip_hot_voxels(plane: Field, out: Field, least: Planes, most: Planes) -> None:
-    """Write a plane, each voxel clipped to the least and largest of its 24 neighbours.
+    """Write a plane in which each voxel is clipped to the range of its 24 neighbours.
 
     least, most  (3, height, width): extremes of planes z - 1, z and z + 1, in any order
 
-    The two neighbours straight across the plane don't count: a camera's hot pixel is hot in all
-    planes.
+    The two neighbours straight across the plane do not count, because a camera's hot pixel is hot
+    in all planes.
     """
     height, width = plane.shape
     for y in range(height):
@@ -94,9 +97,9 @@ def _clip_hot_voxels(plane: Field, out: Field, least: Planes, most: Planes) -> N
 def _smooth_plane(
     plane: Field, out: Field, along_y: Weights, along_x: Weights, total: Weights, wide: Field
 ) -> None:
-    """Write a plane smoothed along y and x; edges repeat.
+    """Write a plane smoothed along y and x; pixels at the edges are repeated.
 
-    total  (width,) and wide (width + len(along_x) - 1,): memory to work in
+    total  (width,), and wide (width + len(along_x) - 1,): working memory
     """
     height, width = plane.shape
     ry, rx = len(along_y) // 2, len(along_x) // 2
@@ -133,15 +136,15 @@ def smooth_in_place(
     has_median: bool,
     max_shift: np.float32,
 ) -> None:
-    """Replace a field float32 (z, y, x) by itself smoothed.
+    """Smooth a field float32 (z, y, x) in place.
 
-    along_z, along_y, along_x  weights, symmetric, of odd length; they add up to 1
-    has_median                 whether a 3 x 3 median in plane goes before
-    max_shift                  by how much both may move a value from that of the voxel without hot
-                               voxels; infinite: by any
+    along_z, along_y, along_x  weights, symmetric, of odd length, with a sum of 1
+    has_median                 whether a 3 x 3 median in plane is applied first
+    max_shift                  largest change of a value by both filters, from the voxel's value
+                               after clipping hot voxels; infinite: no limit and no clipping
 
-    Edges repeat. Sums are float64, in an order that the voxel's neighbours alone decide; what is
-    kept between the axes is float32.
+    Voxels at the edges are repeated. Sums are float64, in an order that depends only on the voxel's
+    neighbours. Values between the axes are float32.
     """
     depth, height, width = field.shape
     rz, rx = len(along_z) // 2, len(along_x) // 2
@@ -162,7 +165,7 @@ def smooth_in_place(
             else:
                 copy_plane(field[z], plane)
             if clips:
-                # planes beyond the ends repeat those within, which changes no extreme
+                # Planes beyond the ends repeat those within, which changes no extreme.
                 for k in range(0 if z == 0 else z + 1, min(z + 2, depth)):
                     _find_extremes(field[k], least[k % 3], most[k % 3], low, high)
                 if z == 0:

@@ -1,4 +1,4 @@
-"""Rings of a surface: each edge has two triangles, and a vertex one fan of them."""
+"""Rings of a surface: each edge has two triangles, and the triangles of a vertex form one fan."""
 
 import numpy as np
 
@@ -9,12 +9,12 @@ from stereocell.kernels.half_edges import Ints, count_fans, find_fixed, match_tw
 from stereocell.kernels.quadrics import price_of
 from stereocell.kernels.rings import MAX_NEIGHBOURS, NEIGHBOURS, STAMP, TRIANGLES, Flags, Mesh, Ring
 
-VALENCE = 24  # most neighbours of two ends together
+VALENCE = 24  # largest number of neighbours of two ends together
 
 
 @kernel
 def fill_fans(mesh: Mesh, triangles: Ints, locked: Flags) -> None:
-    """Write a surface's half-edges, and which vertices stay: locked ones and those of borders."""
+    """Write the half-edges of a surface, and mark vertices that stay: locked or on a border."""
     twins = match_twins(triangles, len(mesh.start))
     start, valence = count_fans(triangles, twins, len(mesh.start))
     mesh.stays[:] = find_fixed(locked, triangles.ravel(), twins, valence)
@@ -24,7 +24,7 @@ def fill_fans(mesh: Mesh, triangles: Ints, locked: Flags) -> None:
 
 @step
 def collect_fan(u: int, mesh: Mesh, ring: Ring) -> bool:
-    """Write the ring of u, which is on no border; return whether there is room for it."""
+    """Write the ring of u, which is not on a border; return whether there is space for it."""
     size, start = 0, mesh.start[u]
     h = start
     while size < MAX_NEIGHBOURS:
@@ -40,7 +40,7 @@ def collect_fan(u: int, mesh: Mesh, ring: Ring) -> bool:
 
 @step
 def stamp_fan(ring: Ring) -> None:
-    """Give the neighbours the next stamp."""
+    """Give the next stamp to the neighbours."""
     ring.sizes[STAMP] += 1
     for k in range(ring.sizes[TRIANGLES]):
         ring.stamp[ring.first[k]] = ring.sizes[STAMP]
@@ -48,7 +48,7 @@ def stamp_fan(ring: Ring) -> None:
 
 @step
 def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
-    """Mark all neighbours of u, which is on no border."""
+    """Mark all neighbours of u, which is not on a border."""
     start = mesh.start[u]
     h = start
     while True:
@@ -60,7 +60,7 @@ def mark_fan(u: int, mesh: Mesh, marks: Flags) -> None:
 
 @step
 def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
-    """Return whether the two ends of an edge have two common neighbours, and few in all.
+    """Return whether the ends of an edge have two common neighbours, and not too many in all.
 
     ring    stamped, see `stamp_fan`
     chosen  number of the edge's far end among the neighbours
@@ -71,7 +71,7 @@ def check_fan_link(mesh: Mesh, ring: Ring, chosen: int) -> bool:
 
 @step
 def join_fans(mesh: Mesh, ring: Ring, chosen: int) -> None:
-    """Put the chosen neighbour in the place of the ring's vertex, and take two triangles out."""
+    """Replace the ring's vertex by the chosen neighbour, and remove two triangles."""
     h = ring.out[chosen]
     mesh.is_left[h // RECORD] = mesh.is_left[mesh.edges[h + TWIN] // RECORD] = False
     v = ring.first[chosen]
@@ -80,7 +80,7 @@ def join_fans(mesh: Mesh, ring: Ring, chosen: int) -> None:
 
 @step
 def find_cheapest_in_fan(u: int, mesh: Mesh, enough: float) -> float:
-    """Return the least price of u's collapses, or one below `enough`; u is on no border."""
+    """Return the least price of u's collapses, or any below `enough`. u is not on a border."""
     start = mesh.start[u]
     best, h = np.inf, start
     while True:

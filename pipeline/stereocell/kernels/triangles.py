@@ -1,4 +1,4 @@
-"""Measures of single triangles, of which larger kernels are made."""
+"""Measures of single triangles, from which larger kernels are built."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ Triple = tuple[float, float, float]
 
 @part
 def doubled_area(at: Points, a: int, b: int, c: int) -> Triple:
-    """Return the normal of the triangle (a, b, c), twice its area long."""
+    """Return the normal of the triangle (a, b, c), whose length is twice the area."""
     ux, uy, uz = at[b, 0] - at[a, 0], at[b, 1] - at[a, 1], at[b, 2] - at[a, 2]
     vx, vy, vz = at[c, 0] - at[a, 0], at[c, 1] - at[a, 1], at[c, 2] - at[a, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -42,7 +42,7 @@ def _square(x: float, y: float, z: float) -> float:
 def closest(
     px: float, py: float, pz: float, at: Points, a: int, b: int, c: int
 ) -> tuple[float, int]:
-    """Return the squared distance of a point from the triangle (a, b, c), and the part nearest.
+    """Return the squared distance of a point from the triangle (a, b, c), and the nearest part.
 
     The part is 0, 1, 2 for the corners a, b, c; 3, 4, 5 for the sides ab, bc, ca; 6 for the inside.
 

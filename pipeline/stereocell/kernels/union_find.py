@@ -1,7 +1,7 @@
-"""Connected components of anything that is numbered: by links between pairs of numbers.
+"""Connected components of numbered things, by links between pairs of numbers.
 
-For each number, `parent` holds a lower number of the same component, or the number itself where it
-is the component's first. Label maps of voxels are made by cc3d instead.
+For each number, `parent` holds a lower number of the same component, or the number itself if it is
+the first of its component. Label maps of voxels are made by cc3d instead.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ Ints = NDArray[np.int32]
 
 @part
 def find_first_of(parent: Ints, number: int) -> int:
-    """Return the first number of the component, and shorten the way to it."""
+    """Return the first number of the component, and shorten the path to it."""
     while parent[number] != number:
         parent[number] = parent[parent[number]]
         number = parent[number]
@@ -33,7 +33,7 @@ def link(parent: Ints, a: int, b: int) -> None:
 
 @part
 def number_components(parent: Ints) -> tuple[Ints, int]:
-    """Return the component of each number, int32 (n,), counted by their first numbers; how many."""
+    """Return the component of each number, int32 (n,), ordered by first numbers, and the count."""
     labels, count = np.empty(len(parent), np.int32), 0
     for number in range(len(parent)):
         first = find_first_of(parent, number)
@@ -47,7 +47,7 @@ def number_components(parent: Ints) -> tuple[Ints, int]:
 
 @kernel
 def label_pairs(one: NDArray[np.int64], two: NDArray[np.int64], size: int) -> tuple[Ints, int]:
-    """Return the component of each of `size` numbers, and how many there are, by linked pairs."""
+    """Return the component of each of `size` numbers, given linked pairs, and the count."""
     parent = np.arange(size).astype(np.int32)
     for i in range(len(one)):
         link(parent, one[i], two[i])

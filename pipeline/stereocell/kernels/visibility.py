@@ -1,11 +1,11 @@
-"""Ambient visibility of points: rays through the voxels of a solid, point by point."""
+"""Ambient visibility of points, by rays through the voxels of a solid."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stereocell.kernels.compiled import kernel
 
-LOWEST = np.float32(0.05)  # least cosine of a ray to the normal
+LOWEST = np.float32(0.05)  # least cosine between a ray and the normal
 
 
 @kernel
@@ -18,13 +18,15 @@ def cast_rays(
     distances: NDArray[np.float32],
     weights: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Return the share of the sky that each point sees, float32 (n,), 0..1.
+    """Return the visible share of the sky at each point, float32 (n,), 0..1.
 
-    solid      bool (z, y, x)
-    start      (n, 3), where rays start, in voxels (z, y, x), + .5: truncated, the nearest one
-    up         (n, 3), unit normals (z, y, x)
-    directions (k, 3), unit vectors; strides (k, 3), the same in voxels a um
-    distances  (s,), um, at which a ray is looked at; weights (s,), what a hit there counts
+    solid       bool (z, y, x)
+    start       (n, 3), starts of rays in voxels (z, y, x) plus .5, so that truncation rounds
+    up          (n, 3), unit normals (z, y, x)
+    directions  (k, 3), unit vectors
+    strides     (k, 3), the directions in voxels per um
+    distances   (s,), um, at which a ray is examined
+    weights     (s,), darkening by a hit at each distance
     """
     nz, ny, nx = solid.shape
     share = np.empty(len(start), np.float32)

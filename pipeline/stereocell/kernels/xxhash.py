@@ -1,7 +1,7 @@
 """XXH32, the checksum of LZ4's formats, over bytes.
 
-N5 stores it with a seed. Of the required packages only imagecodecs computes XXH32, inside frames of
-LZ4 and without a seed. The package xxhash would be one more compiled requirement for these lines.
+N5 stores this checksum with a seed. Among the required packages only imagecodecs computes XXH32,
+inside frames of LZ4 and without a seed. The package xxhash would add one more compiled requirement.
 
 Reference: https://github.com/Cyan4973/xxHash/blob/dev/doc/xxhash_spec.md, "XXH32 Algorithm"
 """
@@ -29,7 +29,7 @@ def _mixed(lane: Any, word: Any) -> Any:
 
 @kernel
 def hash_words(words: NDArray[np.uint32], rest: NDArray[np.uint8], seed: int) -> int:
-    """Return the hash of some little-endian words, and of up to 3 bytes behind them."""
+    """Return the hash of little-endian words and of up to 3 bytes after them."""
     count, size = len(words), 4 * len(words) + len(rest)
     a, b = (seed + _P1 + _P2) & _MASK, (seed + _P2) & _MASK
     c, d = seed & _MASK, (seed - _P1) & _MASK
@@ -51,7 +51,7 @@ def hash_words(words: NDArray[np.uint32], rest: NDArray[np.uint8], seed: int) ->
 
 
 def xxh32(data: bytes, seed: int = 0) -> int:
-    """Return the hash of some bytes, below 2 ** 32."""
+    """Return the hash of bytes, less than 2 ** 32."""
     whole = len(data) // 4 * 4
     words = np.frombuffer(data, "<u4", whole // 4)
     return int(hash_words(words, np.frombuffer(data, np.uint8, offset=whole), seed))

@@ -1,1 +1,4 @@
-"""Triangle meshes: simplification, exact validity, fairing, distances."""
+"""Triangle meshes: simplification, exact validity, volumes, distances.
+
+A body is a connected component of a mesh.
+"""

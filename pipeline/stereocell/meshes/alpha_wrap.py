@@ -1,7 +1,7 @@
-"""The first paper's wrap, over triangles instead of voxels: much slower, kept for comparison.
+"""The first paper's alpha wrap of triangles, much slower than that of voxels; for comparison.
 
-An alpha wrap, as MeshLab has CGAL's, closes each tile by itself, so that its mesh meets no
-neighbour's: it is for builds of a single tile.
+MeshLab offers the alpha wrap of CGAL. It closes each tile by itself, so its mesh does not meet the
+meshes of neighbours. So it is only for builds of a single tile.
 
 References
 C. Portaneri, M. Rouxel-Labbe, M. Hemmer, D. Cohen-Steiner & P. Alliez, "Alpha wrapping with an
@@ -19,7 +19,7 @@ LIBRARY = "pymeshlab"
 
 
 def find_wrapper() -> str:
-    """Return the version of the wrapping package. Raises UsageError if it isn't installed."""
+    """Return the version of the wrapping package. Raises UsageError if it is not installed."""
     _import_wrapper()
     return version_of(LIBRARY)
 
@@ -28,7 +28,7 @@ def alpha_wrap(mesh: Mesh, alpha_um: float, offset_um: float) -> Mesh:
     """Return a closed mesh `offset_um` outside the triangles.
 
     mesh       positions float32 (n, 3) in um, triangles uint32 (m, 3)
-    alpha_um   smaller gaps are bridged
+    alpha_um   size of the gaps that are closed
     offset_um  distance of the result from the triangles
     """
     pymeshlab = _import_wrapper()

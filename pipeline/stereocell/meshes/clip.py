@@ -1,4 +1,4 @@
-"""Cut a surface off at the faces of a box, where it stays open."""
+"""Cut a surface off at the faces of a box, and leave it open there."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -15,9 +15,9 @@ _VALUES = [field.name for field in fields(Mesh) if field.name not in ("positions
 
 
 def clip_mesh(mesh: Mesh, low: Sequence[float], high: Sequence[float]) -> Mesh:
-    """Return what lies inside a box; values at new vertices lie between those of their edge's ends.
+    """Return the part of a mesh inside a box. Values at new vertices are interpolated on edges.
 
-    low, high  corners (x, y, z), um; infinite: not cut there
+    low, high  corners (x, y, z), um; infinite: no cut on that side
     """
     surface = vtkPolyData()
     points = vtkPoints()
@@ -54,7 +54,7 @@ def _cut(surface: vtkPolyData, axis: int, end: float, facing: float) -> vtkPolyD
     cut = vtkClipPolyData()
     cut.SetInputData(surface)
     cut.SetClipFunction(plane)
-    triangles = vtkTriangleFilter()  # a cut triangle may have four corners
+    triangles = vtkTriangleFilter()  # cutting a triangle may leave a quadrilateral
     triangles.SetInputConnection(cut.GetOutputPort())
     triangles.PassLinesOff()
     triangles.PassVertsOff()

@@ -1,4 +1,4 @@
-"""Distances between two meshes, measured both ways."""
+"""Distances between two meshes, measured in both directions."""
 
 from copy import copy
 
@@ -10,19 +10,22 @@ from stereocell.kernels.nearest import find_nearest, find_sides
 from stereocell.meshes.triangle_grid import make_grid
 from stereocell.model.mesh import Mesh, Spread
 
-PERCENTILE = 99.0  # percent; a sliver that vanishes, less than 1 % of the area, does not count
-VERTICES = 50_000  # largest number of a mesh's vertices that are asked for the largest distance
-NEVER = np.int32(np.iinfo(np.int32).max)  # more than all points of a mesh's lifetime
-ON_UM = 1e-6  # um; points this close count as on the surface: float32 rounds
+# Percent of the area; a sliver with less than 1 % of it may vanish without notice
+PERCENTILE = 99.0
+VERTICES = 50_000  # largest number of vertices that are measured for the largest distance
+# Larger than the number of points that a mesh is ever asked for
+NEVER = np.int32(np.iinfo(np.int32).max)
+# Um; points this close count as on the surface, because positions are rounded to float32
+ON_UM = 1e-6
 
 
 class Nearest:
-    """Distances to the nearest point of a mesh; its grid is made once.
+    """Distances to the nearest point of a mesh. The search grid is made once.
 
     points     float64 (samples, 3), um, spread evenly over the mesh's area
     vertices   float64 (n, 3), um
     triangles  int32 (m, 3)
-    twins      of its half-edges, int32 (3 m,), see `match_twins`; None: found when needed
+    twins      int32 (3 m,), twins of the half-edges, see `match_twins`; None: found when needed
     """
 
     def __init__(self, mesh: Mesh, samples: int, twins: NDArray[np.int32] | None = None) -> None:
@@ -31,14 +34,14 @@ class Nearest:
         self.triangles = np.ascontiguousarray(mesh.triangles, np.int32)
         self._twins = twins
         grid = make_grid(self._at, self.triangles)
-        # the triangles' boxes would take a third of a large unit's memory
+        # The triangles' boxes are not kept: they would take a third of a large unit's memory.
         self._cells = grid.first, grid.listed, grid.origin, grid.edge, grid.shape
         self._seen, self._tick = np.full(len(self.triangles), -1, np.int32), 0
 
     def without(self, gone: NDArray[np.bool_]) -> "Nearest":
-        """Return the same of a part of the mesh, by the same grid.
+        """Return the distances to a part of the mesh, with the same grid.
 
-        gone  bool (n,), the vertices of whole bodies that are left out, not of all
+        gone  bool (n,), vertices of whole bodies that are left out; some must remain
         """
         part = copy(self)
         is_gone = gone[self.triangles[:, 0]]
@@ -48,7 +51,7 @@ class Nearest:
         return part
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the distance in um from each of the points, float64 (n,); points (n, 3) in um."""
+        """Return the distance in um from each point, float64 (n,). points: (n, 3), um."""
         return self._find(points)[0]
 
     def nearest_triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -81,8 +84,8 @@ def measure_enclosure(source: Nearest, target: Nearest) -> float:
 def measure_spread(source: Nearest, target: Nearest) -> Spread:
     """Return the distances in um from one mesh to the other.
 
-    Mean and percentiles are over the source's area; the maximum is over its vertices too, of which
-    VERTICES are asked, evenly over their order.
+    Mean and percentiles are over the source's area. The maximum is also over its vertices, of which
+    about VERTICES are measured, spread evenly over their order.
     """
     sampled = target.distances(source.points)
     few = source.vertices[:: -(-len(source.vertices) // VERTICES)]
@@ -99,14 +102,14 @@ def spread_points(
     at         float64 (n, 3), um
     triangles  (m, 3)
 
-    The same mesh gives the same points.
+    The same mesh always gives the same points.
     """
     areas = measure_triangles(at, np.ascontiguousarray(triangles, np.int32))
     along = np.cumsum(areas)
     place = np.arange(count)
     chosen = np.searchsorted(along, (place + 0.5) / count * along[-1], side="right")
-    # inside the triangles: the R2 sequence (M. Roberts, "The unreasonable effectiveness of
-    # quasirandom sequences", 2018), folded over the diagonal
+    # Positions within triangles follow the R2 sequence, folded over the diagonal: M. Roberts, "The
+    # unreasonable effectiveness of quasirandom sequences", 2018
     u, v = (0.5 + place * 0.7548776662466927) % 1, (0.5 + place * 0.5698402909980532) % 1
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     corners = triangles[np.minimum(chosen, len(triangles) - 1)]

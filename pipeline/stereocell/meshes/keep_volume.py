@@ -1,19 +1,25 @@
-"""Give each body of a simplified mesh the volume that it had: vertices move along their normals.
+"""Restore the volume of each body of a simplified mesh: vertices move along their normals.
 
-Simplification keeps a part of the fine surface's vertices, and flat triangles between the vertices
-of a round body lie inside of it: at coarse levels bodies would lose a third of their volume. Here
-all vertices of a body move outward by one distance, until its volume is the fine one's, or the
-distance is at its bound. Towards a cut the move fades out, so that vertices of the cut stay bit by
-bit and no other reaches it. Vertices of caps, the flat ends of bodies, move within their planes. No
-vertex leaves the tile's box, or the fine mesh's where the caps of the data's end lie outside of
-that. Where bodies come to cross each other or themselves, the vertices there move half as far with
-every try, at last not at all, and the body's others farther for it, unless these are FEW; a body
-that still crosses after all TRIES stays. Where MANY cross, as in noise, of which walls are nearer
-than the move is long, these bodies stay at once: tries would cost more than all the rest of a
-level.
+Simplification keeps some of the fine surface's vertices. Flat triangles between the vertices of a
+round body lie inside of it, so coarse levels would lose a third of a body's volume. Here all
+vertices of a body move outward by one distance, until its volume is that of the fine body or the
+distance reaches its bound.
 
-Between near walls a body may have no room: it lacks volume, and textures/lod_chain.py simplifies
-the level less.
+- The move fades out towards a cut, so that vertices of the cut keep their exact position and no
+  other vertex reaches it.
+- Vertices of caps, the flat ends of bodies, move within their planes.
+- No vertex leaves the tile's box, or the box of the fine mesh where caps at the end of the data lie
+  outside of the tile's.
+
+Moves may make bodies cross each other or themselves. Vertices there move half as far with each try,
+and finally not at all. The other vertices of the body move farther to make up for them, unless
+fewer than FEW are held back. A body that still crosses after TRIES tries does not move at all. If
+MANY vertices cross in the first try, these bodies stop moving at once. Noise is an example, where
+walls are nearer to each other than the moves are long: more tries would cost more than the rest of
+the level.
+
+A body between near walls may have no space to grow. It then lacks volume, and
+textures/lod_chain.py simplifies it less.
 """
 
 import itertools
@@ -33,15 +39,17 @@ from stereocell.meshes.validity import (
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-STEPS = 4  # Newton's; volume is a cubic function of the distance
-FADE = 1.25  # moves are whole from this many largest moves from a cut on
-TRIES = 12  # most tries with shorter moves of defects' vertices, before a body with defects stays
-SHORTENING = 0.5  # factor by which each try shortens the moves of such vertices
-MIN_WAY = 0.05  # share of the way below which they stay
+STEPS = 4  # number of Newton steps; volume is a cubic function of the distance
+FADE = 1.25  # distance from a cut, in largest moves, from which vertices move by the whole distance
+TRIES = 12  # number of tries with shorter moves, after which a body with defects does not move
+SHORTENING = 0.5  # factor on the moves of vertices in defects, in each try
+MIN_WAY = 0.05  # share of the whole move below which a vertex in a defect does not move
 MAX_VOLUME_ERROR = 0.03  # largest error of a body's volume, as a share of that volume
 
-FEW = 0.02  # share of a body's vertices that may stay without others moving farther for them
-MANY = 0.05  # share of a level's vertices in defects of its first try, and their number
+FEW = 0.02  # share of a body's vertices; if fewer are held back, others do not move farther
+# If more than this share and more than this number of a level's vertices are in defects after the
+# first try, all bodies with defects stop moving
+MANY = 0.05
 COSTLY = 10_000
 
 Points = NDArray[np.float64]
@@ -49,14 +57,14 @@ Box = tuple[Points, Points]  # least and largest corner, (x, y, z), um
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """A level that has got its volumes back, as far as that goes.
+class RestoredLevel:
+    """A level whose bodies have their volumes back, as far as possible.
 
-    defects  those that are left
-    lacks    bool (n,), vertices of bodies whose volume is still off by more than MAX_VOLUME_ERROR;
-             none is named where MANY cross
-    moves    float64 (n, 3), of the vertices
-    share    float64 (n,), of the whole move, by which each vertex moves
+    defects  remaining defects
+    lacks    bool (n,), vertices of bodies whose volume is off by more than MAX_VOLUME_ERROR; all
+             False if MANY vertices crossed
+    moves    float64 (n, 3), moves of the vertices
+    share    float64 (n,), share of the whole move that each vertex makes
     """
 
     mesh: Mesh
@@ -67,29 +75,29 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class Earlier:
-    """A level that got its volumes, of which other bodies were simplified otherwise since.
+class EarlierLevel:
+    """A level with its volumes, some bodies of which have been simplified differently since.
 
-    vertices  int64 (n,), the number that each vertex has in the fine mesh, ascending
-    changed   bool (k,), vertices of the new level of those other bodies
+    vertices  int64 (n,), index of each vertex in the fine mesh, rising
+    changed   bool (k,), vertices of the new level that belong to bodies that changed
     """
 
-    kept: Kept
+    kept: RestoredLevel
     vertices: NDArray[np.int64]
     changed: NDArray[np.bool_]
 
     @property
     def at_fault(self) -> NDArray[np.int64]:
-        """Return the vertices of its defects, int64 (n,), numbered as in the fine mesh."""
+        """Return the vertices of the level's defects, int64 (n,), as indices in the fine mesh."""
         return self.vertices[self.kept.defects.vertices(self.kept.mesh.triangles)]
 
 
 class FineVolumes:
-    """The volumes of a fine mesh's bodies, for levels of which each vertex is one of it.
+    """The volumes of a fine mesh's bodies, for levels whose vertices are a part of its vertices.
 
     planes    the cut planes
     box       of the tile; None: vertices may move anywhere
-    topology  of the mesh; None: it is found
+    topology  of the mesh; None: it is computed
     caps      planes of caps, which stay flat
     """
 
@@ -131,14 +139,14 @@ class FineVolumes:
         *,
         max_move_um: float,
         topology: Topology | None = None,
-        earlier: Earlier | None = None,
-    ) -> Kept:
-        """Return a level with the fine bodies' volumes.
+        earlier: EarlierLevel | None = None,
+    ) -> RestoredLevel:
+        """Return a level with the volumes of the fine bodies.
 
-        vertices     int64 (n,), the number that each vertex has in the fine mesh
+        vertices     int64 (n,), index of each vertex in the fine mesh
         max_move_um  largest distance of a move
-        topology     of the level; None: it is found
-        earlier      what was found already, of all bodies but those that have changed
+        topology     of the level; None: it is computed
+        earlier      an earlier result, valid for all bodies that have not changed
         """
         planes = self._planes
         topology = topology or find_topology(mesh.triangles, len(mesh.positions))
@@ -153,7 +161,7 @@ class FineVolumes:
             same = np.flatnonzero(~earlier.changed)
             place = np.searchsorted(earlier.vertices, vertices[same])
             share[same] = earlier.kept.share[place]
-            # what was at fault is told of again
+            # Triangles in earlier defects are checked again.
             was_faulty = np.isin(vertices, earlier.at_fault)
             fresh = np.asarray((earlier.changed | was_faulty)[triangles].any(axis=1))
         moves = self._find_moves(start, triangles, (label, count), wanted, share, max_move_um)
@@ -161,11 +169,12 @@ class FineVolumes:
             moves[same] = earlier.kept.moves[place]
         placed: Mesh | None = None
         faulty, are_many = np.zeros(0, np.int64), False
-        for number in itertools.count():  # from TRIES on a body at least stays each time
-            # bit by bit where nothing moves: a sum would lose the sign of a zero
+        # After TRIES, at least one more body stops moving each time
+        for number in itertools.count():
+            # A vertex that does not move stays bit by bit: a sum would lose the sign of a zero.
             positions = np.where(moves == 0, mesh.positions, (start + moves).astype(np.float32))
             if placed is not None:
-                # pairs that stand where they were found sound need not be looked at again
+                # Only triangles that moved, or were in a defect, are checked again.
                 other = (positions != placed.positions).any(axis=1)
                 other[faulty] = True
                 fresh = other[mesh.triangles].any(axis=1)
@@ -190,7 +199,7 @@ class FineVolumes:
         assert placed is not None
         missing = wanted - self._measure(start + moves, triangles, label, count)
         lacks = (np.abs(missing) > MAX_VOLUME_ERROR * self._solid[of_fine]) & (not are_many)
-        return Kept(placed, defects, lacks[label], moves, share)
+        return RestoredLevel(placed, defects, lacks[label], moves, share)
 
     def _find_moves(
         self,
@@ -201,11 +210,12 @@ class FineVolumes:
         share: Points,
         max_move_um: float,
     ) -> Points:
-        """Return how vertices move, (n, 3), so that each body gets its volume.
+        """Return the moves of the vertices, (n, 3), that give each body its volume.
 
-        bodies  of each vertex, and their number
-        wanted  volumes
-        share   of the move that each vertex makes
+        start   float64 (n, 3), positions before the move
+        bodies  body of each vertex, and the number of bodies
+        wanted  volumes of the bodies
+        share   share of the move that each vertex makes
         """
         label, count = bodies
         at, moved = start.copy(), np.zeros(count)
@@ -224,7 +234,7 @@ class FineVolumes:
 
 
 def _fade(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...], reach_um: float) -> Points:
-    """Return the share of the move that each vertex makes (n,): 0 in a cut, 1 far from it."""
+    """Return the share of the move that each vertex makes (n,): 0 at a cut, 1 far from it."""
     share = np.ones(len(mesh.positions))
     for column, value in planes:
         away = np.abs(mesh.positions[:, column].astype(np.float64) - value)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import Bounds, require_bounds, setting
 
-MAX_ERROR = 1e6  # finest spacings; a surface of a million of them is simplified to its box
-MAX_SAMPLES = 10_000_000  # points; their distances take a gigabyte
+MAX_ERROR = 1e6  # in finest spacings; an error of a million spacings leaves only a surface's box
+MAX_SAMPLES = 10_000_000  # number of points; their distances take a gigabyte
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +18,11 @@ class LodOptions:
 
     errors: tuple[float, ...] = setting(
         (0.1, 0.35, 1.1, 4.0),
-        "aim of simplifying to lod0, lod1, ..., in finest spacings; what comes out is measured",
+        "largest errors of lod0, lod1, ... in finest spacings; actual distances are measured",
         bounds=Bounds(0, MAX_ERROR),
     )
     samples: int = setting(
-        1000, "points at which distances are measured, each way", bounds=Bounds(1, MAX_SAMPLES)
+        1000, "points for measuring distances, in each direction", bounds=Bounds(1, MAX_SAMPLES)
     )
 
     def __post_init__(self) -> None:

@@ -1,11 +1,13 @@
-"""Thin out the vertices of a surface in the planes where tiles meet: alike on both sides.
+"""Thin out a surface's vertices in the planes where tiles meet, in the same way on both sides.
 
-Simplification may not touch these vertices, since the neighbour has them too, bit by bit; so all
-levels have the same, and a tile fits its neighbour at any pair of levels. On small tiles they were
-three of five vertices of the coarsest level. Here both tiles take the same ones out, before levels
-are made: each extracts the two layers of cells beside the plane, its own and the neighbour's, and
-decides on these alone. They are the same voxels by the same arithmetic, so the answer is the same.
-What moves stays inside the two layers, so surfaces that come to cross are found there, too.
+Simplification must not touch these vertices, because the neighbour has them too, bit by bit. So all
+levels share them, and a tile fits its neighbour at any pair of levels. On small tiles they made up
+three of five vertices of the coarsest level.
+
+Here both tiles remove the same vertices before levels are made. Each tile extracts the two layers
+of cells beside the plane, its own and the neighbour's, and decides on these alone. Voxels and
+arithmetic are the same, so the decision is the same. Moves stay inside the two layers, so surfaces
+that cross after a move are found there, too.
 """
 
 from dataclasses import replace
@@ -21,8 +23,11 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.tiling import Box
 
-SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle at the plane, or a third of those there
-TRIES = 4  # most tries that keep vertices near crossings, before all of the plane stay
+# Degrees; smallest allowed angle of a triangle at the plane. Triangles that are sharper already may
+# have a third of their smallest angle.
+SHARPEST_DEG = 12.0
+# Number of tries that keep vertices near crossings, before all vertices of the plane stay
+TRIES = 4
 
 
 def thin_rims(
@@ -30,14 +35,14 @@ def thin_rims(
 ) -> Mesh:
     """Return a tile's iso-surface with fewer vertices on its cut planes.
 
-    mesh      as `extract_surface` gives it
+    mesh      as `extract_surface` returns it
     distance  float32 (z, y, x), um; covers `lattice.window`, which reaches past the planes
-    error_um  largest distance of a vertex from the curve that is left
+    error_um  largest distance of a removed vertex from the remaining curve
     """
     target = np.arange(len(mesh.positions))
     for axis, place in lattice.cuts():
         if place in (lattice.region.start[axis], lattice.region.stop[axis] - 1):
-            continue  # no other tile follows, which could be held against these
+            continue  # no other tile follows with the same vertices
         start, stop = list(lattice.own.start), list(lattice.own.stop)
         start[axis], stop[axis] = place - 1, place + 2
         beside = Box((start[0], start[1], start[2]), (stop[0], stop[1], stop[2]))
@@ -59,7 +64,7 @@ def thin_rims(
 
 
 def _plane_um(lattice: Lattice, axis: int, place: int) -> float:
-    """Return where a plane lies along its axis of the world."""
+    """Return the position of a plane along its axis of the world, um."""
     planes = zip(lattice.cuts(), lattice.cut_planes(), strict=True)
     return next(value for cut, (_, value) in planes if cut == (axis, place))
 
@@ -67,10 +72,12 @@ def _plane_um(lattice: Lattice, axis: int, place: int) -> float:
 def _decide(
     layers: Mesh, axis: int, value: np.float32, planes: NDArray[np.uint8], error_um: float
 ) -> tuple[NDArray[np.void], NDArray[np.void]]:
-    """Return the keys of vertices that move, and of those onto which, (k,) each.
+    """Return the keys of vertices that move, and of those onto which they move, (k,) each.
 
+    axis    of the plane, in (x, y, z)
+    value   position of the plane along the axis, um
     planes  uint8 (n,), a bit for each cut plane that a vertex lies in: where two planes meet, a
-            triangle would come to lie in the other one
+            triangle must not come to lie in the other plane
     """
     at = layers.positions.astype(np.float64)
     triangles = np.ascontiguousarray(layers.triangles, np.int32)
@@ -84,7 +91,7 @@ def _decide(
         crossings = find_crossings(at, changed[is_left].astype(np.int64))
         if not len(crossings):
             break
-        # all that was one triangle with a corner of theirs before
+        # Keep all vertices of triangles that touched a vertex now merged into a crossing one.
         at_fault = np.isin(target, changed[is_left][crossings.ravel()])
         stays[triangles[at_fault[triangles].any(axis=1)]] = True
         if number + 1 == TRIES:

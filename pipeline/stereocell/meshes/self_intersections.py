@@ -1,10 +1,10 @@
-"""Self-intersections of a mesh: pairs of triangles that share a point beside common corners.
+"""Self-intersections of a mesh: pairs of triangles that share a point away from common corners.
 
-All decisions are signs of determinants, exact for float64 coordinates, as libigl has them
-(Shewchuk). A grid finds the pairs that are close, and floats, which know their error, leave out
-those that surely don't meet (kernels/crossings.py). Of the few that are left, pairs without a
-common corner go to libigl's test (Guigue & Devillers). Pairs with a common corner are tested here:
-libigl decides those by tolerances, and misses edges that lie on each other.
+All decisions are exact signs of determinants of float64 coordinates (Shewchuk), as in libigl. A
+grid finds the pairs that are close. Floating-point arithmetic with bounds of its error removes the
+pairs that certainly do not meet (kernels/crossings.py). Few remain. Pairs without a common corner
+go to libigl's test (Guigue & Devillers). Pairs with a common corner are tested here, because libigl
+decides those by tolerances, and misses edges that lie on each other.
 
 References
 J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust geometric
@@ -17,10 +17,11 @@ import numpy as np
 from igl import predicates
 from numpy.typing import NDArray
 
-from stereocell.kernels.crossings import ERROR_3D, find_doubtful, find_maybe_flat, find_spread
+from stereocell.kernels.crossings import ERROR_3D, find_candidates, find_maybe_flat, find_spread
 from stereocell.meshes.triangle_grid import find_around, make_grid
 
-FEW = 20  # share of fresh triangles, one in this, under which only those around them are looked at
+# If less than one in FEW triangles is fresh, only the triangles around fresh ones are examined
+FEW = 20
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -29,12 +30,12 @@ Indices = NDArray[np.int64]
 def find_crossings(
     positions: Points, triangles: Indices, *, fresh: NDArray[np.bool_] | None = None
 ) -> Indices:
-    """Return the pairs of triangles that meet beside their common corners, int64 (n, 2), sorted.
+    """Return the pairs of triangles that meet away from common corners, int64 (n, 2), sorted.
 
     positions  float64 (n, 3)
-    triangles  int64 (m, 3), each with three different corners on no line: others have no plane,
-               and the caller leaves them out
-    fresh      bool (m,); each pair has at least one such triangle. All triangles, if not given
+    triangles  int64 (m, 3), each with three different corners that are not on a line. Other
+               triangles have no plane, and the caller must leave them out.
+    fresh      bool (m,); only pairs with a fresh triangle are returned. None: all pairs
     """
     if fresh is None:
         fresh = np.ones(len(triangles), bool)
@@ -50,7 +51,7 @@ def find_crossings(
 def _find_crossings(positions: Points, triangles: Indices, fresh: NDArray[np.bool_]) -> Indices:
     corners = np.ascontiguousarray(triangles, np.int32)
     grid = make_grid(positions, corners)
-    pairs = find_doubtful(
+    pairs = find_candidates(
         positions,
         corners,
         fresh,
@@ -70,15 +71,15 @@ def _find_crossings(positions: Points, triangles: Indices, fresh: NDArray[np.boo
 
 
 def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
-    """Return the pairs (n, 2), of those without common corners, that meet."""
+    """Return those pairs (n, 2) of triangles without common corners that meet."""
     if not len(pairs):
         return pairs
     part = np.unique(pairs)
     _, found, _ = predicates.find_self_intersections(
         positions, np.ascontiguousarray(triangles[part])
     )
-    met = part[found.reshape(-1, 2)]
-    numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, met))
+    crossing = part[found.reshape(-1, 2)]
+    numbers = (np.sort(some, axis=1) @ [len(triangles), 1] for some in (pairs, crossing))
     asked, hit = numbers
     return pairs[np.isin(asked, hit)]
 
@@ -86,8 +87,8 @@ def _apart(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
 def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
     """Return the exact sign of the volume of a, b, c, d, int32 (n,); points float64 (n, 3).
 
-    Floats decide where the determinant is larger than its error can be (bound A of Shewchuk's
-    orient3d), exact arithmetic elsewhere: those are few, and each call of it starts threads.
+    Floats decide if the determinant exceeds its largest error (bound A of Shewchuk's orient3d).
+    Exact arithmetic decides the others, which are few: each call of it starts threads.
     """
     u, v, w = a - d, b - d, c - d
     first, second = (
@@ -106,7 +107,7 @@ def orient_3d(a: Points, b: Points, c: Points, d: Points) -> NDArray[np.int32]:
 
 def orient_2d(a: Points, b: Points, c: Points) -> NDArray[np.int32]:
     """Return the exact sign of the area of a, b, c, int32 (n,); points float64 (n, 2)."""
-    # libigl takes arrays in 3D only: a tetrahedron over the triangle has the same sign
+    # libigl takes points in 3D only. A tetrahedron over the triangle has the same sign.
     a, b, c = (np.pad(x, ((0, 0), (0, 1))) for x in (a, b, c))
     return orient_3d(a, b, c, np.broadcast_to([0.0, 0.0, -1.0], (len(a), 3)))
 
@@ -114,7 +115,7 @@ def orient_2d(a: Points, b: Points, c: Points) -> NDArray[np.int32]:
 def are_collinear(a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
     """Return whether a, b, c lie on a line, exactly, bool (n,); points float64 (n, 3).
 
-    They do if they lie on a line in all three projections.
+    They lie on a line if they do so in all three projections.
     """
     flat = np.ones(len(a), bool)
     for axes in ([0, 1], [1, 2], [0, 2]):
@@ -124,7 +125,7 @@ def are_collinear(a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
 
 
 def find_flat(positions: Points, triangles: Indices) -> Indices:
-    """Return the triangles (n,) whose corners lie on a line, exactly; arguments as above."""
+    """Return the triangles whose corners lie on a line, exactly (n,). See `find_crossings`."""
     maybe = np.flatnonzero(find_maybe_flat(positions, np.ascontiguousarray(triangles, np.int32)))
     return maybe[are_collinear(*positions[triangles[maybe]].transpose(1, 0, 2))]
 
@@ -135,7 +136,7 @@ def _share_corners(triangles: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 
 def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
-    """Return the pairs, of those with common corners, that meet elsewhere too."""
+    """Return those pairs of triangles with common corners that also meet elsewhere."""
     same = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
     common = same.sum(axis=(1, 2))
     by_edge = pairs[common == 2]
@@ -159,7 +160,7 @@ def _meet(positions: Points, triangles: Indices, pairs: Indices) -> Indices:
 def _folded(
     positions: Points, triangles: Indices, pairs: Indices, same: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return which pairs with a common edge overlap: coplanar, on the same side of it."""
+    """Return which pairs with a common edge are coplanar and lie on the same side of it."""
     rows = np.arange(len(pairs))
     own, other = (~same.any(axis=2)).argmax(axis=1), (~same.any(axis=1)).argmax(axis=1)
     first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
@@ -174,10 +175,10 @@ def _folded(
 
 
 def _fans_meet(v: Points, a: Points, b: Points, c: Points, d: Points) -> NDArray[np.bool_]:
-    """Return which triangles (v, a, b) and (v, c, d) meet beside v.
+    """Return which triangles (v, a, b) and (v, c, d) meet away from v.
 
-    A common point beside v lies on a ray from v. The ray leaves one triangle, through the side
-    opposite v, while it is still in the other: so that side meets the other triangle.
+    Such a point lies on a ray from v. The ray leaves one triangle, through the side opposite v,
+    while it is still within the other triangle. Therefore that side meets the other triangle.
     """
     of_a, of_b = orient_3d(v, c, d, a), orient_3d(v, c, d, b)
     meet = np.zeros(len(v), bool)
@@ -204,7 +205,7 @@ def _fans_meet(v: Points, a: Points, b: Points, c: Points, d: Points) -> NDArray
 
 
 def _side_meets(p: Points, q: Points, u: Points, v: Points, w: Points) -> NDArray[np.bool_]:
-    """Return where the segment pq, which is not in its plane, meets the triangle uvw."""
+    """Return where the segment pq meets the triangle uvw; pq must not lie in its plane."""
     straddles = orient_3d(u, v, w, p) * orient_3d(u, v, w, q) <= 0
     signs = np.stack([orient_3d(p, q, u, v), orient_3d(p, q, v, w), orient_3d(p, q, w, u)])
     outside = (signs > 0).any(axis=0) & (signs < 0).any(axis=0)
@@ -218,7 +219,7 @@ def _in_cone(v: Points, a: Points, b: Points, c: Points) -> NDArray[np.bool_]:
 
 
 def _projection(a: Points, b: Points, c: Points) -> Indices:
-    """Return, for each triangle, two axes (n, 2) on which its projection has area, exactly."""
+    """Return two axes (n, 2) for each triangle on which its projection has area, exactly."""
     axes = np.zeros((len(a), 2), np.int64)
     left = np.arange(len(a))
     for pair in ([0, 1], [1, 2], [0, 2]):

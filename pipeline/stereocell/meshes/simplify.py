@@ -1,12 +1,13 @@
-"""Simplify a mesh within an absolute error; boundary edges stay, and so does topology.
+"""Simplify a mesh within an absolute error; boundary edges and topology stay.
 
-Vertices move onto their neighbours (kernels/collapse.py): those that are left have not moved, and
-keep their normals and values. Vertices of boundary edges stay: the edges on a common plane are the
-same at every level, and neighbours at different levels still meet. A body stays one, with its
-handles, and never gets thinner than the errors allow, but bodies may come to cross each other:
-meshes/simplify_valid.py.
+Vertices move onto their neighbours (kernels/collapse.py). The vertices that are left have not
+moved, and keep their normals and values. Vertices of boundary edges stay. So the edges on a common
+plane are the same at every level, and neighbours at different levels still meet. A body keeps its
+handles and is never split, and never gets thinner than the errors allow. But bodies may cross each
+other afterwards: see meshes/simplify_valid.py.
 
-A small body may have less of an error than a large one: at half its radius a ball is a few spikes.
+The error of a small body is bounded by its size: at an error of half its radius a ball is a few
+spikes.
 """
 
 import numpy as np
@@ -14,17 +15,18 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.collapse import collapse
 from stereocell.kernels.flips import flip_edges
-from stereocell.kernels.half_edges import label_bodies, measure_boxes, renumber_corners
+from stereocell.kernels.half_edges import label_vertices, measure_boxes, renumber_corners
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-# largest error that a body may have, as a share of its box's diagonal, and of its shortest side
+# Largest error that a body may have, as a share of its box's diagonal, and of its shortest side
 OF_DIAGONAL, OF_SIDE = 0.1, 0.2
-STRAY = 3.0  # errors; largest distance of a vertex from the result
-SHARPEST_DEG = 12.0  # degrees; smallest angle of a triangle, unless those around are sharper
-FLIP_DEG = 25.0  # degrees; edges of sharper triangles flip
+STRAY = 3.0  # largest distance of a vertex from the result, in errors
+# Degrees; smallest allowed angle of a triangle, unless triangles around it are sharper already
+SHARPEST_DEG = 12.0
+FLIP_DEG = 25.0  # degrees; edges of triangles with a smaller angle are flipped
 
-Moves = NDArray[np.int32]  # (n, 2), what was done: a vertex, and the one onto which it moved
+Moves = NDArray[np.int32]  # (n, 2), collapses: a vertex, and the one onto which it moved
 NOTHING: Moves = np.zeros((0, 2), np.int32)
 
 
@@ -33,8 +35,8 @@ def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ())
 
     mesh          positions float32 (n, 3) in um, triangles uint32 (m, 3)
     max_error_um  largest root of the mean squared distance of a vertex from the planes of the
-                  triangles that it stands for; on small bodies less: see `find_errors`
-    planes        the cut planes, where the mesh may be open: no triangle comes to lie in one
+                  triangles that it represents; less on small bodies, see `find_errors`
+    planes        the cut planes, where the mesh may be open; no triangle comes to lie in one
 
     >>> v = np.array([[i % 5, i // 5, 0] for i in range(25)], np.float32)
     >>> a = np.array([i for i in range(20) if i % 5 < 4], np.uint32)
@@ -44,7 +46,7 @@ def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ())
     (32, 16)
     """
     locked = np.zeros(len(mesh.positions), bool)
-    bodies = label_bodies(np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions))
+    bodies = label_vertices(np.ascontiguousarray(mesh.triangles, np.int32), len(mesh.positions))
     errors = find_errors(mesh, max_error_um, bodies)
     corners, left, _ = simplify_part(
         mesh, mesh.triangles, errors, locked=locked, planes=planes, past=NOTHING
@@ -55,9 +57,9 @@ def simplify(mesh: Mesh, max_error_um: float, *, planes: tuple[Plane, ...] = ())
 def find_errors(
     mesh: Mesh, max_error_um: float, bodies: tuple[NDArray[np.int32], int]
 ) -> NDArray[np.float64]:
-    """Return the error that each vertex may have (n,), um: less on bodies that are small for it.
+    """Return the error that each vertex may have (n,), um; it is less on small bodies.
 
-    bodies  body of each vertex, int32 (n,), and the number of bodies: see `label_bodies`
+    bodies  body of each vertex, int32 (n,), and the number of bodies: see `label_vertices`
     """
     labels, count = bodies
     sides = measure_boxes(mesh.positions.astype(np.float64), labels, count)
@@ -75,16 +77,16 @@ def simplify_part(
     caps: tuple[Plane, ...] = (),
     past: Moves,
 ) -> tuple[NDArray[np.uint32], NDArray[np.bool_], Moves]:
-    """Return the triangles of some whole bodies simplified, uint32 (m, 3), and which are left.
-
-    And the moves that did it.
+    """Simplify the triangles of some whole bodies.
 
     triangles  uint32 (m, 3), by the mesh's vertices
     errors     float64 (n,), see `find_errors`
     locked     bool (n,), vertices that stay
     planes     the cut planes
     caps       planes of caps, which stay flat
-    past       the bodies' moves before more vertices were locked, made again but around these
+    past       earlier moves of these bodies, with fewer locked vertices; they are repeated except
+               around the newly locked ones
+    result     triangles uint32 (m, 3), a mask (m,) of those that are left, and the moves
     """
     used, own = renumber(triangles, len(mesh.positions))
     if not len(used):
@@ -113,7 +115,7 @@ def simplify_part(
 
 
 def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> NDArray[np.uint8]:
-    """Return a bit for each plane that a vertex lies in, uint8 (n,).
+    """Return a bit for each plane that a vertex lies in, uint8 (n,), exactly.
 
     positions  float32 (n, 3), (x, y, z), um
     """
@@ -126,7 +128,7 @@ def find_planes(positions: NDArray[np.float32], planes: tuple[Plane, ...]) -> ND
 def renumber(
     triangles: NDArray[np.uint32], vertices: int
 ) -> tuple[NDArray[np.int64], NDArray[np.uint32]]:
-    """Return the used vertices, int64 (k,), in order, and the triangles by their places there.
+    """Return the used vertices in order, int64 (k,), and the triangles by indices among them.
 
     triangles  uint32 (m, 3)
     vertices   number of vertices
@@ -135,6 +137,6 @@ def renumber(
 
 
 def compact(mesh: Mesh, triangles: NDArray[np.uint32]) -> Mesh:
-    """Return the mesh of these triangles (m, 3), with their vertices only, in the same order."""
+    """Return the mesh of some triangles (m, 3), with only their vertices, in the same order."""
     used, own = renumber(triangles, len(mesh.positions))
     return Mesh(mesh.positions[used], own, mesh.normals[used])

@@ -1,11 +1,11 @@
-"""Simplify a mesh so that it stays valid: check exactly, lock around the defects, simplify again.
+"""Simplify a mesh so that it stays valid: check exactly, lock around defects, simplify again.
 
-Simplification keeps topology and does not fold triangles over, but sees only the triangles around
-a vertex: walls that are near each other may come to cross. Around each defect the vertices of the
-given surface are locked, in a ball that grows with every try, and the bodies with defects are
-simplified again: as before, but around what is locked now. A body that still has defects after
-ROUNDS keeps the surface it had before. Where MANY of a body's vertices cross, as in a sponge, locks
-would come to nearly all of it: its error is halved, up to HALVINGS times.
+Simplification keeps the topology and does not fold triangles over. But it sees only the triangles
+around a vertex, so walls that are near each other may cross afterwards. Around each defect the
+vertices of the given surface are then locked, in a ball that grows with every try. The bodies with
+defects are simplified again, with the same moves except around newly locked vertices. A body that
+still has defects after ROUNDS keeps the surface it had before. If MANY of a body's vertices cross,
+as in a sponge, nearly all of it would be locked. Its error is halved instead, up to HALVINGS times.
 """
 
 from dataclasses import dataclass
@@ -20,26 +20,29 @@ from stereocell.meshes.validity import Defects, Topology, find_defects, find_top
 from stereocell.model.lattice import Plane
 from stereocell.model.mesh import Mesh
 
-ROUNDS = 12  # most rounds in which defective bodies are simplified again
+ROUNDS = 12  # largest number of rounds in which bodies with defects are simplified again
 GROWTH = 2.0  # factor by which the ball of locked vertices grows with each try in a place
-MANY = 0.05  # share of a body's vertices in defects, and their number
+# Share and number of a body's vertices in defects, above which its error is halved
+MANY = 0.05
 COSTLY = 10_000
 HALVINGS = 3
-AT_A_TIME = 1000  # balls; all of their vertices take much memory
-LOCKED_EVERY = 8  # every 8th vertex of a body that is inside out is locked first, then more of them
+# Number of balls that are searched together, to limit the memory for their vertices
+AT_A_TIME = 1000
+# Every 8th vertex of a body that is inside out is locked first; later more of them
+LOCKED_EVERY = 8
 
 Triangles = NDArray[np.uint32]
 
 
 @dataclass(frozen=True, slots=True)
 class Simplified:
-    """The result.
+    """A simplified mesh without defects.
 
     topology          of the mesh
-    vertices          int64 (k,), the number that each vertex has in the given mesh, ascending
-    changed           bool (k,), those of bodies that were simplified in this call
-    simplified_again  bodies
-    fallbacks         bodies that stayed as they were
+    vertices          int64 (k,), index of each vertex in the given mesh, rising
+    changed           bool (k,), vertices of bodies that were simplified in this call
+    simplified_again  number of bodies that were simplified more than once
+    fallbacks         number of bodies that kept their given surface
     """
 
     mesh: Mesh
@@ -53,19 +56,19 @@ class Simplified:
 def simplify_without_defects(
     mesh: Mesh, planes: tuple[Plane, ...], *, max_error_um: float
 ) -> Simplified:
-    """Return the mesh simplified and without defects; its boundary edges stay. See `Simplifier`."""
+    """Return the mesh simplified and without defects. Boundary edges stay. See `Simplifier`."""
     return Simplifier(mesh, planes).simplify(max_error_um)
 
 
 class Simplifier:
-    """Simplifies the bodies of a mesh, all of them and then some with another error.
+    """Simplifies all bodies of a mesh, and later some of them with another error.
 
     mesh      positions float32 (n, 3) in um, triangles uint32 (m, 3)
     planes    the cut planes, where the mesh may be open
-    topology  of the mesh; None: it is found
+    topology  of the mesh; None: it is computed
     caps      planes of caps, which stay flat
 
-    A mesh that has defects itself keeps the bodies with defects.
+    Bodies with defects in the given mesh stay as they are.
     """
 
     def __init__(
@@ -79,20 +82,21 @@ class Simplifier:
         self._mesh, self._planes, self._caps = mesh, planes, caps
         self._bodies = (topology or find_topology(mesh.triangles, vertices)).bodies
         self._body_of = self._bodies[0][mesh.triangles[:, 0]]
-        # of the given triangles: their corners now, and which are left
+        # For each given triangle, its present corners, and whether it is left
         self._corners, self._left = mesh.triangles.copy(), np.ones(len(mesh.triangles), bool)
         self._moves = NOTHING
         self._errors = np.zeros(vertices)
-        self._tries = np.zeros(vertices, np.int8)  # a vertex that was locked once stays
+        # Number of locks at each vertex; a vertex with one stays
+        self._tries = np.zeros(vertices, np.int8)
         self._faulty = np.zeros(vertices, bool)  # vertices of the last draft's defects
         self._redone, self._kept = np.zeros((2, self._bodies[1]), bool)
 
     def simplify(self, max_error_um: float, bodies: NDArray[np.bool_] | None = None) -> Simplified:
-        """Return the mesh simplified and without defects; its boundary edges stay.
+        """Return the mesh simplified and without defects. Boundary edges stay.
 
         max_error_um  see `simplify`
-        bodies        bool (b,), those that are simplified; the others are as in the call before,
-                      unless these come to cross them. None: all
+        bodies        bool (b,), the bodies that are simplified; None: all. The others stay as after
+                      the last call, unless simplified ones cross them.
         """
         mesh, (body, count) = self._mesh, self._bodies
         chosen = np.ones(count, bool) if bodies is None else bodies
@@ -121,12 +125,12 @@ class Simplifier:
                 break
             many = worst & (hits > np.maximum(MANY * size, COSTLY))
             ended = (worst & (rounds == ROUNDS)) | (many & (halvings == HALVINGS))
-            # what crosses as it was given can't be mended
+            # Crossings of given triangles cannot be repaired by simplifying less.
             given = (self._corners == mesh.triangles).all(axis=1)[self._left]
             as_given = defects.crossings[given[defects.crossings].all(axis=1)]
             ended[body[used[own[as_given, 0]]]] = True
             ended &= worst
-            # what was found sound in the draft before, and is there still, need not be looked at
+            # Triangles that passed the last check and have not changed are not checked again.
             fresh = self._are_faulty()
             if ended.any():
                 self._kept |= ended
@@ -139,12 +143,12 @@ class Simplifier:
                 fresh |= self._simplify_again(chosen)
             else:
                 chosen = worst
-                # few places are asked for: a balanced tree takes three times as long to make
+                # Few places are looked up, and a balanced tree takes three times as long to build.
                 tree = tree or cKDTree(mesh.positions, balanced_tree=False, compact_nodes=False)
                 self._tries[_around(tree, draft, defects, self._tries)] += 1
                 turned = body[used[own[defects.inside_out, 0]]]
                 self._tries[_some_of(body, turned, max(1, LOCKED_EVERY >> rounds))] += 1
-                fresh |= self._simplify_again(chosen, but_around_locks=True)
+                fresh |= self._simplify_again(chosen, repeats_moves=True)
                 rounds += 1
             self._redone |= chosen
             changed |= chosen
@@ -152,15 +156,15 @@ class Simplifier:
         return Simplified(draft, found, used, changed[body[used]], again, fallbacks)
 
     def _are_faulty(self) -> NDArray[np.bool_]:
-        """Return which of all triangles touch a defect of the last draft (m,)."""
+        """Return which of all triangles touch a defect of the last draft, bool (m,)."""
         return np.asarray(self._faulty[self._corners].any(axis=1))
 
     def _simplify_again(
-        self, chosen: NDArray[np.bool_], *, but_around_locks: bool = False
+        self, chosen: NDArray[np.bool_], *, repeats_moves: bool = False
     ) -> NDArray[np.bool_]:
-        """Simplify the chosen bodies (b,); return which of all triangles are other now (m,).
+        """Simplify the chosen bodies (b,); return which of all triangles have changed (m,).
 
-        but_around_locks  as they were simplified before, but for what is locked now
+        but_around_locks  whether earlier moves are repeated except around newly locked vertices
         """
         part = self._mesh.triangles[chosen[self._body_of]]
         past = self._moves[chosen[self._bodies[0][self._moves[:, 0]]]]
@@ -171,12 +175,12 @@ class Simplifier:
             locked=self._tries > 0,
             planes=self._planes,
             caps=self._caps,
-            past=past if but_around_locks else NOTHING,
+            past=past if repeats_moves else NOTHING,
         )
         return self._put(chosen, corners, left, moves)
 
     def _put_back(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Give the chosen bodies (b,) the triangles that they had; see above."""
+        """Restore the given triangles of the chosen bodies (b,); return which have changed (m,)."""
         part = self._mesh.triangles[chosen[self._body_of]]
         return self._put(chosen, part, np.ones(len(part), bool), NOTHING)
 
@@ -197,7 +201,7 @@ class Simplifier:
 
 
 def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> NDArray[np.int64]:
-    """Return every so manieth vertex of each of the chosen bodies."""
+    """Return every `every`-th vertex of each of the chosen bodies."""
     vertices = np.flatnonzero(np.isin(body, chosen))
     vertices = vertices[np.argsort(body[vertices], kind="stable")]
     first = np.flatnonzero(np.diff(body[vertices], prepend=-1))
@@ -208,7 +212,7 @@ def _some_of(body: NDArray[np.int32], chosen: NDArray[np.int32], every: int) -> 
 def _around(
     tree: cKDTree, draft: Mesh, defects: Defects, tries: NDArray[np.int8]
 ) -> NDArray[np.int64]:
-    """Return the tree's vertices in balls around the defects; a ball grows with each try there."""
+    """Return vertices of the tree in balls around the defects. A ball grows with each try."""
     at = draft.positions.astype(np.float64)
     one, other, whole = (
         at[draft.triangles[some]]
@@ -216,7 +220,7 @@ def _around(
     )
     edges = at[np.concatenate([defects.open, defects.non_manifold_edges])]
     vertices = at[defects.non_manifold_vertices]
-    # two triangles can meet only where their boxes do
+    # Two triangles can meet only where their boxes do.
     lows = [np.maximum(one.min(axis=1), other.min(axis=1)), edges.min(axis=1), vertices]
     highs = [np.minimum(one.max(axis=1), other.max(axis=1)), edges.max(axis=1), vertices]
     lows, highs = [*lows, whole.min(axis=1)], [*highs, whole.max(axis=1)]
@@ -226,8 +230,8 @@ def _around(
     side = np.median(measure_sides(at, np.ascontiguousarray(draft.triangles, np.int32)))
     size = np.maximum(np.linalg.norm(end - start, axis=1) / 2, float(side) / 4)
     nearest = tree.query((start + end) / 2)[1]
-    # a ball for each vertex that is the nearest one, not for each defect: those may be very many;
-    # it holds that vertex at least
+    # One ball for each vertex that is nearest to a defect, not for each defect, of which there may
+    # be very many. A ball holds at least its vertex.
     places, which = np.unique(nearest, return_inverse=True)
     radius = np.zeros(len(places))
     np.maximum.at(radius, which, size * GROWTH ** tries[nearest].astype(np.float64))

@@ -1,9 +1,9 @@
-"""Bodies that a coarse level does without: fewer bodies, rather than thinner ones.
+"""Remove small bodies from coarse levels: fewer bodies, rather than thinner ones.
 
-A closed body whose box has a diagonal of less than SMALL errors goes as a whole, smallest first,
-as long as all that go have at most MAX_AREA_SHARE of the surface's area. Large bodies have less
-area for their volume, so the volume that goes is a smaller share. A body that a cut opens stays:
-both tiles would have to decide alike.
+A closed body is removed as a whole if the diagonal of its box is less than SMALL errors. The
+smallest are removed first, as long as all removed bodies have at most MAX_AREA_SHARE of the
+surface's area. Their share of the volume is smaller still, because large bodies have less area for
+their volume. A body that a cut opens stays, because both tiles would have to decide alike.
 """
 
 import numpy as np
@@ -13,15 +13,16 @@ from stereocell.kernels.half_edges import measure_areas, measure_boxes
 from stereocell.meshes.validity import Topology, find_topology
 from stereocell.model.mesh import Mesh
 
-SMALL = 4.0  # errors; at the default errors only lod3's is larger than fragments that stay
-MAX_AREA_SHARE = 0.02  # largest share of the surface's area in bodies that go
+# In errors; with the default errors, only at lod3 is this more than the size of kept fragments
+SMALL = 4.0
+MAX_AREA_SHARE = 0.02  # largest share of the surface's area in bodies that are removed
 
 
 class SmallBodies:
-    """The bodies of a fine surface by their sizes."""
+    """The bodies of a fine surface, sorted by size."""
 
     def __init__(self, mesh: Mesh, topology: Topology | None = None) -> None:
-        """`topology`: the mesh's; None: it is found."""
+        """Measure the bodies of a mesh. topology: the mesh's; None: it is computed."""
         topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         self._label, bodies = topology.bodies
         at = mesh.positions.astype(np.float64)
@@ -31,9 +32,9 @@ class SmallBodies:
         self._diagonals = np.linalg.norm(measure_boxes(at, self._label, bodies), axis=1)
 
     def find(self, error_um: float) -> NDArray[np.bool_]:
-        """Return which vertices of the surface belong to bodies that go, bool (n,).
+        """Return which vertices of the surface belong to removed bodies, bool (n,).
 
-        error_um  of the level
+        error_um  error of the level
         """
         small = (self._diagonals < SMALL * error_um) & (self._areas > 0) & ~self._is_open
         order = np.flatnonzero(small)

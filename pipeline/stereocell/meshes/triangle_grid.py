@@ -1,4 +1,4 @@
-"""A uniform grid over a mesh's triangles, whose cells fit them."""
+"""A uniform grid over the triangles of a mesh, with cells of a suitable size."""
 
 from dataclasses import dataclass
 
@@ -10,23 +10,24 @@ from stereocell.kernels.grid import bound_all, bound_boxes, count_entries, find_
 Points = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-EDGE = 1.5  # edge of a cell, in lengths of the median side of a triangle
-ENTRIES = 12  # cells that a triangle may lie in, on average: large ones among small ask for more
-CELLS = 16  # a triangle, at most: a mesh fills little of its box
-COARSE = 128  # cells along the longest side of a mesh, to see which triangles are near others
-MIN_CELLS, MAX_CELLS = 4096, 16_000_000  # cells, at most
+EDGE = 1.5  # edge of a cell, in median sides of a triangle
+# Largest average number of cells per triangle; large triangles lie in many small cells
+ENTRIES = 12
+CELLS = 16  # largest number of cells per triangle; a mesh fills only a small part of its box
+COARSE = 128  # cells along the longest side of a mesh, to find the triangles near others
+MIN_CELLS, MAX_CELLS = 4096, 16_000_000  # bounds of the largest number of cells
 
 
 @dataclass(frozen=True, slots=True)
 class TriangleGrid:
-    """Triangles by the cells of space that their boxes touch.
+    """Triangles listed by the cells of space that their boxes touch.
 
     low, high  float64 (m, 3), corners of the triangles' boxes
-    first      int32, place of each cell's first entry in `listed`, and one more
+    first      int32, index of each cell's first entry in `listed`, and the total
     listed     int32, triangles
     origin     float64 (3,), least corner of the grid
-    edge       of a cell
-    shape      int64 (3,), cells
+    edge       edge length of a cell
+    shape      int64 (3,), number of cells along each axis
     """
 
     low: Points
@@ -39,7 +40,7 @@ class TriangleGrid:
 
 
 def make_grid(positions: Points, triangles: Ints) -> TriangleGrid:
-    """Return the grid of a mesh of one triangle or more.
+    """Return the grid of a mesh that has at least one triangle.
 
     positions  float64 (n, 3), contiguous
     triangles  int32 (m, 3), contiguous
@@ -63,9 +64,9 @@ def make_grid(positions: Points, triangles: Ints) -> TriangleGrid:
 
 
 def find_around(positions: Points, triangles: Ints, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the triangles whose boxes may meet those of chosen ones, and these, int64 (k,).
+    """Return chosen triangles, and those whose boxes may meet theirs, int64 (k,).
 
-    chosen  bool (m,); other arguments as of `make_grid`
+    chosen  bool (m,); for other arguments see `make_grid`
     """
     low, high = bound_boxes(positions, triangles)
     origin, top = bound_all(low, high)

@@ -1,4 +1,4 @@
-"""Sweep tubes along lines of points: closed meshes with round ends cut flat."""
+"""Sweep tubes along lines of points: closed meshes with a round cross-section and flat ends."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,7 @@ SIDES = 12  # edges of a tube's cross-section
 def sweep_tubes(
     lines: Iterable[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> Mesh | None:
-    """Return the tubes of all lines as one mesh; None where no line has a length.
+    """Return the tubes of all lines as one mesh; None if no line has a length.
 
     lines  points (n, 3), and the diameter at each (n,)
     """
@@ -47,7 +47,8 @@ def _sweep(
     steps = np.diff(points, axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
     along = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
-    short = np.linalg.norm(along, axis=1) < 1e-9  # the line turns back: keep its direction
+    # The line turns back here, so it keeps its direction
+    short = np.linalg.norm(along, axis=1) < 1e-9
     along[short] = np.concatenate([steps, steps[-1:]])[short]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = _carry_across(along)
@@ -72,12 +73,12 @@ def _sweep(
 
 
 def _carry_across(along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a unit vector across the line at each point that turns as little as it can."""
+    """Return a unit vector across the line at each point, with as little twist as possible."""
     axis = np.eye(3)[np.abs(along[0]).argmin()]
     carried = []
     for direction in along:
         across = axis - (axis @ direction) * direction
-        if np.linalg.norm(across) < 1e-9:  # the line turned by a right angle towards it
+        if np.linalg.norm(across) < 1e-9:  # the line turned by a right angle towards the axis
             across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
         axis = across / np.linalg.norm(across)
         carried.append(axis)

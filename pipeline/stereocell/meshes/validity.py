@@ -1,10 +1,10 @@
 """The exact check that every mesh passes before it is written.
 
-A valid mesh is closed except where another tile follows, without a wall there. Its edges and
-vertices are 2-manifold, its triangles are wound consistently and outward, and it nowhere touches
-itself. Topology is counted. Geometry is decided by the signs of determinants, without tolerances
-(meshes/self_intersections.py). Only the winding of a whole body is the sign of a float64 sum, its
-volume.
+A valid mesh is closed, except on cut planes where another tile follows, and has no triangle in such
+a plane. Its edges and vertices are 2-manifold, its triangles are wound consistently and outward,
+and it touches itself nowhere. Topology is counted. Geometry is decided by the signs of
+determinants, without tolerances (meshes/self_intersections.py). Only the winding of a whole body is
+the sign of a float64 sum, its volume.
 """
 
 from dataclasses import dataclass, fields
@@ -17,7 +17,7 @@ from stereocell.kernels.half_edges import (
     CROWDED,
     count_fans,
     find_first,
-    label_bodies,
+    label_vertices,
     lie_within,
     match_twins,
     measure_windings,
@@ -31,14 +31,14 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Defects:
-    """The defects of a mesh; all arrays, int64, are empty for a valid one.
+    """The defects of a mesh. All arrays are int64, and empty for a valid mesh.
 
-    degenerate             triangles (n,) with two equal corners, or all three on a line
-    open                   edges (n, 2), by vertices, of one triangle only, that lie on no cut plane
+    degenerate             triangles (n,) with two equal corners, or with all three on a line
+    open                   edges (n, 2), by vertices, of only one triangle, that lie on no cut plane
     non_manifold_edges     edges (n, 2) of more than two triangles, or of two that are wound alike
-    non_manifold_vertices  vertices (n,) whose triangles make more than one fan
+    non_manifold_vertices  vertices (n,) whose triangles form more than one fan
     inside_out             one triangle (n,) of each body that is wound inwards
-    crossings              pairs (n, 2) of triangles that meet beside their common corners
+    crossings              pairs (n, 2) of triangles that meet away from their common corners
     walls                  triangles (n,) in a cut plane, where the neighbour may have one as well
     """
 
@@ -52,16 +52,16 @@ class Defects:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return the number of defects of each kind."""
+        """The number of defects of each kind."""
         return {field.name: len(getattr(self, field.name)) for field in fields(self)}
 
     @property
     def total(self) -> int:
-        """Return the number of all defects."""
+        """The number of all defects."""
         return sum(self.counts.values())
 
     def vertices(self, triangles: NDArray[np.integer]) -> Indices:
-        """Return the vertices of all defects, int64 (n,), sorted; triangles (m, 3): the mesh's."""
+        """Return the vertices of all defects, int64 (n,), sorted. triangles: the mesh's (m, 3)."""
         whole = (self.degenerate, self.inside_out, self.walls, self.crossings.ravel())
         at = np.concatenate(whole)
         corners = triangles[at].astype(np.int64).ravel()
@@ -76,13 +76,13 @@ class Defects:
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """The parts of the check that don't depend on where vertices are; `find_topology` makes it.
+    """The parts of the check that do not depend on positions, from `find_topology`.
 
     corners                int32 (m, 3), the triangles
     twins                  int32 (3 m,), see `match_twins`
-    rim, crowded           directed edges (n, 2) without a triangle beyond, and with several
+    rim, crowded           directed edges (n, 2) with no other triangle, and with several others
     non_manifold_vertices  (n,)
-    bodies                 the number of each vertex's body, and how many there are
+    bodies                 body of each vertex, and the number of bodies
     """
 
     corners: NDArray[np.int32]
@@ -94,7 +94,7 @@ class Topology:
 
 
 def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
-    """Return how triangles (m, 3) of so many vertices hang together."""
+    """Return how triangles (m, 3) are connected. vertices: their number."""
     corners = np.ascontiguousarray(triangles, np.int32)
     twins = match_twins(corners, vertices)
     return Topology(
@@ -103,7 +103,7 @@ def find_topology(triangles: NDArray[np.integer], vertices: int) -> Topology:
         _ends_of(corners.astype(np.int64), np.flatnonzero(twins == BORDER)),
         _ends_of(corners.astype(np.int64), np.flatnonzero(twins == CROWDED)),
         np.flatnonzero(count_fans(corners, twins, vertices)[1] < 0),
-        label_bodies(corners, vertices),
+        label_vertices(corners, vertices),
     )
 
 
@@ -114,15 +114,15 @@ def find_defects(
     fresh: NDArray[np.bool_] | None = None,
     topology: Topology | None = None,
 ) -> Defects:
-    """Return the mesh's defects; it may be open on the planes and nowhere else.
+    """Return the defects of a mesh, which may be open only on the planes.
 
     mesh      positions float32 (n, 3), triangles uint32 (m, 3)
     planes    the cut planes: axis (0 x, 1 y, 2 z) and value in um
-    fresh     bool (m,): crossings are looked for only in pairs with such a triangle; None: in all
-    topology  of the triangles, for meshes that differ in positions alone; None: it is found
+    fresh     bool (m,); only pairs with such a triangle are checked for crossings; None: all pairs
+    topology  of the triangles, for meshes that differ only in positions; None: it is computed
 
-    A body's winding is the sign of the volume that it encloses with the planes that cut it. A body
-    of negative volume is a cavity, if it lies in the box of a solid.
+    A body's winding is the sign of the volume that it encloses together with the planes that cut
+    it. A body of negative volume is a cavity if it lies in the box of a solid.
 
     >>> corners = np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> faces = np.uint32([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -153,16 +153,16 @@ def find_defects(
 
 
 def label_components(triangles: NDArray[np.integer], vertices: int) -> NDArray[np.int32]:
-    """Return the number of the connected body of each vertex, int32 (n,).
+    """Return the index of the body (connected component) of each vertex, int32 (n,).
 
     triangles  (m, 3)
     vertices   number of vertices, n
     """
-    return label_bodies(np.ascontiguousarray(triangles, np.int32), vertices)[0]
+    return label_vertices(np.ascontiguousarray(triangles, np.int32), vertices)[0]
 
 
 def border(triangles: NDArray[np.integer]) -> Indices:
-    """Return the directed boundary edges, int64 (n, 2), sorted: they have no triangle beyond.
+    """Return the directed boundary edges, int64 (n, 2), sorted: they have only one triangle.
 
     triangles  (m, 3)
     """
@@ -175,7 +175,7 @@ def border(triangles: NDArray[np.integer]) -> Indices:
 def _on_planes(
     positions: NDArray[np.float32], corners: Indices, planes: tuple[Plane, ...]
 ) -> NDArray[np.bool_]:
-    """Return which edges (n, 2) or triangles (n, 3) lie in one of the planes, bit by bit."""
+    """Return which edges (n, 2) or triangles (n, 3) lie exactly in one of the planes."""
     on = np.zeros(len(corners), bool)
     for column, value in planes:
         on |= (positions[corners, column] == np.float32(value)).all(axis=1)
@@ -190,14 +190,14 @@ def _ends_of(triangles: Indices, half_edges: NDArray[np.integer]) -> Indices:
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What bodies enclose with the planes that cut them; `measure_sizes` makes it.
+    """The volumes that bodies enclose with the planes that cut them, from `measure_sizes`.
 
-    volumes    (b,), um^3, of a cavity negative; where it is not known a number with its sign
-    are_known  bool (b,): not of a body that reaches from plane to plane along all three axes
-    low, high  (b, 3), the corners of each body's box
-    first      int64 (b,), a triangle of each body, or -1: it has none
-    faces_out  bool (b,): of a body that is open on a plane, and whose triangles face as the normals
-               of its vertices do
+    volumes    (b,), um^3, negative for a cavity; if unknown, any number with the right sign
+    are_known  bool (b,); False for a body that reaches from plane to plane along all three axes
+    low, high  (b, 3), corners of each body's box
+    first      int64 (b,), a triangle of each body, or -1 if it has none
+    faces_out  bool (b,); True for a body that is open on a plane and whose triangles face the same
+               way as the normals of its vertices
     """
 
     volumes: NDArray[np.float64]
@@ -209,7 +209,7 @@ class Sizes:
 
 
 def measure_sizes(mesh: Mesh, planes: tuple[Plane, ...], topology: Topology) -> Sizes:
-    """Return the volumes of a mesh's bodies; it has triangles, and may be open on the planes."""
+    """Return the volumes of a mesh's bodies. It has triangles, and may be open on the planes."""
     triangles, rim, (labels, bodies) = topology.corners, topology.rim, topology.bodies
     positions = mesh.positions.astype(np.float64)
     first = find_first(triangles, labels, bodies).astype(np.int64)
@@ -224,9 +224,10 @@ def measure_sizes(mesh: Mesh, planes: tuple[Plane, ...], topology: Topology) -> 
     )
     size, known = along.copy(), np.zeros(bodies, bool)
     for axis in range(3):
-        # Gauss: the integral of x n_x. Caps across other axes add nothing, nor does one at x = 0
+        # By Gauss's law, the integral of x n_x. Caps across other axes add nothing, and neither
+        # does a cap at x = 0.
         fits = (cuts[:, axis] <= 1) & ~known
-        size[fits] = volumes[fits, axis] / 6  # doubled areas, and sums of three heights
+        size[fits] = volumes[fits, axis] / 6  # the sums have doubled areas and three heights each
         known |= fits
     return Sizes(size, known, low, high, first, (cuts > 0).any(axis=1) & (along > 0))
 
@@ -239,7 +240,7 @@ def _inside_out(mesh: Mesh, topology: Topology, planes: tuple[Plane, ...]) -> In
     size, low, high, first = found.volumes, found.low, found.high, found.first
     wrong, solid = (first >= 0) & (size <= 0), (first >= 0) & (size > 0)
     hollow = np.flatnonzero(wrong & (size < 0))
-    # a solid that fills a tile up to all its planes has no surface there in which cavities lie
+    # A solid that fills a tile up to all its planes has no surface around the cavities in it.
     is_held = lie_within(low, high, hollow, np.flatnonzero(solid)) | found.faces_out[hollow]
     wrong[hollow] = ~is_held
     return first[wrong]

@@ -1,4 +1,4 @@
-"""Join the vertices that a mesh has twice along the seams of its UVs."""
+"""Join vertices that unwrapping copied along the seams of a mesh's UVs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,11 +7,11 @@ from stereocell.model.mesh import Mesh
 
 
 def weld_seams(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the vertices to keep (k,), in their order, and the kept one (n,) of each vertex.
+    """Return the vertices to keep (k,), in order, and the kept vertex (n,) of each vertex.
 
-    Vertices are joined if their place, normal and object are the same to the bit: unwrapping copies
-    them so. Two surfaces that touch at a point have normals of their own, and stay apart. A mesh
-    without UVs has no seams.
+    Vertices are joined if their positions, normals and objects are equal bit by bit, as unwrapping
+    leaves them. Two surfaces that touch at a point have different normals there, and stay apart. A
+    mesh without UVs has no seams.
     """
     every = np.arange(len(mesh.positions))
     if mesh.uvs is None or not len(every):

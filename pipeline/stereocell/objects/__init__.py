@@ -1,1 +1,1 @@
-"""Objects from label maps, in which each voxel holds its object's number."""
+"""Objects of label maps, in which each voxel holds the number of its object."""

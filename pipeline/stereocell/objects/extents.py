@@ -1,6 +1,6 @@
-"""Where the objects of a label map are: voxels, box and centre of each, block by block.
+"""Find where the objects of a label map are: voxels, box and centre of each, block by block.
 
-Looked at are runs of equal voxels along x, of which a label map has few.
+The search uses runs of equal voxels along x, of which a label map has few.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Runs of equal voxels along x of an array (z, y, x), in its order.
+    """Runs of equal voxels along x of an array (z, y, x), in the array's order.
 
-    values   (n,), of the array's dtype
-    starts   int64 (n,), voxels of the flat array
-    lengths  int64 (n,), voxels
+    values   (n,), in the array's dtype
+    starts   int64 (n,), indices of voxels in the flat array
+    lengths  int64 (n,), numbers of voxels
     """
 
     values: NDArray[np.integer]
@@ -25,7 +25,7 @@ class Runs:
 
     @classmethod
     def of(cls, voxels: NDArray[np.integer]) -> "Runs":
-        """Return the runs of an array of integers (z, y, x); none goes past a row's end."""
+        """Return the runs of an array of integers (z, y, x). No run passes the end of a row."""
         begins = np.ones(voxels.shape, bool)
         np.not_equal(voxels[..., 1:], voxels[..., :-1], out=begins[..., 1:])
         starts = np.flatnonzero(begins)
@@ -33,18 +33,18 @@ class Runs:
         return cls(voxels.ravel()[starts], starts, lengths)
 
     def spread(self, values: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return a value a run as a value a voxel, flat."""
+        """Return one value per voxel, flat, from one value per run."""
         return np.repeat(values, self.lengths)
 
 
 @dataclass(frozen=True, slots=True)
 class Extents:
-    """The objects of a block, or of blocks together: n of them, by ascending label.
+    """The objects of a block, or of several blocks together: n of them, by rising label.
 
-    labels     uint64 (n,), none is 0
-    voxels     int64 (n,)
-    low, high  int64 (n, 3), (z, y, x): half-open boxes of voxels
-    sums       float64 (n, 3), (z, y, x): sums of their voxels' indices
+    labels     uint64 (n,), without 0
+    voxels     int64 (n,), numbers of voxels
+    low, high  int64 (n, 3), (z, y, x): half-open boxes in voxels
+    sums       float64 (n, 3), (z, y, x): sums of the indices of their voxels
     """
 
     labels: NDArray[np.uint64]
@@ -55,15 +55,15 @@ class Extents:
 
     @property
     def centroids(self) -> NDArray[np.float64]:
-        """The means of their voxels' indices, float64 (n, 3), (z, y, x)."""
+        """The means of the indices of their voxels, float64 (n, 3), (z, y, x)."""
         return self.sums / self.voxels[:, np.newaxis]
 
 
 def find_extents(labels: NDArray[np.integer], start: tuple[int, int, int]) -> Extents:
     """Return the extents of a block's objects.
 
-    labels  (z, y, x), integers of 0 and above
-    start   the index of the block's first voxel in the label map, which results are counted from
+    labels  (z, y, x), integers of at least 0
+    start   index of the block's first voxel in the label map; results are indices in the label map
 
     >>> found = find_extents(np.array([[[0, 7, 7], [0, 0, 9]]]), (10, 0, 0))
     >>> found.labels.tolist(), found.voxels.tolist(), found.low.tolist(), found.sums[0].tolist()
@@ -82,7 +82,7 @@ def find_extents(labels: NDArray[np.integer], start: tuple[int, int, int]) -> Ex
 
 
 def merge_extents(parts: Sequence[Extents]) -> Extents:
-    """Return the extents of all blocks together; an object may lie in several of them."""
+    """Return the extents of all blocks together. An object may lie in several blocks."""
     labels = np.concatenate([part.labels for part in parts] or [np.zeros(0, np.uint64)])
     found, which = np.unique(labels, return_inverse=True)
     if not len(labels):

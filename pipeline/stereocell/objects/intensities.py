@@ -1,4 +1,4 @@
-"""What a channel of the image is over objects."""
+"""Measure a channel of the image over the voxels of objects."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 PERCENTILE = 95.0
 NO_PIECES = np.zeros(0, np.int32)
-QUANTILES = 1001  # quantiles of a piece: the share of an object's percentile is exact to 0.001
+# Number of quantiles of a piece; the share of an object's percentile is exact to 0.001
+QUANTILES = 1001
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
-    """Of n objects, in the voxels' unit.
+class Intensities:
+    """Measurements of n objects, in the voxels' unit.
 
     mean, p95  float64 (n,), mean and 95th percentile
     quantiles  float32 (k, QUANTILES), of the k pieces
@@ -30,15 +31,15 @@ def measure_intensities(
     numbers: NDArray[np.int32],
     *,
     pieces: NDArray[np.int32] = NO_PIECES,
-) -> Measured:
-    """Return mean and percentile of the voxels of each object.
+) -> Intensities:
+    """Return the mean and the percentile of the voxels of each object.
 
     labels   int32 (z, y, x)
     voxels   (z, y, x), any number type
-    numbers  int32 (n,), ascending, of objects that have voxels
-    pieces   int32 (k,), those of them that are pieces of one
+    numbers  int32 (n,), rising: objects, which all have voxels
+    pieces   int32 (k,): those of them that are only pieces of an object
 
-    The percentile is linear between voxels, as numpy's.
+    The percentile is interpolated linearly between voxels, as in numpy.
 
     >>> labels = np.repeat(np.arange(1, 3, dtype=np.int32), 3).reshape(1, 2, 3)
     >>> found = measure_intensities(labels, np.arange(6).reshape(1, 2, 3), np.array([1, 2]))
@@ -59,13 +60,13 @@ def measure_intensities(
     cut = np.searchsorted(numbers, pieces)
     shares = np.linspace(0, 1, QUANTILES)
     found = [_quantile(values, firsts[cut], counts[cut], share) for share in shares]
-    return Measured(mean, p95, np.stack(found, axis=1).astype(np.float32))
+    return Intensities(mean, p95, np.stack(found, axis=1).astype(np.float32))
 
 
 def _quantile(
     values: NDArray[np.float64], firsts: NDArray[np.int64], counts: NDArray[np.int64], share: float
 ) -> NDArray[np.float64]:
-    """Return a quantile of each object; its values ascend from `firsts` on, `counts` of them."""
+    """Return a quantile of each object from its `counts` rising values, which begin at `firsts`."""
     at = share * (counts - 1)
     below = np.floor(at).astype(np.int64)
     above = np.minimum(below + 1, counts - 1)
@@ -76,10 +77,11 @@ def _quantile(
 def merge_quantiles(
     quantiles: NDArray[np.float32], voxels: NDArray[np.int64], *, share: float = PERCENTILE / 100
 ) -> float:
-    """Return a quantile of an object of k pieces.
+    """Return a quantile of an object that consists of k pieces.
 
-    quantiles  float32 (k, q), of each piece, evenly from its least to its largest value
-    voxels     int64 (k,), of each piece
+    quantiles  float32 (k, q), of each piece, evenly spaced from its least to its largest value
+    voxels     int64 (k,), number of voxels of each piece
+    share      share of the voxels below the quantile, 0..1
 
     >>> pieces = np.array([[0, 1, 2], [10, 11, 12]], np.float32)
     >>> merge_quantiles(pieces, np.array([30, 10]), share=0.9)

@@ -1,14 +1,14 @@
-"""Recognise a label map: voxels that hold an object's number, and no brightness.
+"""Recognise a label map, whose voxels hold the numbers of objects instead of brightness.
 
-An intensity varies from voxel to voxel; a label is the same over all of its object, and the numbers
-of neighbours have nothing to do with one another. Looked at are the pairs of voxels that share a
-face, and the connected components of equal voxels; 0 is left out, and so is the commonest value,
-since the ground of an image may be even, whatever its value.
+An intensity varies from voxel to voxel. A label is the same over its whole object, and the numbers
+of neighbouring objects are unrelated. The rule examines the pairs of voxels that share a face, and
+the connected components of equal voxels. It leaves out 0, and also the most common value, because
+an image may have an even ground of any value.
 
-Tried on 530 integer arrays, 504 of them images: of images at most .76 of the pairs are equal, of
-label maps at least .87; an image's components hold up to 7.5 voxels, a label map's at least 23. An
-image of a few grey levels (posterised) can't be told from nested classes: so the rule stops a
-build and says both ways out, and never decides by itself.
+It was tested on 530 integer arrays, 504 of them images. In images at most .76 of the pairs are
+equal, in label maps at least .87. The components of images hold up to 7.5 voxels on average, those
+of label maps at least 23. An image of a few grey levels (posterised) cannot be distinguished from
+nested classes. So the rule never decides by itself: it stops a build and names both ways on.
 """
 
 from dataclasses import dataclass
@@ -19,23 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 Kind = Literal["image", "mask", "labels"]
-MIN_EQUAL = 0.8  # share of equal pairs, of a label map of any shape
-MIN_BY_AXIS = 0.5  # the same along each axis
-MIN_VOXELS = 20.0  # mean voxels of a component
-MAX_PIECES = 1.2  # components of a value, of a map of whole objects
-MIN_OBJECTS = 8  # values from which whole objects are enough
-ONE_OFF = 0.5  # share of the unequal pairs that differ by 1: a smooth image of many levels
+MIN_EQUAL = 0.8  # least share of equal pairs in a label map
+MIN_BY_AXIS = 0.5  # least share of equal pairs along each axis
+MIN_VOXELS = 20.0  # least mean number of voxels of a component
+MAX_PIECES = 1.2  # largest number of components per value, in a map of whole objects
+MIN_OBJECTS = 8  # number of values from which whole objects are sufficient evidence
+# Share of the unequal pairs that differ by 1, in a smooth image of more than MANY_LEVELS values
+ONE_OFF = 0.5
 MANY_LEVELS = 32
-_NO_LABELS = 0.5  # share of equal pairs below which components are not looked for
+_NO_LABELS = 0.5  # share of equal pairs below which components are not examined
 
 
 @dataclass(frozen=True, slots=True)
 class LabelEvidence:
     """The evidence in an array on whether it holds labels.
 
-    kind    mask: two values in all, whatever they are
-    values  the number of values besides 0
-    pieces  the connected components of what is no ground
+    kind    mask: the array has only two values
+    values  number of values without 0
+    pieces  number of connected components outside of the ground
     """
 
     kind: Kind
@@ -44,9 +45,9 @@ class LabelEvidence:
 
 
 def recognise(voxels: NDArray[Any]) -> LabelEvidence:
-    """Return what kind of array this is.
+    """Return the kind of an array.
 
-    voxels  (z, y, x), any number type; a part of the data will do
+    voxels  (z, y, x), any number type; a part of the data is sufficient
 
     >>> z, y, x = np.mgrid[:8, :16, :16] // 4
     >>> recognise((1 + z + 10 * y + 100 * x).astype(np.uint16))
@@ -58,10 +59,10 @@ def recognise(voxels: NDArray[Any]) -> LabelEvidence:
     values = len(found) - int(found[0] == 0)
     if len(found) <= 2:
         return LabelEvidence("mask" if len(found) == 2 else "image", values)
-    # as small numbers, with 0 for the ground
+    # Values become small indices, with 0 for the ground.
     compact = 1 + places.reshape(voxels.shape).astype(np.uint32)
     compact[voxels == 0] = 0
-    if values > MIN_OBJECTS:  # of a few classes each counts
+    if values > MIN_OBJECTS:  # with few values, the most common one may be a class
         compact[voxels == found[counts.argmax()]] = 0
     pairs, equal, one_off = np.zeros(3), np.zeros(3), 0
     for axis in range(3):

@@ -16,67 +16,67 @@ class ObjectOptions:
 
     errors: tuple[float, ...] = setting(
         (0.1, 0.25, 0.6, 1.5),
-        "aim of simplifying to lod0, lod1, ..., in finest spacings; at small objects less",
+        "largest errors of lod0, lod1, ... in finest spacings; small objects have smaller ones",
         bounds=Bounds(0, MAX_ERROR),
     )
     samples: int = setting(
         1000,
-        "points of a tile at which distances are measured, each way",
+        "points of a tile for measuring distances, in each direction",
         bounds=Bounds(1, MAX_SAMPLES),
     )
     smallest_voxels: int = setting(
-        27, "objects of fewer voxels are left out, and counted", bounds=COUNT
+        27, "objects with fewer voxels are left out and counted", bounds=COUNT
     )
     background: int = setting(
         0,
-        "number of the voxels that are no object, as 65535, 255 or -2 in some files; 0, -1 and NaN "
-        "are none either",
+        "number of the voxels outside all objects, such as 65535, 255 or -2 in some files; 0, -1 "
+        "and NaN always count as outside",
         flag=Flag(
             "--background",
-            "the number of the voxels of label maps that are no object, as 65535 or -2 in some "
-            "files (0, -1 and NaN are none either)",
+            "the number of voxels outside all objects, such as 65535 or -2 in some files (0, -1 "
+            "and NaN always count as outside)",
             "NUMBER",
         ),
         bounds=WHOLE_NUMBER,
     )
     table: str = setting(
         "",
-        "a table with a row an object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
+        "table with one row per object: CSV, TSV, Parquet, .h5ad, or a table of SpatialData",
         flag=Flag(
             "--table",
-            "a table with a row an object, joined by --table-key: CSV, TSV, Parquet, .h5ad",
+            "a table with one row per object, joined by --table-key: CSV, TSV, Parquet, .h5ad",
             "FILE",
         ),
     )
     table_key: str = setting(
         "",
-        "the table's column of the objects' numbers; empty: CellID, label, Label, cell_id, ...",
+        "column of the table with the objects' numbers; empty: CellID, label, Label, cell_id, ...",
         flag=Flag(
             "--table-key",
-            "the table's column of the objects' numbers (default: CellID, label, cell_id, "
-            "instance_id, object_id, whichever is there)",
+            "the table's column with the objects' numbers (default: the first of CellID, label, "
+            "cell_id, instance_id, object_id that exists)",
             "COLUMN",
         ),
     )
     columns: tuple[str, ...] = setting(
         (),
-        "columns of the table that are taken; empty: all, up to 128",
-        flag=Flag("--columns", "columns of the table that are taken, as CD8,cell_type", "A,B,..."),
+        "columns of the table that are read; empty: all, up to 128",
+        flag=Flag("--columns", "columns of the table that are read, as CD8,cell_type", "A,B,..."),
     )
     segment_labels: bool = setting(
         False,
-        "whether segments of DICOM have their SegmentLabel for a name: free text, which may say "
-        "who the patient is; else the standard's words for their codes",
+        "whether segments of DICOM are named by their SegmentLabel, free text that may identify "
+        "the patient; otherwise by the standard's terms for their codes",
         flag=Flag(
             "--segment-labels",
-            "call segments of DICOM by their SegmentLabel, free text that may say who the patient "
-            "is (default: the standard's words for their codes)",
+            "name segments of DICOM by their SegmentLabel, free text that may identify the patient "
+            "(default: the standard's terms for their codes)",
         ),
     )
     color_by: str = setting(
         "",
-        "the column that colours objects first; empty: the first of categories",
-        flag=Flag("--color-by", "the column that colours objects first", "COLUMN"),
+        "column that colours the objects at first; empty: the first column of categories",
+        flag=Flag("--color-by", "the column that colours the objects at first", "COLUMN"),
     )
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Take the objects of one mesh apart."""
+"""Separate the objects of one mesh."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,7 +9,7 @@ from stereocell.model.mesh import Mesh
 
 
 def split_objects(mesh: Mesh) -> Iterator[tuple[int, Mesh]]:
-    """Yield each object's number, ascending, and its part of a mesh."""
+    """Yield each object's number, rising, and its part of the mesh."""
     assert mesh.objects is not None
     order = np.argsort(mesh.objects, kind="stable")
     rank = np.empty(len(order), np.int64)

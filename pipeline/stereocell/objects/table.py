@@ -1,4 +1,4 @@
-"""Make the table of a label map's objects: own columns, and a user's table joined to them."""
+"""Make the table of a label map's objects: measured columns, joined with a user's table."""
 
 import colorsys
 from collections.abc import Mapping, Sequence
@@ -13,13 +13,13 @@ from stereocell.model.unit import ObjectFacts
 from stereocell.objects.intensities import merge_quantiles
 
 Triple = tuple[float, float, float]
-MEAN = "mean_"  # before a channel's identifier: its mean over each object
-P95 = "p95_"  # the same, its 95th percentile
+MEAN = "mean_"  # prefix of a channel's identifier: its mean over each object
+P95 = "p95_"  # prefix of a channel's identifier: its 95th percentile over each object
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where objects are, n of them: boxes and centroids (n, 3), (z, y, x) um; voxels (n,)."""
+    """Positions of n objects: boxes and centroids (n, 3), (z, y, x) um; and volumes (n,)."""
 
     low_um: NDArray[np.float64]
     high_um: NDArray[np.float64]
@@ -30,9 +30,10 @@ class Place:
 def own_columns(
     place: Place, facts: Sequence[tuple[NDArray[np.int32], ObjectFacts]], channels: Sequence[str]
 ) -> list[Column]:
-    """Return what the pipeline itself knows of n objects.
+    """Return the columns that the pipeline measures for n objects.
 
-    facts     of each tile: its objects' rows in the table, int32 (k,), and what is known of them
+    place     positions of the objects
+    facts     for each tile, its objects' rows in the table, int32 (k,), and their measurements
     channels  names of the image's channels that were measured
     """
     count = len(place.volume_um3)
@@ -52,7 +53,7 @@ def own_columns(
         held = np.stack([quantiles for quantiles, _ in parts])
         counts = np.array([count for _, count in parts])
         p95s[row] = [merge_quantiles(held[:, k], counts) for k in range(len(channels))]
-    # a neighbour of several pieces is one
+    # A neighbour that consists of several pieces counts once.
     pairs = [np.stack([rows[one.walls].astype(np.uint64), one.beside], 1) for rows, one in facts]
     if pairs:
         found = np.unique(np.concatenate(pairs), axis=0)
@@ -62,30 +63,30 @@ def own_columns(
     round_area = np.pi ** (1 / 3) * (6 * volume) ** (2 / 3)
     extent = place.high_um - place.low_um
     made = [
-        ("volume_um3", "volume", volume, "Of its voxels", "um3"),
-        ("area_um2", "area", area, "Of its surface at the finest level", "um2"),
+        ("volume_um3", "volume", volume, "Volume of its voxels", "um3"),
+        ("area_um2", "area", area, "Area of its surface at the finest level", "um2"),
         (
             "sphericity",
             "sphericity",
             np.where(area > 0, round_area / np.maximum(area, 1e-12), np.nan),
-            "Area of the ball of its volume to its own area: 1 is a ball",
+            "Area of a ball of the same volume, divided by its own area; 1 for a ball",
             "",
         ),
-        ("neighbours", "neighbours", touching, "Objects that it shares a wall with", ""),
+        ("neighbours", "neighbours", touching, "Number of objects that it touches", ""),
         (
             "contact",
             "contact",
             np.where(area > 0, shared / np.maximum(area, 1e-12), np.nan),
-            "Share of its surface that is a wall to other objects",
+            "Share of its surface that touches other objects",
             "",
         ),
     ]
     for axis, letter in ((2, "x"), (1, "y"), (0, "z")):
-        about = f"Of its centroid along {letter}, from the image's first voxel"
+        about = f"Position of its centroid along {letter}, from the image's first voxel"
         at = place.centroid_um[:, axis]
         made.append((f"centroid_{letter}_um", f"centroid {letter}", at, about, "um"))
     for axis, letter in ((2, "x"), (1, "y"), (0, "z")):
-        about = f"Of its box along {letter}"
+        about = f"Length of its box along {letter}"
         made.append((f"extent_{letter}_um", f"extent {letter}", extent[:, axis], about, "um"))
     for index, name in enumerate(channels):
         mean, p95 = means[:, index], p95s[:, index]
@@ -107,7 +108,7 @@ def own_columns(
 
 
 def number_column(name: str, values: NDArray[np.float64], about: str) -> Column:
-    """Return a column of numbers, float64 `values` (n,); infinite ones are missing."""
+    """Return a column of numbers, float64 `values` (n,). Infinite values count as missing."""
     with np.errstate(over="ignore"):
         narrow = np.asarray(values, np.float32)
     return Column(to_identifier(name), name, np.where(np.isfinite(narrow), narrow, np.nan), about)
@@ -116,9 +117,12 @@ def number_column(name: str, values: NDArray[np.float64], about: str) -> Column:
 def category_column(
     name: str, texts: Sequence[str], about: str, *, colors: Mapping[str, Triple] | None = None
 ) -> Column | None:
-    """Return a column of words; None: of more than MAX_CATEGORIES. An empty one is missing."""
+    """Return a column of categories, or None for more than MAX_CATEGORIES.
+
+    An empty text is a missing value. colors: linear RGB by category.
+    """
     words = sorted({text for text in texts if text})
-    if not words:  # nobody has any: nothing is known
+    if not words:  # all values are missing
         return Column(to_identifier(name), name, np.full(len(texts), np.nan, np.float32), about)
     if len(words) > MAX_CATEGORIES:
         return None
@@ -130,10 +134,10 @@ def category_column(
     return Column(to_identifier(name), name, values, about, "", tuple(words), shown)
 
 
-NO_CATEGORY = (0.2, 0.2, 0.2)  # linear RGB of objects of no category
+NO_CATEGORY = (0.2, 0.2, 0.2)  # linear RGB of objects without a category
 
-# Okabe & Ito's colours for categories (linear RGB), which the colour-blind tell apart; without
-# black, which a dark ground hides. https://jfly.uni-koeln.de/color/
+# Colours of Okabe & Ito for categories (linear RGB), which colour-blind people can distinguish;
+# without black, which is invisible on a dark ground. https://jfly.uni-koeln.de/color/
 _OKABE_ITO = tuple(
     tuple(
         ((value / 255 + 0.055) / 1.055) ** 2.4
@@ -144,10 +148,10 @@ _OKABE_ITO = tuple(
 
 
 def choose_colors(count: int) -> list[Triple]:
-    """Return colours for categories, linear RGB: seven that all tell apart, then further hues."""
+    """Return colours for categories, linear RGB: seven clearly different ones, then other hues."""
     found: list[Triple] = [(r, g, b) for r, g, b in _OKABE_ITO[:count]]
     for place in range(len(found), count):
-        # by the golden ratio, so that no two hues in a row are near
+        # Steps of the golden ratio keep successive hues far apart.
         found.append(
             colorsys.hls_to_rgb(place * 0.618033988749895 % 1, (0.35, 0.55)[place % 2], 0.6)
         )
@@ -155,11 +159,11 @@ def choose_colors(count: int) -> list[Triple]:
 
 
 def hashed_colors(labels: NDArray[np.uint64]) -> NDArray[np.float32]:
-    """Return a colour an object, linear RGB (n, 3), float32: neighbours seldom have the same.
+    """Return a colour for each object, linear RGB float32 (n, 3); neighbours seldom share one.
 
     labels  uint64 (n,), the objects' numbers in the label map
 
-    They are pastels of many hues, so that none of them means anything.
+    The colours are pastels of many hues, so that none suggests a meaning.
     """
     mixed = labels * np.uint64(0x9E3779B97F4A7C15)  # Fibonacci hashing
     hue = (mixed >> np.uint64(40)).astype(np.float64) / (1 << 24)
@@ -169,14 +173,16 @@ def hashed_colors(labels: NDArray[np.uint64]) -> NDArray[np.float32]:
 
 
 def color_objects(table: ObjectTable) -> NDArray[np.float32]:
-    """Return the colour of each object as it is first shown, linear RGB (n, 3), float32.
+    """Return the colour in which each object is first shown, linear RGB float32 (n, 3).
 
-    By the table's default column; without one, in the label map's own colour, or a hue of its own.
+    It follows the table's default column. Without that, it is the label map's own colour, or a hue
+    from the object's number.
     """
     column = table.column(table.default)
     if column is None or not column.categories:
         hashed = hashed_colors(table.labels)
         own = hashed if table.colors is None else table.colors
         return np.where(np.isnan(own), hashed, own)
-    palette = np.array([*column.colors, NO_CATEGORY], np.float32)  # -1, missing, is the last
+    # Missing values are -1, the last row
+    palette = np.array([*column.colors, NO_CATEGORY], np.float32)
     return palette[column.values.astype(np.int64)]

@@ -1,8 +1,8 @@
-"""Label maps of which each object has a surface without pinches.
+"""Change label maps so that each object has a surface without pinches.
 
-The surface between voxels is a 2-manifold exactly where no label touches itself by an edge or a
-corner alone. Where one does, a voxel goes to the label or from it: the one whose neighbours are for
-it most.
+The surface between voxels is a 2-manifold exactly where no label touches itself only by an edge or
+a corner. At each such place, one voxel is given to the label or taken from it: the voxel whose
+neighbours support the change most.
 
 References
 L. J. Latecki, "3D well-composed pictures", Graphical Models and Image Processing 59(3), 1997.
@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from stereocell.kernels.critical import find_critical
 
 MAX_SHARE = 0.03  # largest share of an object's voxels that may change
-MAX_OF_SMALL = 4  # voxels that may change, of however small an object
+MAX_OF_SMALL = 4  # number of voxels that may change in any object, however small
 _ROUNDS = 60
-_AT_ONCE = 1 << 20  # places of a round
-_AGAIN = 1000  # neighbours that a voxel needs more, to change a second time
+_AT_ONCE = 1 << 20  # largest number of places in a round
+_AGAIN = 1000  # number of additional neighbours that a voxel needs to change a second time
 
 
 def make_well_composed(
     labels: NDArray[np.int32],
 ) -> tuple[NDArray[np.int32], int, NDArray[np.int32]]:
-    """Return labels without such places, how many voxels changed, and objects that are too thin.
+    """Return labels without pinches, the number of changed voxels, and objects that are too thin.
 
     labels  int32 (z, y, x), 0 outside; two voxels at each end of each axis are 0
 
-    Objects that would change by more than MAX_SHARE, as shells and threads of one voxel do, are
-    taken out: int32 (n,), ascending. Their voxels count as outside, and not as changed.
+    Objects that would change by more than MAX_SHARE, such as shells and threads of one voxel, are
+    removed: int32 (n,), rising. Their voxels count as outside, and not as changed.
 
     >>> labels = np.zeros((7, 7, 7), np.int32)
     >>> labels[2:4, 2:4, 2:4], labels[4, 4, 2:4] = 1, 1
@@ -41,7 +41,7 @@ def make_well_composed(
     """
     labels = np.ascontiguousarray(labels)
     thin = np.zeros(0, np.int32)
-    while True:  # each time without some objects
+    while True:  # each time without the objects found too thin
         mended, found = _mend(labels)
         if not len(found):
             return mended, int((mended != labels).sum()), thin
@@ -50,7 +50,7 @@ def make_well_composed(
 
 
 def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return labels without such places; or as far as it went, and which objects are too thin."""
+    """Return labels without pinches; or the labels so far, and the objects that are too thin."""
     mended = labels.copy()
     flat, strides = mended.ravel(), np.array([mended[0].size, mended.shape[2], 1])
     offsets = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -62,21 +62,22 @@ def _mend(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int3
             return mended, np.zeros(0, np.int32)
         touched: set[int] = set()
         for place in places.tolist():
-            if touched.isdisjoint(place):  # else its surroundings are others now: next round
+            if touched.isdisjoint(place):  # otherwise its surroundings have changed: next round
                 voxel, label = _best_change(flat, place, around, changed)
                 flat[voxel] = label
                 touched.add(voxel)
                 changed.add(voxel)
-        thin = _find_thin(labels, mended)  # at once: noise takes many rounds
+        thin = _find_thin(labels, mended)  # in each round, since noise takes many rounds
         if len(thin):
             return mended, thin
-    return mended, np.unique(flat[places[:, 0]]).astype(np.int32)  # no end in sight
+    # Pinches remain after the last round
+    return mended, np.unique(flat[places[:, 0]]).astype(np.int32)
 
 
 def _best_change(
     flat: NDArray[np.int32], place: Sequence[int], around: NDArray[np.int64], changed: set[int]
 ) -> tuple[int, int]:
-    """Return the voxel that changes, and its new label."""
+    """Return the voxel to change, and its new label."""
     own, others = dict.fromkeys(place[:2]), [voxel for voxel in place[2:] if voxel >= 0]
     label = int(flat[place[0]])
     changes = [(voxel, label) for voxel in others]
@@ -93,7 +94,7 @@ def _best_change(
 
 
 def _find_thin(labels: NDArray[np.int32], mended: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the objects that have changed by more than MAX_SHARE (n,)."""
+    """Return the objects of which more than MAX_SHARE changed (n,)."""
     where = labels != mended
     size = int(labels.max()) + 1
     voxels = np.bincount(labels.ravel(), minlength=size)

@@ -111,7 +111,7 @@ def find_level(
     if mask is not None and criterion not in CRITERIA:
         # A blurred mask has its edge half-way. Other peaks come from the blur and are not levels.
         half = levels.judge(sum(mask) / 2)
-        levels = replace(levels, ladder=(half,) if levels.has_both_sides(half.value) else ())
+        levels = replace(levels, all_levels=(half,) if levels.has_both_sides(half.value) else ())
     if given is not None:
         value, subtracts = given
         # A level above the background can only be judged if the background was subtracted.
@@ -127,7 +127,7 @@ def find_level(
         return Found(window, levels, evidence, (half,), False, "", is_fixed=True)
     highest = highest_of(window.statistics, levels.subtracts)
     clear = levels.shown(highest)
-    reason = f"no clear surface: {levels.doubt}" if levels.doubt else ""
+    reason = f"no clear surface: {levels.why_unclear}" if levels.why_unclear else ""
     if criterion == ADAPTIVE and clear:
         threshold = window.statistics.threshold
         if threshold is None:
@@ -170,9 +170,9 @@ def explain_uncertainty(found: Found, chosen: int, tiles: Sequence[TileIso]) -> 
     if not isinstance(level, Level):
         return ""
     clear, highest = found.levels.clear, highest_of(found.window.statistics, found.subtracts)
-    if level in found.levels.ladder and level not in clear and clear:
+    if level in found.levels.all_levels and level not in clear and clear:
         return (
-            f"the level is nearly clear ({level.doubt}), but the next clear level, "
+            f"the level is nearly clear ({level.why_unclear}), but the next clear level, "
             f"{clear[0].value:.5g}, leaves only {clear[0].share:.3%} of the voxels inside"
         )
     if level.value > highest:
@@ -181,7 +181,7 @@ def explain_uncertainty(found: Found, chosen: int, tiles: Sequence[TileIso]) -> 
         return "no tile by itself has enough voxels on both sides of the level"
     if uneven := _uneven_light(found, level):
         return uneven
-    if bodies := bodies_in_haze(level, found.levels.ladder):
+    if bodies := bodies_in_haze(level, found.levels.all_levels):
         return (
             "the surface may enclose a haze around brighter structures: their level, "
             f"{bodies.value:.5g}, has {bodies.contrast / level.contrast:.0f} times the contrast "

@@ -48,7 +48,7 @@ def note_on_found(plan: Plan, found: Found, *, is_whole: bool) -> str:
     if len(levels) > 1:
         choice = _CHOICES[plan.settings.isovalue.rung]
         return f"the build takes one of {about}{words_of(levels, mark, digits)}: {choice}{tail}"
-    ladder = () if found.levels is None else found.levels.ladder
+    ladder = () if found.levels is None else found.levels.all_levels
     if not levels:
         near = find_near_levels(ladder, None, is_unsure=False)
         reason = found.reason.removeprefix("no clear surface: ")

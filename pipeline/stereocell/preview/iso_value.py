@@ -255,7 +255,7 @@ def _candidates(
         raw = level + below if above else level
         return Candidate(name, level, above, raw, float(inside), confidence, chosen, setting)
 
-    ladder = () if found.levels is None else found.levels.ladder
+    ladder = () if found.levels is None else found.levels.all_levels
     value = chosen.value
     candidates = []
     if value is not None:

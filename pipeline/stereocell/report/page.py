@@ -230,7 +230,7 @@ def _candidates(found: ChannelSurvey) -> dict[str, Any] | None:
         "rows": [
             {
                 "level": one,
-                "reason": one.doubt,
+                "reason": one.why_unclear,
                 "taken": level is not None and one.value == level.iso,
             }
             for one in found.ladder

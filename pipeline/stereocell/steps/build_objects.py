@@ -17,7 +17,7 @@ from stereocell.model.unit import ObjectFacts, Unit
 from stereocell.model.volume import xyz_to_zyx
 from stereocell.objects.build_objects import BuiltObjects, build_objects
 from stereocell.objects.extents import Runs
-from stereocell.objects.intensities import QUANTILES, Measured, measure_intensities
+from stereocell.objects.intensities import QUANTILES, Intensities, measure_intensities
 from stereocell.objects.options import ObjectOptions
 from stereocell.steps.labels import Labels
 from stereocell.steps.open_source import Voxels
@@ -241,7 +241,7 @@ def _facts(
     built: BuiltObjects,
     owned: NDArray[np.int32],
     names: _Names,
-    measured: Sequence[Measured],
+    measured: Sequence[Intensities],
     compact: NDArray[np.int32],
     thin: NDArray[np.uint64],
 ) -> ObjectFacts:

@@ -1,1 +1,1 @@
-"""UVs of a mesh, and the maps that are baked into them."""
+"""UVs of a mesh, and the maps that are baked for them."""

@@ -1,11 +1,12 @@
-"""Ambient occlusion: the part of the sky above a surface that its own body and its neighbours hide.
+"""Ambient occlusion: the part of the sky above a surface that its body and neighbours hide.
 
-Rays start at points of the surface and run through the repaired field that the surface was
-extracted from, not through its triangles. The field reaches past the tile into its halo, while a
-mesh ends at the cut: so neighbours find nearly the same values on both sides of a cut. A ray steps
-through voxels (kernels/visibility.py), so that no ray tracer is needed: libigl's has no radius.
+Rays start at points of the surface. They run through the repaired field from which the surface was
+extracted, not through its triangles. The field reaches past the tile into its halo, while a mesh
+ends at the cut. So neighbours find nearly the same values on both sides of a cut. A ray steps
+through voxels (kernels/visibility.py), so that no ray tracer is needed; libigl's has no radius.
 
-The directions are the same for every point and every tile: no noise, and the same bytes each time.
+The directions are the same for every point and every tile, so there is no noise, and the bytes are
+the same each time.
 """
 
 import numpy as np
@@ -17,9 +18,9 @@ from stereocell.model.lattice import Lattice
 from stereocell.model.mesh import Mesh
 from stereocell.model.volume import xyz_to_zyx
 
-DIRECTIONS = 48  # rays over the whole sphere; half of them rise above a surface
+DIRECTIONS = 48  # number of rays over the whole sphere; half of them rise above a surface
 STEP = 0.75  # step along a ray, in coarsest voxel spacings
-NEIGHBOURS = 4  # points with a value, of which others take the mean
+NEIGHBOURS = 4  # number of points with values whose mean other points take
 
 
 def find_ambient_visibility(
@@ -32,14 +33,15 @@ def find_ambient_visibility(
 ) -> NDArray[np.float32]:
     """Return the ambient visibility of each vertex, float32 (n,), 0..1; 1 for a radius of 0.
 
-    It is 1 - ambient occlusion: 1 is open, as in glTF's occlusion texture.
+    Ambient visibility is 1 - ambient occlusion; 1 is open, as in glTF's occlusion texture.
 
     solid      bool (z, y, x), covers `lattice.window`
     mesh       positions and unit normals in world space, um (x, y, z); triangles are not used
-    radius_um  a hit counts less the farther it is, and nothing at this distance
-    thinned    whether one vertex of each voxel casts rays, and others take the mean of those near
+    radius_um  a hit counts less the farther it is, and not at all from this distance
+    thinned    whether only one vertex per voxel casts rays, and others take the mean of near ones
 
-    A direction's weight is the cosine to the normal. Rays start a STEP above the surface, so that
+    A direction's weight is its cosine to the normal. Rays start a STEP above the surface, so that
+    its own voxels do not hide it.
     its own voxels don't hide it.
     """
     points = mesh.positions
@@ -53,10 +55,10 @@ def find_ambient_visibility(
 
 
 def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
-    """Return the number of the first point in each occupied block of space, int64 (k,), rising.
+    """Return the index of the first point in each occupied block of space, int64 (k,), rising.
 
     points   float32 (n, 3), um
-    edge_um  edge of a block; blocks lie on one grid in world space
+    edge_um  edge length of a block; all blocks lie on one grid in world space
     """
     blocks = np.floor(points / edge_um).astype(np.int64)
     blocks -= blocks.min(axis=0)
@@ -68,7 +70,7 @@ def thin_out(points: NDArray[np.float32], edge_um: float) -> NDArray[np.int64]:
 def spread(
     known: NDArray[np.float32], values: NDArray[np.float32], points: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return values at the points, float32 (n,): the mean of the nearest known ones, by closeness.
+    """Return values at the points, float32 (n,): means of the nearest known ones, near ones more.
 
     known   float32 (k, 3), um, where values are known
     values  float32 (k,)
@@ -93,7 +95,7 @@ def _cast(
     distances = np.arange(offset, radius_um + offset, step)
     up = xyz_to_zyx(normals.astype(np.float64))
     start = (xyz_to_zyx(points.astype(np.float64)) + offset * up - origin) / spacing
-    start += 0.5 - np.asarray(lattice.window.start)  # truncated, the nearest voxel
+    start += 0.5 - np.asarray(lattice.window.start)  # makes truncation give the nearest voxel
     directions = sphere(DIRECTIONS)
     return cast_rays(
         solid,
@@ -107,7 +109,7 @@ def _cast(
 
 
 def sphere(count: int) -> NDArray[np.float64]:
-    """Return unit vectors spread evenly over the sphere, float64 (count, 3): Fibonacci's spiral."""
+    """Return unit vectors spread evenly over the sphere, float64 (count, 3): a Fibonacci spiral."""
     place = np.arange(count) + 0.5
     height = 1 - 2 * place / count
     turn = np.pi * (1 + np.sqrt(5)) * place

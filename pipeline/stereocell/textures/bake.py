@@ -1,8 +1,8 @@
 """Bake the fine surface into a coarser level: normals, ambient occlusion, the sampled channel.
 
 A point of the level takes the values of the nearest point on the fine surface's triangles,
-interpolated between the triangle's corners. The fine surface reaches past the tile's cut: a
-texel's centre can lie half a texel past it, and neighbours must shade the same on both sides.
+interpolated between the triangle's corners. The fine surface reaches past the tile's cut, because
+the centre of a texel can lie half a texel past it, and both neighbours must shade the cut alike.
 """
 
 from dataclasses import dataclass
@@ -17,17 +17,18 @@ from stereocell.model.mesh import Mesh
 from stereocell.textures.rasterize import find_texels
 from stereocell.textures.seam_padding import find_chart_edges, fit_seam_texels
 
-NEIGHBOURS = 8  # fine vertices searched where the nearest point is on another wall
-REACH = 1.5  # texels outside a chart that get values of their own, for bilinear lookups
-LOWEST = 0.05  # least cosine of a map's normal to the mesh's: no map points below the surface
+NEIGHBOURS = 8  # number of fine vertices that are searched if the nearest point is on another wall
+REACH = 1.5  # texels outside of a chart that get values of their own, for bilinear lookups
+# Least cosine between a map's normal and the mesh's, so that no normal points inwards
+LOWEST = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class FineSurface:
-    """The finest surface, some voxels past the tile's cut, with values at its vertices.
+    """The finest surface, with some voxels past the tile's cut, and values at its vertices.
 
     openness  float32 (n,) 0..1: 1 - ambient occlusion, see textures/ambient_occlusion.py
-    paint     float32 (n,) 0..1: intensity of the sampled channel; None: there is none
+    paint     float32 (n,) 0..1: intensity of the sampled channel; None: no channel is sampled
     """
 
     mesh: Mesh
@@ -51,11 +52,11 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Maps:
-    """Images of a level, row 0 at v = 1; texels between charts repeat the nearest one inside.
+    """Maps of a level, row 0 at v = 1. Texels between charts repeat the nearest texel of a chart.
 
     normals   uint8 (h, w, 3), tangent space
     openness  uint8 (h, w); 255: no ambient occlusion
-    paint     uint8 (h, w), or None
+    paint     uint8 (h, w); None: no channel is sampled
     """
 
     normals: NDArray[np.uint8]
@@ -64,7 +65,7 @@ class Maps:
 
 
 class Baker:
-    """Looks up values of the fine surface; its search trees are built once."""
+    """Looks up values of the fine surface. The search trees are built once."""
 
     def __init__(self, fine: FineSurface) -> None:
         self._fine = fine
@@ -80,8 +81,8 @@ class Baker:
         points   float64 (n, 3), um, world space (x, y, z)
         normals  float64 (n, 3), unit length, of the coarse surface
 
-        The other wall of a thin shell may be nearer. Then vertices nearby that face the same way
-        are used instead.
+        The other wall of a thin shell may be nearer. In that case, vertices nearby that face the
+        same way are used instead.
         """
         fine = self._fine
         _, nearest, place = self._tree.squared_distance(self._vertices, self._triangles, points)
@@ -109,11 +110,11 @@ class Baker:
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
         """Return near vertices, their weights, and whether none of them faces the same way.
 
-        A weight follows from closeness; it is 0 for vertices that face away.
+        Near vertices have larger weights. Vertices that face away have weights of 0.
         """
         if self._corners is None:
             self._corners = cKDTree(self._vertices, balanced_tree=False, compact_nodes=False)
-        # a list of k asks for k columns, even for one
+        # A list of k numbers makes the result have k columns, even for k = 1.
         columns = list(range(1, min(NEIGHBOURS, self._corners.n) + 1))
         distance, near = self._corners.query(points, k=columns)
         closeness: NDArray[np.float64] = 1 / np.maximum(distance, 1e-6)
@@ -152,7 +153,7 @@ def bake(coarse: Mesh, size: tuple[int, int], baker: Baker) -> Maps:
 def _compute_texels(
     coarse: Mesh, triangle: NDArray[np.int64], weights: NDArray[np.float64], baker: Baker
 ) -> NDArray[np.float64]:
-    """Return the content of maps at points of triangles: normal (3), openness, paint if any; 0..1.
+    """Return maps' values at points of triangles, 0..1: normal (3), openness, and paint if any.
 
     weights  (n, 3), barycentric; below 0 or above 1 for points outside the triangle
     """
@@ -180,14 +181,14 @@ def _in_frame(
     bitangent: NDArray[np.float64],
     normal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the factors of the three axes that add up to the vectors, (n, 3).
+    """Return the factors (n, 3) by which the three axes add up to the vectors.
 
-    A renderer multiplies by the same axes. Between vertices they are not at right angles any more;
-    a renderer uses them as they are.
+    A renderer multiplies by the same axes. Between vertices they are no longer at right angles, and
+    a renderer uses them unchanged.
     """
-    # Cramer's rule: the axes of the inverse are cross products
+    # Cramer's rule: the axes of the inverse are cross products.
     rows = np.cross(bitangent, normal), np.cross(normal, tangent), np.cross(tangent, bitangent)
-    whole = (tangent * rows[0]).sum(axis=1)  # below 0 where a chart is mirrored
+    whole = (tangent * rows[0]).sum(axis=1)  # negative where a chart is mirrored
     whole = np.copysign(np.maximum(np.abs(whole), 1e-3), whole)
     return np.stack([(vectors * row).sum(axis=1) / whole for row in rows], axis=1)
 
@@ -195,7 +196,7 @@ def _in_frame(
 def fill(
     values: NDArray[np.float64], texel: NDArray[np.int64], size: tuple[int, int]
 ) -> NDArray[np.float64]:
-    """Return an image (h, w, k) of the values of texels; other texels repeat the nearest one.
+    """Return an image (h, w, k) of texel values; all other texels repeat the nearest one.
 
     values  float64 (n, k)
     texel   int64 (n,), row * w + column
@@ -213,7 +214,7 @@ def fill(
 
 
 def _barycentric(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weights (n, 3) of points (n, 3) in their triangles (n, 3, 3), 0..1, of sum 1."""
+    """Return the weights (n, 3) of points (n, 3) in triangles (n, 3, 3), 0..1, with a sum of 1."""
     a, b, c = corners.transpose(1, 0, 2)
     parts = [np.cross(c - b, points - b), np.cross(a - c, points - c), np.cross(b - a, points - a)]
     facing = np.cross(b - a, c - a)

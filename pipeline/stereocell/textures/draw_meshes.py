@@ -1,7 +1,7 @@
-"""Draw meshes without OpenGL: alike on every machine.
+"""Draw meshes without OpenGL, with the same result on every machine.
 
-Parallel projection, by default from the front, above and the right. One lamp stands over the left
-shoulder, and a weaker one on the right; light comes from the sky and the ground as well.
+The projection is parallel, by default from the front, above and the right. One lamp stands over the
+left shoulder, and a weaker one on the right. Light also comes from the sky and the ground.
 """
 
 from collections.abc import Iterable
@@ -19,19 +19,20 @@ Box = tuple[tuple[float, ...], tuple[float, ...]]
 # Direction of the eye, from the front, above and the right: x right, y up, z towards the viewer.
 _EYE = np.array([0.42, 0.5, 1.0])
 _UP = np.array([0.0, 1.0, 0.0])
-# linear light
+# Linear light
 _GROUND_LIGHT, _SKY_LIGHT = 0.06, 0.18
-_LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))  # right, up, towards the eye; light
+# Direction (right, up, towards the eye) and light
+_LAMPS = (((-0.5, 0.7, 1.0), 0.85), ((0.9, 0.1, 0.5), 0.2))
 _GLOSS, _GLOSS_POWER = 0.12, 25.0
 _BACKGROUND = (0.0033, 0.0040, 0.0052)
 _LINES = (0.148, 0.171, 0.214)
-_FINE = 2  # factor by which a picture is drawn larger, then averaged down
+_FINE = 2  # factor by which an image is drawn larger and then averaged down
 _MARGIN = 1.04  # factor by which the view exceeds the frame
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A mesh in memory, and the linear RGB of all of it (3,) or of its vertices (n, 3), 0..1."""
+    """A mesh in memory, with linear RGB 0..1 for all of it (3,) or for its vertices (n, 3)."""
 
     positions: NDArray[np.float32]
     triangles: NDArray[np.uint32]
@@ -41,9 +42,9 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """Where points of the world lie in the picture; columns are to the right, up, and to the eye.
+    """The projection of the world to an image. The columns of `axes` point right, up, to the eye.
 
-    size  (height, width), pixels as they are drawn
+    size  (height, width) in pixels, as drawn before averaging
     """
 
     axes: Vector
@@ -66,12 +67,12 @@ def draw_pixels(
     boxes: Iterable[Box] = (),
     turned_deg: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Return a picture of meshes (h, w, 3), sRGB.
+    """Return an image of meshes (h, w, 3), sRGB.
 
-    frame       corners (x, y, z) in world um of a box that fills the picture
+    frame       corners (x, y, z) in world um of a box that fills the image
     size        pixels: width, largest height
-    boxes       drawn as outlines
-    turned_deg  the eye goes round the upright axis by this; `frame` fills the picture at 0
+    boxes       boxes that are drawn as outlines
+    turned_deg  angle of the eye around the upright axis; at 0 `frame` fills the image
     """
     view = _look_at(frame, size, turned_deg)
     picture, nearest = _shade(shapes, view)
@@ -82,11 +83,11 @@ def draw_pixels(
 
 
 def draw_side(shapes: Iterable[Shape], box: Box, axes: Vector, longest: int) -> NDArray[np.uint8]:
-    """Return a picture of meshes (h, w, 4) on a transparent ground, in parallel projection.
+    """Return an image of meshes (h, w, 4) on a transparent ground, in parallel projection.
 
-    box      fills the picture
-    axes     (3, 3), columns are directions of the world: to the right, up, and to the eye
-    longest  pixels of the longer edge
+    box      fills the image
+    axes     (3, 3), columns are directions in the world: right, up, and to the eye
+    longest  number of pixels of the longer edge
     """
     low, high = (np.array(corner) for corner in box)
     across, upright = (float(np.abs(axes[:, k]) @ (high - low)) for k in (0, 1))
@@ -129,12 +130,12 @@ def _shrink(drawn: Vector) -> Vector:
     parts = [drawn[down::_FINE, on::_FINE] for down in range(_FINE) for on in range(_FINE)]
     mean: Vector = sum(parts[1:], parts[0]) / len(
         parts
-    )  # a third of what .mean over two axes takes
+    )  # takes a third of the time of .mean over two axes
     return mean
 
 
 def turning_frame(low: Vector, high: Vector) -> Box:
-    """Return the frame that a box (x, y, z) never leaves, however far it is turned."""
+    """Return a frame that contains a box (x, y, z) at every turn around the upright axis."""
     middle, half = (low + high) / 2, (high - low) / 2
     aside = np.abs(_EYE[[0, 2]]).sum() / np.hypot(_EYE[0], _EYE[2])
     half[[0, 2]] = np.hypot(half[0], half[2]) / aside
@@ -147,7 +148,7 @@ def _look_at(frame: Box, size: tuple[int, int], turned_deg: float) -> _View:
     right = np.cross(_UP, to_eye)
     right /= np.linalg.norm(right)
     up = np.cross(to_eye, right)
-    # width and height of the frame's box from the eye
+    # Width and height of the frame's box as seen from the eye
     across, upright = float(np.abs(right) @ (high - low)), float(np.abs(up) @ (high - low))
     width, most = size
     height = int(np.clip(width * upright / across, min(0.3 * width, most), most))
@@ -167,7 +168,7 @@ def _are_turned_away(corners: Vector) -> NDArray[np.bool_]:
 
 
 def _light(normals: Vector, color: Vector) -> Vector:
-    """Return the linear light (n, 3) of points with such normals (n, 3), of any length."""
+    """Return the linear light (n, 3) of points by their normals (n, 3) of any length."""
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
     sky = 0.5 + 0.5 * normals[:, 1]
     diffuse = _GROUND_LIGHT * (1 - sky) + _SKY_LIGHT * sky
@@ -182,7 +183,7 @@ def _light(normals: Vector, color: Vector) -> Vector:
 
 
 def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> None:
-    """Draw a box's edges where nothing is nearer; ends: (2, 3), its corners."""
+    """Draw the edges of a box where nothing is nearer. ends: (2, 3), corners of the box."""
     height, width = view.size
     for axis in range(3):
         beside, above = (axis + 1) % 3, (axis + 2) % 3
@@ -197,6 +198,7 @@ def _outline(picture: Vector, nearest: Vector, view: _View, ends: Vector) -> Non
                 here = depth[0] + share[:, 0] * (depth[1] - depth[0])
                 inside = (row >= 0) & (row < height - 1) & (column >= 0) & (column < width - 1)
                 row, column, here = row[inside], column[inside], here[inside]
-                for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):  # as wide as a pixel at last
+                # Two pixels are one pixel wide after averaging.
+                for down, on in ((0, 0), (0, 1), (1, 0), (1, 1)):
                     seen = here >= nearest[row + down, column + on]
                     picture[(row[seen] + down) * width + column[seen] + on] = _LINES

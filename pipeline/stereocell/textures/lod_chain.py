@@ -1,10 +1,10 @@
-"""Make all levels of detail of one unit from its fine surface; each is validated and measured.
+"""Make all levels of detail of one unit from its fine surface; validate and measure each of them.
 
-Each level is simplified from the one before, so that its vertices are some of that one's, and then
-gets back the volume that this took (meshes/keep_volume.py). Bodies that have no room for it between
-near walls are simplified less, at last not at all, as long as the level hardly gets heavier by it.
-Rims stay as they are.
-Small bodies go as a whole where they would be thinner than the error (meshes/small_bodies.py).
+Each level is simplified from the one before, so that its vertices are a part of that level's. Then
+it gets its volume back (meshes/keep_volume.py). Bodies between near walls may have no space to
+grow. These are simplified less, and at last not at all, as long as the level hardly becomes larger.
+Rims do not change. Small bodies are removed as a whole if they would become thinner than the error
+(meshes/small_bodies.py).
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.half_edges import measure_sharpest
 from stereocell.meshes.distance import Nearest, measure_enclosure, measure_spread
-from stereocell.meshes.keep_volume import Box, Earlier, FineVolumes, Kept
+from stereocell.meshes.keep_volume import Box, EarlierLevel, FineVolumes, RestoredLevel
 from stereocell.meshes.options import LodOptions
 from stereocell.meshes.simplify import compact
 from stereocell.meshes.simplify_valid import Simplified, Simplifier
@@ -26,16 +26,16 @@ from stereocell.model.spacing import Spacing
 from stereocell.model.timing import Clock
 from stereocell.textures.texture_lod import Texturer
 
-# shares of the error for bodies that lack volume, one try after another
+# Shares of the error for bodies that lack volume, one try after another
 FINER = (0.5, 0.25, 0.0)
-# of the first try's triangles that another may have: a wide membrane that lacks 3 % of its volume
-# would stay as heavy as the level before
+# Largest number of triangles of another try, as a multiple of the first try's. Without it a wide
+# membrane that lacks 3 % of its volume would stay as large as the level before.
 MAX_HEAVIER = 1.5
-# triangles that it may have more in any case: small levels weigh little
+# Number of triangles that another try may have more in any case, because small levels are light
 MAX_MORE = 1000
 
-# returns what gives values to levels, by the finest level that is made and by the numbers that its
-# vertices have in the fine surface
+# Function of the finest level that is made, and of the indices of its vertices in the fine surface;
+# it returns the object that gives values to levels
 GetTexturer = Callable[[Mesh, NDArray[np.int64]], Texturer]
 
 
@@ -51,22 +51,22 @@ def make_levels(
     get_texturer: GetTexturer | None = None,
     first: int = 0,
 ) -> tuple[Lod, ...]:
-    """Return lod0, lod1, ... of the fine surface, which is open on the planes and nowhere else.
+    """Return lod0, lod1, ... of the fine surface, which is open only on the planes.
 
     fine          positions float32 (n, 3) in um, world space (x, y, z)
     planes        the cut planes
     spacing_um    of the voxels, (z, y, x)
-    box           of the tile, least and largest corner (x, y, z), um, which vertices don't leave
+    box           of the tile, least and largest corner (x, y, z), um; vertices do not leave it
     caps          planes of caps, which stay flat
     get_texturer  None: levels get no values
-    first         the first level that is made; `fine` is then the level before it
+    first         number of the first level that is made; `fine` is then the level before it
 
-    Meshes are validated before the seams of charts split their vertices: positions stay the same.
+    Meshes are validated before the seams of charts split their vertices, which moves no vertex.
     """
     lods: list[Lod] = []
-    mesh, number = fine, np.arange(len(fine.positions))  # of each vertex in the fine mesh
+    mesh, number = fine, np.arange(len(fine.positions))  # index of each vertex in the fine mesh
     texturer: Texturer | None = None
-    place = np.zeros(0, np.int64)  # of a fine vertex in the finest level that is made
+    place = np.zeros(0, np.int64)  # index of each fine vertex in the finest level made
     with clock("volume kept"):
         topology: Topology | None = find_topology(fine.triangles, len(fine.positions))
         volumes = FineVolumes(fine, planes, box, topology, caps)
@@ -87,14 +87,15 @@ def make_levels(
             topology = topology or find_topology(mesh.triangles, len(mesh.positions))
         simplifier = Simplifier(mesh, planes, topology, caps)
         simplified, kept = _simplify(simplifier, topology, number, volumes, length, clock)
-        mesh, topology = simplified.mesh, simplified.topology  # the past ones take much memory
+        mesh, topology = simplified.mesh, simplified.topology  # earlier ones take much memory
         number, shown = number[simplified.vertices], kept.mesh
         with clock("measure"):
             if gone.any():
                 to_fine = of_all.without(gone)
             to_mesh = Nearest(shown, lod.samples, simplified.topology.twins)
             away, back = measure_spread(to_fine, to_mesh), measure_spread(to_mesh, to_fine)
-            # a coarser level is no more accurate: sampling errors must not break the viewers' order
+            # A coarser level never states a smaller distance, because viewers rely on the order,
+            # and distances have sampling errors.
             distance = max(away.p99, back.p99, lods[-1].distance_um if lods else 0.0)
             quality = Quality(
                 away=away,
@@ -124,18 +125,18 @@ def _simplify(
     volumes: FineVolumes,
     error_um: float,
     clock: Clock,
-) -> tuple[Simplified, Kept]:
-    """Return a level simplified, and the same with its volumes.
+) -> tuple[Simplified, RestoredLevel]:
+    """Return a simplified level, and the same level with its volumes.
 
     simplifier  of the level before
-    topology    of that level
-    number      of each of its vertices in the fine mesh
+    topology    of the level before
+    number      index of each of its vertices in the fine mesh
     """
     with clock("simplify"):
         simplified = simplifier.simplify(error_um)
     count = len(simplified.mesh.triangles)
     most, earlier = max(MAX_HEAVIER * count, count + MAX_MORE), None
-    best: tuple[Simplified, Kept] | None = None
+    best: tuple[Simplified, RestoredLevel] | None = None
     for finer in (*FINER, None):
         with clock("volume kept"):
             own = number[simplified.vertices]
@@ -155,7 +156,7 @@ def _simplify(
             simplified = simplifier.simplify(finer * error_um, lacking)
         if len(simplified.mesh.triangles) > most:
             break
-        earlier = Earlier(kept, own, simplified.changed)
+        earlier = EarlierLevel(kept, own, simplified.changed)
     assert best is not None
     return best
 

@@ -8,17 +8,17 @@ UNWRAPPER, ENCODER = "xatlas", "alktx2"
 
 
 def import_unwrapper() -> Any:
-    """Return xatlas. Raises UsageError, with the command that installs it, if it is missing."""
+    """Return xatlas. Raises UsageError with the command to install it if it is missing."""
     return import_extra(UNWRAPPER, extra="maps", wanted_by="unwrap.maps")
 
 
 def import_encoder() -> Any:
-    """Return alktx2. Raises UsageError, with the command that installs it, if it is missing."""
+    """Return alktx2. Raises UsageError with the command to install it if it is missing."""
     return import_extra(ENCODER, extra="maps", wanted_by="a surface with baked maps")
 
 
 def require_map_packages() -> None:
-    """Raise UsageError where a package of baked maps is missing, before any work is done."""
+    """Raise UsageError if a package for baked maps is missing, before any work is done."""
     for package in (UNWRAPPER, ENCODER):
         import_extra(package, extra="maps", wanted_by="unwrap.maps")
 
@@ -30,5 +30,5 @@ def unwrapper_version() -> str:
 
 
 def encoder_version() -> str:
-    """Return the version of alktx2; empty: it is not installed."""
+    """Return the version of alktx2; empty if it is not installed."""
     return version_of(ENCODER)

@@ -16,57 +16,60 @@ from stereocell.model.settings import (
 )
 from stereocell.model.spacing import Spacing
 
-TEXTURES = tuple(2**k for k in range(6, 14))  # allowed largest edges of a map, in texels
-MAX_PADDING = 24  # texels: mip levels 0 to 3. xatlas packs 2,500 charts in 7 s; with 64 in 90 s
-# Texels finer than voxels show nothing new. At a tenth xatlas is slow, and far below it crashes.
-MAX_TEXELS = 10  # most texels along the finest voxel spacing
-# Largest reach of rays into the body and past its ends: the voxels they cross are held in memory.
-MAX_REACH = 64.0  # coarsest voxel spacings
+# Allowed values of the largest edge of a map, in texels
+TEXTURES = tuple(2**k for k in range(6, 14))
+# Texels; with 24 mip levels 0 to 3 stay apart. xatlas then packs 2,500 charts in 7 s; with 64 it
+# takes 90 s.
+MAX_PADDING = 24
+# Largest number of texels along the finest voxel spacing. Texels finer than voxels show nothing
+# new. At a tenth xatlas is slow, and far below that it crashes.
+MAX_TEXELS = 10
+# Coarsest voxel spacings; largest reach of rays into the body and past its ends, because the voxels
+# that they cross are held in memory
+MAX_REACH = 64.0
 
 
 @dataclass(frozen=True, slots=True)
 class UnwrapOptions:
-    """UVs and baked maps, for DCC tools. Levels without have their values at the vertices.
+    """UVs and baked maps, for DCC tools. Levels without maps have their values at the vertices.
 
     Raises UsageError for a number out of range.
     """
 
     maps: bool = setting(
         False,
-        "whether coarser levels get UVs and baked maps, 4 to 6 times as large",
+        "whether coarser levels get UVs and baked maps; they are then 4 to 6 times as large",
         flag=Flag(
             "--maps",
-            "coarser levels get UVs and baked maps of normals, occlusion and paint, for DCC tools; "
-            "needs the extra `maps` (default: normals and values at vertices alone)",
+            "bake maps of normals, occlusion and paint with UVs for coarser levels, for DCC tools; "
+            "needs the extra `maps` (default: only normals and values at vertices)",
         ),
     )
-    first_lod: int = setting(
-        1, "the finest level that gets UVs and baked maps", bounds=COUNT_OR_NONE
-    )
+    first_lod: int = setting(1, "finest level that gets UVs and baked maps", bounds=COUNT_OR_NONE)
     texel_um: float | str = setting(
-        AUTO, "um a texel; auto: the coarsest voxel spacing", bounds=LENGTH_UM
+        AUTO, "edge of a texel in um; auto: the coarsest voxel spacing", bounds=LENGTH_UM
     )
     padding: int = setting(
         6,
         "texels between charts; 6 keep mip levels 0 and 1 apart, 12 also 2",
         bounds=Bounds(3, MAX_PADDING),
     )
-    # Texels of one coarse voxel spacing need an edge of 1750 on a unit of 194 x 512 x 512 that is
-    # full of membranes, 300 to 1000 on nuclei and vessels.
+    # With texels of one coarse voxel spacing, a unit of 194 x 512 x 512 voxels full of membranes
+    # needs a map of 1750 texels. Units of nuclei and vessels need 300 to 1000.
     max_texture: int = setting(
-        1024, "texels, largest edge of a map; texels grow up to 2.8 times", bounds=COUNT
+        1024, "largest edge of a map in texels; texels grow up to 2.8 times to fit", bounds=COUNT
     )
     max_triangles: int = setting(
-        100_000, "levels with more triangles go without maps", bounds=COUNT_OR_NONE
+        100_000, "levels with more triangles get no maps", bounds=COUNT_OR_NONE
     )
     occlusion_um: float | str = setting(
         AUTO,
-        "how far ambient occlusion looks; auto: 8 coarsest spacings; 0: none",
+        "reach of ambient occlusion; auto: 8 coarsest spacings; 0: no ambient occlusion",
         bounds=LENGTH_UM,
     )
     paint_um: float | str = setting(
         AUTO,
-        "depth below the surface within which paint's maximum counts; auto: 2 coarsest",
+        "depth below the surface in which paint takes its maximum; auto: 2 coarsest spacings",
         bounds=LENGTH_UM,
     )
 
@@ -81,7 +84,7 @@ class UnwrapOptions:
     def resolved(self, spacing_um: Spacing) -> "UnwrapOptions":
         """Return the options with every `auto` replaced by a length.
 
-        Raises UsageError for a length that doesn't fit the voxels.
+        Raises UsageError for a length that does not fit the voxels.
         """
         finest, coarsest = min(spacing_um), max(spacing_um)
         texel_um = length_um("unwrap.texel_um", self.texel_um, coarsest)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stereocell.kernels.depth_buffer import find_visible
 
-_AT_ONCE = 1 << 20  # texels or pixels computed at once: about 0.2 GB
+_AT_ONCE = 1 << 20  # texels or pixels that are computed together, in about 0.2 GB
 
 
 def find_texels(
@@ -21,7 +21,7 @@ def find_texels(
     uvs        float32 (n, 2), origin at the lower left
     triangles  uint32 (m, 3)
     size       (height, width), texels; row 0 at v = 1
-    beyond     texels; a texel outside all triangles goes with the nearest edge within this distance
+    beyond     texels; a texel outside of all triangles takes the nearest edge within this distance
     result     texel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
                float64 (k, 3); distance to the triangles float64 (k,), in texels, 0 inside
 
@@ -36,7 +36,7 @@ def find_texels(
     weights_of = np.zeros((height * width, 3))
     for triangle, weights, texel, outside in _cover(corners, size, beyond):
         better = np.flatnonzero(outside < nearest[texel])
-        # the best comes last: the last assignment to a texel stays
+        # The best one comes last, since the last assignment to a texel remains.
         order = better[np.argsort(-outside[better], kind="stable")]
         at = texel[order]
         nearest[at] = outside[order]
@@ -57,7 +57,7 @@ def find_pixels(
     corners  float64 (m, 3, 2), pixels, x right, y down
     depth    float64 (m, 3), larger is nearer
     size     (height, width), pixels
-    nearest  float64 (height, width), the depth of what is drawn already; it becomes that of both
+    nearest  float64 (height, width), depth of what is drawn already; updated in place
     result   pixel int64 (k,), row * width + column; triangle int64 (k,); barycentric weights
              float64 (k, 3)
     """
@@ -67,7 +67,7 @@ def find_pixels(
     triangle_of = np.full(size, -1)
     weights_of = np.zeros((height, width, 3))
     low, high = _boxes(corners, size, 0.0)
-    # of a fine surface most lie between the centres of pixels
+    # Most triangles of a fine surface lie between the centres of pixels.
     drawn = np.flatnonzero((low[:, 0] <= high[:, 0]) & (low[:, 1] <= high[:, 1]))
     frames, is_flat = _frames(corners[drawn])
     drawn = drawn[~is_flat]
@@ -82,7 +82,7 @@ def _cover(
 ) -> Iterator[
     tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 ]:
-    """Yield triangle, weights, pixel and distance outside (0: inside) of each pixel near triangles.
+    """Yield triangle, weights, pixel and distance (0: inside) of each pixel near triangles.
 
     corners  (m, 3, 2) in pixels, x right, y down
     """
@@ -90,7 +90,7 @@ def _cover(
     low, high = _boxes(corners, size, beyond)
     extent = np.maximum(high - low + 1, 0)
     frames, is_flat = _frames(corners)
-    count = np.where(is_flat, 0, extent.prod(axis=1))  # flat triangles have nothing near
+    count = np.where(is_flat, 0, extent.prod(axis=1))  # nothing is near flat triangles
     ends = np.cumsum(count)
     first = 0
     while first < len(corners):
@@ -115,7 +115,7 @@ def _boxes(
     """Return the first and last pixel (x, y) near each triangle: (m, 2)."""
     height, width = size
     last = np.array([width - 1, height - 1])
-    a, b, c = corners.transpose(1, 0, 2)  # numpy is slow along an axis of three
+    a, b, c = corners.transpose(1, 0, 2)  # numpy is slow along an axis of length 3
     least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     low = np.clip(np.ceil(least - 0.5 - beyond - 1e-6), 0, last + 1)
     high = np.clip(np.floor(most - 0.5 + beyond + 1e-6), -1, last)
@@ -125,15 +125,16 @@ def _boxes(
 def _frames(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the numbers that `_weigh` needs of each triangle (10, m), and which are flat (m,).
+    """Return the numbers that `_weigh` needs for each triangle (10, m), and which are flat (m,).
 
-    They are corner a, edges a to b and a to c, twice the area, and the height over each edge.
+    The numbers are corner a, edges a to b and a to c, twice the area, and the height over each
+    edge.
     """
     a, b, c = corners.transpose(1, 2, 0)
     ab, ac = b - a, c - a
     twice = ab[0] * ac[1] - ab[1] * ac[0]
     sides = np.stack([np.hypot(*edge) for edge in (c - b, ac, ab)])
-    # slivers too: their weights are noise
+    # Slivers count as flat, because their weights are noise.
     is_flat = np.abs(twice) <= 1e-6 * sides.max(axis=0) ** 2 + 1e-12
     heights = np.abs(twice) / np.maximum(sides, 1e-12)
     return np.concatenate([a, ab, ac, twice[None], heights]), is_flat
@@ -142,11 +143,11 @@ def _frames(
 def _weigh(
     frames: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return barycentric weights (n, 3), and how far each point lies beyond its triangle's edges.
+    """Return barycentric weights (n, 3), and each point's distance beyond its triangle's edges.
 
-    Beyond a corner that is less than the distance to the corner.
+    For a point beyond a corner, that is less than its distance from the corner.
 
-    frames  (10, n), of each point's triangle
+    frames  (10, n), numbers of each point's triangle
     """
     ax, ay, abx, aby, acx, acy, twice, *heights = frames
     x, y = x - ax, y - ay

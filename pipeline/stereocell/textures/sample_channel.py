@@ -1,8 +1,8 @@
-"""Sample another channel's intensity on a surface, as `--paint CD31=MART1` asks for.
+"""Sample another channel's intensity on a surface, for options such as `--paint CD31=MART1`.
 
-Each vertex takes the largest value from the surface down to a given depth: a marker of the membrane
-has its maximum beside the iso-surface, not on it, and a marker of the cytoplasm below it. Intensity
-follows the sampled channel's own window, as in its 8-bit volume.
+Each vertex takes the largest value between the surface and a given depth. A marker of the membrane
+has its maximum beside the iso-surface, not on it, and a marker of the cytoplasm below it.
+Intensities follow the sampled channel's own window, as in its 8-bit volume.
 """
 
 import numpy as np

@@ -1,22 +1,22 @@
 """Fit the texels around charts so that lookups on both sides of a seam, and of a cut, are right.
 
-A bilinear lookup on a chart's edge mixes texels inside with texels outside, whose centres lie past
-the surface. The texels outside are free, since only such lookups read them. They are fitted so that
-the mix equals the surface's value, by a few rounds of averaged Kaczmarz projections.
+A bilinear lookup on the edge of a chart mixes texels inside with texels outside, whose centres lie
+past the surface. The texels outside may have any value, since only these lookups read them. They
+are fitted by a few rounds of averaged Kaczmarz projections, so that the mix is the surface's value.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-ROUNDS = 8  # rounds of projections
-MAX_CHANGE = 0.35  # largest change of a texel, values are 0..1
+ROUNDS = 8  # number of rounds of projections
+MAX_CHANGE = 0.35  # largest change of a texel, where values are 0..1
 PER_TEXEL = 2.0  # points per texel of a chart's edge
 
 
 def find_chart_edges(
     uvs: NDArray[np.float32], triangles: NDArray[np.uint32], size: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return points on the edges that have one triangle.
+    """Return points on the edges that have only one triangle.
 
     uvs        float32 (n, 2)
     triangles  uint32 (m, 3)
@@ -53,8 +53,8 @@ def fit_seam_texels(
 
     image    float64 (h, w, k), 0..1, row 0 at v = 1
     is_free  bool (h, w), texels that may change, by MAX_CHANGE at most
-    uvs      float64 (n, 2), where lookups are made
-    wanted   float64 (n, k), 0..1, results of the bilinear lookups
+    uvs      float64 (n, 2), positions of bilinear lookups
+    wanted   float64 (n, k), 0..1, desired results of these lookups
     """
     height, width, depth = image.shape
     x, y = uvs[:, 0] * width - 0.5, (1 - uvs[:, 1]) * height - 0.5

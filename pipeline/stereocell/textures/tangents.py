@@ -1,14 +1,14 @@
-"""Tangents by the rules of MikkTSpace, which glTF and USD name as their convention.
+"""Tangents by the rules of MikkTSpace, the convention that glTF and USD name.
 
 Each triangle has one direction along +u, of unit length. A vertex takes the directions of its
-triangles, each projected onto the plane across the vertex's normal, normalized again and weighted
-by the angle of the triangle's corner, measured in that plane; the sum is normalized. The sign
-gives the side of normal and tangent that +v lies on: bitangent = sign * cross(normal, tangent).
+triangles. Each of them is projected onto the plane across the vertex's normal, normalized again,
+and weighted by the angle of the triangle's corner in that plane. The sum is normalized. The sign
+shows on which side of normal and tangent +v lies: bitangent = sign * cross(normal, tangent).
 
-No package for this installs: `pymikktspace` is source only and does not build. The rules differ in
-one case: where triangles that are mirrored in UV space meet others at one vertex, MikkTSpace splits
-it; here the larger angle wins. Charts of xatlas are not mirrored inside. The stage and the bundle
-carry these tangents, and the maps are baked with them, so that no reader has to derive its own.
+No package for this can be installed: `pymikktspace` is available as source only and does not build.
+The rules differ in one case. If triangles that are mirrored in UV space meet others at a vertex,
+MikkTSpace splits it; here the larger angle decides. Charts of xatlas are not mirrored inside. Stage
+and bundle contain these tangents, and maps are baked with them, so no reader has to derive its own.
 
 References
 M. S. Mikkelsen, "Simulation of wrinkled surfaces revisited", University of Copenhagen, 2008.
@@ -34,7 +34,7 @@ def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
     signed = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]  # twice the area in UV space
     side = np.where(signed < 0, -1.0, 1.0)
     along = _unit((e1 * d2[:, 1:] - e2 * d1[:, 1:]) * side[:, None])
-    along[signed == 0] = 0.0  # no area in UV space: no direction
+    along[signed == 0] = 0.0  # without area in UV space a triangle has no direction
 
     total, handed = np.zeros_like(p), np.zeros(len(p))
     for here, after, before in ((a, b, c), (b, c, a), (c, a, b)):
@@ -47,7 +47,7 @@ def make_tangents(mesh: Mesh) -> NDArray[np.float32]:
             total[:, axis] += np.bincount(here, part[:, axis], len(p))
         handed += np.bincount(here, side * angle, len(p))
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    # a vertex without a direction from its triangles: any direction across the normal serves
+    # Without a direction from triangles, any direction across the normal will do.
     beside = np.where(np.abs(normals[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     spare = _unit(np.cross(normals, beside))
     tangent = np.where(length > 1e-12, total / np.maximum(length, 1e-12), spare)
@@ -61,6 +61,6 @@ def _across(normals: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArr
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the vectors at unit length; a zero vector stays."""
+    """Return the vectors at unit length. Zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 1e-30)

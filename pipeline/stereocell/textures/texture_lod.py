@@ -1,4 +1,4 @@
-"""Values of a level of detail: at its vertices, or in maps where these are asked for."""
+"""Values of a level of detail: at its vertices, or in maps if these are requested."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ class VertexValues:
     """Values at the vertices of the finest level that is made.
 
     openness  float32 (n,) 0..1: 1 - ambient occlusion, see textures/ambient_occlusion.py
-    paint     float32 (n,) 0..1: intensity of the sampled channel; None: there is none
+    paint     float32 (n,) 0..1: intensity of the sampled channel; None: no channel is sampled
     """
 
     openness: NDArray[np.float32]
@@ -33,11 +33,11 @@ class VertexValues:
 
 
 class Texturer:
-    """Gives levels their values. Coarser levels have some of the finest's vertices, and its values.
+    """Gives levels their values. Coarser levels have some of the finest level's vertices.
 
     options     resolved
     values      at the vertices of the finest level
-    get_source  returns the surface that maps are baked from; it is called where maps are asked for
+    get_source  returns the surface from which maps are baked; called only if maps are requested
     """
 
     def __init__(
@@ -55,9 +55,9 @@ class Texturer:
         """Return the level with maps, or with values at its vertices.
 
         level     number of the level, 0: the finest
-        vertices  int64 (n,), the number that each vertex has in the finest level
+        vertices  int64 (n,), index of each vertex in the finest level
         """
-        reason = self._without(level)
+        reason = self._why_no_maps(level)
         if not reason:
             with self._clock("unwrap"):
                 unwrapped = unwrap(lod.mesh, self._options)
@@ -70,9 +70,9 @@ class Texturer:
             reason = unwrapped
         return replace(lod, baked=replace(self._values.at(vertices), reason=reason))
 
-    def _without(self, level: int) -> str:
-        """Return why a level gets no maps, whatever its mesh is; empty: it may."""
+    def _why_no_maps(self, level: int) -> str:
+        """Return the reason why a level gets no maps regardless of its mesh; empty if it may."""
         if not self._options.maps:
-            return "maps are not asked for"
+            return "maps were not requested"
         first = self._options.first_lod
         return f"finer than lod{first}" if level < first else ""

@@ -1,18 +1,19 @@
-"""UVs of a level of detail: charts that end at sharp edges, packed at a given texel density.
+"""UVs of a level of detail: charts that end at sharp edges, packed at a given density of texels.
 
-xatlas makes the charts and packs them. It finds sharp edges by the normals alone, and ours are
-smooth: so xatlas gets the mesh split along them, with the split parts' own normals.
+xatlas makes the charts and packs them. It finds sharp edges by the normals alone, and our normals
+are smooth. So xatlas gets the mesh cut along sharp edges, with the parts' own normals.
 
-Padding and mip levels. A bilinear lookup inside a chart at mip level k reaches 1.5 * 2^k texels
-beyond it, and two charts share the texels between them half and half. So `padding` texels keep
-charts apart up to the level k for which padding >= 3 * 2^k; with 6 that is levels 0 and 1. The
-viewer replaces a level of detail by a coarser one before its texels, a coarse voxel wide, are much
-below a pixel. So deeper mip levels matter for the coarsest level only, and mix edges of charts.
+Padding and mip levels: a bilinear lookup inside a chart at mip level k reaches 1.5 * 2^k texels
+beyond it, and two charts share the texels between them equally. So `padding` texels keep charts
+apart up to the level k for which padding >= 3 * 2^k. With 6 texels these are levels 0 and 1. The
+viewer replaces a level of detail by a coarser one before its texels, each as wide as a coarse
+voxel, become much smaller than a pixel. So deeper mip levels, which mix the edges of charts, matter
+only for the coarsest level.
 
-Charts cover 15 to 38 % of the texels on six of the demo's units, lod1 to lod3: they are small, and
-padding takes much of the rest. With 3 texels of padding (mip level 0 alone) they cover 25 to 41 %,
-with texels of a quarter, 6 to 13 times as many, 38 to 55 %. Packing by brute force gives up to 4 %
-more, and a larger `max_cost` of charts hardly any.
+On six of the demo's units, lod1 to lod3, charts cover 15 to 38 % of the texels: they are small, and
+padding takes much of the rest. With 3 texels of padding (only mip level 0) they cover 25 to 41 %.
+With texels of a quarter, 6 to 13 times as many, they cover 38 to 55 %. Packing by brute force adds
+up to 4 %, and a larger `max_cost` of charts hardly anything.
 """
 
 import atexit
@@ -31,16 +32,18 @@ from stereocell.textures.map_packages import import_unwrapper
 from stereocell.textures.options import UnwrapOptions
 from stereocell.textures.tangents import make_tangents
 
-# xatlas 0.0.11 stops its worker threads without holding the lock that they sleep under. An atlas
-# destroyed just when a worker goes to sleep waits for it forever (seen once, in ~TaskScheduler).
-# So an atlas is destroyed some unwraps later, when its workers sleep, and the last ones never: they
-# end with the process.
-ATLASES_KEPT = 4  # most atlases that wait for their workers
+# xatlas 0.0.11 stops its worker threads without holding the lock on which they sleep. An atlas that
+# is destroyed just when a worker goes to sleep then waits for it forever (seen once, in
+# ~TaskScheduler). So an atlas is destroyed some unwraps later, when its workers sleep. The last
+# ones are never destroyed, and end with the process.
+ATLASES_KEPT = 4  # largest number of atlases that wait for their workers
 _past_atlases: deque[Any] = deque()
 
-SHARP_DEG = 75.0  # degrees between two triangles; on coarse levels 60 are common
-MULTIPLE = 8  # texels; edges of a map are multiples of it: blocks of 4 down to mip level 1
-COARSENINGS = 3  # most times that texels grow, each by sqrt 2 or more, before a level has no maps
+SHARP_DEG = 75.0  # degrees between two triangles; on coarse levels 60 degrees are common
+# Texels; edges of a map are multiples of this, so that mip level 1 still has blocks of 4
+MULTIPLE = 8
+# Largest number of times that texels grow, each by at least sqrt 2, before a level gets no maps
+COARSENINGS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,20 +62,20 @@ class Unwrapped:
 
 
 def mip_levels_apart(padding: int) -> int:
-    """Return for how many mip levels, from 0 on, a lookup in a chart reads no other chart.
+    """Return the number of mip levels, from 0 on, at which a lookup in a chart reads no other.
 
-    padding  texels between charts; see the module's text
+    padding  texels between charts; see the module's docstring
     """
     return int(math.log2(padding / 3)) + 1
 
 
 def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
-    """Return the mesh with UVs, or the reason why not: too many triangles, or too many charts.
+    """Return the mesh with UVs, or the reason why it has none: too many triangles or charts.
 
-    mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals stay
+    mesh     positions float32 (n, 3) in um, triangles uint32 (m, 3); its normals do not change
     options  resolved
 
-    Raises UsageError without xatlas, a package of the extra `maps`.
+    Raises UsageError without xatlas, which is a package of the extra `maps`.
     """
     xatlas = import_unwrapper()
     if len(mesh.triangles) > options.max_triangles:
@@ -84,7 +87,7 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
         atlas.add_mesh(mesh.positions[vertices], corners, normals)
         charts, pack = xatlas.ChartOptions(), xatlas.PackOptions()
         charts.max_iterations = 1
-        charts.normal_seam_weight = 1000.0  # with 1000 and more no chart crosses a seam
+        charts.normal_seam_weight = 1000.0  # with 1000 or more no chart crosses a seam
         pack.texels_per_unit, pack.padding = 1 / texel_um, options.padding
         atlas.generate(charts, pack)
         width, height = atlas.width, atlas.height
@@ -100,7 +103,7 @@ def unwrap(mesh: Mesh, options: UnwrapOptions) -> Unwrapped | str:
     own, triangles, uvs = atlas.get_mesh(0)
     _retire(atlas)
     size = _rounded(height), _rounded(width)
-    # the map is larger than the atlas by a few empty texels
+    # The map is a few empty texels larger than the atlas.
     scale = np.array([width / size[1], height / size[0]])
     at = vertices[own]
     split = Mesh(
@@ -118,7 +121,7 @@ def split_sharp_edges(
     """Return the mesh cut open along its sharp edges, for xatlas.
 
     result  int64 (n,), the original vertex of each new one; triangles uint32 (m, 3); normals
-            float32 (n, 3), weighted by area, of the triangles that no sharp edge separates
+            float32 (n, 3), means by area over triangles that no sharp edge separates
     """
     triangles = mesh.triangles.astype(np.int64)
     a, b, c = mesh.positions[triangles].astype(np.float64).transpose(1, 0, 2)
@@ -134,7 +137,7 @@ def split_sharp_edges(
     cosine = (unit[one // 3] * unit[two // 3]).sum(axis=1)
     is_smooth = cosine > math.cos(math.radians(SHARP_DEG))
     one, two = one[is_smooth], two[is_smooth]
-    # two triangles have their common edge in opposite directions
+    # Two triangles have their common edge in opposite directions.
     joined = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
     label, count = label_pairs(*joined, start.size)
     _, first = np.unique(label, return_index=True)

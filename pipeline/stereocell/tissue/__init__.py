@@ -1,1 +1,1 @@
-"""Tissue classes that are learned from a volume."""
+"""Tissue classes that are learned from a volume or found by a network."""

@@ -1,7 +1,8 @@
-"""A multiplicative bias field, as a receive coil causes it: a low polynomial of log intensity.
+"""A multiplicative bias field, as caused by a receive coil: a low polynomial of log intensity.
 
-It is fitted between two steps of the mixture to the part that the classes don't explain, each voxel
-weighted by its certainty: the EM of Wells et al., with the polynomial basis of Van Leemput et al.
+The field is fitted between two steps of the mixture to the part that the classes do not explain.
+The weight of each voxel is its certainty: the EM of Wells et al., with the polynomial basis of Van
+Leemput et al.
 
 References
 W. M. Wells, W. E. L. Grimson, R. Kikinis & F. A. Jolesz, "Adaptive segmentation of MRI data", IEEE
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class BiasField:
-    """log of the field as a sum of Legendre products over a box of voxels.
+    """The logarithm of the field, as a sum of Legendre products over a box of voxels.
 
     shape    (z, y, x), voxels
     terms    degrees (z, y, x) of each product
@@ -32,7 +33,7 @@ class BiasField:
     weights: tuple[float, ...]
 
     def log_at(self, indices: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return log of the field at voxels, float32 (n,).
+        """Return the logarithm of the field at voxels, float32 (n,).
 
         indices  int64 (3, n), rows (z, y, x)
         """
@@ -55,7 +56,7 @@ class BiasField:
 
 
 def flat_field(shape: tuple[int, int, int], degree: int) -> BiasField:
-    """Return the field that is 1 everywhere, with all terms up to a total degree but the constant.
+    """Return the field that is 1 everywhere, with all terms up to a total degree but no constant.
 
     shape  (z, y, x), voxels
     """
@@ -75,16 +76,16 @@ def fit_bias_field(
     """Return the field whose log is nearest to the residual.
 
     indices   int64 (3, n), rows (z, y, x)
-    residual  float32 (n,), log intensity that the classes don't explain
+    residual  float32 (n,), log intensity that the classes do not explain
     weights   float32 (n,), certainty of each voxel
 
-    A constant is fitted too and dropped: it is the classes' brightness, not the field's.
+    A constant is fitted too and dropped, because it is the brightness of the classes.
     """
     basis = _basis(indices, field.shape, field.terms)
     basis = np.concatenate([np.ones((len(basis), 1)), basis], axis=1)
     weighted = basis * weights[:, None]
     normal = weighted.T @ basis
-    # slight damping: terms that the mask doesn't distinguish stay small
+    # Slight damping keeps terms small that the mask does not distinguish.
     normal += 1e-6 * np.trace(normal) / len(normal) * np.eye(len(normal))
     found = np.linalg.solve(normal, weighted.T @ residual)
     return BiasField(field.shape, field.terms, tuple(float(w) for w in found[1:]))

@@ -1,9 +1,9 @@
 """The brain's hull: a closed mesh that grows from inside until it meets dark voxels, as in BET.
 
 Every vertex moves out along its normal while the voxels below it are bright for their surroundings.
-Smoothness holds it back, by a rule that distinguishes a gyrus from a sharp corner. The threshold
-is local, so a bias field matters little; the mesh is smooth, so it bridges sulci, and the neck is a
-hole too narrow for it.
+Smoothness holds it back, by a rule that distinguishes a gyrus from a sharp corner. The threshold is
+local, so a bias field matters little. The mesh is smooth, so it bridges sulci and does not enter
+the neck, which is too narrow for it.
 
 References
 S. M. Smith, "Fast robust automated brain extraction", Human Brain Mapping 17, 2002.
@@ -19,16 +19,18 @@ from scipy.spatial import ConvexHull
 
 Points = NDArray[np.float64]  # (n, 3), (z, y, x), mm
 Triangles = NDArray[np.int64]
-SUBDIVISIONS = 3  # 642 vertices, 14 mm apart on an adult's brain; at the end four times as many
+# 642 vertices, 14 mm apart on an adult's brain; the second mesh has four times as many
+SUBDIVISIONS = 3
 ITERATIONS = 400  # steps with each of the two meshes
-SMOOTH_MM = (3.33, 10.0)  # mm; radii of curvature: smaller are smoothed away, larger are kept
-DEEP_MM, NEAR_MM, EVERY_MM = 20.0, 10.0, 2.0  # mm below a vertex: search for dark, for bright, step
+SMOOTH_MM = (3.33, 10.0)  # mm; smaller radii of curvature are smoothed away, larger ones are kept
+# mm below a vertex: reach of the search for dark voxels and for bright ones, and its step
+DEEP_MM, NEAR_MM, EVERY_MM = 20.0, 10.0, 2.0
 EDGE = 0.55  # Smith's fractional threshold between dark and bright, 0..1
 
 
 @dataclass(frozen=True, slots=True)
 class Hull:
-    """A closed mesh, outward.
+    """A closed mesh whose triangles face outward.
 
     points     float64 (n, 3), (z, y, x), mm from the centre of voxel (0, 0, 0)
     triangles  int64 (m, 3)
@@ -48,12 +50,11 @@ def find_hull(
 ) -> Hull:
     """Return the hull of the brain around `center_mm`.
 
-    field       float32 (z, y, x), voxels of about 2 mm: finer ones show the bottoms of sulci
+    field       float32 (z, y, x), voxels of about 2 mm, because finer ones show the floors of sulci
     spacing_mm  (z, y, x)
     center_mm   (z, y, x), from the centre of voxel (0, 0, 0)
-    radius_mm   of a ball of the brain's volume; the mesh begins at half of it
-    levels      voxel values: dark (air, bone), the least value that counts as bright, the brain's
-                median
+    radius_mm   radius of a ball with the brain's volume; the mesh starts with half of it
+    levels      voxel values: dark (air, bone), the least bright value, the brain's median
     """
     unit, triangles = _icosphere(SUBDIVISIONS)
     points = np.asarray(center_mm) + 0.5 * radius_mm * unit
@@ -76,7 +77,7 @@ def _inflate(
     depths = np.arange(1.0, DEEP_MM, EVERY_MM)
     near = int((depths < NEAR_MM).sum())
     edge_of = triangles[:, 0], triangles[:, 1]
-    padded = np.pad(field, 1).astype(np.float32)  # 0 past the ends
+    padded = np.pad(field, 1).astype(np.float32)  # 0 beyond the ends
     sharp, blunt = (1 / r for r in SMOOTH_MM)
     for _ in range(ITERATIONS):
         normals = _normals(points, triangles)
@@ -179,7 +180,7 @@ def _quarter(points: Points, triangles: Triangles) -> tuple[Points, Triangles]:
 
 
 def _neighbours(triangles: Triangles, n: int) -> tuple[Triangles, NDArray[np.int64]]:
-    """Return each vertex' neighbours (n, most), padded with 0, and their number (n,)."""
+    """Return the neighbours of each vertex (n, most), padded with 0, and their number (n,)."""
     edges = np.unique(
         np.concatenate([triangles[:, [a, b]] for a in range(3) for b in range(3) if a != b]), axis=0
     )

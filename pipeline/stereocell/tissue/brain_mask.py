@@ -1,8 +1,8 @@
-"""Masks of a head and of its brain: thresholds, a hull (tissue/brain_hull.py), fluid.
+"""Masks of a head and of its brain, from thresholds, a hull (tissue/brain_hull.py) and fluid.
 
-The hull begins at the bright tissue that erosion leaves, as in Shattuck et al. It is found twice,
-the second time with a rough bias field removed, which is measured inside the first hull. Lengths
-are in um, not in voxels.
+The hull starts at the bright tissue that erosion leaves, as in Shattuck et al. It is found twice.
+Before the second time a rough bias field, measured inside the first hull, is removed. Lengths are
+in um, not in voxels.
 
 References
 D. W. Shattuck, S. R. Sandor-Leahy, K. A. Schaper, D. A. Rottenberg & R. M. Leahy, "Magnetic
@@ -25,14 +25,14 @@ from stereocell.tissue.brain_hull import Hull, fill_hull, find_hull
 
 Mask = NDArray[np.bool_]
 Triple = tuple[float, float, float]
-COARSE_UM = 2000.0  # um; the hull is found in voxels of about this size
-NOISE_UM = 800.0  # um; sigma that smooths those voxels
+COARSE_UM = 2000.0  # um; approximate size of the voxels in which the hull is found
+NOISE_UM = 800.0  # um; sigma of the smoothing of those voxels
 BIAS_UM = 20_000.0  # um; sigma of the rough bias field
 ERODED_UM = 4500.0  # um; erosion that separates the brain from scalp, optic nerves and dura
 GYRI_UM = 3000.0  # um; bright tissue within this distance of the hull belongs to the brain
 RIM_UM = 12000.0  # um; largest distance of the fluid from the hull
-CALM = 0.3  # share of the dark voxels, of lowest gradient, that separate bone and fluid
-PARTED = 0.85  # least separability of two kinds, 0..1; an even spread has .75
+CALM = 0.3  # share of the dark voxels, of lowest gradient, in which bone and fluid are compared
+PARTED = 0.85  # least separability of two kinds, 0..1; an even distribution has .75
 
 
 def find_foreground(smooth: NDArray[np.float32]) -> Mask:
@@ -58,9 +58,9 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
     head        bool (z, y, x), the foreground
     spacing_um  (z, y, x)
 
-    Where fluid differs from bone, the mask follows it outward from the hull. Where it is as dark as
-    bone, its outer bound is unknown, and the result is the hull. Raises SourceError where there is
-    no brain to begin at.
+    If fluid differs from bone, the mask follows it outward from the hull. If it is as dark as bone,
+    its outer boundary is unknown, and the result is the hull. Raises SourceError if there is no
+    brain to start from.
     """
     coarse, inside, spacing = _coarsen(smooth, head, spacing_um)
     hull, tissue_level = _find_hull(coarse, inside, spacing)
@@ -69,7 +69,7 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
     )
     brain &= head
     if not brain.any():
-        raise SourceError("no brain: the hull holds no voxel, expected a head in MR")
+        raise SourceError("no brain: the hull holds no voxel; expected a head in MR")
     return _add_fluid(brain, smooth, head, tissue_level, spacing_um)
 
 
@@ -80,7 +80,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     core = _within(tissue, -ERODED_UM, spacing_um)
     if not core.any():
         raise SourceError(
-            "no brain: bright tissue is nowhere 9 mm thick, expected a head in MR (or --everywhere)"
+            "no brain: bright tissue is nowhere 9 mm thick; expected a head in MR (or --everywhere)"
         )
     core = _within(_largest(core), ERODED_UM, spacing_um) & tissue
     mm = _mm(spacing_um)
@@ -93,7 +93,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     )
     brain = fill_hull(hull, _shape(field), spacing_mm=mm) & tissue
     if not brain.any():
-        raise SourceError("no brain: the hull holds no bright tissue, expected a head in MR")
+        raise SourceError("no brain: the hull holds no bright tissue; expected a head in MR")
     flat = field / _rough_bias(field, brain, spacing_um)
     return find_hull(
         flat, mm, center_mm=center, radius_mm=radius, levels=_levels(flat, head, brain)
@@ -107,7 +107,7 @@ def _levels(field: NDArray[np.float32], head: Mask, brain: Mask) -> Triple:
 
 
 def _rough_bias(field: NDArray[np.float32], brain: Mask, spacing_um: Triple) -> NDArray[np.float32]:
-    """Return the rough bias field: the field's blur in the brain, about 1; far from it 1."""
+    """Return the rough bias field: about 1, from the blurred field in the brain; 1 far from it."""
     sigma = [BIAS_UM / h for h in spacing_um]
     weight = ndimage.gaussian_filter(brain.astype(np.float32), sigma)
     log = np.log(np.maximum(field, np.float32(1e-6) * field.max())) * brain
@@ -131,14 +131,14 @@ def _add_fluid(
         return brain
     split = float(threshold_otsu(dark))
     bone, fluid = dark[dark <= split], dark[dark > split]
-    # half-way between their medians: voxels of mixed content pull Otsu's level up
+    # Half-way between their medians, because voxels of mixed content move Otsu's level up.
     split = min(0.5 * float(np.median(bone) + np.median(fluid)), split)
     near &= (smooth > split) & (~tissue | _within(brain, GYRI_UM, spacing_um))
     return np.asarray(ndimage.binary_fill_holes(_touching(near, brain)), np.bool_)
 
 
 def _separability(values: NDArray[np.float32]) -> float:
-    """Return the share of the variance that lies between Otsu's two classes, his eta, 0..1."""
+    """Return the share of the variance between Otsu's two classes (his eta), 0..1."""
     if values.min() == values.max():
         return 0.0
     split = float(threshold_otsu(values))
@@ -151,7 +151,7 @@ def _separability(values: NDArray[np.float32]) -> float:
 def _coarsen(
     field: NDArray[np.float32], mask: Mask, spacing_um: Triple
 ) -> tuple[NDArray[np.float32], Mask, Triple]:
-    """Return smoothed means over blocks of COARSE_UM, the mask's majority, and the spacing."""
+    """Return smoothed means over blocks of COARSE_UM, the majority of the mask, and the spacing."""
     z, y, x = (max(1, round(COARSE_UM / h)) for h in spacing_um)
     d, h, w = (n // k for n, k in zip(field.shape, (z, y, x), strict=True))
 
@@ -165,7 +165,7 @@ def _coarsen(
 
 
 def _shift(coarse_um: Triple, spacing_um: Triple) -> Triple:
-    """Return the centre of the coarse voxel (0, 0, 0) in mm from the fine one's, (z, y, x)."""
+    """Return the centre of coarse voxel (0, 0, 0) from that of the fine one, (z, y, x), mm."""
     z, y, x = ((c - f) / 2000 for c, f in zip(coarse_um, spacing_um, strict=True))
     return z, y, x
 

@@ -1,9 +1,9 @@
-"""Learn tissue classes from the volume itself: probabilities of each voxel, bias field removed.
+"""Learn tissue classes from the volume itself: the probabilities of each voxel, without bias field.
 
-A mixture of Gaussians is fitted to intensity and gradient magnitude, with the bias field fitted
-between its steps (tissue/bias_field.py) and a spatial prior at the end (tissue/potts_prior.py). The
-Bayesian information criterion chooses the number of classes. Everything is seeded, and samples are
-taken by rule: the same voxels give the same bytes.
+A mixture of Gaussians is fitted to intensity and gradient magnitude. The bias field is fitted
+between its steps (tissue/bias_field.py), and a spatial prior is applied at the end
+(tissue/potts_prior.py). The Bayesian information criterion chooses the number of classes. All
+random numbers are seeded and samples follow a rule, so the same voxels give the same bytes.
 
 References
 G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
@@ -30,7 +30,8 @@ from stereocell.tissue.potts_prior import apply_potts_prior
 Field = NDArray[np.float32]
 AUTO_CLASSES = range(2, 7)  # numbers of classes that `auto` tries
 MODE_BINS = 64  # bins of the histogram whose modes are counted
-SHALLOWEST_DIP = 0.9  # largest dip between two modes, as a share of the lower peak
+# Largest dip between two modes, as a share of the lower peak; shallower ones do not count
+SHALLOWEST_DIP = 0.9
 MIN_SHARE = 0.01  # least share of the voxels in a class
 
 
@@ -39,12 +40,14 @@ class TissueOptions:
     """How classes are learned."""
 
     classes: int | Literal["auto"] = "auto"
-    brain: bool = False  # learn inside the brain alone: heads in MR
+    brain: bool = False  # learn only inside the brain: heads in MR
     bias_degree: int = 3  # degree of the polynomial; 0: no bias field
     bias_rounds: int = 6  # rounds of fitting mixture and bias field
     sample: int = 120_000  # voxels of the mask to which the mixture is fitted
-    calm_share: float = 0.6  # share of them, of lowest gradient, that is used: inside one tissue
-    blur_voxels: float = 0.5  # voxels; x the gradient, the uncertainty of intensity at a border
+    # Share of the sample, of lowest gradient, that is used; these voxels lie inside one tissue
+    calm_share: float = 0.6
+    # Voxels; times the gradient, this is the uncertainty of intensity at a border
+    blur_voxels: float = 0.5
     smoothing_voxels: float = 0.8  # sigma in finest spacings, for both features
     prior: float = 0.6  # strength of the Potts prior
     prior_rounds: int = 5  # rounds of its mean field
@@ -74,7 +77,7 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
     voxels      (z, y, x), any number type
     spacing_um  (z, y, x)
 
-    Raises SourceError for a constant volume, and where a brain is asked for and not found.
+    Raises SourceError for a constant volume, and if no brain is found although it is requested.
     """
     spacing = np.asarray(spacing_um)
     raw = voxels.astype(np.float32)
@@ -95,7 +98,7 @@ def learn_tissue(voxels: NDArray[Any], spacing_um: Spacing, *, options: TissueOp
 
     counts = AUTO_CLASSES if options.classes == "auto" else [options.classes]
     flat = flat_field(shape, options.bias_degree)
-    # each number of classes has its own field: the two depend on each other
+    # Each number of classes has a field of its own, because the two depend on each other.
     fields = {k: _learn_field(flat, sampled, indices, k, options) for k in counts}
     scale = (4 * np.pi) ** 1.5 * float(np.prod(sigma))  # voxels that smoothing makes dependent
     independent = min(1.0, int(inside.sum()) / len(calm) / max(scale, 1e-9))
@@ -133,14 +136,14 @@ def _gradient(field: Field, spacing: NDArray[np.float64]) -> Field:
 
 
 def _fit(samples: NDArray[Any], count: int) -> GaussianMixture:
-    """Return a mixture with one common covariance, started at k-means of intensity.
+    """Return a mixture with one common covariance, started from k-means of intensity.
 
-    No start is random. With a covariance for each, two classes would share one tissue's mean and
-    divide its gradients.
+    No start is random. With a covariance for each class, two classes would share the mean of one
+    tissue and divide its gradients.
     """
     edges = np.quantile(samples[:, 0], np.linspace(0, 1, count + 1))
     low, high = np.quantile(samples[:, 0], (0.005, 0.995))
-    # starts by shares miss a small class, starts by range miss a dim pair
+    # Starts by shares may miss a small class, and starts by range may miss a dim pair.
     starts = ((edges[1:] + edges[:-1]) / 2, np.linspace(low, high, count))
     fits = [
         KMeans(count, init=start[:, None], n_init=1, max_iter=50).fit(samples[:, :1])
@@ -172,21 +175,21 @@ def _spread(values: NDArray[Any], labels: NDArray[Any]) -> float:
 def _score(
     samples: NDArray[Any], log_field: Field, count: int, independent: float
 ) -> tuple[float, bool]:
-    """Return BIC for a number of classes, and whether each class is a mode of its own.
+    """Return the BIC for a number of classes, and whether each class is a mode of its own.
 
-    It uses intensity alone and the calmest voxels: gradients are no Gaussian, and voxels of mixed
-    content would make classes. A class without a mode in the histogram only corrects another one's
-    shape (Hennig).
+    It uses only intensity and the calmest voxels: gradients are not Gaussian, and voxels of mixed
+    content would become classes. A class without a mode in the histogram only corrects the shape of
+    another class (Hennig).
 
     independent  share of the samples that are independent after smoothing
     """
     calm = samples[:, 1] <= np.quantile(samples[:, 1], 0.5)
     values = samples[calm, :1] / np.exp(log_field[calm])[:, None]
     mixture = _fit(values, count)
-    # density of the voxels before correction
+    # Density of the voxels before correction
     likelihood = float(mixture.score(values)) - float(log_field[calm].mean())
     n = max(2.0, independent * len(values))
-    parameters = 2 * count  # means, all shares but one, one variance
+    parameters = 2 * count  # means, all shares except one, one variance
     order = np.argsort(mixture.means_[:, 0])
     means, shares = mixture.means_[order, 0], mixture.weights_[order]
     are_modes = _dips(values[:, 0], means) < SHALLOWEST_DIP
@@ -195,7 +198,7 @@ def _score(
 
 
 def _dips(values: NDArray[Any], means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least of the histogram between each two means, by the lower peak's height."""
+    """Return the least height of the histogram between two means, over the lower peak's height."""
     low, high = np.quantile(values, (0.002, 0.998))
     counts, edges = np.histogram(values, MODE_BINS, (float(low), float(high)))
     density = ndimage.gaussian_filter1d(counts.astype(np.float64), 1.5)
@@ -226,7 +229,7 @@ def _learn_field(
         mixture = _fit(corrected, count)
         share = mixture.predict_proba(corrected)
         level = np.maximum(mixture.means_[:, 0], 1e-6 * samples[:, 0].max())
-        # 1 / variance of log intensity: (level / noise)^2
+        # 1 / variance of log intensity is (level / noise)^2
         certainty = level**2 / mixture.covariances_[0, 0]
         weights = share @ certainty
         residual = measured - (share * certainty) @ np.log(level) / weights
@@ -237,9 +240,9 @@ def _learn_field(
 
 
 def _log_likelihood(mixture: GaussianMixture, intensity: Field, blur: Field) -> Field:
-    """Return log of share times density, float32 (k, z, y, x), classes by rising intensity.
+    """Return the log of share times density, float32 (k, z, y, x), classes by rising intensity.
 
-    blur  voxel values added to the spread of intensity at a border, so that neighbours decide there
+    blur  voxel values added to the spread of intensity at a border, where neighbours then decide
     """
     order = np.argsort(mixture.means_[:, 0])
     result = np.empty((len(order), *intensity.shape), np.float32)

@@ -1,11 +1,11 @@
-"""A user's own network, as an ONNX file, that classifies voxels.
+"""A network of the user, in an ONNX file, that classifies voxels.
 
-Patches half overlap and are blended by a Gaussian, as in nnU-Net. The network runs on the processor
-on one thread: the same voxels give the same bytes.
+Patches overlap by half and are blended by a Gaussian, as in nnU-Net. The network runs on one thread
+of the processor, so the same voxels give the same bytes.
 
 Input   float32 (1, 1, D, H, W): (voxel - mean) / deviation, both over the foreground. D, H, W are
-        the model's fixed sizes, else 64.
-Output  float32 (1, K, D, H, W): probabilities; other values are taken for logits (softmax).
+        the model's fixed sizes, or else 64.
+Output  float32 (1, K, D, H, W): probabilities; any other values are treated as logits (softmax).
 
 References
 F. Isensee, P. F. Jaeger, S. A. A. Kohl, J. Petersen & K. H. Maier-Hein, "nnU-Net: a
@@ -31,10 +31,10 @@ from stereocell.tissue.brain_mask import find_foreground
 from stereocell.tissue.onnx_session import OnnxError, OnnxSession, Session
 
 Field = NDArray[np.float32]
-PATCH = 64  # voxels along an edge where the model leaves it open
-LARGEST = 512  # most voxels along an edge that a model may ask for
-MAX_CLASSES = 32  # most outputs of a model
-NAMES_KEY = "stereocell_classes"  # metadata of the model: a JSON list of K names, "" leaves out
+PATCH = 64  # edge of a patch in voxels if the model leaves it open
+LARGEST = 512  # largest edge in voxels that a model may require
+MAX_CLASSES = 32  # largest number of outputs of a model
+NAMES_KEY = "stereocell_classes"  # metadata of the model: a JSON list of K names; "" hides a class
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Network:
         return sum(bool(name) for name in self.classes)
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that the result depends on: no path and no file name."""
+        """Return the settings on which the result depends. They include no path or file name."""
         return {
             "model": self.digest,
             "patch": list(self.patch),
@@ -67,7 +67,7 @@ class Network:
         }
 
     def key_content(self) -> dict[str, Any]:
-        """Return what counts in a key."""
+        """Return the content that counts in a key."""
         return self.settings()
 
     @classmethod
@@ -77,12 +77,13 @@ class Network:
         content: bytes,
         open_session: Callable[[bytes], Session] = OnnxSession,
     ) -> "Network":
-        """Return the model of a file's content, tried on one empty patch.
+        """Return the model from a file's content, after a test on one empty patch.
 
-        path          path of the file, for its name and for messages
+        path          path of the file, for the model's name and for messages
         open_session  opens a session that runs the network; by default in this process
 
-        Raises UsageError if onnxruntime isn't installed, SourceError if the file is no such model.
+        Raises UsageError if onnxruntime is not installed, SourceError if the file is not such a
+        model.
         """
         try:
             session = open_session(content)
@@ -95,11 +96,11 @@ class Network:
 
 
 def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
-    """Return the probabilities of the classes, float32 (k, z, y, x), with the sum 1.
+    """Return the probabilities of the classes, float32 (k, z, y, x), with a sum of 1.
 
     voxels  (z, y, x), any number type
 
-    Raises SourceError where the network fails or returns other shapes or infinite numbers.
+    Raises SourceError if the network fails, or returns other shapes or infinite numbers.
     """
     values = voxels.astype(np.float32)
     inside = values[find_foreground(ndimage.gaussian_filter(values, 0.8))]
@@ -115,7 +116,7 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
     for corner in itertools.product(*starts):
         box = tuple(slice(a, a + p) for a, p in zip(corner, network.patch, strict=True))
         found = _run(network.name, network.session, padded[box])
-        if is_probability is None:  # decided by the first patch, the same for all patches
+        if is_probability is None:  # decided on the first patch, for all patches
             is_probability = bool(found.min() >= 0 and np.abs(found.sum(axis=0) - 1).max() < 1e-3)
         if not is_probability:
             found = np.exp(found - found.max(axis=0))
@@ -129,7 +130,7 @@ def apply_network(network: Network, voxels: NDArray[Any]) -> Field:
 
 
 def _starts(length: int, patch: int) -> list[int]:
-    """Return the starts of patches that half overlap; the last patch ends where the axis does."""
+    """Return the starts of patches that overlap by half. The last patch ends at the axis' end."""
     step = max(1, patch // 2)
     return [*range(0, length - patch, step), length - patch]
 
@@ -156,8 +157,8 @@ def _patch(path: Path, session: Session) -> tuple[int, int, int]:
     z, y, x = (n if isinstance(n, int) else PATCH for n in shape[2:])
     if not all(1 <= n <= LARGEST for n in (z, y, x)):
         raise SourceError(
-            f"{path}: input {inputs[0].name!r} asks for patches of {z} x {y} x {x} voxels, "
-            f"expected 1 to {LARGEST} each way"
+            f"{path}: input {inputs[0].name!r} requires patches of {z} x {y} x {x} voxels, "
+            f"expected 1 to {LARGEST} along each axis"
         )
     return z, y, x
 
@@ -193,6 +194,6 @@ def _names(path: Path, session: Session, count: int) -> tuple[str, ...]:
     if not is_list or len(names) != count or len(set(shown)) != len(shown) or not shown:
         raise SourceError(
             f"{path}: metadata {NAMES_KEY!r} is {text[:80]!r}, expected a JSON list of {count} "
-            "different names (an empty one leaves its class out)"
+            "different names (an empty name hides its class)"
         )
     return tuple(names)

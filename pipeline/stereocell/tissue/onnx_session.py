@@ -1,7 +1,7 @@
 """Run a network of an ONNX file in onnxruntime, on one thread of the processor.
 
 A network is a program: it may loop without end or allocate any amount of memory, and the runtime
-bounds neither. So the caller runs this object in a process of its own (building/model_process.py).
+bounds neither. So the caller runs this object in another process (building/model_process.py).
 """
 
 import re
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from stereocell.model.errors import StereoCellError
 from stereocell.model.extra_packages import import_extra
 
-# How the runtime says that it gets no memory; it has no class of errors for it
+# Texts with which the runtime reports that it gets no memory, for which it has no class of errors
 _NO_MEMORY = re.compile(r"bfc_arena|bad_alloc|bad allocation|[Ff]ailed to allocate")
 
 
 class OnnxError(StereoCellError):
-    """The runtime refuses a network, or fails. The text is the reason without a file's name."""
+    """The runtime refuses a network, or fails. The text is the reason, without the file's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Session(Protocol):
 class OnnxSession:
     """A loaded network.
 
-    Raises UsageError if onnxruntime isn't installed, OnnxError if the content is no model.
+    Raises UsageError if onnxruntime is not installed, OnnxError if the content is not a model.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -66,7 +66,7 @@ class OnnxSession:
         return tuple(Tensor(o.name, tuple(o.shape), o.type) for o in self._session.get_outputs())
 
     def metadata(self, key: str) -> str | None:
-        """Return a text of the model's own metadata; None: there is none."""
+        """Return a text of the model's own metadata, or None if it has none of that key."""
         found: str | None = self._session.get_modelmeta().custom_metadata_map.get(key)
         return found
 
@@ -85,7 +85,7 @@ def _find_runtime() -> Any:
 
 
 def _errors() -> tuple[type[Exception], ...]:
-    """Return onnxruntime's errors, which share no class of their own."""
+    """Return onnxruntime's errors, which have no common class."""
     state = import_module("onnxruntime.capi.onnxruntime_pybind11_state")
     found = (v for v in vars(state).values() if isinstance(v, type) and issubclass(v, Exception))
     return (*found, RuntimeError, ValueError)
@@ -94,8 +94,8 @@ def _errors() -> tuple[type[Exception], ...]:
 def _reason(error: Exception) -> str:
     """Return the runtime's message without its name and codes, in one line."""
     text = " ".join(str(error).split())
-    if "protobuf" in text:  # the file couldn't be parsed, or holds no graph
+    if "protobuf" in text:  # the file could not be parsed, or holds no graph
         return "found another kind of file"
     if _NO_MEMORY.search(text):
-        return "it asks for more memory than it gets: if it is sound, raise --model-memory-gb"
+        return "it needs more memory than allowed; if the model is right, raise --model-memory-gb"
     return re.sub(r"^\[ONNXRuntimeError\] : \d+ : \w+ : ", "", text)[:200]

@@ -1,7 +1,7 @@
-"""A Potts prior, solved by mean field: neighbouring voxels are likely of one class.
+"""A Potts prior, solved by mean field: neighbouring voxels are likely to have the same class.
 
-It is the model of Zhang, Brady & Smith, with the mean-field update of Van Leemput et al. instead
-of iterated modes, so that probabilities stay probabilities.
+It is the model of Zhang, Brady & Smith. The mean-field update of Van Leemput et al. replaces
+iterated modes, so that probabilities stay probabilities.
 
 References
 Y. Zhang, M. Brady & S. Smith, "Segmentation of brain MR images through a hidden Markov random field
@@ -25,14 +25,14 @@ def apply_potts_prior(
     strength: float,
     rounds: int,
 ) -> NDArray[np.float32]:
-    """Return probabilities, float32 (k, z, y, x), with the sum 1 in the mask and 0 outside.
+    """Return probabilities, float32 (k, z, y, x), with a sum of 1 in the mask and 0 outside.
 
     log_likelihood  float32 (k, z, y, x), with the logs of the classes' shares
     mask            bool (z, y, x)
     spacing_um      (z, y, x)
     strength        weight of a neighbour (of six) at the finest spacing; weights fall with the
-                    squared spacing, so that voxels depend less on neighbours along a coarse axis
-    rounds          updates of the mean field
+                    squared spacing, so that neighbours along a coarse axis count less
+    rounds          number of updates of the mean field
     """
     nearest = min(spacing_um)
     probabilities = np.zeros_like(log_likelihood)

@@ -1,29 +1,30 @@
-"""The adaptive binarisation threshold of a channel: between two peaks of its histogram.
+"""The adaptive binarisation threshold of a channel, between two peaks of its histogram.
 
-The paper on streamed MRI states the rule: the histogram is smoothed by a moving window of 10 % of
-its length, and the threshold lies between the second-highest peak and the peak before it. The rule
+The paper on streamed MRI states the rule. The histogram is smoothed by a moving window of 10 % of
+its length. The threshold then lies between the second-highest peak and the peak before it. The rule
 leaves some points open. Here they mean:
 
-- window: the mean over an odd number of bins. At the histogram's ends it holds existing bins only:
-  added bins of zero would push a peak at the end (the air around a head) away from it.
-- peak: a bin that is higher than both sides; a plateau is one peak, at its middle; at an end of the
+- Window: the mean over an odd number of bins. At the ends of the histogram it holds only existing
+  bins. Added bins of zero would push a peak at the end away from it, such as the air around a head.
+- Peak: a bin that is higher than both sides. A plateau is one peak, at its middle. At an end of the
   histogram one side is enough. Counting noise has peaks of its own where the mean is flat: in thin
-  tails, and over a spike narrower than the window. A peak counts if it rises above the saddle to
-  any higher peak by more than CHANCE standard deviations of the difference of two means of Poisson
-  counts over the window, sqrt(2 height / its bins), with a height of at least one voxel. A peak
-  that passes this test counts, however low it is beside the others.
-- second-highest: by the smoothed height. Of equal heights the darker comes first, as air does.
-- the peak before it: the next one of lower intensity, of any height. In a head that is the air, the
-  highest of all. Where no peak lies before it (bright air, dark bodies) the threshold lies between
-  it and the next one of higher intensity.
-- between: at the lowest point of the smoothed histogram between the two, in the middle of a flat
-  one. Fewest voxels lie there, so that a small error of the threshold changes the fewest (the mode
-  method of Prewitt & Mendelsohn). The peaks' midpoint depends on the peaks' widths, and cuts the
-  broader one.
-- a single peak has no peak before it. The threshold is then the foot of its longer side: the bin
+  tails, and over a spike narrower than the window. So a peak counts only if it rises far enough
+  above the saddle to any higher peak. The rise must exceed CHANCE standard deviations of the
+  difference of two means of Poisson counts over the window, sqrt(2 height / its bins), for a height
+  of at least one voxel. A peak that passes this test counts, however low it is beside the others.
+- Second-highest: by the smoothed height. If heights are equal, the darker peak counts as the higher
+  one, as air does.
+- The peak before it: the next peak of lower intensity, of any height. In a head that is the air,
+  the highest peak of all. If no peak lies before it (bright air, dark bodies), the threshold lies
+  between it and the next peak of higher intensity.
+- Between: at the lowest point of the smoothed histogram between the two peaks, or in the middle of
+  a flat one. Fewest voxels lie there, so that a small error of the threshold changes the fewest
+  (the mode method of Prewitt & Mendelsohn). The midpoint of the peaks would depend on their widths,
+  and cut the broader one.
+- A single peak has no peak before it. The threshold is then the foot of its longer side: the bin
   farthest below the line from the peak to that side's end (the triangle method of Zack, Rogers &
   Latt).
-- a flat histogram, or one with a single filled bin, has no threshold.
+- A flat histogram, or one with a single filled bin, has no threshold.
 
 References
 J. M. S. Prewitt & M. L. Mendelsohn, "The analysis of cell images", Annals of the New York Academy
@@ -38,10 +39,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-WINDOW_SHARE = 0.10  # length of the moving window as a share of the histogram's
-CHANCE = 5.0  # standard deviations that a peak must rise above its saddle
-BINS = 256  # most bins of a histogram
-_AT_ONCE = 1 << 20  # voxels counted at once
+WINDOW_SHARE = 0.10  # length of the moving window as a share of the histogram's length
+CHANCE = 5.0  # standard deviations by which a peak must rise above its saddle
+BINS = 256  # largest number of bins of a histogram
+_AT_ONCE = 1 << 20  # number of voxels that are counted together
 Reading = Literal["two peaks", "no peak before", "single peak"]
 
 
@@ -70,14 +71,14 @@ class Histogram:
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """A threshold with the evidence for it, for drawing.
+    """A threshold, with the evidence for it that a chart shows.
 
-    value     voxels at or above it are the body; in voxel values
+    value     voxels at or above it belong to the body; in voxel values
     peaks     levels of the peaks that count, rising, in voxel values
-    between   the two peaks around the value; one, if there is only one
+    between   the two peaks around the value, or the only one
     smoothed  float64 (bins,), the mean over the moving window, in voxels
-    reading   which case of the rule applied
-    chance    levels of the peaks that counting noise may have made
+    reading   the case of the rule that applied
+    chance    levels of the peaks that counting noise may have caused
     """
 
     value: float
@@ -92,11 +93,11 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
     """Return the counts of the voxels within the window, in at most BINS bins.
 
     voxels  any shape, any number type, voxel values
-    window  lowest and highest voxel value that count
+    window  lowest and highest voxel value that are counted
 
-    Voxels outside are left out: hot voxels would stretch the histogram, and with it the moving
-    window; clipped, they would make a peak. For integers a bin is a whole number wide: other
-    widths hold now two, now three integers, and the histogram is a comb.
+    Voxels outside of the window are left out. Hot voxels would stretch the histogram, and so the
+    moving window; if clipped, they would make a peak. For integers the width of a bin is a whole
+    number. Other widths would hold sometimes two and sometimes three integers, like a comb.
     """
     low, high = window
     bins = BINS
@@ -105,7 +106,7 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
         width = max(1.0, np.ceil((last - first + 1) / BINS))
         bins = max(1, int(np.ceil((last - first + 1) / width)))
         low, high = float(first - 0.5), float(first - 0.5 + bins * width)
-    # part by part: a mask of the whole, and a copy of the voxels it selects, take memory too
+    # The voxels are counted in parts, because a mask of all of them, and a copy, take much memory.
     flat, counts = voxels.reshape(-1), np.zeros(bins, np.int64)
     for start in range(0, flat.size, _AT_ONCE):
         part = flat[start : start + _AT_ONCE]
@@ -116,7 +117,7 @@ def make_histogram(voxels: NDArray[Any], window: tuple[float, float]) -> Histogr
 
 
 def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
-    """Return the threshold; None for a flat histogram, as of a constant channel."""
+    """Return the threshold, or None for a flat histogram such as that of a constant channel."""
     counts = np.asarray(histogram.counts, dtype=np.float64)
     if np.count_nonzero(counts) < 2 or counts.min() == counts.max():
         return None
@@ -152,7 +153,7 @@ def find_adaptive_threshold(histogram: Histogram) -> Threshold | None:
 def smooth(counts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the moving mean of counts (bins,), float64 (bins,).
 
-    The window has WINDOW_SHARE of the bins, an odd number, at least one.
+    The window has WINDOW_SHARE of the bins, rounded to an odd number of at least one.
     """
     sums = np.concatenate([[0.0], np.cumsum(counts)])
     first, stop = _windows(len(counts))
@@ -161,15 +162,16 @@ def smooth(counts: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _windows(bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return where the window of each bin begins and ends, cut at the histogram's ends."""
+    """Return where the window of each bin begins and ends, cut off at the histogram's ends."""
     half = int(WINDOW_SHARE * bins) // 2
     at = np.arange(bins, dtype=np.int64)
     return np.maximum(at - half, 0), np.minimum(at + half + 1, bins)
 
 
 def _find_peaks(heights: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the middles, in bins, of the peaks that count and of those of chance; rising."""
-    starts = np.flatnonzero(np.diff(heights, prepend=np.nan) != 0)  # of runs of equal heights
+    """Return the middles, in bins, of the peaks that count and of those by chance; both rising."""
+    # Starts of runs of equal heights
+    starts = np.flatnonzero(np.diff(heights, prepend=np.nan) != 0)
     stops = np.append(starts[1:], len(heights))
     runs = heights[starts]
     if len(runs) == 1:
@@ -194,7 +196,7 @@ def _find_peaks(heights: NDArray[np.float64]) -> tuple[tuple[float, ...], tuple[
 
 
 def _valley(heights: NDArray[np.float64], first: int, last: int) -> float:
-    """Return the lowest bin between two peaks; of several the first run's middle."""
+    """Return the lowest bin between two peaks; of several, the middle of the first run."""
     between = heights[first : last + 1]
     start = int(between.argmin())
     higher = np.flatnonzero(between[start:] > between[start])
@@ -208,5 +210,5 @@ def _foot(heights: NDArray[np.float64], peak: float) -> float:
     end = int(max(filled[0], filled[-1], key=lambda bin_: abs(int(bin_) - top)))
     bins = np.linspace(top, end, abs(end - top) + 1)
     line = np.interp(np.arange(len(bins)), [0, len(bins) - 1], [heights[top], heights[end]])
-    # vertical distance: the distance at right angles differs by a constant factor only
+    # The vertical distance is used. That at right angles differs only by a constant factor.
     return float(bins[int((line - heights[bins.astype(int)]).argmax())])

@@ -1,17 +1,17 @@
 """Find the boundaries between materials in a histogram of value and gradient magnitude.
 
-A boundary between materials of values a < b, an ideal edge blurred by a Gaussian, crosses the
-value at a + t (b - a) with the gradient (b - a) / (s sqrt(2 pi)) exp(-erfinv(2t - 1)^2): an arc
-from one material to the other (Kindlmann & Durkin, "Semi-automatic generation of transfer
+A boundary between materials of values a < b is an ideal edge blurred by a Gaussian. It crosses the
+value at a + t (b - a) with the gradient (b - a) / (s sqrt(2 pi)) exp(-erfinv(2t - 1)^2), which is
+an arc from one material to the other (Kindlmann & Durkin, "Semi-automatic generation of transfer
 functions for direct volume rendering", IEEE Volume Visualization 1998. doi:10.1145/288126.288167).
 
-Arcs of different pairs cross, and one that spans the whole window passes over the others' voxels.
-So no arc is looked for by itself: what lies above the noise is explained as a sum of boundaries of
-all pairs of materials (see transfer/material_peaks.py) at a row of blurs (see
-transfer/edge_model.py), and of what the materials' own noise leaves there, none of them negative
-(Lawson & Hanson, Solving Least Squares Problems, 1974. doi:10.1137/1.9781611971217). The pairs that
-it takes much of are the boundaries; one that passes over a third material, whose own noise it can
-pass for, only if the rest explains what is there clearly worse.
+Arcs of different pairs cross, and an arc over the whole window passes over the voxels of others. So
+no arc is looked for by itself. The voxels above the noise are explained as a sum of boundaries of
+all pairs of materials (see transfer/material_peaks.py) at several blurs (see
+transfer/edge_model.py), and of the materials' own noise. No term is negative (Lawson & Hanson,
+Solving Least Squares Problems, 1974. doi:10.1137/1.9781611971217). Pairs with a large part of the
+sum are the boundaries. A boundary may pass over a third material, and resemble that material's
+noise. It counts only if the sum without it explains the voxels clearly worse.
 """
 
 from dataclasses import dataclass
@@ -36,16 +36,17 @@ from stereocell.transfer.material_peaks import find_materials, find_noise
 from stereocell.transfer.shapes2d import NAME
 
 BLURS = np.geomspace(0.3, 8.0, 14)  # sigma of an edge, in finest voxels
-NOISES = (1.0, 1.5)  # x a material's noise, which a bias field widens
+NOISES = (1.0, 1.5)  # multiples of a material's noise, which a bias field makes wider
 MIN_CONTRAST = 0.06  # least difference between two materials, as a share of the window
-OVER_NOISE = 1.1  # least height of an arc's apex, in noise
-MIN_SEEN = 0.02  # least share of an edge's voxels above the noise; below, it is not looked for
-MIN_SHARE = 0.05  # least share that a boundary has of the voxels that all boundaries explain
-MIN_MISSED = 0.05  # more squares left over without a boundary that passes over a third material
-MIN_VOXELS = 2e-5  # least share of all voxels: a ball of 40 voxels in 256^3 has twice as many
-MIN_COUNT = 20.0  # voxels: cells of fewer weigh no more, as nothing is quite as ideal
+OVER_NOISE = 1.1  # least height of an arc's apex, in multiples of the noise
+MIN_SEEN = 0.02  # least share of an edge's voxels above the noise for an edge to be looked for
+MIN_SHARE = 0.05  # least share of a boundary in the voxels that all boundaries explain
+# Least relative growth of squares without a boundary that passes over a third material
+MIN_MISSED = 0.05
+MIN_VOXELS = 2e-5  # least share of all voxels; a ball of 40 voxels in 256^3 has twice as many
+MIN_COUNT = 20.0  # voxels; cells with fewer get no more weight, because no edge is quite ideal
 MAX_BOUNDARIES = 6
-CLEAR = 2.0  # sigmas of noise that a shape keeps from a material's value
+CLEAR = 2.0  # standard deviations of noise that a shape keeps away from a material's value
 EVEN: Ratios = (1.0, 1.0, 1.0)
 
 
@@ -54,12 +55,13 @@ class Boundary:
     """A boundary between two materials.
 
     low, high  values of the materials, 0..1 in the window
-    apex       its steepest gradient, met head-on, 0..1 of the scale's end: at times a little above
-    steepest   the same, met in the direction that has most
+    apex       steepest gradient along an axis across the edge, 0..1 of the scale's end; it may
+               exceed 1 a little
+    steepest   steepest gradient in the direction for which it is largest
     blur       sigma of the edge, in finest voxels
-    share      of all voxels, those above the noise that it explains
-    noise      gradient magnitude at the middle value, 0..1 of the scale's end, that noise may have
-    sigma      of the values' noise there
+    share      share of all voxels that lie above the noise and that it explains
+    noise      gradient magnitude that noise may have at the middle value, 0..1 of the scale's end
+    sigma      standard deviation of the values' noise there
     """
 
     low: float
@@ -77,7 +79,7 @@ class Boundaries:
     """The boundaries between materials of a volume.
 
     materials  values 0..1, rising
-    reason     why there is no boundary; empty: there is one
+    reason     why there is no boundary; empty if there is one
     """
 
     boundaries: tuple[Boundary, ...]
@@ -87,7 +89,7 @@ class Boundaries:
 
 @dataclass(frozen=True, slots=True)
 class SuggestedShapes:
-    """A first 2D function for a channel; `reason` says why it has no shapes."""
+    """A first 2D function for a channel. `reason` is why it has no shapes; empty if it has some."""
 
     transfer_2d: TransferFunctions2d
     reason: str
@@ -98,11 +100,11 @@ class SuggestedShapes:
 
 
 def suggest(fine: NDArray[np.int64], *, spacing_um: Ratios = EVEN) -> SuggestedShapes:
-    """Return shapes on the boundaries of a channel.
+    """Return shapes for the boundaries of a channel.
 
     fine        int64 (FINE_ROWS, COLUMNS), counts of voxels by gradient and value; see
                 choose_gradient_max
-    spacing_um  (z, y, x); only its ratios count
+    spacing_um  (z, y, x); only the ratios matter
     """
     gradient_max = choose_gradient_max(fine)
     found = find_boundaries(rebin(fine, gradient_max), gradient_max, spacing_um=spacing_um)
@@ -118,10 +120,11 @@ def find_boundaries(
     """Return materials and boundaries of a histogram.
 
     counts        int64 (rows, columns), voxels by gradient magnitude and value; see count_joint
-    gradient_max  magnitude that the last row stands for
-    spacing_um    (z, y, x); only its ratios count
+    gradient_max  gradient magnitude of the last row
+    spacing_um    (z, y, x); only the ratios matter
 
-    Same histogram, same answer. A constant volume, or one of a single material, has no boundaries.
+    The same histogram always gives the same answer. A constant volume, or one of a single material,
+    has no boundaries.
     """
     total = int(counts.sum())
     noise = find_noise(counts, gradient_max)
@@ -147,11 +150,11 @@ def find_boundaries(
 
 
 def suggest_shapes(found: Boundaries) -> Shapes:
-    """Return a triangle on each boundary: its tip below the apex, its sides between the materials.
+    """Return a triangle for each boundary, with its tip below the apex.
 
-    What lies within 0.3 of the contrast of the middle value at the apex's height is taken, as far
-    as the noise of the two materials leaves room, and up to a little above the boundary's steepest
-    voxels. The lower a boundary's value, the more lies behind it: outer ones let more through.
+    At the height of the apex it covers values within 0.3 of the contrast around the middle, as far
+    as the noise of the two materials leaves space. It reaches a little above the steepest voxels.
+    Boundaries of lower values are more transparent, because more lies behind them.
     """
     boundaries = sorted(
         found.boundaries, key=lambda boundary: (boundary.low + boundary.high, boundary.low)
@@ -179,14 +182,14 @@ def suggest_shapes(found: Boundaries) -> Shapes:
 
 
 @dataclass(frozen=True, slots=True)
-class _Sum:
-    """What lies above the noise, as a sum to be found.
+class _EdgeSum:
+    """The voxels above the noise, as a sum whose terms are to be found.
 
-    matrix  (cells, terms): what each boundary, and then each material, leaves there; weighted
-    cells   (cells,) what was counted; weighted
-    pairs   (boundaries,) which pair of materials each is of
-    blurs   (boundaries,) in finest voxels
-    seen    (boundaries,) voxels above the noise that one of 1 has
+    matrix  (cells, terms): voxels from each boundary, and then each material; weighted
+    cells   (cells,): counted voxels; weighted
+    pairs   (boundaries,): the pair of materials of each boundary
+    blurs   (boundaries,): in finest voxels
+    seen    (boundaries,): voxels above the noise for an amount of 1
     """
 
     matrix: NDArray[np.float64]
@@ -196,10 +199,12 @@ class _Sum:
     seen: NDArray[np.float64]
 
     def fit(self, without: int = -1) -> tuple[NDArray[np.float64], float]:
-        """Return the voxels of each boundary, and the squares that are left; without one pair."""
-        from scipy.optimize import (
-            nnls,
-        )  # slow to import: every command and worker would wait for it
+        """Return the voxels of each boundary, and the sum of the remaining squares.
+
+        without  number of a pair whose boundaries are left out; -1: none is
+        """
+        # This import is slow, and every command and worker would wait for it at the start.
+        from scipy.optimize import nnls
 
         used = np.ones(self.matrix.shape[1], bool)
         used[: len(self.pairs)] = self.pairs != without
@@ -217,7 +222,7 @@ def _explain(
     materials: tuple[float, ...],
     grid: HistogramGrid,
 ) -> list[Boundary]:
-    """Return the boundaries that have their share of what lies above the noise."""
+    """Return the boundaries that have a large share of the voxels above the noise."""
     pairs = [(a, b) for a, b in combinations(materials, 2) if b - a >= MIN_CONTRAST]
     terms = _make_terms(counts, noise, materials, pairs, grid)
     if terms is None:
@@ -260,12 +265,12 @@ def _make_terms(
     materials: tuple[float, ...],
     pairs: list[tuple[float, float]],
     grid: HistogramGrid,
-) -> _Sum | None:
-    """Return the sum for all pairs and blurs; None where no boundary rises above the noise."""
+) -> _EdgeSum | None:
+    """Return the sum for all pairs and blurs, or None if no boundary rises above the noise."""
     cells = counts.reshape(grid.rows, grid.columns, COARSER).sum(axis=2).astype(np.float64)
     level = noise.reshape(grid.columns, COARSER).max(axis=1)
     is_steep = np.arange(grid.rows)[:, np.newaxis] > level * (grid.rows - 1)
-    weight = 1 / np.sqrt(cells[is_steep] + MIN_COUNT)  # counts are off by their root
+    weight = 1 / np.sqrt(cells[is_steep] + MIN_COUNT)  # standard errors of counts are their roots
     terms: list[NDArray[np.float64]] = []
     edges: list[tuple[int, float, float]] = []
     for number, (low, high) in enumerate(pairs):
@@ -283,7 +288,7 @@ def _make_terms(
             sigma = wider * value_noise(_noise_at(noise, value), grid.gradient_max)
             terms.append(count_material(value, sigma, grid)[is_steep] * weight)
     numbers, blurs, seen_of = (np.array(column) for column in zip(*edges, strict=True))
-    return _Sum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
+    return _EdgeSum(np.stack(terms, axis=1), cells[is_steep] * weight, numbers, blurs, seen_of)
 
 
 def _noise_at(noise: NDArray[np.float64], value: float) -> float:

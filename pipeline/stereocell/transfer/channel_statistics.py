@@ -1,7 +1,7 @@
-"""What must be known of the whole dataset before any unit: windows, histograms, transfer functions.
+"""Statistics of the whole dataset that every unit needs: windows, histograms, transfer functions.
 
-8 bits mean the same in every tile, so a channel's window comes from all of the region, on a coarse
-level, and so does its threshold.
+An 8-bit value means the same in every tile. So a channel's window and threshold are found on the
+whole region, at a coarse level.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ from stereocell.transfer.options import WindowOptions
 from stereocell.transfer.shapes2d import fall_back
 
 BINS = 256
-BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than its lightest grey
+BRIGHT_SHARE = 0.95  # share of an MR's tissue that is darker than the lightest grey
 _AT_ONCE = 1 << 20  # voxels
 NO_SUGGESTION = SuggestedShapes(TransferFunctions2d(), "not looked for")
 NOTHING_COUNTED = Histogram((), 0.0, 0.0)
@@ -43,8 +43,13 @@ NOTHING_COUNTED = Histogram((), 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ChannelStatistics:
-    """One channel's window in voxel values, voxel counts (256 bins) inside it, its background, the
-    2D function that is suggested for it, and the counts that its threshold is read from.
+    """The statistics of one channel.
+
+    window      lowest and highest voxel value
+    histogram   voxel counts in 256 bins of the window
+    background  that is subtracted; None: none is
+    suggested   2D function for the channel
+    values      counts from which the threshold is found
     """
 
     window: tuple[float, float]
@@ -65,27 +70,27 @@ def find_statistics(
     background: LatticeField | None = None,
     window: tuple[float, float] | None = None,
 ) -> ChannelStatistics:
-    """Return window and histogram of a channel's voxels; a constant channel's window is 1 wide.
+    """Return the window and the histogram of a channel. A constant channel has a window of width 1.
 
-    voxels  any shape, any number type, voxel values
-    window  lowest and highest voxel value, where they are known; None: they are found
-
-    The voxels are left in another order: a sorted copy would be what the memory of a small build
-    peaks at.
+    voxels      any shape, any number type, voxel values; they are reordered in place, because the
+                peak memory of a small build would be a sorted copy
+    background  that is subtracted; None: none is
+    window      lowest and highest voxel value if known; None: they are found
     """
     percentiles = (options.low_percentile, options.high_percentile)
     voxels = voxels.reshape(-1)
     low, high = (float(v) for v in np.percentile(voxels, percentiles, overwrite_input=True))
-    if not high > low:  # sparse channels: fewer bright voxels than the percentile leaves out
+    if not high > low:  # a sparse channel has fewer bright voxels than the percentile leaves out
         low, high = float(voxels.min()), float(voxels.max())
     if not high > low:
-        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 tells apart
+        high = low + max(1.0, 1e-6 * abs(low))  # more than float32 can distinguish
     if window is not None:
         low, high = window
     if voxels.dtype.kind == "f" and high - low < 1e-3 * max(abs(low), abs(high)):
-        voxels = voxels.astype(np.float64)  # bins so narrow that float32 has no edges for them
+        voxels = voxels.astype(np.float64)  # float32 has no edges for such narrow bins
     counts = np.zeros(BINS, np.int64)
-    for start in range(0, voxels.size, _AT_ONCE):  # clipped, an integer takes eight bytes
+    # In parts, because a clipped integer takes eight bytes
+    for start in range(0, voxels.size, _AT_ONCE):
         part = np.clip(voxels[start : start + _AT_ONCE], low, high)
         counts += np.histogram(part, BINS, (low, high))[0]
     values = make_histogram(voxels, (low, high))
@@ -99,36 +104,40 @@ def make_appearance(
     statistics: ChannelStatistics,
     level: SurfaceLevel | None,
     confidence: float,
-    doubt: str,
+    why_unclear: str,
     modality: str = "",
     is_hounsfield: bool = True,
     unevenness: float = 1.0,
     level_percentile: float = 99.0,
     depth_voxels: float = 0.0,
 ) -> Appearance:
-    """Return how a channel is drawn; `level`: where its surface lies, else why there is none.
+    """Return how a channel is drawn.
 
-    doubt     why there is no level, or why the level cannot be called clear; empty: it can
-    modality  DICOM's code; a CT has functions by tissue too, an MR noise of magnitudes. Empty: of a
-        microscope, whose volumes open translucent, so that bodies show within others
-    is_hounsfield  whether a CT's values are Hounsfield units: else it has no functions by tissue
-    unevenness  coarsest over finest voxel spacing; a CT of thick slices opens in one colour
+    level             where its surface lies; None: it has no surface
+    why_unclear       why there is no level, or why the level is not clear; empty if it is clear
+    modality          DICOM's code. CT has functions by tissue, and MR has noise of magnitudes. It
+                      is empty for a microscope, whose volumes are translucent at first, so that
+                      bodies show within others.
+    is_hounsfield     whether a CT's values are Hounsfield units; otherwise it has no functions by
+                      tissue
+    unevenness        coarsest over finest voxel spacing; a CT of thick slices has one colour at
+                      first
     level_percentile  percent of the voxels below the level of a volume without a surface
-    depth_voxels  shortest edge of the volume, in finest voxel spacings; 0: not known
+    depth_voxels      shortest edge of the volume, in finest voxel spacings; 0: unknown
     """
     iso_value, threshold = None, None
     if level is not None:
         below = 0.0 if level.background is None else float(level.background.values.mean())
         iso_value = level.iso + below
-        # where nothing tells a surface from noise, peaks of the histogram are noise too
+        # If no level is distinguished from noise, peaks of the histogram are noise as well.
         threshold = statistics.threshold
     surface: SurfaceConfidence = "none" if level is None else "clear"
-    if level is not None and doubt:
+    if level is not None and why_unclear:
         surface = "unsure"
-        doubt = f"unsure surface: at {level.words}: {doubt}"
+        why_unclear = f"unsure surface: at {level.words}: {why_unclear}"
     elif level is not None and confidence < LOW_CONFIDENCE:
         surface = "unsure"
-        doubt = (
+        why_unclear = (
             f"unsure surface: at {level.words} with a confidence of {confidence:.2f}; "
             f"below {LOW_CONFIDENCE:g} about half of such surfaces are right"
         )
@@ -141,7 +150,7 @@ def make_appearance(
         surface,
         {},
         threshold=None if threshold is None else threshold.value,
-        surface_reason=doubt,
+        surface_reason=why_unclear,
         level=level,
     )
     functions = make_transfer_functions(
@@ -181,10 +190,10 @@ def _coloured_function(
     opacity: OpacityPoints,
     modality: str,
 ) -> tuple[str, Shapes] | None:
-    """Return the name and the shapes of a 2D function that colours values; None: there is none.
+    """Return the name and the shapes of a 2D function that colours values, or None.
 
-    opacity   of the general function
-    modality  DICOM's code; of a CT only where its values are Hounsfield units
+    opacity   opacity points of the general function
+    modality  DICOM's code; empty for a CT whose values are not Hounsfield units
     """
     level, gradient_max = appearance.iso_normalized, statistics.suggested.transfer_2d.gradient_max
     if modality in TRACER_MODALITIES:

@@ -1,18 +1,20 @@
-"""The tissues of a CT in their colours, as a physician knows them from an atlas.
+"""The tissues of a CT in the colours that a physician knows from an atlas.
 
-A 2D function of bands of Hounsfield units. Fat is yellow. Soft tissue is red, and the denser the
-lighter, so that organs part from each other on a cut. Bone has the channel's own light colour, and
-vessels with contrast medium are light red. An edge to air is skin, whatever its values are:
-half-way from air to muscle lies the value of fat. So the bands of fat and soft tissue lie at small
-steps alone, and skin, which has the channel's colour as the surface has, at large ones.
+This is a 2D function of bands of Hounsfield units. Fat is yellow. Soft tissue is red, and lighter
+if it is denser, so that organs differ on a cut. Bone has the channel's own light colour, and
+vessels with contrast medium are light red.
+
+An edge to air is skin with any values: half-way from air to muscle lies the value of fat.
+So the bands of fat and soft tissue cover only small gradients. Skin, in the channel's colour like
+the surface, covers large ones.
 """
 
 from stereocell.model.channel import Shape, Shapes
 from stereocell.transfer.ct_tissues import TISSUES
 
 NAME = "tissues"
-# linear RGB as factors to the channel's colour, and Hounsfield units. Neighbours share their ends,
-# which SOFT_HU blurs
+# Linear RGB as factors to the channel's colour, and Hounsfield units. Neighbouring bands share
+# their ends, which _SOFT_HU blurs.
 _SKIN = (1.0, 1.0, 1.0)
 _FAT = (1.0, 0.92, 0.58)
 # Soft tissue by its upper end in Hounsfield units: fluid, organs, muscle and blood, and tissue that
@@ -25,23 +27,23 @@ _SOFT_TISSUE = (
 )
 _CONTRAST = (0.97, 0.5, 0.48)
 _BONE = (1.0, 1.0, 1.0)
-_SOFT_HU = 40.0
-_AIR_STEP_HU = 220.0  # step over two voxels from which on an edge is one to air
-_FAT_FROM_HU = -150.0  # blurred skin has values of the thinnest fat
-# Coarsest over finest voxel spacing, at most: across thicker slices an edge to air is as flat as
-# one between tissues
+_SOFT_HU = 40.0  # Hounsfield units over which neighbouring bands blend
+_AIR_STEP_HU = 220.0  # Hounsfield units; least step over two voxels of an edge to air
+_FAT_FROM_HU = -150.0  # blurred skin has the values of the thinnest fat
+# Largest ratio of the coarsest to the finest voxel spacing. Across thicker slices an edge to air is
+# as flat as one between tissues.
 MAX_UNEVEN = 3.0
-_FOOT_HU = 36.0  # Hounsfield units below the surface at which opacity starts
-# Share of the light that a path of one finest voxel spacing absorbs: skin hides the fat beneath it
+_FOOT_HU = 36.0  # Hounsfield units below the surface at which opacity begins
+# Share of the light absorbed along one finest voxel spacing. Skin hides the fat beneath it.
 _OPACITY, _SKIN_OPACITY, _BONE_OPACITY = 0.45, 0.95, 0.6
 
 
 def tissue_shapes(level: float, window: tuple[float, float], gradient_max: float) -> Shapes:
     """Return the bands of tissues that lie in a window.
 
-    level         where the surface lies, Hounsfield units
-    window        Hounsfield units that are 0 and 1
-    gradient_max  share of the window that a step is where its gradient is 1
+    level         iso-value of the surface, Hounsfield units
+    window        Hounsfield units that become 0 and 1
+    gradient_max  step, as a share of the window, whose gradient is 1
     """
     fat, muscle, bone = (TISSUES[name] for name in ("fat", "soft_tissue", "bone"))
     first = level - _FOOT_HU
@@ -72,7 +74,7 @@ def _band(
     color: tuple[float, float, float],
     opacity: float,
 ) -> Shape | None:
-    """Return a band that overlaps its neighbours by SOFT_HU; None: the window shows none of it."""
+    """Return a band that overlaps its neighbours by _SOFT_HU; None if it is outside the window."""
     low, high = window
     first, last = ends_hu[0] - _SOFT_HU / 2, ends_hu[1] + _SOFT_HU / 2
     values = tuple(min(max((hu - low) / (high - low), 0.0), 1.0) for hu in (first, last))

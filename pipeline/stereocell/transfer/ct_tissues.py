@@ -1,4 +1,4 @@
-"""Transfer functions of CT by tissue: each shows the Hounsfield units that are published for one.
+"""Transfer functions of CT by tissue. Each shows the published Hounsfield units of one tissue.
 
 References
 G. N. Hounsfield, "Computed medical imaging", Medical Physics 7, 1980. doi:10.1118/1.594709 (air at
@@ -22,15 +22,15 @@ TISSUES: dict[str, tuple[float, float]] = {
 }
 _OPACITY = {"air": 0.05, "fat": 0.3, "soft_tissue": 0.25, "blood": 0.5, "bone": 0.8}
 BONE = "bone"
-BONE_LEVEL_HU = 150.0  # from here on a surface is one of bone: soft tissue ends there
+BONE_LEVEL_HU = 150.0  # least level of a surface that counts as bone; soft tissue ends there
 _SOFT_HU = 10.0  # Hounsfield units over which opacity rises
 
 
 def opening_function(level: float | None, functions: Collection[str]) -> str | None:
-    """Return the tissue whose function fits a surface best; None: the general one does.
+    """Return the tissue whose function suits a surface best, or None for the general function.
 
-    level      where the surface lies, Hounsfield units; None: there is none
-    functions  names of the functions that there are
+    level      iso-value of the surface, Hounsfield units; None: there is no surface
+    functions  names of the available functions
     """
     is_bone = level is not None and level >= BONE_LEVEL_HU
     return BONE if is_bone and BONE in functions else None
@@ -39,7 +39,7 @@ def opening_function(level: float | None, functions: Collection[str]) -> str | N
 def tissue_functions(window: tuple[float, float]) -> dict[str, OpacityPoints]:
     """Return the opacity points of each tissue that lies in a window, by its name.
 
-    window  Hounsfield units that are 0 and 1
+    window  Hounsfield units that become 0 and 1
     """
     low, high = window
     functions: dict[str, OpacityPoints] = {}
@@ -49,7 +49,7 @@ def tissue_functions(window: tuple[float, float]) -> dict[str, OpacityPoints]:
         top = _OPACITY[name]
         hu = ((first - _SOFT_HU, 0.0), (first, top), (last, top), (last + _SOFT_HU, 0.0))
         places = [(min(max((at - low) / (high - low), 0.0), 1.0), opacity) for at, opacity in hu]
-        # a tissue that goes on beyond the window is shown up to its end
+        # A tissue that continues beyond the window is shown up to the window's end.
         start = (0.0, top if first <= low else 0.0)
         end = (1.0, top if last >= high else 0.0)
         inner = [point for point in places if 0.0 < point[0] < 1.0]

@@ -1,12 +1,12 @@
-"""Model of the traces that an edge, and a material, leave in a histogram of value and gradient.
+"""Model the voxels that an edge, and a material, have in a histogram of value and gradient.
 
 Across an edge blurred by a Gaussian of s finest voxels, the value d voxels away is a + (b - a)
-Phi(d / s). Central differences along an axis at the cosine n to the edge's normal are
-(b - a) (Phi((d + n) / s) - Phi((d - n) / s)). For a broad edge that is n times the head-on
-difference, so that the gradient's length does not depend on the edge's direction (the arc of
-Kindlmann & Durkin). For an edge sharper than a voxel it is up to sqrt 3 times as long. So the
-voxels of one boundary lie on arcs of all these heights. Here they are counted over normals of all
-directions, with noise.
+Phi(d / s). Along an axis at the cosine n to the edge's normal, the central difference is
+(b - a) (Phi((d + n) / s) - Phi((d - n) / s)). For a broad edge that is n times the difference along
+the normal, so the gradient's length does not depend on the edge's direction (the arc of Kindlmann &
+Durkin). For an edge sharper than a voxel it is up to sqrt 3 times as long. So the voxels of one
+boundary lie on arcs of all these heights. Here they are counted over normals of all directions,
+with noise.
 
 References
 G. Kindlmann & J. W. Durkin, "Semi-automatic generation of transfer functions for direct volume
@@ -21,9 +21,9 @@ from scipy.special import ndtr
 
 from stereocell.transfer.material_peaks import NOISE_FACTOR
 
-DIRECTIONS, PLACES = 128, 96  # directions of an edge, and points across it, that are counted
-COARSER = 4  # columns of the histogram that are merged into one here
-BEYOND = 3.0  # sigmas of the blur to either side of an edge that are counted
+DIRECTIONS, PLACES = 128, 96  # number of directions of an edge, and of points across it
+COARSER = 4  # number of columns of the histogram that are merged into one here
+BEYOND = 3.0  # sigmas of the blur that are counted on each side of an edge
 
 Ratios = tuple[float, float, float]
 Field = NDArray[np.float64]
@@ -33,9 +33,9 @@ Field = NDArray[np.float64]
 class HistogramGrid:
     """The extent of a joint histogram.
 
-    rows, columns  its size; columns are the merged ones
+    rows, columns  number of rows, and of columns after merging
     gradient_max   gradient magnitude of the last row
-    ratios         voxel spacings by the finest one, (z, y, x)
+    ratios         voxel spacings divided by the finest one, (z, y, x)
     """
 
     rows: int
@@ -45,9 +45,9 @@ class HistogramGrid:
 
 
 def value_noise(noise: float, gradient_max: float) -> float:
-    """Return sigma of the values' noise, 0..1, for a gradient noise of `find_noise`.
+    """Return the standard deviation of the values' noise, 0..1, from a result of `find_noise`.
 
-    The length of three differences of sigma sqrt 2 has its mode at 2 sigma.
+    The length of a vector of three differences, each of sigma sqrt 2, has its mode at 2 sigma.
     """
     return noise * gradient_max / NOISE_FACTOR / 2
 
@@ -57,7 +57,7 @@ def count_edge(low: float, high: float, *, blur: float, sigma: float, grid: Hist
 
     low, high  values of the two materials, 0..1
     blur       sigma of the edge's blur, in finest voxels
-    sigma      of the values' noise, 0..1
+    sigma      standard deviation of the values' noise, 0..1
     result     float64 (rows, columns)
     """
     reach = BEYOND * blur + max(grid.ratios)
@@ -72,9 +72,9 @@ def count_edge(low: float, high: float, *, blur: float, sigma: float, grid: Hist
 
 
 def count_material(value: float, sigma: float, grid: HistogramGrid) -> Field:
-    """Return a material's voxels by gradient and value, float64 (rows, columns), with the sum 1.
+    """Return a material's share of voxels by gradient and value, float64 (rows, columns); sum 1.
 
-    value, sigma  the material's value and its noise, 0..1
+    value, sigma  value of the material, and standard deviation of its noise, 0..1
     """
     squares = sum(
         (np.sqrt(2) * sigma * _CHANCE[axis] / ratio) ** 2 for axis, ratio in enumerate(grid.ratios)
@@ -85,8 +85,8 @@ def count_material(value: float, sigma: float, grid: HistogramGrid) -> Field:
 def find_steepest(blur: float, ratios: Ratios) -> float:
     """Return the longest gradient of an edge of height 1, over all directions.
 
-    blur    sigma in finest voxels
-    ratios  voxel spacings by the finest one, (z, y, x)
+    blur    sigma of the edge's blur, in finest voxels
+    ratios  voxel spacings divided by the finest one, (z, y, x)
     """
     squares = sum(
         (2 * ndtr(_NORMALS[:, i] * r / blur) - 1) ** 2 / r**2 for i, r in enumerate(ratios)
@@ -112,5 +112,5 @@ def _directions() -> Field:
 
 
 _NORMALS = _directions()
-# noise of the difference along each axis, and of the value: the same at every call
+# Noise of the difference along each axis, and of the value; the same in every call
 _CHANCE = np.random.default_rng(0).standard_normal((4, PLACES, DIRECTIONS))

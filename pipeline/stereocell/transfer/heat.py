@@ -1,14 +1,14 @@
-"""The heat map of a radiotracer: the more of it, the lighter, as PET and SPECT are read.
+"""The heat map of a radiotracer: more tracer is lighter, as in readings of PET and SPECT.
 
-A 2D function of bands of values, at every gradient: colours are a part of such functions alone.
-Bands overlap by half, so that their colours run into each other. They are factors to the channel's
-colour. A faint veil shows the body that the organs lie in.
+This is a 2D function of bands of values at all gradients, because only 2D functions have colours.
+Bands overlap by half, so that their colours blend. Colours are factors to the channel's colour. A
+faint veil shows the body in which the organs lie.
 """
 
 from stereocell.model.channel import Shape, Shapes
 
 NAME = "heat"
-# linear RGB from little to much: dark red, red, orange, and the channel's own colour
+# Linear RGB from little to much tracer: dark red, red, orange, and the channel's own colour
 _COLORS = (
     (0.25, 0.02, 0.02),
     (0.6, 0.06, 0.02),
@@ -17,17 +17,18 @@ _COLORS = (
     (1.0, 1.0, 1.0),
 )
 _OPACITIES = (0.08, 0.2, 0.35, 0.45, 0.6)
-# The body around the organs: a factor to amber that makes it grey, and what one voxel absorbs. 60
-# voxels take a fifth of the light, so that one sees where organs lie in the body.
+# Colour and opacity per voxel of the body around the organs. The colour is a factor to amber that
+# makes it grey. 60 voxels absorb a fifth of the light, which shows where in the body organs lie.
 _BODY_COLOR, _BODY_OPACITY = (0.3, 0.42, 0.9), 0.0045
-_BODY_BELOW = 0.8  # of the organs' level: a threshold above it parts no body from the air
+# Share of the organs' level; a threshold above it does not separate the body from the air
+_BODY_BELOW = 0.8
 
 
 def heat_shapes(level: float, body: float | None = None) -> Shapes:
-    """Return the bands from a level up to the window's end; 0..1 in the window.
+    """Return the bands from a level up to the window's end. Values are 0..1 in the window.
 
-    level  that of the organs: below it the body's background takes up little
-    body   value that parts the body from the air; None: it is not known, and no body shows
+    level  level of the organs; the body's background takes up less tracer
+    body   value that separates the body from the air; None: unknown, and the body is not shown
     """
     first = min(max(level, 0.02), 0.9)
     step = (1 - first) / len(_COLORS)

@@ -1,11 +1,12 @@
-"""Count a channel's voxels by value and gradient magnitude: the domain of 2D transfer functions.
+"""Count a channel's voxels by value and gradient magnitude, the domain of 2D transfer functions.
 
-The gradient magnitude is the step of intensity (0..1 of the window) over two finest voxel
-spacings, by central differences: 2 h |grad f|, h the finest spacing. At a voxel's centre it is just
-what a shader gets of trilinear samples one h to either side along each axis: with r = h / spacing
-of that axis, f(+r) - f(-r) = r (f[1] - f[-1]). `gradient_max`, one number a channel, is the step
-that the last row stands for.
+The gradient magnitude is the step of intensity (0..1 of the window) over two finest voxel spacings,
+by central differences: 2 h |grad f|, where h is the finest spacing. At a voxel's centre it equals
+the result of a shader that takes trilinear samples at a distance of h on both sides along each
+axis: with r = h / spacing of that axis, f(+r) - f(-r) = r (f[1] - f[-1]). Each channel has a number
+`gradient_max`, the step of the last row.
 
+References
 Kindlmann & Durkin, "Semi-automatic generation of transfer functions for direct volume rendering",
 IEEE Symposium on Volume Visualization 1998; Kniss, Kindlmann & Hansen, "Multidimensional transfer
 functions for interactive volume rendering", IEEE TVCG 8(3), 2002.
@@ -19,19 +20,20 @@ from numpy.typing import NDArray
 from stereocell.model.spacing import Spacing
 from stereocell.model.tiling import Box
 
-ROWS, COLUMNS = 64, 256  # gradient magnitudes, values of 8 bits
-STEEPEST = 3**0.5  # the largest step there is: all of the window along each axis
-FINE_ROWS = 1024  # rows over 0..STEEPEST, before gradient_max is known: half a step of 8 bits each
+ROWS, COLUMNS = 64, 256  # gradient magnitudes, and values of 8 bits
+STEEPEST = 3**0.5  # the largest possible step: the whole window along each axis
+# Rows over 0..STEEPEST before gradient_max is known; each is half a step of 8 bits
+FINE_ROWS = 1024
 ENERGY_SHARE = 0.995  # share of the squared steps that lies below gradient_max
-SMALLEST_MAX = 0.05  # share of the window: 13 steps of 8 bits; below, rows are too fine to differ
-SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, where not all of a region is counted
+SMALLEST_MAX = 0.05  # share of the window, 13 steps of 8 bits; finer rows would not differ
+SAMPLE_EDGE = (16, 128, 128)  # voxels (z, y, x) of a block, if not all of a region is counted
 
 
 def find_steps(voxels: NDArray[np.uint8], spacing_um: Spacing) -> NDArray[np.float32]:
-    """Return the gradient magnitude at all voxels but the outermost, as 8-bit values: 255 is 1.
+    """Return the gradient magnitudes of all voxels except the outermost; 255 stands for 1.
 
     voxels      uint8 (z, y, x)
-    spacing_um  (z, y, x); only its ratios count
+    spacing_um  (z, y, x); only the ratios matter
     result      float32 (z - 2, y - 2, x - 2)
     """
     finest = min(spacing_um)
@@ -58,15 +60,18 @@ def count_joint(
 ) -> NDArray[np.int64]:
     """Return how many voxels have each gradient magnitude and value, int64 (rows, COLUMNS).
 
-    uint8 (z, y, x), of which the outermost voxels are counted only as neighbours; an axis of fewer
-    than 3 voxels has its ends repeated. Row j stands for j / (rows - 1) of `gradient_max`, the last
-    one for all that is steeper too; column k for the value k / 255. Of the planes every `every`-th.
+    voxels        uint8 (z, y, x); the outermost voxels count only as neighbours, and an axis of
+                  fewer than 3 voxels has its ends repeated
+    spacing_um    (z, y, x); only the ratios matter
+    gradient_max  step of the last row, which also counts steeper voxels; row j stands for
+                  j / (rows - 1) of it, and column k for the value k / 255
+    every         only one of this many planes is counted
     """
     short = [(1, 1) if n < 3 else (0, 0) for n in voxels.shape]
     voxels = np.pad(voxels, short, mode="edge") if (1, 1) in short else voxels
     factor = np.float32((rows - 1) / (255 * gradient_max))
     counts = np.zeros(rows * COLUMNS, np.int64)
-    for z in range(1, len(voxels) - 1, every):  # by planes: they stay in the cache
+    for z in range(1, len(voxels) - 1, every):  # by planes, which stay in the processor's cache
         steps = find_steps(voxels[z - 1 : z + 2], spacing_um)[0]
         row = np.minimum(steps * factor + np.float32(0.5), rows - 1).astype(np.intp)
         row *= COLUMNS
@@ -76,12 +81,12 @@ def count_joint(
 
 
 def choose_gradient_max(fine: NDArray[np.int64]) -> float:
-    """Return the step that a channel's last row is to stand for, rounded up to 3 digits.
+    """Return the step of a channel's last row, rounded up to 3 digits.
 
     fine  int64 (FINE_ROWS, COLUMNS), counts over 0..STEEPEST
 
-    Nearly all of the squared steps lie below it: voxels without a boundary, which are most, weigh
-    nothing, and a few hot ones little.
+    Nearly all of the squared steps lie below it. Voxels without a boundary, which are the most,
+    have no weight, and a few hot voxels have little.
     """
     steps = np.linspace(0, STEEPEST, len(fine))
     energy = np.cumsum(fine.sum(axis=1) * steps**2)
@@ -90,7 +95,7 @@ def choose_gradient_max(fine: NDArray[np.int64]) -> float:
 
 
 def rebin(fine: NDArray[np.int64], gradient_max: float) -> NDArray[np.int64]:
-    """Return the counts of FINE_ROWS over 0..STEEPEST as those of ROWS over 0..gradient_max.
+    """Return counts in FINE_ROWS over 0..STEEPEST as counts in ROWS over 0..gradient_max.
 
     fine    int64 (FINE_ROWS, COLUMNS)
     result  int64 (ROWS, COLUMNS)
@@ -103,7 +108,7 @@ def rebin(fine: NDArray[np.int64], gradient_max: float) -> NDArray[np.int64]:
 
 
 def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Return counts as a picture, uint8: 0 where there is none, 255 where there are most."""
+    """Return counts as an image on a logarithmic scale, uint8: 0 for none, 255 for the most."""
     most = int(counts.max(initial=0))
     if most == 0:
         return np.zeros(counts.shape, np.uint8)
@@ -112,7 +117,7 @@ def log_scaled(counts: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 
 def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return voxels as the 8-bit volumes hold them: the window's ends are 0 and 255.
+    """Return voxels as in the 8-bit volumes: the window's ends become 0 and 255.
 
     voxels  any real dtype and shape (z, ...), voxel values
     window  lowest and highest voxel value
@@ -120,16 +125,16 @@ def to_eight_bits(voxels: NDArray[Any], window: tuple[float, float]) -> NDArray[
     """
     low, high = window
     result = np.empty(voxels.shape, np.uint8)
-    for z, plane in enumerate(voxels):  # one at a time: float32 is large
+    for z, plane in enumerate(voxels):  # one plane at a time, because float32 is large
         share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
         result[z] = np.rint(np.clip(share, 0, 1) * 255)
     return result
 
 
 def sample_boxes(region: Box, limit: int, largest: tuple[int, int, int] = SAMPLE_EDGE) -> list[Box]:
-    """Return boxes of a region with at most about `limit` voxels in all: all of it, or blocks.
+    """Return boxes of a region with at most about `limit` voxels in all: the whole, or blocks.
 
-    Blocks stand evenly along each axis, from end to end, as far as the limit goes.
+    Blocks are spaced evenly along each axis, from end to end, as many as the limit allows.
 
     largest  voxels (z, y, x) of a block
     """

@@ -1,22 +1,22 @@
 """Find noise and materials in a histogram of value and gradient (transfer/joint_histogram.py).
 
-Inside a material the gradient is noise alone, the length of a vector of three noisy differences,
-and values pile up. So the modes of the gradients give the noise. The peaks among the voxels whose
-gradient is no more than noise are the materials.
+Inside a material the gradient is only noise, the length of a vector of three noisy differences, and
+many voxels have the same value. So the modes of the gradients show the noise. The materials are the
+peaks of the values, among voxels with gradients no larger than noise.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-NOISE_FACTOR = 1.9  # x the mode of the gradients: 93 % of such a vector's lengths lie below
+NOISE_FACTOR = 1.9  # multiple of the gradients' mode; 93 % of such a vector's lengths lie below
 BRIGHT = 0.3  # value, 0..1, above which noise that rises with the value is looked for
 RISING_PERCENTILE = 10.0  # percent of the columns that may rise less than the noise
-FLAT_STEP = 3.0 / 255  # least noise, values are 0..1: rounding to 8 bits and a slow drift
+FLAT_STEP = 3.0 / 255  # least noise, where values are 0..1: rounding to 8 bits and a slow drift
 MIN_IN_COLUMN = 2e-5  # least share of all voxels in a column whose mode is used
-MIN_SHARE = 0.004  # least share of the flat voxels that a material has
-MIN_PROMINENCE = 0.2  # least prominence by the peak's height: a shoulder is no material
-MAX_MATERIALS = 6  # most materials of a channel
+MIN_SHARE = 0.004  # least share of the flat voxels in a material
+MIN_PROMINENCE = 0.2  # least prominence divided by the peak's height; a shoulder is not a material
+MAX_MATERIALS = 6  # largest number of materials of a channel
 
 
 def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.float64]:
@@ -26,10 +26,10 @@ def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.flo
     gradient_max  gradient magnitude of the last row
     result        float64 (columns,), shares of `gradient_max`, 0..1
 
-    It follows from the mode of each column's gradients. Their median over the voxels is the floor,
-    since most voxels lie inside a material. Columns at the window's ends are left out: clipping
-    reduces their noise. Photon noise grows with brightness: a rise of the squared modes in
-    proportion to the value, found in nearly all columns, counts as noise too.
+    The noise follows from the mode of each column's gradients. The median of the modes over the
+    voxels is the floor, because most voxels lie inside a material. Columns at the window's ends are
+    left out, because clipping reduces their noise. Photon noise grows with brightness. So a rise of
+    the squared modes in proportion to the value, found in nearly all columns, also counts as noise.
     """
     rows, columns = counts.shape
     inner = counts.copy()
@@ -50,19 +50,19 @@ def find_noise(counts: NDArray[np.int64], gradient_max: float) -> NDArray[np.flo
 
 
 def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the values of the materials, 0..1, rising: voxels without a boundary pile up there.
+    """Return the values of the materials, 0..1, rising.
 
     counts  int64 (rows, columns), voxels by gradient and value
-    noise   float64 (columns,), as `find_noise` returns it
+    noise   float64 (columns,), from `find_noise`
     """
     rows, columns = counts.shape
     is_flat = np.arange(rows)[:, np.newaxis] <= noise * (rows - 1)
     flat = np.where(is_flat, counts, 0).sum(axis=0).astype(np.float64)
     if flat.sum() == 0:
         return ()
-    # a source of few values leaves gaps between the columns
+    # A source with few values leaves gaps between the columns.
     sigma = max(2.0, column_gap(counts))
-    pad = int(4 * sigma) + 2  # a peak may stand at an end of the window
+    pad = int(4 * sigma) + 2  # a peak may lie at an end of the window
     smooth = ndimage.gaussian_filter1d(np.pad(flat, pad), sigma, mode="constant")
     candidates = []
     for peak in find_peaks(smooth):
@@ -79,12 +79,12 @@ def find_materials(counts: NDArray[np.int64], noise: NDArray[np.float64]) -> tup
 
 
 def find_peaks(curve: NDArray[np.float64]) -> list[int]:
-    """Return where a curve is higher than on both sides; of a plateau its middle.
+    """Return where a curve is higher than on both sides; for a plateau, its middle.
 
     curve  float64 (columns,)
 
-    As `scipy.signal.find_peaks`, whose import takes a second: every command and worker of a build
-    would wait for it.
+    The result equals that of `scipy.signal.find_peaks`. Importing that takes a second, for which
+    every command and worker of a build would wait.
     """
     starts = np.flatnonzero(np.concatenate([[True], np.diff(curve) != 0]))
     ends = np.append(starts[1:], len(curve)) - 1
@@ -95,11 +95,11 @@ def find_peaks(curve: NDArray[np.float64]) -> list[int]:
 
 
 def bases_of(curve: NDArray[np.float64], peak: int) -> tuple[int, int]:
-    """Return the lowest places beside a peak, before the curve is higher than it, on either side.
+    """Return the lowest places on both sides of a peak, up to where the curve exceeds it.
 
     curve  float64 (columns,)
 
-    The nearest of equally low ones, as `scipy.signal.peak_prominences`.
+    The nearest of equally low places is returned, as by `scipy.signal.peak_prominences`.
     """
     higher = np.flatnonzero(curve > curve[peak])
     start = higher[higher < peak].max(initial=-1) + 1
@@ -118,7 +118,7 @@ def column_gap(counts: NDArray[np.int64]) -> float:
 
 
 def _foot(smooth: NDArray[np.float64], peak: int, left: int, right: int) -> tuple[int, int]:
-    """Return the columns at which a peak falls to half of its height, inside its bases."""
+    """Return the columns at which a peak falls to half of its height, within its bases."""
     low = high = peak
     while low > left and smooth[low - 1] > 0.5 * smooth[peak]:
         low -= 1
@@ -128,7 +128,7 @@ def _foot(smooth: NDArray[np.float64], peak: int, left: int, right: int) -> tupl
 
 
 def _centre(smooth: NDArray[np.float64], peak: int, low: int, high: int) -> float:
-    """Return the centre of a peak's upper half, over the same distance to both sides."""
+    """Return the centre of a peak's upper half, over the same distance on both sides."""
     reach = min(peak - low, high - peak) if peak not in (low, high) else 0
     part = np.arange(peak - reach, peak + reach + 1)
     return float(np.average(part, weights=smooth[part]))

@@ -1,8 +1,8 @@
-"""The grey values of an MR on its cut faces, as a slice shows them.
+"""The grey values of an MR on its cut faces, as on a slice.
 
-A 2D function of bands of values: the brighter the tissue, the lighter its colour. Opacity alone
-shows tissues of a solid body hardly at all. The edge between air and tissue has the channel's own
-colour, which the surface has.
+This is a 2D function of bands of values: brighter tissue has a lighter colour. Opacity alone hardly
+shows the tissues of a solid body. The edge between air and tissue has the channel's own colour,
+like the surface.
 """
 
 from dataclasses import replace
@@ -14,13 +14,13 @@ from stereocell.model.channel import OpacityPoints, Shape, Shapes
 NAME = "grey"
 _BANDS = 10
 _DARKEST = 0.14  # linear RGB of the dimmest tissue, as a factor to the channel's colour
-_LEAST_RANGE = 0.01  # share of the window from the foot to the brightest tissue, at least
-# Step over two voxels, as a factor to the value, from which on an edge is one to air. Half-way up a
-# blurred edge to air it is 1.6, and between tissues about 1 at most.
+_LEAST_RANGE = 0.01  # share of the window: least distance from the foot to the brightest tissue
+# Multiple of the value: least step over two voxels of an edge to air. Half-way up a blurred edge to
+# air it is 1.6, and between tissues at most about 1.
 _STEEP = 1.1
-_STEEPEST = 0.8  # gradient, 0..1, from which on no band has an edge of its own
-_EDGE_FROM = 0.6  # share of that step at which the edge's colour begins
-_EDGE_SOFTNESS = 0.3  # a sharp end: in a soft one the edge would mix with the dimmest tissue
+_STEEPEST = 0.8  # gradient, 0..1, above which a band has no edge of its own
+_EDGE_FROM = 0.6  # share of that step at which the colour of the edge begins
+_EDGE_SOFTNESS = 0.3  # low, because a soft edge would mix with the dimmest tissue
 
 
 def grey_shapes(
@@ -28,10 +28,11 @@ def grey_shapes(
 ) -> Shapes:
     """Return the bands from a body's outermost values up to the window's end.
 
-    level         where the surface lies, 0..1 in the window
-    brightest     value from which on tissue has the channel's own colour, 0..1 in the window
-    opacity       of the general function: bands absorb as much, so that noise stays as faint
-    gradient_max  share of the window that a step is where its gradient is 1
+    level         iso-value of the surface, 0..1 in the window
+    brightest     least value with the channel's own colour, 0..1 in the window
+    opacity       opacity points of the general function; bands absorb as much, so that noise stays
+                  as faint
+    gradient_max  step, as a share of the window, whose gradient is 1
     """
     foot = next(value for value, absorbed in reversed(opacity) if absorbed == 0)
     places, absorbed = np.array(opacity).T

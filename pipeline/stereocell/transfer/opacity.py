@@ -1,8 +1,8 @@
-"""Transfer functions from a channel's intensity to opacity, made from histogram and iso-value.
+"""Transfer functions from a channel's intensity to opacity, from its histogram and iso-value.
 
 Intensity 0..1 is the channel's window. Opacity, 0..1, is the absorption along one finest voxel
-spacing of the material; the ray-marcher corrects it for its own step. The channel's colour is kept
-apart, so that a recoloured channel needs no new table.
+spacing; the ray-marcher corrects it for its own step. The channel's colour is stored separately, so
+that a recoloured channel needs no new table.
 """
 
 import numpy as np
@@ -14,32 +14,32 @@ from stereocell.model.channel import OpacityPoints
 SOFT = "soft"  # name of the translucent function
 SURFACE = "surface"  # name of the function that looks like the surface
 SHARP = "sharp"  # name of the function of an opaque body that ends at the level
-# Mean optical depth of the whole volume along its shortest edge, at most, by the soft function.
-# Light then crosses it, and bodies show within others, however many voxels the volume has. Chosen
-# by eye on stained cells, nuclei, an ovule and a cleared brain, of 15 to 270 voxels.
+# Largest mean optical depth of the whole volume along its shortest edge, with the soft function.
+# Light then crosses the volume, and bodies show within others, for any number of voxels. Chosen by
+# eye on stained cells, nuclei, an ovule and a cleared brain, of 15 to 270 voxels.
 SOFT_DEPTH = 0.6
-LEAST_SHARE = 0.2  # of the soft absorption: with less, steps of 8 bits would show as bands
+LEAST_SHARE = 0.2  # share of the soft absorption; with less, steps of 8 bits would show as bands
 THRESHOLD = "threshold"  # name of the function of channels that have a threshold
 RAMP = 0.08  # share of the window over which opacity rises from the threshold
-FOOT = 0.95  # share of the level from which opacity rises at the latest: no step, which is jagged
+FOOT = 0.95  # largest share of the level at which opacity starts; a step would look jagged
 # Share of the way from the background to the surface's level at which opacity starts. The volume
-# then begins a quarter of a voxel before the surface, and both have one silhouette.
+# then begins a quarter of a voxel before the surface, and both have the same silhouette.
 NEAR_SURFACE = 0.8
-AT_SURFACE = 0.18  # opacity a voxel at the surface's level ...
-IN_BODY = 0.45  # ... and where the body is bright
+AT_SURFACE = 0.18  # opacity per voxel at the surface's level
+IN_BODY = 0.45  # opacity per voxel where the body is bright
 BRIGHT = 0.3  # share of the window above the level over which a body becomes bright
-# The same two numbers for magnitudes, as MR has them. A cut through such a volume shows tissues by
+# AT_SURFACE and BRIGHT for magnitudes, as MR has them. A cut through such a volume shows tissues by
 # their opacity, so the opacity has to rise over all of their values.
 AT_SURFACE_OF_MAGNITUDES = 0.12
 BRIGHT_OF_MAGNITUDES = 0.5
-# Share of the window between the start of a body's opacity and its surface. The presets for CT
-# make it 36 HU. The values at an edge rise by more than that within a voxel. A step of the opacity
-# would look jagged.
+# Share of the window between the start of a body's opacity and its surface; 36 HU with the presets
+# for CT. The values at an edge rise by more than that within a voxel. A step of the opacity would
+# look jagged.
 BELOW_BODY = 0.012
 SOLID_BODY = 0.06  # share of the window above the surface in which a body becomes opaque: 180 HU
-NOISE_REACH = 2.5  # half-widths: of Gaussian or Rayleigh noise 1 voxel in 1000 lies beyond them
-FAINT = 1e-2  # share of the peak's count: rarer noise is left, since dim materials are as rare
-MAX_SHIFT = 1.5  # x the level, to which noise may push the start of the opacity
+NOISE_REACH = 2.5  # half-widths; 1 voxel in 1000 of Gaussian or Rayleigh noise lies beyond
+FAINT = 1e-2  # share of the peak's count; rarer noise is ignored, because dim materials are as rare
+MAX_SHIFT = 1.5  # largest multiple of the level to which noise moves the start of the opacity
 
 
 def make_transfer_functions(
@@ -52,15 +52,15 @@ def make_transfer_functions(
     is_calibrated: bool = False,
     depth_voxels: float = 0.0,
 ) -> dict[str, OpacityPoints]:
-    """Return the opacity points of each function: THRESHOLD only where there is a threshold.
+    """Return the opacity points of each function. THRESHOLD is included only with a threshold.
 
     histogram             int64 (bins,), voxel counts over 0..1 in equal bins
-    iso_normalized        the iso-value, 0..1; None: the channel has no clear surface
-    threshold_normalized  the adaptive threshold, 0..1; None: there is none
+    iso_normalized        iso-value, 0..1; None: the channel has no clear surface
+    threshold_normalized  adaptive threshold, 0..1; None: there is none
+    has_magnitudes        whether values are magnitudes as in MR, where air is noise in each voxel
     level_percentile      percent of the voxels below the level of a channel without a surface
-    has_magnitudes        whether values are magnitudes, as of MR: the air is noise, voxel by voxel
     is_calibrated         whether values lie on an absolute scale, as the Hounsfield units of CT
-    depth_voxels          shortest edge of the volume, in finest voxel spacings; 0: not known
+    depth_voxels          shortest edge of the volume, in finest voxel spacings; 0: unknown
 
     The level is the iso-value, or a percentile in a channel without a clear surface.
     """
@@ -88,7 +88,8 @@ def make_transfer_functions(
             (0.85 * level, 0.0), (level, 0.5), (min(1.15 * level, 0.99), 0.0), (1.0, 0.0)
         ),
     }
-    if threshold_normalized is not None:  # opacity is 0 below it: the marcher skips such bricks
+    # Opacity is 0 below it, so that the marcher skips such bricks
+    if threshold_normalized is not None:
         start = float(np.clip(threshold_normalized, 0.01, 0.97))
         top = start + min(RAMP, 0.9 * (1 - start))
         functions[THRESHOLD] = _points((start, 0.0), (top, 0.45), (1.0, 0.6))
@@ -98,9 +99,9 @@ def make_transfer_functions(
 def _thinned(
     points: OpacityPoints, histogram: NDArray[np.int64], depth_voxels: float
 ) -> OpacityPoints:
-    """Return the points with opacities so low that the volume's mean optical depth is SOFT_DEPTH.
+    """Return the points with opacities reduced until the mean optical depth is SOFT_DEPTH.
 
-    The absorption becomes LEAST_SHARE of what it was at the least.
+    The absorption is reduced at most to the share LEAST_SHARE.
     """
     absorbed = -np.log1p(-evaluate(points, size=len(histogram)).astype(np.float64))
     depth = depth_voxels * float(absorbed @ histogram) / max(1, int(histogram.sum()))
@@ -113,17 +114,17 @@ def _thinned(
 def _rise_of_body(level: float) -> tuple[float, float, float]:
     """Return where the opacity of a CT's body starts, where its level is, and where it is solid.
 
-    On a calibrated scale nothing between air and the surface is of interest: opacity that starts
-    half-way would be a veil before the skin, and before bone all of the soft tissue.
+    On a calibrated scale nothing of interest lies between air and the surface. Opacity that starts
+    half-way would be a veil in front of the skin, and all of the soft tissue in front of bone.
     """
     return max(level - BELOW_BODY, 0.5 * level), level, min(level + SOLID_BODY, 0.99)
 
 
 def _foot(level: float, median: float, *, has_surface: bool) -> float:
-    """Return where opacity starts above the median, since most voxels are background.
+    """Return where opacity starts, above the median because most voxels are background.
 
-    Near the level of a surface; half-way to that of a channel without one, where faint structure
-    is to show.
+    It starts near the level of a surface. In a channel without a surface it starts half-way to the
+    level, so that faint structure shows.
     """
     way = NEAR_SURFACE if has_surface else 0.5
     return min(max(median + way * (level - median), way * level), 0.9 * level)
@@ -134,12 +135,12 @@ def _rise(
 ) -> tuple[float, float, float]:
     """Return where opacity starts, where it is that of the level, and where the body is bright.
 
-    floor  where opacity starts at the earliest
-    below  int64, voxel counts below the surface of magnitudes; None: values are none
+    floor  lowest value at which opacity starts
+    below  int64, voxel counts below the surface of magnitudes; None: values are not magnitudes
 
-    Noise of magnitudes would be dust in front of a surface: opacity starts where it ends. That is
-    below the level, unless the counts still fall steeply there: then a part of the air lies above
-    the level, which the surface leaves out as specks, and the volume has to, too.
+    Noise of magnitudes would look like dust in front of a surface, so opacity starts where it ends.
+    That is below the level, unless the counts still fall steeply at the level. In that case a part
+    of the air lies above the level. The surface leaves it out as specks, and so must the volume.
     """
     share = BRIGHT if below is None else BRIGHT_OF_MAGNITUDES
     bright = max(level + share * (1 - level), level + 0.02)
@@ -152,12 +153,12 @@ def _rise(
 
 
 def _end_of_noise(below: NDArray[np.int64]) -> float:
-    """Return where the noise of the background ends, in bins; 0: there is no peak of a background.
+    """Return where the noise of the background ends, in bins; 0 if the background has no peak.
 
     below  int64 (bins,), voxel counts below the surface
 
-    The peak's half-width is that of the upper side: on the lower one magnitudes (of MR, whose
-    noise is Rayleigh's) are cut off.
+    The half-width of the peak is measured on the upper side. On the lower side magnitudes are cut
+    off: MR has Rayleigh noise.
     """
     if not below.any():
         return 0.0
@@ -168,8 +169,9 @@ def _end_of_noise(below: NDArray[np.int64]) -> float:
 
 
 def _noise_beyond(below: NDArray[np.int64]) -> float:
-    """Return by how many bins noise goes on beyond the surface's level; 0: the counts that are left
-    there are few, or even, as those of the surface's own edge.
+    """Return by how many bins noise continues beyond the surface's level.
+
+    The result is 0 if the remaining counts are few, or even like those of the surface's own edge.
 
     below  int64 (bins,), voxel counts below the surface
     """
@@ -186,7 +188,7 @@ def _noise_beyond(below: NDArray[np.int64]) -> float:
 
 
 def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:
-    """Return the opacity at `size` intensities from 0 to 1, linear between the points.
+    """Return the opacity at `size` intensities from 0 to 1, interpolated between the points.
 
     points  (intensity, opacity) pairs, rising, 0..1; outside them the opacity is constant
     result  float32 (size,), 0..1
@@ -196,10 +198,10 @@ def evaluate(points: OpacityPoints, *, size: int = 256) -> NDArray[np.float32]:
 
 
 def invisible_below(opacities: NDArray[np.uint8]) -> int:
-    """Return the largest intensity, 0..254, that a table of 256 opacities leaves at 0; -1: none.
+    """Return the intensity, 0..254, up to which a table of 256 opacities is 0; -1: nowhere.
 
-    Texel k is intensity k; between texels opacity is linear, so everything up to the last texel
-    before the first opaque one is invisible.
+    Texel k is intensity k. Opacity is linear between texels, so everything up to the last texel
+    before the first visible one is invisible.
     """
     shown = opacities > 0
     first = int(shown.argmax()) if shown.any() else 255
@@ -207,6 +209,6 @@ def invisible_below(opacities: NDArray[np.uint8]) -> int:
 
 
 def _points(*points: tuple[float, float]) -> OpacityPoints:
-    """Return the origin and the points, rounded so that text files are the same each time."""
+    """Return the origin and the points, rounded so that text files never differ."""
     inner = [(round(x, 4), round(opacity, 4)) for x, opacity in points]
     return ((0.0, 0.0), *inner)

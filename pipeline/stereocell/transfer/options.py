@@ -8,7 +8,7 @@ from stereocell.model.settings import Bounds, require_bounds, setting
 
 @dataclass(frozen=True, slots=True)
 class WindowOptions:
-    """Which voxel values become 0 and 255, dataset-wide.
+    """The voxel values that become 0 and 255 in the whole dataset.
 
     Raises UsageError unless 0 <= low < high <= 100.
     """
@@ -22,8 +22,8 @@ class WindowOptions:
 
     volume_percentile: float = setting(
         99.0,
-        "percent of the voxels that are fainter than what the volume of a channel without a "
-        "surface shows",
+        "percent of the voxels that are too faint to show in the volume of a channel without a "
+        "surface",
         bounds=Bounds(1, 100),
     )
 

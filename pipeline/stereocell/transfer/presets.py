@@ -1,8 +1,8 @@
-"""Titles and explanations of the transfer functions that a build makes, by the name in the stage.
+"""Titles and explanations of the transfer functions of a build, by their names in the stage.
 
-The viewer's tables are generated from PRESETS by viewer_gltf/scripts/types.ts, which reads one row
-as a name, a title and a sentence, each a single string. The other modules of `transfer` make the
-functions of these names.
+The viewer's tables are generated from PRESETS by viewer_gltf/scripts/types.ts, which reads each row
+as a name, a title and a sentence, each of them a single string. The other modules of `transfer`
+make the functions with these names.
 """
 
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ class Preset:
     """One transfer function as users see it."""
 
     title: str  # in the list of functions
-    sentence: str  # how the channel looks with it
+    sentence: str  # appearance of the channel with the function
 
 
 PRESETS = {
     "default": Preset(
         "Translucent bodies",
-        "The background is clear, the material translucent, its bright parts denser.",
+        "The background is clear, and the material is translucent and denser where it is bright.",
     ),
     "soft": Preset(
         "Thin veil",
-        "A thin veil: faint material shows too, and the inside stays visible.",
+        "A thin veil that also shows faint material and leaves the inside visible.",
     ),
     "sharp": Preset(
         "Solid bodies",
@@ -31,11 +31,11 @@ PRESETS = {
     ),
     "surface": Preset(
         "Thin shell",
-        "A thin shell where the surface lies. Inside and outside are clear.",
+        "A thin shell at the surface; inside and outside are clear.",
     ),
     "threshold": Preset(
-        "All above the threshold",
-        "All that is brighter than the channel's threshold, and nothing below it.",
+        "Above the threshold",
+        "Everything brighter than the channel's threshold.",
     ),
     "arcs": Preset(
         "Boundaries of materials",
@@ -43,7 +43,7 @@ PRESETS = {
     ),
     "heat": Preset(
         "Heat colours",
-        "Little is dark red, much is bright, as PET and SPECT are read.",
+        "Little tracer is dark red and much is bright, as in readings of PET and SPECT.",
     ),
     "grey": Preset(
         "Shades of grey",
@@ -51,26 +51,26 @@ PRESETS = {
     ),
     "tissues": Preset(
         "Tissues in colour",
-        "Skin, muscle and bone in colours of their own.",
+        "Fat is yellow, soft tissue is red, and bone is light.",
     ),
     "air": Preset(
         "Air",
-        "Only what is as thin as air, such as lungs and sinuses.",
+        "Only parts with the density of air, such as lungs and sinuses.",
     ),
     "fat": Preset(
         "Fat",
-        "Only what has the density of fat.",
+        "Only parts with the density of fat.",
     ),
     "soft_tissue": Preset(
         "Soft tissue",
-        "Only what has the density of muscles and organs.",
+        "Only parts with the density of muscles and organs.",
     ),
     "blood": Preset(
         "Blood",
-        "Only what has the density of blood.",
+        "Only parts with the density of blood.",
     ),
     "bone": Preset(
         "Bone",
-        "Only what is as dense as bone.",
+        "Only parts with the density of bone.",
     ),
 }

@@ -1,9 +1,10 @@
 """Two-dimensional transfer functions: value and gradient magnitude to colour and opacity.
 
-A function is a list of shapes, the widgets of Kniss, Kindlmann & Hansen, IEEE TVCG 8(3), 2002: a
-rectangle, or a triangle that stands on its tip at gradient 0, which is the region that Levoy, IEEE
-CG&A 8(3), 1988, keeps of an iso-surface: as thick at every steepness. `evaluate2d` makes a table of
-them; docs/transfer-functions.md states it as a formula, and the viewer computes the same bytes.
+A function is a list of shapes, like the widgets of Kniss, Kindlmann & Hansen, IEEE TVCG 8(3), 2002.
+A shape is a rectangle, or a triangle that stands on its tip at gradient 0. The triangle is the
+region around an iso-surface of Levoy, IEEE CG&A 8(3), 1988, whose thickness does not depend on the
+steepness. `evaluate2d` makes a table of the shapes; docs/transfer-functions.md states it as a
+formula, and the viewer computes the same bytes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,15 +22,15 @@ from stereocell.model.channel import (
 from stereocell.transfer.joint_histogram import COLUMNS, ROWS
 
 NAME = "arcs"  # name of the proposed function, beside those of transfer/opacity.py
-MAX_SHAPES = 32  # most shapes of one function: more neither fit a link nor a person's eye
+MAX_SHAPES = 32  # largest number of shapes of a function; more fit neither a link nor the eye
 
 
 def evaluate2d(shapes: Shapes, *, size: tuple[int, int] = (ROWS, COLUMNS)) -> NDArray[np.uint8]:
     """Return the table of a function, uint8 RGBA (rows, columns, 4), straight alpha.
 
-    Row j stands for the gradient magnitude j / (rows - 1), column k for the value k / (columns -
-    1). RGB is a factor to the channel's colour, A what one finest voxel spacing absorbs. Shapes
-    that overlap absorb together and share the colour by their opacities.
+    Row j stands for the gradient magnitude j / (rows - 1), and column k for the value
+    k / (columns - 1). RGB is a factor to the channel's colour, and A is the absorption along one
+    finest voxel spacing. Overlapping shapes absorb together, and mix their colours by opacity.
     """
     rows, columns = size
     gradient = (np.arange(rows) / (rows - 1))[:, np.newaxis]
@@ -49,7 +50,7 @@ def evaluate2d(shapes: Shapes, *, size: tuple[int, int] = (ROWS, COLUMNS)) -> ND
 
 
 def find_fault(shape: Shape) -> str:
-    """Return what is wrong with a shape, found against expected; empty if nothing is."""
+    """Return the fault of a shape, as found and expected values; empty if there is none."""
     if shape.kind not in get_args(ShapeKind):
         return f"kind is {shape.kind!r}, expected one of {', '.join(get_args(ShapeKind))}"
     for name, (low, high) in (("values", shape.values), ("gradients", shape.gradients)):
@@ -64,9 +65,9 @@ def find_fault(shape: Shape) -> str:
 
 
 def fall_back(shapes: Shapes) -> OpacityPoints:
-    """Return opacity points that stand for shapes where nothing knows gradients.
+    """Return opacity points that replace the shapes in programs that know no gradients.
 
-    At each value the most that a shape has there at its upper end.
+    The opacity at each value is the largest of any shape, at the shape's upper end.
     """
     edges = {0.0, 1.0}
     for shape in shapes:
@@ -83,7 +84,7 @@ def fall_back(shapes: Shapes) -> OpacityPoints:
 def _cover(
     shape: Shape, value: NDArray[np.float64], gradient: NDArray[np.float64], smallest: float
 ) -> NDArray[np.float64]:
-    """Return how much a shape has of each cell, 0..1; value (1, n), gradient (m, 1) to (m, n)."""
+    """Return how much a shape covers each cell (m, n), 0..1. value: (1, n); gradient: (m, 1)."""
     low, high = shape.values
     bottom, top = shape.gradients
     if shape.kind == "triangle":
@@ -92,7 +93,7 @@ def _cover(
         across = _across(value, left, right, shape.softness, smallest)
     else:
         across = _across(value, low, high, shape.softness, smallest)
-        # what is beyond an end of the window is clipped to it: no edge there
+        # Values beyond an end of the window are clipped to it, so there is no edge at the end.
         middle = (low + high) / 2
         if low == 0:
             across = np.where((value >= 0) & (value <= middle), 1.0, across)
@@ -115,20 +116,20 @@ def _across(
     softness: float,
     smallest: float,
 ) -> NDArray[np.float64]:
-    """Return the share of opacity between edges that lie at least `smallest` from their middle."""
+    """Return the share of opacity between edges at least `smallest` from their middle."""
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, smallest)
     return _soften(1 - np.abs(value - middle) / half, softness)
 
 
 def _soften(depth: NDArray[np.float64], softness: float) -> NDArray[np.float64]:
-    """Return 0 outside (depth below 0), 1 from `softness` on, straight in between."""
+    """Return 0 for a depth below 0, and 1 from `softness` on, linear in between."""
     if softness == 0:
         return (depth >= 0).astype(np.float64)
     return np.clip(depth / softness, 0.0, 1.0)
 
 
 def shapes_from(content: Sequence[Mapping[str, Any]]) -> Shapes:
-    """Return the shapes that JSON holds, as dataclasses.asdict made them; it passed its schema."""
+    """Return the shapes from JSON that has passed its schema, as dataclasses.asdict made it."""
     return tuple(
         Shape(
             one["kind"],

@@ -1,9 +1,9 @@
-"""Windows that are given by value, and those of CT that radiologists call by name."""
+"""Windows that are given by value, and those of CT that radiologists know by name."""
 
 from stereocell.model.errors import UsageError
 from stereocell.model.settings import MAX_VOXEL_VALUE
 
-# width and centre in Hounsfield units, as CT consoles have them
+# Width and centre in Hounsfield units, as on CT consoles
 NAMED = {
     "brain": (80.0, 40.0),
     "bone": (2000.0, 500.0),
@@ -13,7 +13,10 @@ NAMED = {
 
 
 def parse_window(where: str, text: str) -> tuple[float, float]:
-    """Return the voxel values that become 0 and 255, of `LOW:HIGH` or a name. Raises UsageError."""
+    """Return the voxel values that become 0 and 255, from `LOW:HIGH` or a name.
+
+    Raises UsageError if the text is neither.
+    """
     if text in NAMED:
         width, centre = NAMED[text]
         return centre - width / 2, centre + width / 2

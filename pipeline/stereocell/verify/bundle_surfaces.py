@@ -24,7 +24,7 @@ from stereocell.formats.basis_textures import (
     encode_occlusion_map,
 )
 from stereocell.formats.gltf import AMBIENT_SHARE
-from stereocell.formats.gltf_decode import Drawn, read_glb
+from stereocell.formats.gltf_decode import DecodedMesh, read_glb
 from stereocell.formats.tiles3d_walk import Content, walk
 from stereocell.model.mesh import Mesh
 from stereocell.usd.read_levels import ComposedLod
@@ -127,7 +127,9 @@ def _compare_boxes(
                 break
 
 
-def _compare_surface(drawn: Drawn, lod: ComposedLod, is_last: bool) -> tuple[float, list[str]]:
+def _compare_surface(
+    drawn: DecodedMesh, lod: ComposedLod, is_last: bool
+) -> tuple[float, list[str]]:
     """Return the largest distance of a vertex from its place (lattice steps), and the problems.
 
     is_last  whether it is the coarsest of several: without maps, its occlusion is at its vertices
@@ -186,7 +188,7 @@ def _compare_faces(
     there: NDArray[np.float64],
     here: NDArray[np.float64],
     triangles: NDArray[np.uint32],
-    drawn: Drawn,
+    drawn: DecodedMesh,
     mesh: Mesh,
 ) -> Iterator[str]:
     """Yield problems with the facing of triangles, and with their place in the maps.
@@ -261,7 +263,7 @@ def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 def _compare_vertex_colors(
-    drawn: Drawn, mesh: Mesh, places: NDArray[np.float64], decoded: NDArray[np.float64]
+    drawn: DecodedMesh, mesh: Mesh, places: NDArray[np.float64], decoded: NDArray[np.float64]
 ) -> Iterator[str]:
     if mesh.colors is None:
         return
@@ -274,7 +276,7 @@ def _compare_vertex_colors(
         yield "the mesh's own colours are others"
 
 
-def _compare_maps(drawn: Drawn, lod: ComposedLod, is_last: bool) -> Iterator[str]:
+def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterator[str]:
     for name, (kind, encode) in _ENCODERS.items():
         path: Path | NDArray[np.uint8] | None = getattr(lod.images or lod.maps, kind)
         named = path.name if isinstance(path, Path) else f"lod{lod.level}_{kind}"

@@ -1,4 +1,7 @@
-"""Walls between objects: closed, shared, as large as the voxels, near the truth, at all levels."""
+"""Interfaces between objects are closed, shared, exact in volume and near the truth, at all levels.
+
+Each object has the volume of its voxels.
+"""
 
 from collections.abc import Sequence
 from functools import cache
@@ -13,9 +16,15 @@ from numpy.typing import NDArray
 from corpus.real import data_folder
 from stereocell.meshes.validity import find_defects, label_components
 from stereocell.model.volume import zyx_to_xyz
-from stereocell.objects import simplify_walls as simplifying
-from stereocell.objects.simplify_walls import keep_volumes, simplify_walls
-from stereocell.objects.walls import Walls, extract_walls, find_faults, measure_volumes, surfaces_of
+from stereocell.objects import simplify_interfaces as simplifying
+from stereocell.objects.interfaces import (
+    Interfaces,
+    extract_interfaces,
+    find_faults,
+    measure_volumes,
+    surfaces_of,
+)
+from stereocell.objects.simplify_interfaces import keep_volumes, simplify_interfaces
 from stereocell.objects.well_composed import make_well_composed
 from support.exhaustive import sweep
 from support.touching_cells import RADIUS_UM, touching_cells
@@ -27,27 +36,27 @@ AIMS_UM = (0.1, 0.2, 0.4, 0.8)
 
 def levels_of(
     labels: NDArray[np.int32], spacing_um: tuple[float, float, float], aims_um: Sequence[float]
-) -> tuple[list[Walls], NDArray[np.float64]]:
+) -> tuple[list[Interfaces], NDArray[np.float64]]:
     mended, _, _ = make_well_composed(np.pad(labels, 2))
     volumes = np.bincount(mended.ravel()) * np.prod(spacing_um)
-    found = [extract_walls(mended, spacing_um, STEP_UM)]
+    found = [extract_interfaces(mended, spacing_um, STEP_UM)]
     for aim in aims_um:
-        walls, is_done = simplify_walls(found[-1], aim, volumes, STEP_UM)
+        interfaces, is_done = simplify_interfaces(found[-1], aim, volumes, STEP_UM)
         assert is_done
-        found.append(walls)
+        found.append(interfaces)
     return found, volumes
 
 
 @cache
-def tissue() -> tuple[list[Walls], NDArray[np.float64], NDArray[np.float64]]:
+def tissue() -> tuple[list[Interfaces], NDArray[np.float64], NDArray[np.float64]]:
     labels, centres = touching_cells((36, 72, 72), SPACING_UM)
     levels, volumes = levels_of(labels, SPACING_UM, AIMS_UM)
     return levels, volumes, centres
 
 
-def require_sound(walls: Walls, objects: int) -> None:
+def require_valid(interfaces: Interfaces, objects: int) -> None:
     for number in range(1, objects + 1):
-        counts = find_defects(surfaces_of(walls, np.array([number], np.int32))).counts
+        counts = find_defects(surfaces_of(interfaces, np.array([number], np.int32))).counts
         assert not any(counts.values()), (number, counts)
 
 
@@ -55,49 +64,51 @@ def require_sound(walls: Walls, objects: int) -> None:
 def test_each_object_is_closed_and_valid_at_each_level() -> None:
     levels, _, centres = tissue()
     assert len(centres) >= 12
-    for walls in levels:
-        require_sound(walls, len(centres))
-        assert not len(find_faults(walls))  # nor does one meet another beside their wall
-    triangles = [len(walls.triangles) for walls in levels]
+    for interfaces in levels:
+        require_valid(interfaces, len(centres))
+        assert not len(find_faults(interfaces))  # no interface meets another elsewhere
+    triangles = [len(interfaces.triangles) for interfaces in levels]
     assert all(fewer < 0.75 * many for many, fewer in pairwise(triangles)), triangles
 
 
 @pytest.mark.slow
-def test_neighbours_share_their_wall_triangle_by_triangle() -> None:
+def test_neighbours_share_their_interface_triangle_by_triangle() -> None:
     levels, _, centres = tissue()
-    for walls in levels:
-        assert (walls.sides[:, 0] < walls.sides[:, 1]).all()
-        shared = walls.sides[(walls.sides > 0).all(axis=1)]
+    for interfaces in levels:
+        assert (interfaces.sides[:, 0] < interfaces.sides[:, 1]).all()
+        shared = interfaces.sides[(interfaces.sides > 0).all(axis=1)]
         assert len(np.unique(shared, axis=0)) >= len(centres)  # the cells do touch
-        # all objects together are as large as what surrounds them: nothing lies between two
-        around = walls.sides[:, 0] == 0
-        corners = walls.positions[walls.triangles[around]]
+        # All objects together are as large as the hole in their surroundings, so there are no gaps.
+        around = interfaces.sides[:, 0] == 0
+        corners = interfaces.positions[interfaces.triangles[around]]
         whole = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()
-        assert measure_volumes(walls, len(centres)).sum() == pytest.approx(-whole / 6, rel=1e-9)
+        assert measure_volumes(interfaces, len(centres)).sum() == pytest.approx(
+            -whole / 6, rel=1e-9
+        )
 
 
-def test_each_object_keeps_its_voxels_volume() -> None:
+def test_each_object_keeps_the_volume_of_its_voxels() -> None:
     levels, volumes, centres = tissue()
-    # the coarsest has facets as large as a quarter of a cell
-    for walls, median, most in zip(
+    # The coarsest level has facets as large as a quarter of a cell.
+    for interfaces, median, most in zip(
         levels[1:], (1e-3,) * 3 + (5e-3,), (0.01,) * 3 + (0.03,), strict=True
     ):
-        bias = measure_volumes(walls, len(centres))[1:] / volumes[1:] - 1
+        bias = measure_volumes(interfaces, len(centres))[1:] / volumes[1:] - 1
         assert abs(np.median(bias)) < median
         assert np.abs(bias).max() < most
 
 
-def test_walls_lie_where_the_truth_has_them() -> None:
-    """A wall of two cells midway between their centres, a free one on the cell's sphere."""
+def test_interfaces_lie_near_the_true_ones() -> None:
+    """Interfaces of two cells lie midway between their centres, and others on the cell's sphere."""
     levels, _, centres = tissue()
-    for walls, most_um in zip(levels[1:], (0.16, 0.17, 0.2, 0.3), strict=True):
-        corners = walls.positions[walls.triangles]
+    for interfaces, most_um in zip(levels[1:], (0.16, 0.17, 0.2, 0.3), strict=True):
+        corners = interfaces.positions[interfaces.triangles]
         x, y, z = corners.mean(axis=1).T
         at = np.stack([z, -y, x], axis=1) - 2 * np.array(SPACING_UM)  # two voxels are padding
         area = np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         )
-        first, second = walls.sides.T
+        first, second = interfaces.sides.T
         to_second = np.linalg.norm(at - centres[second - 1], axis=1)
         to_first = np.linalg.norm(at - centres[first - 1], axis=1)
         between = np.linalg.norm(centres[second - 1] - centres[first - 1], axis=1)
@@ -117,10 +128,10 @@ def test_a_ball_is_round_where_its_slices_end(
     grid = np.meshgrid(*(axis - at for axis, at in zip(axes, middle, strict=True)), indexing="ij")
     inside = (np.linalg.norm(grid, axis=0) < radius_um).astype(np.int32)
     origin_um = tuple(float(axis[0]) for axis in axes)
-    walls = extract_walls(inside, spacing_um, STEP_UM, origin_um=origin_um)
-    at = walls.positions - zyx_to_xyz(middle)
+    interfaces = extract_interfaces(inside, spacing_um, STEP_UM, origin_um=origin_um)
+    at = interfaces.positions - zyx_to_xyz(middle)
     assert np.abs(np.linalg.norm(at, axis=1) - radius_um).mean() < 0.1 * max(spacing_um)
-    corners = at[walls.triangles]
+    corners = at[interfaces.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
     outward = corners.mean(axis=1)
@@ -132,51 +143,55 @@ def test_a_ball_is_round_where_its_slices_end(
 
 
 def test_vertices_lie_on_the_lattice() -> None:
-    for walls in tissue()[0]:
-        np.testing.assert_array_equal(walls.positions, np.round(walls.positions * 256) / 256)
+    for interfaces in tissue()[0]:
+        np.testing.assert_array_equal(
+            interfaces.positions, np.round(interfaces.positions * 256) / 256
+        )
 
 
-def test_a_ring_stays_a_ring_and_two_pieces_stay_two() -> None:
+def test_simplifying_keeps_a_ring_and_two_pieces() -> None:
     z, y, x = np.mgrid[:16, :40, :40] - np.array([7.5, 19.5, 19.5])[:, None, None, None]
     ring = (np.hypot(np.hypot(y, x) - 12, z) < 4.5).astype(np.int32)
     ring[np.hypot(np.hypot(z, y), x) < 5] = 2
     ring[6:10, 2:5, 2:5] = 2  # one object in two pieces
     levels, _ = levels_of(ring, (1.0, 1.0, 1.0), (0.2, 0.4, 0.8))
-    for walls in levels:
-        require_sound(walls, 2)
+    for interfaces in levels:
+        require_valid(interfaces, 2)
         for number, bodies, genus in ((1, 1, 1), (2, 2, 0)):
-            mesh = surfaces_of(walls, np.array([number], np.int32))
+            mesh = surfaces_of(interfaces, np.array([number], np.int32))
             vertices, faces = len(mesh.positions), len(mesh.triangles)
             assert label_components(mesh.triangles, vertices).max() + 1 == bodies
             assert vertices - faces // 2 == 2 * bodies - 2 * genus  # Euler
 
 
-def test_one_object_that_fills_all_is_a_box() -> None:
+def test_an_object_that_fills_the_volume_is_a_box() -> None:
     levels, volumes = levels_of(np.ones((8, 10, 12), np.int32), (2.0, 1.0, 1.0), (0.2, 0.8))
-    for walls in levels:
-        require_sound(walls, 1)
+    for interfaces in levels:
+        require_valid(interfaces, 1)
     assert volumes[1] == pytest.approx(2 * 8 * 10 * 12)
     assert measure_volumes(levels[-1], 1)[1] == pytest.approx(volumes[1], rel=1e-3)
 
 
-def test_labels_without_an_object_have_no_walls() -> None:
+def test_labels_without_an_object_have_no_interfaces() -> None:
     levels, _ = levels_of(np.zeros((4, 5, 6), np.int32), SPACING_UM, AIMS_UM)
-    assert all(walls.triangles.shape == walls.positions.shape == (0, 3) for walls in levels)
+    assert all(
+        interfaces.triangles.shape == interfaces.positions.shape == (0, 3) for interfaces in levels
+    )
 
 
 @pytest.mark.slow
-def test_small_objects_stay() -> None:
+def test_small_objects_stay_at_all_levels() -> None:
     labels = np.zeros((6, 6, 40), np.int32)
     for number in range(1, 10):
         labels[2 : 2 + number % 3 + 1, 2:4, 4 * number - 1 : 4 * number + 1] = number
     levels, volumes = levels_of(labels, (1.0, 1.0, 1.0), AIMS_UM)
-    for walls in levels:
-        require_sound(walls, 9)
+    for interfaces in levels:
+        require_valid(interfaces, 9)
     np.testing.assert_allclose(measure_volumes(levels[-1], 9)[1:], volumes[1:], rtol=0.02)
 
 
 @pytest.mark.slow
-def test_the_same_labels_give_the_same_walls() -> None:
+def test_the_same_labels_give_the_same_interfaces() -> None:
     labels, _ = touching_cells((36, 72, 72), SPACING_UM)
     again, _ = levels_of(labels, SPACING_UM, AIMS_UM)
     for a, b in zip(tissue()[0], again, strict=True):
@@ -196,28 +211,28 @@ def _mask(name: str) -> NDArray[np.integer]:
 @pytest.mark.slow
 @pytest.mark.skipif(data_folder() is None, reason="STEREOCELL_DATA is not set")
 @pytest.mark.parametrize("name", sweep(["ovule", "nuclei"], kept=["nuclei"]))
-def test_masks_of_real_cells(name: str) -> None:
+def test_masks_of_real_cells_keep_their_volumes(name: str) -> None:
     mask = _mask(name)
     ids, numbered = np.unique(mask, return_inverse=True)
     labels = (numbered.reshape(mask.shape) + (ids[0] != 0)).astype(np.int32)
     levels, volumes = levels_of(labels, (1.0, 1.0, 1.0), (0.15, 0.3, 0.6))
     objects = len(volumes) - 1
     assert objects >= 50
-    for walls in levels:
-        require_sound(walls, objects)
-    for walls in levels[1:]:
-        bias = measure_volumes(walls, objects)[1:] / volumes[1:] - 1
+    for interfaces in levels:
+        require_valid(interfaces, objects)
+    for interfaces in levels[1:]:
+        bias = measure_volumes(interfaces, objects)[1:] / volumes[1:] - 1
         assert abs(np.median(bias)) < 1e-3
         assert np.abs(np.percentile(bias, [2, 98])).max() < 0.01
 
 
-def test_few_vertices_that_may_move_do_not_go_far() -> None:
+def test_a_few_free_vertices_do_not_move_far() -> None:
     """However coarse the aim: most of the vertices of so few triangles can't move at all."""
     levels, volumes, _ = tissue()
     coarse = levels[-1]
     low, high = coarse.positions.min(axis=0), coarse.positions.max(axis=0)
     aim_um = 2.0
-    coarser, _ = simplify_walls(coarse, aim_um, volumes, STEP_UM)
+    coarser, _ = simplify_interfaces(coarse, aim_um, volumes, STEP_UM)
     assert (coarser.positions > low - 3 * aim_um).all()
     assert (coarser.positions < high + 3 * aim_um).all()
     keeps, _ = keep_volumes(
@@ -226,14 +241,16 @@ def test_few_vertices_that_may_move_do_not_go_far() -> None:
     assert np.abs(keeps.positions - coarse.positions).max() <= aim_um + STEP_UM
 
 
-def test_walls_that_would_cross_after_all_rounds_are_left_and_said_so(
+def test_interfaces_that_still_cross_after_all_rounds_are_returned_unchanged_and_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     levels, volumes, _ = tissue()
-    walls = levels[1]
-    monkeypatch.setattr(simplifying, "find_faults", lambda walls, fresh: walls.triangles[0])
-    left, is_done = simplify_walls(walls, AIMS_UM[1], volumes, STEP_UM)
-    assert (left is walls, is_done) == (True, False)
-    free = np.zeros(len(walls.positions), bool)
-    left, is_done = keep_volumes(walls, free, 1.0, volumes, STEP_UM)
-    assert (left is walls, is_done) == (True, False)
+    interfaces = levels[1]
+    monkeypatch.setattr(
+        simplifying, "find_faults", lambda interfaces, fresh: interfaces.triangles[0]
+    )
+    left, is_done = simplify_interfaces(interfaces, AIMS_UM[1], volumes, STEP_UM)
+    assert (left is interfaces, is_done) == (True, False)
+    free = np.zeros(len(interfaces.positions), bool)
+    left, is_done = keep_volumes(interfaces, free, 1.0, volumes, STEP_UM)
+    assert (left is interfaces, is_done) == (True, False)

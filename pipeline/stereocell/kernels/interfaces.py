@@ -1,4 +1,4 @@
-"""Walls between objects, vertex by vertex: how they are smoothed, and what objects weigh there."""
+"""Interfaces between objects: smooth their vertices, and measure objects' volumes at vertices."""
 
 import numpy as np
 
@@ -8,15 +8,15 @@ from stereocell.kernels.triangles import Points, doubled_area
 
 
 @kernel
-def smooth_walls(
+def smooth_interfaces(
     centres: Points, first: Ints, beside: Ints, shares: Points, reach: float
 ) -> Points:
-    """Return vertices that go a share of the way to the mean of their neighbours, by turns (n, 3).
+    """Move vertices by a share of the way to the mean of their neighbours, in turns; return (n, 3).
 
-    centres        float64 (n, 3), where they start
-    first, beside  place of each vertex's first neighbour in `beside`, and one more
-    shares         float64 (turns,)
-    reach          farthest way from the start, along each axis
+    centres        float64 (n, 3), start positions
+    first, beside  index of each vertex's first neighbour in `beside`, and the total
+    shares         float64 (turns,), share of the way in each turn
+    reach          largest distance from the start, along each axis
     """
     n = len(centres)
     placed, past = centres.copy(), centres.copy()
@@ -53,7 +53,7 @@ def bound_objects(at: Points, triangles: Ints, sides: Ints, count: int) -> tuple
 
 @kernel
 def least_of_objects(triangles: Ints, sides: Ints, values: Points, most: float, n: int) -> Points:
-    """Return the least value of the objects at each vertex, float64 (n,), or `most`."""
+    """Return the least value among the objects at each vertex, at most `most`, float64 (n,)."""
     least = np.full(n, most)
     for t in range(len(triangles)):
         value = min(values[sides[t, 0]], values[sides[t, 1]])
@@ -69,11 +69,11 @@ def slope_volumes(
 ) -> tuple[tuple[Ints, Ints, Ints, Points], Points]:
     """Return how objects' volumes change as vertices move.
 
-    row  int32 (objects + 1,), an object's number among those that are asked for; else -1
+    row  int32 (objects + 1,), number of each requested object; else -1
 
-    The result is entries: of each vertex its first one, or -1 (n,); of each entry the next one of
-    the same vertex, or -1 (e,), the row (e,), and the volume's slope (e, 3). Beside them, a third
-    of the area of each vertex's triangles (n,).
+    The result is a list of entries for each vertex: `head`, the first entry of each vertex, or -1
+    (n,); `after`, the next entry of the same vertex, or -1 (e,); `of`, the row (e,); and the slope
+    of the volume (e, 3). The last result is a third of the area of each vertex's triangles (n,).
     """
     n = len(at)
     head, own = np.full(n, -1, np.int32), np.zeros(n)
@@ -86,7 +86,7 @@ def slope_volumes(
         for k in range(3):
             u, v, w = triangles[t, k], triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
             own[u] += third
-            # of the cone to the origin: what is of its other sides cancels in a closed surface
+            # Slope of the cone to the origin. The cone's other sides cancel in a closed surface.
             x = (at[v, 1] * at[w, 2] - at[v, 2] * at[w, 1]) / 6
             y = (at[v, 2] * at[w, 0] - at[v, 0] * at[w, 2]) / 6
             z = (at[v, 0] * at[w, 1] - at[v, 1] * at[w, 0]) / 6
@@ -115,14 +115,14 @@ def slope_volumes(
 def couple(
     head: Ints, after: Ints, of: Ints, slopes: Points, light: Points, count: int
 ) -> tuple[Points, Ints, Points]:
-    """Return how a pressure within one object changes another one's volume.
+    """Return how a pressure within one object changes the volumes of others.
 
     head, after, of, slopes  of `slope_volumes`
-    light                    float64 (n,), how easily a vertex moves
-    count                    of rows
+    light                    float64 (n,), how easily each vertex moves
+    count                    number of rows
 
-    The result is that of each row to itself (count,), and pairs of different ones (m, 2), with
-    what each adds (m,): a pair comes once for each of its vertices.
+    The result is the effect of each row on itself (count,), pairs of different rows (m, 2), and the
+    effect of each pair (m,). A pair is listed once for each of its vertices.
     """
     own, size = np.zeros(count), 0
     for is_filling in (False, True):
@@ -159,7 +159,7 @@ def couple(
 def press(
     head: Ints, after: Ints, of: Ints, slopes: Points, light: Points, pressure: Points
 ) -> Points:
-    """Return how far each vertex moves by a pressure within each object (n, 3)."""
+    """Return the move of each vertex under a pressure within each object (n, 3)."""
     moved = np.zeros((len(head), 3))
     for v in range(len(head)):
         e = head[v]
