@@ -1,5 +1,5 @@
 /** Carries out commands: those of the parts, the host's own, and those that move the specimen or the camera. */
-import { CANT, type Command, STAYS } from "../state/commands";
+import { type Command, UNAVAILABLE, UNCHANGED_VIEW } from "../state/commands";
 import type { CommandTable, PartHost } from "./part";
 import type { Parts } from "./parts";
 import type { Taps } from "./taps";
@@ -31,10 +31,10 @@ export class Commands {
     if (parts.run(command, isOnPage)) return true;
     if (ENDS_A_LOOK.has(command)) host.undo.noteLook();
     if (!this.carryOut(command)) {
-      host.announce(CANT);
+      host.announce(UNAVAILABLE);
       return false;
     }
-    const stays = STAYS[command];
+    const stays = UNCHANGED_VIEW[command];
     const isSame = host.state === state && before !== null && viewpoint.isAt(before);
     if (isSame && stays !== undefined) host.announce(stays);
     host.display.redraw();

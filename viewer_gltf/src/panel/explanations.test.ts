@@ -4,7 +4,7 @@ import { sampleManifest } from "../../test/support/fixture/manifest";
 import { KEYS } from "../../test/support/panel/all_keys";
 import { layOut } from "../../test/support/panel/whole_panel";
 import { PRESET_TITLES } from "../bundle/generated/preset_titles";
-import { STAYS } from "../state/commands";
+import { UNCHANGED_VIEW } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
 import { allParameters } from "../state/parameters/table";
@@ -82,7 +82,7 @@ describe("the words of the panel", () => {
       name,
       ...keys.map(({ label }) => label),
     ]);
-    const others = [...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
+    const others = [...Object.values(CHOICES), REFUSED, UNCHANGED_VIEW].flatMap((table) =>
       Object.values(table),
     );
     const found = [...ofControls, ...ofKeys, ...others].filter((text) => PRIVATE.test(text));

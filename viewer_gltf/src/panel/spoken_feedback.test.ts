@@ -21,7 +21,7 @@ describe("announcements of the light", () => {
     const { isOn, color, place, numbers } = LAMP[0];
     expect(after(setTo(isOn, false))).toBe("Lamp 1: off");
     expect(after(setTo(isOn, true))).toBe("Lamp 1: on");
-    expect(after(setTo(color, [1, 0.5, 0]))).toBe("Lamp 1: another colour");
+    expect(after(setTo(color, [1, 0.5, 0]))).toBe("Lamp 1: new colour");
     expect(after(setTo(place[0], 1.25))).toBe("Lamp 1, left to right: 1.25");
     expect(after(setTo(numbers[3], 2))).toBe("Lamp 1, strength: 2 x");
   });
@@ -56,12 +56,12 @@ describe("announcements of the light", () => {
     expect(names.size).toBe(LIGHT_NUMBERS.length);
   });
 
-  it("report the room, scatterings and post-processing", () => {
+  it("report the environment, scattering and image adjustments", () => {
     const set = (id: string, value: string | boolean) => after({ type: "set", id, value });
-    expect(set("trace-room", "sky")).toBe("Room: sky");
-    expect(set("trace/multiple", false)).toBe("Scattered once");
-    expect(set("trace/multiple", true)).toBe("Scattered many times");
-    expect(set("trace/post", false)).toBe("Before");
+    expect(set("trace-room", "sky")).toBe("Environment: sky");
+    expect(set("trace/multiple", false)).toBe("Multiple scattering: off");
+    expect(set("trace/multiple", true)).toBe("Multiple scattering: on");
+    expect(set("trace/post", false)).toBe("Image adjustments: off");
     expect(set("trace-tone-map", "none")).toBe("Tone map: none");
   });
 

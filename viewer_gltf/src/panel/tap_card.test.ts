@@ -69,7 +69,7 @@ describe("the card of a tapped place", () => {
   it("undoes the last change, and says why it can't", () => {
     const undo = (text: string | null) =>
       tapCardOf(start, { tile, channel: null }, text).controls.find(({ id }) => id === "tap-undo");
-    expect(undo("only tile")?.label).toBe("Undo: only tile");
+    expect(undo("isolated tile")?.label).toBe("Undo: isolated tile");
     expect(undo(null)?.refusal).toMatch(/^[A-Z].*\.$/);
   });
 });

@@ -1,6 +1,6 @@
-/** The state after an action. Pure. */
+/** Returns the state after an action. Pure. */
 import type { Action } from "./actions";
-import { withOwn } from "./history";
+import { withoutUserChanges } from "./history";
 import { MAX_VIEWS } from "./kept_views";
 import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withObjects } from "./objects";
@@ -29,24 +29,27 @@ function withMendable(state: ViewerState, text: string, isMendable: boolean): Vi
   return { ...state, mendable: isMendable ? [...others, text] : others };
 }
 
-/** Show a channel; if there is no room, the one that has been shown longest leaves: see announce_change.ts. */
+/**
+ * Shows a channel. If there are too many, the channel that has been shown longest is hidden (see
+ * announce_change.ts).
+ */
 function withShown(state: ViewerState, id: string): ViewerState {
   const channel = state.channels.find((c) => c.id === id);
   if (channel === undefined || channel.shown) return state;
   const turn = Math.max(0, ...state.channels.map((c) => c.turn + 1));
   const shown = state.channels.filter((c) => c.shown).sort((a, b) => a.turn - b.turn);
   const next = withChannel(state, id, (c) => ({ ...c, shown: true, turn }));
-  const [leaves] = shown;
+  const [oldest] = shown;
   if (shown.length < MAX_CHANNELS) return next;
-  return withChannel(next, leaves.id, (c) => ({ ...c, shown: false }));
+  return withChannel(next, oldest.id, (c) => ({ ...c, shown: false }));
 }
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
 
-/** Least width of a window, 0..1: a narrower one would be one step of the 8 bits. */
+/** Smallest width of a window, 0..1. A narrower window would cover a single step of 8 bits. */
 const NARROWEST_WINDOW = 1 / 128;
 
-/** The next state. Returns the same object if the action changes nothing. */
+/** Returns the next state: the same object if the action changes nothing. */
 export function reduce(state: ViewerState, action: Action): ViewerState {
   switch (action.type) {
     case "set": {
@@ -86,7 +89,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "select":
       return withTile(state, "selected", action.tile);
     case "isolate":
-      // the isolated tile is the selected one: `back` leads from one to the other
+      // the isolated tile is also the selected one, so that `back` leads from one to the other
       return withTile(
         action.tile === null ? state : withTile(state, "selected", action.tile),
         "isolated",
@@ -109,7 +112,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "keep-views":
       return { ...state, keptViews: action.views.slice(-MAX_VIEWS) };
     case "restore":
-      return withOwn(action.state, state);
+      return withoutUserChanges(action.state, state);
     case "notify":
       return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
     case "dismiss": {
@@ -133,7 +136,7 @@ function withTile(
   return { ...state, [key]: tile };
 }
 
-/** The notice that a change has brought, also if it was there before; null: none. */
+/** Returns the notice that a change has added, even if it existed before; null: none. */
 export function newNotice(before: ViewerState, after: ViewerState): string | null {
   const isNew = after.notices !== before.notices && after.notices.length >= before.notices.length;
   return (isNew && after.notices.at(-1)) || null;

@@ -226,7 +226,9 @@ describeInChromium("the panel", () => {
     }
     await alone(other.id);
     expect((await state()).isolated).toBe(other.id);
-    expect(await said()).toBe(`Only ${tileName(other.id, [])}: the cut leaves nothing of it.`);
+    expect(await said()).toBe(
+      `Only ${tileName(other.id, [])} is shown, and the cut removes all of it.`,
+    );
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -292,7 +294,9 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
     const { isolated } = await state();
     const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(`Only ${tileName(isolated ?? "", [])}: the cut leaves nothing of it.`);
+    expect(told.at(-1)).toBe(
+      `Only ${tileName(isolated ?? "", [])} is shown, and the cut removes all of it.`,
+    );
     expect((await state()).notices).toEqual([]);
   });
 
@@ -321,7 +325,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     expect(shown.map(({ id }) => id)).toEqual(["Balls", "Block", "marker_0", "marker_42"]);
     expect(await focused()).toBe("marker_42/shown");
     expect(await page().locator("[data-said]").textContent()).toBe(
-      "4 channels show at once: F body left for Marker 42.",
+      "Only 4 channels can be shown: F body was hidden to show Marker 42.",
     );
     expect((await state()).notices).toEqual([]); // it is no fault, and goes by itself
     await expect.poll(() => page().locator("[data-said]").textContent()).toBe("");

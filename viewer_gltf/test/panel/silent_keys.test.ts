@@ -1,6 +1,6 @@
 /** Every key in headless Chromium, in several states: something is seen to change, or is said. */
 import { expect, it } from "vitest";
-import { STAYS } from "../../src/state/commands";
+import { UNCHANGED_VIEW } from "../../src/state/commands";
 import { REFUSED } from "../../src/state/refusals";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -88,8 +88,8 @@ describeInChromium("every key", () => {
     expect(await said()).toBe(REFUSED.measured);
     await page.keyboard.press("z");
     await page.keyboard.press("z");
-    expect(await said()).toBe(STAYS.front);
+    expect(await said()).toBe(UNCHANGED_VIEW.front);
     for (let i = 0; i < 30; i++) await page.keyboard.press("+");
-    expect(await said()).toBe(STAYS["zoom-in"]);
+    expect(await said()).toBe(UNCHANGED_VIEW["zoom-in"]);
   });
 });
