@@ -182,6 +182,6 @@ export const capture: PartDefinition = {
   keys: SAVE_KEYS,
   commands: SAVE_COMMANDS,
   settings: CAPTURE_SETTINGS,
-  waysOn: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
+  remedies: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
   create: (host) => new CapturePart(host),
 };

@@ -7,8 +7,8 @@ import {
   changePanel,
   type HistogramEditor,
   type PanelView,
+  type Request,
   START_VIEW,
-  type Wish,
 } from "../panel/controls";
 import { isRefusal } from "../panel/key";
 import { spokenFeedback } from "../panel/spoken_feedback";
@@ -35,10 +35,10 @@ class Controller {
     }
   }
 
-  grant(wish: Wish | null): void {
-    if (wish === null || typeof wish === "string") throw new Error(`${wish}`);
-    if ("panel" in wish) this.view = changePanel(this.view, wish);
-    else this.state = reduce(this.state, wish);
+  grant(request: Request | null): void {
+    if (request === null || typeof request === "string") throw new Error(`${request}`);
+    if ("panel" in request) this.view = changePanel(this.view, request);
+    else this.state = reduce(this.state, request);
   }
 
   get channel(): ChannelState {
@@ -79,8 +79,8 @@ class Controller {
 
   press(name: string): void {
     const { state, view } = this;
-    const wish = KEYS.wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
-    this.grant(wish === null || isRefusal(wish) ? null : wish);
+    const request = KEYS.requestOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
+    this.grant(request === null || isRefusal(request) ? null : request);
   }
 }
 
@@ -194,11 +194,11 @@ describe("its block on the panel in the room", () => {
     const [region] = block.regions;
     expect(region.isSlide).toBe(true);
     const pressed = region.press?.(0.6, 0.35); // the upper right corner
-    expect(pressed).toMatchObject({ panel: "shape", grasp: { index: 0, part: "top-right" } });
-    controller.grant(pressed as Wish);
+    expect(pressed).toMatchObject({ panel: "shape", grab: { index: 0, part: "top-right" } });
+    controller.grant(pressed as Request);
     const [{ regions }] = blocksOf(controller.editor, 760);
-    const wish = regions[0].to(0.9, 0.1);
-    controller.grant(wish as Wish);
+    const request = regions[0].to(0.9, 0.1);
+    controller.grant(request as Request);
     expect(controller.shapes[0].values[1]).toBeCloseTo(0.9, 2);
     expect(controller.shapes[0].gradients[1]).toBeCloseTo(0.9, 2);
     expect(block.height).toBeLessThan(600); // fits a page way on

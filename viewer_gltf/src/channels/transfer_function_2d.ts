@@ -3,7 +3,13 @@
 import { MAX_SHAPES, type Shape, type Shapes } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
 import type { Control, Histogram, PanelView } from "../panel/controls";
-import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../panel/edit_shapes";
+import {
+  draggedTo,
+  editedShapes,
+  grabAt,
+  selectedShapeIndex,
+  withNewShape,
+} from "../panel/edit_shapes";
 import { PALETTES } from "../panel/palettes";
 import type { Action } from "../state/actions";
 import { REFUSED } from "../state/refusals";
@@ -55,7 +61,7 @@ export function transferFunction2dItems(
   };
   if (!isOpen) return [toggle];
   const shapes = editedShapes(channel);
-  const selected = meantShape(view.shape, shapes);
+  const selected = selectedShapeIndex(view.shape, shapes);
   const refusal = refusalOf(channel);
   const full = shapes.length >= MAX_SHAPES ? `There are ${MAX_SHAPES} shapes: no more.` : "";
   const count = shapes.length;
@@ -86,12 +92,12 @@ export function transferFunction2dItems(
       color: channel.color,
       texts: [valueText(window[0]), valueText(window[1]), steepest],
       press: (at, reach) => {
-        const grasp = graspAt(shapes, at, reach, selected);
-        const index = grasp?.index ?? selected;
-        return { panel: "shape", shape: index === null ? null : { index, count }, grasp };
+        const grab = grabAt(shapes, at, reach, selected);
+        const index = grab?.index ?? selected;
+        return { panel: "shape", shape: index === null ? null : { index, count }, grab };
       },
       drag: (at) => {
-        const dragged = view.grasp === null ? null : draggedTo(shapes, view.grasp, at);
+        const dragged = view.grab === null ? null : draggedTo(shapes, view.grab, at);
         return dragged === null ? null : set(dragged);
       },
     },

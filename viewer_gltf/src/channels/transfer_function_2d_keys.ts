@@ -1,8 +1,13 @@
 /** The keys of the shapes of a two-dimensional transfer function. Pure. */
 import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
-import type { PanelView, Refusal, Wish } from "../panel/controls";
-import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../panel/edit_shapes";
+import type { PanelView, Refusal, Request } from "../panel/controls";
+import {
+  editedShapes,
+  SHAPE_NUMBERS,
+  selectedShapeIndex,
+  withNewShape,
+} from "../panel/edit_shapes";
 import { type Key, key, neighbour, no, ofChannel, withChannel } from "../panel/key";
 import { nextColour } from "../panel/palettes";
 import { REFUSED } from "../state/refusals";
@@ -16,7 +21,7 @@ const SHAPE_STEP = 5 / 255;
 const NO_SHAPE = no(REFUSED.shape);
 
 function addShapeOf(kind: Shape["kind"]) {
-  return (channel: ChannelState): Wish | Refusal => {
+  return (channel: ChannelState): Request | Refusal => {
     const reason = refusalOf(channel);
     if (reason !== "") return no(reason);
     const shapes = withNewShape(channel, kind);
@@ -37,7 +42,7 @@ function ofShape(
       const reason = refusalOf(channel);
       if (reason !== "") return no(reason);
       const shapes = editedShapes(channel);
-      const index = meantShape(context.view.shape, shapes);
+      const index = selectedShapeIndex(context.view.shape, shapes);
       if (index === null) return NO_SHAPE;
       const changed = to(shapes[index], context.view);
       return setShapes(
@@ -66,10 +71,10 @@ export const SHAPE_KEYS: readonly Key[] = [
   key("J", "Next shape: the keys below mean it", (context) =>
     withChannel(context, (channel) => {
       const shapes = editedShapes(channel);
-      const present = meantShape(context.view.shape, shapes);
+      const present = selectedShapeIndex(context.view.shape, shapes);
       if (present === null) return NO_SHAPE;
       const { length: count } = shapes;
-      return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
+      return { panel: "shape", shape: { index: (present + 1) % count, count }, grab: null };
     }),
   ),
   key(";", "Next number of the shape", ({ view }) => {

@@ -28,15 +28,15 @@ export class Faults {
     const { state, dispatch, isIncomplete } = this.options;
     const isOffline = navigator.onLine === false;
     if (isOffline && FINER.test(error.message) && !isIncomplete()) return;
-    const isMendable = isOffline || error instanceof TemporaryError;
+    const isRetryable = isOffline || error instanceof TemporaryError;
     const text = isOffline
       ? OFFLINE
       : error instanceof TemporaryError
         ? error.notice
         : error.message;
     // it would be reported again for each of a host's files
-    if (isMendable && state().mendable.includes(text)) return;
-    dispatch({ type: "notify", text, isMendable });
+    if (isRetryable && state().retryable.includes(text)) return;
+    dispatch({ type: "notify", text, isRetryable });
   }
 
   /**
@@ -48,7 +48,7 @@ export class Faults {
     const { state, dispatch, isIncomplete } = this.options;
     const text = navigator.onLine ? WAITING : OFFLINE;
     // A file that was awaited in vain keeps its notice until it arrives.
-    const passing = [WAITING, OFFLINE].filter((each) => !state().mendable.includes(each));
+    const passing = [WAITING, OFFLINE].filter((each) => !state().retryable.includes(each));
     if (files === 0) dispatch({ type: "dismiss", texts: passing });
     else if (state().notices.includes(text)) return;
     else if (navigator.onLine ? files === 1 : isIncomplete()) dispatch({ type: "notify", text });

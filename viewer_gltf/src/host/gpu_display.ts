@@ -32,7 +32,7 @@ export type DisplayOptions = Readonly<{
   state: () => ViewerState;
   dispatch: (action: Action, isStep?: boolean) => void;
   report: (error: unknown) => void;
-  stereo: Pick<StereoOptions, "layOut" | "onCommand" | "onLenses" | "onChoose">;
+  stereo: Pick<StereoOptions, "buildPanel" | "onCommand" | "onLenses" | "onChoose">;
   /** Brings the display and the parts to the state once more. */
   follow: () => void;
   /** Stereo has begun, or has ended. */

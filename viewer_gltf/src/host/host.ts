@@ -5,7 +5,7 @@ import type { ValuesHost } from "../bundle/values_host";
 import type { Ray } from "../math/vec3";
 import type { Lenses } from "../panel/controls";
 import type { KeyTable } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Reading } from "../probe/probe_reader";
 import type { Theme } from "../render/theme";
 import type { Action } from "../state/actions";
@@ -133,8 +133,8 @@ export class Host implements PartHost {
     return this.parts.keys;
   }
 
-  get waysOn(): WaysOn {
-    return this.parts.waysOn;
+  get remedies(): Remedies {
+    return this.parts.remedies;
   }
 
   get hasStandingPart(): boolean {
@@ -220,7 +220,7 @@ export class Host implements PartHost {
       report: (error) => this.report(error),
       follow: () => this.follow(),
       stereo: {
-        layOut: (view) => this.panel.layOut(view),
+        buildPanel: (view) => this.panel.buildPanel(view),
         onCommand: (command) => this.run(command, false),
         onLenses: (lenses) => this.lensesChosen.emit(lenses),
         onChoose: (ray, tile, isByGaze) => this.taps.choose(ray, tile, isByGaze),
@@ -238,7 +238,7 @@ export class Host implements PartHost {
 
   /** Asks again for all that has failed. */
   private retry(): void {
-    this.dispatch({ type: "dismiss", texts: this.state.mendable });
+    this.dispatch({ type: "dismiss", texts: this.state.retryable });
     this.parts.retryFailed();
     this.follow();
   }

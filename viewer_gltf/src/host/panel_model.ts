@@ -11,7 +11,7 @@ import {
   type PartSection,
   START_VIEW,
 } from "../panel/controls";
-import { type Facts, layOut, MORE } from "../panel/layout";
+import { buildPanel, type Facts, MORE } from "../panel/layout";
 import type { Ranges } from "../panel/window_texts";
 import { unitOf } from "../probe/measure";
 import { Signal } from "../state/signal";
@@ -115,15 +115,15 @@ export class PanelModel {
   }
 
   /** The content of the panel in the page. */
-  layOutPage(): Layout {
+  buildPagePanel(): Layout {
     this.view = keepPlaces(this.view, this.source().state);
-    return this.layOut(this.view);
+    return this.buildPanel(this.view);
   }
 
   /** The content of a panel; one in the room has its own sections open. */
-  layOut(view: PanelView): Layout {
+  buildPanel(view: PanelView): Layout {
     const source = this.source();
-    return layOut(source.state, this.factsFor(source), view, source.sections(view));
+    return buildPanel(source.state, this.factsFor(source), view, source.sections(view));
   }
 
   private factsFor(source: PanelSource): Facts {

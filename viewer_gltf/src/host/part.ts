@@ -9,7 +9,7 @@ import type { Ray, Vec3 } from "../math/vec3";
 import type { Lenses, PanelView, PartSection } from "../panel/controls";
 import type { KeyGroup } from "../panel/key";
 import type { KeyTable } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Cone, Probed } from "../probe/probe";
 import type { Reading } from "../probe/probe_reader";
 import type { FrameRenderer } from "../render/frame_renderer";
@@ -144,7 +144,7 @@ export type PartDefinition = Readonly<{
   /** The settings and actions that the part adds to the state. */
   settings?: PartSettings;
   /** Buttons that lead on from the part's refusals. */
-  waysOn?: WaysOn;
+  remedies?: Remedies;
   create: (host: PartHost) => Part;
 }>;
 
@@ -200,7 +200,7 @@ export interface PartHost {
   readonly panel: PanelModel;
   readonly undo: Undo;
   readonly keys: KeyTable;
-  readonly waysOn: WaysOn;
+  readonly remedies: Remedies;
   readonly changed: Signal<ViewerState>;
   readonly drawn: Signal<void>;
   /** Words to say on the page; the host says them in stereo. */

@@ -5,7 +5,7 @@ import type { ClipPlane } from "../math/clip";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { PanelView, PartSection } from "../panel/controls";
 import { KeyTable, OWN_KEYS } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
 import type { Form } from "./form";
@@ -22,14 +22,14 @@ export function inOrder(definitions: readonly PartDefinition[]): readonly PartDe
 
 export class Parts {
   readonly keys: KeyTable;
-  readonly waysOn: WaysOn;
+  readonly remedies: Remedies;
   private all: readonly Part[] = [];
   /** The newest state: a part may change it while the parts follow an older one. */
   private newest: ViewerState | null = null;
 
   constructor(definitions: readonly PartDefinition[]) {
     this.keys = new KeyTable([...OWN_KEYS, ...definitions.flatMap(({ keys = [] }) => keys)]);
-    this.waysOn = Object.assign({}, ...definitions.map(({ waysOn = {} }) => waysOn));
+    this.remedies = Object.assign({}, ...definitions.map(({ remedies = {} }) => remedies));
   }
 
   add(part: Part): void {

@@ -5,7 +5,7 @@
 import type { Object3D } from "three";
 import type { HandleId } from "../marks/clip_handles";
 import type { Vec3 } from "../math/vec3";
-import type { Refusal, Wish } from "../panel/controls";
+import type { Refusal, Request } from "../panel/controls";
 import type { BlendedSurface } from "../render/blend_material";
 import type { Action } from "../state/actions";
 import type { CameraView } from "../state/camera_view";
@@ -59,7 +59,7 @@ export interface MeasuredPoints {
 /** The panel in the page. */
 export interface PagePanel {
   /** Grants a request of the panel or of a card. */
-  perform(wish: Wish | Refusal): void;
+  perform(request: Request | Refusal): void;
   /** Brings the keyboard to a control, also of a panel that is hidden. Returns whether there is one. */
   focus(section: string, control: string): boolean;
   /** Shows words on the page alone. */

@@ -3,7 +3,7 @@ import type { PartHost } from "../host/part";
 import type { Offer } from "../panel/controls";
 import { type Content, emptyViewOf } from "../panel/empty_view";
 import { type Message, ViewMessage } from "../panel/html/view_message";
-import { offerFor } from "../panel/ways_on";
+import { offerFor } from "../panel/remedies";
 import type { ViewerState } from "../state/viewer_state";
 
 export class PictureMessage {
@@ -32,7 +32,7 @@ export class PictureMessage {
     const { host } = this;
     const objects = host.service("objects")?.rowsShown ?? new Map();
     const now = { state: host.state, shown: host.panel.shown, objects };
-    const offer = offerFor(refusal, now, host.waysOn);
+    const offer = offerFor(refusal, now, host.remedies);
     return offer && this.buttonOf(offer);
   }
 

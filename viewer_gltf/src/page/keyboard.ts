@@ -4,7 +4,7 @@ import type { PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
 import type { Mark } from "../host/undo";
 import { handleOf } from "../panel/clip_by_key";
-import type { PanelView, Wish } from "../panel/controls";
+import type { PanelView, Request } from "../panel/controls";
 import type { Help } from "../panel/html/key_list";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
@@ -63,16 +63,16 @@ export class Keyboard {
       return true;
     }
     const name = host.keys.standsFor(pressed, view.keyChanges);
-    const wish = name === null ? null : host.keys.wishOf(name, this.context);
-    if (name === null || wish === null) {
+    const request = name === null ? null : host.keys.requestOf(name, this.context);
+    if (name === null || request === null) {
       if (isWritten(pressed)) host.announce(`No key ${pressed}: ? lists the keys.`);
       return false;
     }
-    if (isRefusal(wish)) {
-      this.page.perform(wish);
+    if (isRefusal(request)) {
+      this.page.perform(request);
       return false;
     }
-    this.grant(wish, name, isWritten(pressed));
+    this.grant(request, name, isWritten(pressed));
     return true;
   }
 
@@ -82,28 +82,29 @@ export class Keyboard {
     return { state, view, shown, focusTile: display.snapshot().gazed };
   }
 
-  private grant(wish: Wish, name: string, canBeAccident: boolean): void {
+  private grant(request: Request, name: string, canBeAccident: boolean): void {
     const { host } = this;
     const before = host.state;
     const { mark } = host.undo;
     const { view, ranges } = host.panel;
-    this.page.perform(wish);
-    if (typeof wish !== "string" && "panel" in wish && wish.panel === "clip-part") {
-      host.service("handles")?.highlight(handleOf(wish.clipPart));
+    this.page.perform(request);
+    if (typeof request !== "string" && "panel" in request && request.panel === "clip-part") {
+      host.service("handles")?.highlight(handleOf(request.clipPart));
     }
     const { tiles } = host.bundle.manifest;
     const text =
-      announcementOf(before, host.state, tiles) ?? spokenFeedback(wish, before, host.state, ranges);
+      announcementOf(before, host.state, tiles) ??
+      spokenFeedback(request, before, host.state, ranges);
     const words = text || host.keys.labelOf(name);
-    if (canBeAccident && this.offerBack(wish, words, { mark, view })) return;
+    if (canBeAccident && this.offerBack(request, words, { mark, view })) return;
     if (text !== "") host.announce(text);
   }
 
   /** Announces the change by a key, and offers to take it back: the key may have been hit by accident. */
-  private offerBack(wish: Wish, text: string, { mark, view }: Before): boolean {
+  private offerBack(request: Request, text: string, { mark, view }: Before): boolean {
     const { host } = this;
     const now = host.panel.view;
-    const isOwnAnswer = wish === "share" || now.isHelpOpen || host.isInRoom;
+    const isOwnAnswer = request === "share" || now.isHelpOpen || host.isInRoom;
     if (isOwnAnswer || !(host.undo.hasChangedSince(mark) || view !== now)) return false;
     const words = view.isHidden === now.isHidden ? text : HIDDEN[String(now.isHidden)];
     const accident = { mark, view, after: host.undo.newest };

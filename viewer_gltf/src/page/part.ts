@@ -2,7 +2,7 @@
 import { toggleFullScreen } from "../dom/full_screen";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
-import type { Refusal, Wish } from "../panel/controls";
+import type { Refusal, Request } from "../panel/controls";
 import { Panel } from "../panel/html/panel";
 import { withKeys } from "../panel/keys";
 import { pixelShare } from "../render/pixel_share";
@@ -33,7 +33,7 @@ class PagePart implements Part, PagePanel {
     const { signal } = this.disposed;
     const parent = host.view.parentElement ?? host.view;
     this.overlays = new Overlays(host, this, signal);
-    this.html = new Panel((wish) => this.perform(wish));
+    this.html = new Panel((request) => this.perform(request));
     parent.append(this.html.root);
     this.keyboard = new Keyboard(host, this, parent, signal);
     host.announced.subscribe((text) => this.say(text));
@@ -67,7 +67,7 @@ class PagePart implements Part, PagePanel {
     clearTimeout(this.timer);
     this.timer = 0;
     const { panel } = this.host;
-    this.html.update(panel.layOutPage());
+    this.html.update(panel.buildPagePanel());
     if (this.keyboard.update()) this.overlays.said.withdraw();
     panel.noteShown();
   }
@@ -77,16 +77,16 @@ class PagePart implements Part, PagePanel {
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish | Refusal): void {
+  perform(request: Request | Refusal): void {
     const { host } = this;
-    if (typeof wish === "string") host.run(wish);
-    else if ("refusal" in wish) void this.explain(wish);
-    else if ("panel" in wish) {
-      if (wish.panel === "hide" && host.stereo.togglePanel()) return;
-      host.panel.change(wish);
-      rememberChange(wish, host.panel.view);
-      if (wish.panel === "reveal") this.html.reveal(wish.control);
-    } else host.dispatch(wish);
+    if (typeof request === "string") host.run(request);
+    else if ("refusal" in request) void this.explain(request);
+    else if ("panel" in request) {
+      if (request.panel === "hide" && host.stereo.togglePanel()) return;
+      host.panel.change(request);
+      rememberChange(request, host.panel.view);
+      if (request.panel === "reveal") this.html.reveal(request.control);
+    } else host.dispatch(request);
   }
 
   focus(section: string, control: string): boolean {

@@ -50,5 +50,5 @@ export type Action =
   | Readonly<{ type: "restore"; state: ViewerState }>
   /** Replaces the views that a video goes through. */
   | Readonly<{ type: "keep-views"; views: readonly KeptView[] }>
-  | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
+  | Readonly<{ type: "notify"; text: string; isRetryable?: boolean }>
   | Readonly<{ type: "dismiss"; texts: readonly string[] }>;

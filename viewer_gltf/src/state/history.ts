@@ -105,12 +105,12 @@ export function isSameView(a: ViewerState, b: ViewerState): boolean {
  * Returns an earlier state with the notices, loaded data and device abilities of the present one.
  */
 export function withoutUserChanges(then: ViewerState, now: ViewerState): ViewerState {
-  const { notices, mendable, canTrace, tiles, middle } = now;
+  const { notices, retryable, canTrace, tiles, middle } = now;
   const channels = then.channels.map((channel): ChannelState => {
     const transfer2d = now.channels.find(({ id }) => id === channel.id)?.transfer2d ?? null;
     return channel.transfer2d === transfer2d ? channel : { ...channel, transfer2d };
   });
-  return { ...then, channels, notices, mendable, canTrace, tiles, middle };
+  return { ...then, channels, notices, retryable, canTrace, tiles, middle };
 }
 
 function isShallowEqual(a: object, b: object): boolean {

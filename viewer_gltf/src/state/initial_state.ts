@@ -89,7 +89,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
               'nearest the centre open as volumes. Choose "Volumes everywhere" to draw the rest.',
           ]
         : [],
-    mendable: [],
+    retryable: [],
   };
 }
 

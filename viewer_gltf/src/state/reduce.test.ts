@@ -253,13 +253,13 @@ describe("the viewer's state", () => {
     const faulty = after(
       opened,
       { type: "notify", text: "a file is damaged" },
-      { type: "notify", text: "no network", isMendable: true },
+      { type: "notify", text: "no network", isRetryable: true },
     );
-    expect(faulty.mendable).toEqual(["no network"]);
-    expect(reduce(faulty, { type: "dismiss", texts: ["a file is damaged"] }).mendable).toEqual([
+    expect(faulty.retryable).toEqual(["no network"]);
+    expect(reduce(faulty, { type: "dismiss", texts: ["a file is damaged"] }).retryable).toEqual([
       "no network",
     ]);
-    expect(reduce(faulty, { type: "dismiss", texts: ["no network"] }).mendable).toEqual([]);
+    expect(reduce(faulty, { type: "dismiss", texts: ["no network"] }).retryable).toEqual([]);
   });
 
   it("returns the notice that a change has added, also a second time", () => {

@@ -24,9 +24,9 @@ function withNotice(state: ViewerState, text: string): ViewerState {
   return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
 }
 
-function withMendable(state: ViewerState, text: string, isMendable: boolean): ViewerState {
-  const others = state.mendable.filter((n) => n !== text);
-  return { ...state, mendable: isMendable ? [...others, text] : others };
+function withRetryable(state: ViewerState, text: string, isRetryable: boolean): ViewerState {
+  const others = state.retryable.filter((n) => n !== text);
+  return { ...state, retryable: isRetryable ? [...others, text] : others };
 }
 
 /**
@@ -114,12 +114,16 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "restore":
       return withoutUserChanges(action.state, state);
     case "notify":
-      return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
+      return withRetryable(
+        withNotice(state, action.text),
+        action.text,
+        action.isRetryable === true,
+      );
     case "dismiss": {
       const isLeft = (notice: string) => !action.texts.includes(notice);
       const notices = state.notices.filter(isLeft);
       if (notices.length === state.notices.length) return state;
-      return { ...state, notices, mendable: state.mendable.filter(isLeft) };
+      return { ...state, notices, retryable: state.retryable.filter(isLeft) };
     }
     default:
       return withPartAction(state, action);

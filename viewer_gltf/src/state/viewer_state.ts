@@ -75,7 +75,7 @@ export type ViewerState = Settings &
     /** Faults that leave the rest usable, newest last. */
     notices: readonly string[];
     /** Notices of faults that another attempt may solve. */
-    mendable: readonly string[];
+    retryable: readonly string[];
   }>;
 
 /** Returns the channels that may be drawn as volumes, in the order of the bundle. */

@@ -32,7 +32,7 @@ class TapCardPart implements Part {
       host.announce(NOT_LOADED);
       return;
     }
-    this.card ??= new part.PlacedCard(host, (wish) => host.service("page")?.perform(wish));
+    this.card ??= new part.PlacedCard(host, (request) => host.service("page")?.perform(request));
     await this.card.open(tap);
   }
 

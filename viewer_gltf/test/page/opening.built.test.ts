@@ -58,7 +58,7 @@ describeInChromium("the opening", () => {
       .poll(async () => (await stand.viewer.snapshot()).discRadius_deg)
       .toBeGreaterThan(1);
     const hint = page().locator('[data-overlay="hint"]');
-    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom, go near for volumes");
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom, move closer for volumes");
     const frames = () => page().evaluate(() => window.stereocell?.frames ?? 0);
     const before = await frames();
     await expect.poll(frames).toBeGreaterThan(before + 3);

@@ -42,7 +42,7 @@ describeInChromium("the picture", () => {
   it("says that the cut leaves nothing, and removes it", async () => {
     await press("t", "i", "b", "t"); // the next tile alone, beyond the cut
     await message().waitFor({ state: "visible" });
-    expect(await message().textContent()).toContain("The cut leaves nothing of row 1, column 2.");
+    expect(await message().textContent()).toContain("The cut removes all of row 1, column 2.");
     await wayBack().click();
     expect((await state()).clip).toEqual({ box: null, plane: null });
     await message().waitFor({ state: "hidden" });

@@ -256,7 +256,7 @@ describeInChromium("the panel", () => {
     expect(await labels()).toEqual(["Cut by a box: on or off"]);
     await find.fill("no such key");
     expect(await labels()).toEqual([]);
-    expect(await dialog.textContent()).toContain("No key fits these words.");
+    expect(await dialog.textContent()).toContain("No key matches this text.");
     await page().keyboard.press("Escape");
     expect(await dialog.isVisible()).toBe(false);
     for (const isOpen of [true, false]) {

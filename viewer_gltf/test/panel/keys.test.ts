@@ -125,10 +125,10 @@ describeInChromium("a key that a reader changes", () => {
     const press = (key: string) => page().keyboard.press(key);
     await press("?");
     await cap("o").click();
-    expect(await line()).toMatch(/^Press the new key for “.+”; Esc leaves it\.$/);
+    expect(await line()).toMatch(/^Press the new key for “.+”, or Esc to cancel\.$/);
     await press("x");
     expect(await line()).toBe(
-      "That key does “Hide the channel”: press another one, or change that one first.",
+      "That key is used for “Hide the channel”: press another key, or change that one first.",
     );
     await press("F5");
     expect(await line()).toMatch(/^That key belongs to the browser/);

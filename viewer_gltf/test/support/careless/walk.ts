@@ -28,7 +28,7 @@ export type Act = Readonly<{
 /** Largest change of a length that is none, m: what is left of a glide. */
 const SAME_M = 1e-3;
 /** Changes by themselves: what has come, and what could not come. */
-const NOBODYS: ReadonlySet<string> = new Set(["notices", "mendable"]);
+const NOBODYS: ReadonlySet<string> = new Set(["notices", "retryable"]);
 
 type View = Readonly<{ state: Snapshot["state"]; look: Snapshot["look"] }>;
 

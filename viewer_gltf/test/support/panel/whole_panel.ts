@@ -12,7 +12,7 @@ import {
 } from "../../../src/channels/section";
 import { labelMapSections } from "../../../src/objects/label_maps";
 import type { Layout, PanelView, Section } from "../../../src/panel/controls";
-import { layOut as layOutOwn, type Facts as OwnFacts } from "../../../src/panel/layout";
+import { buildPanel as buildOwnPanel, type Facts as OwnFacts } from "../../../src/panel/layout";
 import { lightSections } from "../../../src/pathtrace/section";
 import { sliceSections } from "../../../src/slices/section";
 import { SLICE_SETTINGS } from "../../../src/slices/settings";
@@ -46,10 +46,10 @@ export type Facts = OwnFacts &
     objects?: readonly Readonly<{ id: string; items: Section["items"] }>[];
   }>;
 
-export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
+export function buildPanel(state: ViewerState, facts: Facts, view: PanelView): Layout {
   const { values = [], sliceValues = [], isPatient = false, isFilming = false } = facts;
   const made = new Map((facts.objects ?? []).map(({ id, items }) => [id, items]));
-  return layOutOwn(state, facts, view, [
+  return buildOwnPanel(state, facts, view, [
     ...measureSections(state, values),
     ...saveSections(state, isFilming, 0),
     ...labelMapSections(state, made, facts.isStereo),

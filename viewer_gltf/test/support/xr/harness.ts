@@ -32,7 +32,7 @@ import { Hands } from "../../../src/xr/interaction";
 import { XrSession } from "../../../src/xr/session";
 import { STEREO_FACTS } from "../fixture/facts";
 import { sampleManifest } from "../fixture/manifest";
-import { type Facts, layOut } from "../panel/whole_panel";
+import { buildPanel, type Facts } from "../panel/whole_panel";
 
 type At = readonly [number, number, number];
 type Side = "left" | "right";
@@ -107,7 +107,7 @@ class Stand {
       specimen: this.specimen,
       tiles: sampleManifest(6).tiles,
       handles: () => [this.handle],
-      layOut: (view) => layOut(this.state, FACTS, view),
+      buildPanel: (view) => buildPanel(this.state, FACTS, view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => {
         this.commands.push(command);

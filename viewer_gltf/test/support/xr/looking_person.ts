@@ -21,7 +21,7 @@ import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
 import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
-import { type Facts, layOut } from "../panel/whole_panel";
+import { buildPanel, type Facts } from "../panel/whole_panel";
 import { tremble } from "./tremble";
 
 /** Longest time that a frame counts, s. */
@@ -97,7 +97,7 @@ export class LookingPerson {
       objectAlong: () => this.objectAlong(),
       isPainted: false,
       now_ms: () => this.now_ms,
-      layOut: (view) => layOut(this.state, FACTS, view),
+      buildPanel: (view) => buildPanel(this.state, FACTS, view),
       onAction: (action) => {
         this.wishes.push(action);
         this.state = reduce(this.state, action);
@@ -127,7 +127,7 @@ export class LookingPerson {
 
   /** The names of all controls of the panel that are on or off. */
   get switches(): readonly string[] {
-    return layOut(this.state, FACTS, { ...START_VIEW, ...this.view })
+    return buildPanel(this.state, FACTS, { ...START_VIEW, ...this.view })
       .sections.flatMap(({ items }) => items)
       .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item]))
       .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));
