@@ -162,7 +162,7 @@ class CapturePart implements Part, PosterMaker {
     const { state, isInRoom, undo, viewpoint } = this.host;
     const { keptViews } = state;
     if (isInRoom || keptViews.length === 0) return false;
-    undo.noteLook();
+    undo.noteCameraMove();
     const before = viewpoint.lookNow;
     const { name, ...look } = keptViews[this.nextView++ % keptViews.length];
     viewpoint.lookFlatFrom(look);

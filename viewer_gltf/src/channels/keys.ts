@@ -1,4 +1,4 @@
-/** The keys of the channels: which one is meant, and how it looks. Pure. */
+/** The keys of the channels: which channel they change, and its appearance. Pure. */
 import { fromHex, toHex } from "../math/color";
 import type { Request } from "../panel/controls";
 import {

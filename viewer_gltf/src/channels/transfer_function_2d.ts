@@ -17,31 +17,31 @@ import { editedName } from "../state/transfer_functions_2d";
 import { removeShape, replaceShape, resize } from "../state/transfer_shapes";
 import type { ChannelState } from "../state/viewer_state";
 
-/** White leaves the channel's own. */
+/** Colours of shapes, which multiply the channel's colour. White leaves it unchanged. */
 const SHAPE_COLORS = PALETTES.slice(1).map(({ colors }) => ({
-  name: "Colour, times the channel's",
+  name: "Colour, multiplied by the channel's",
   colors,
 }));
 const PERCENT_STEPS = 100;
 const VALUE_STEPS = 255;
 const GRADIENT_STEPS = 63;
 
-/** New shapes for the edited function of a channel. */
+/** Returns the action that gives the edited function of a channel new shapes. */
 export function setShapes(channel: ChannelState, shapes: Shapes): Action {
   return { type: "set-shapes", channel: channel.id, name: editedName(channel), shapes };
 }
 
-/** Why no shapes can be edited now; "": they can. */
+/** Returns why the shapes cannot be edited now; "": they can. */
 export function refusalOf(channel: ChannelState): string {
   if (!channel.volume) return REFUSED.transfer;
   const name = editedName(channel);
   const isOfBundle =
     channel.transferFunctions2d.includes(name) && !Object.hasOwn(channel.shapes, name);
-  return channel.transfer2d === null && isOfBundle ? "Its shapes have not come." : "";
+  return channel.transfer2d === null && isOfBundle ? "The shapes are not loaded yet." : "";
 }
 
 /**
- * @param valueText of 0 and 1 of the window, as the source counts intensities
+ * @param valueText returns a share of the intensities as a value of the source
  */
 export function transferFunction2dItems(
   channel: ChannelState,
@@ -63,7 +63,8 @@ export function transferFunction2dItems(
   const shapes = editedShapes(channel);
   const selected = selectedShapeIndex(view.shape, shapes);
   const refusal = refusalOf(channel);
-  const full = shapes.length >= MAX_SHAPES ? `There are ${MAX_SHAPES} shapes: no more.` : "";
+  const full =
+    shapes.length >= MAX_SHAPES ? `A transfer function has at most ${MAX_SHAPES} shapes.` : "";
   const count = shapes.length;
   const set = (changed: Shapes) => setShapes(channel, changed);
   const most =
@@ -189,7 +190,7 @@ function shapeItems(
       kind: "colour",
       id: `${id}/shape-color`,
       label: "Colour of the shape",
-      name: `Colour ${which}, times the channel's`,
+      name: `Colour ${which}, multiplied by the channel's`,
       value: toHex(shape.color),
       palettes: SHAPE_COLORS,
       refusal,

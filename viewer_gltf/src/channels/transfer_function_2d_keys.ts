@@ -15,7 +15,7 @@ import { removeShape, replaceShape } from "../state/transfer_shapes";
 import type { ChannelState } from "../state/viewer_state";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
-/** One step of a shape's number, 0..1: five cells of its table. */
+/** Step of a shape's number, 0..1: five columns of the table. */
 const SHAPE_STEP = 5 / 255;
 
 const NO_SHAPE = no(REFUSED.shape);
@@ -31,7 +31,7 @@ function addShapeOf(kind: Shape["kind"]) {
   };
 }
 
-/** A key of the meant shape of the meant channel; `shape` null: without it. */
+/** Returns a key that changes the selected shape of the chosen channel; `to` returns null to remove it. */
 function ofShape(
   name: string,
   label: string,
@@ -62,13 +62,13 @@ function changeNumber(steps: number) {
 }
 
 export const SHAPE_KEYS: readonly Key[] = [
-  ofChannel("H", "Plane of value and gradient: open or close", ({ id }) => ({
+  ofChannel("H", "Joint histogram of value and gradient: open or close", ({ id }) => ({
     panel: "histogram",
     channel: id,
   })),
   ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),
   ofChannel("Y", "Add a triangle", addShapeOf("triangle")),
-  key("J", "Next shape: the keys below mean it", (context) =>
+  key("J", "Next shape, which the keys below change", (context) =>
     withChannel(context, (channel) => {
       const shapes = editedShapes(channel);
       const present = selectedShapeIndex(context.view.shape, shapes);
@@ -82,8 +82,8 @@ export const SHAPE_KEYS: readonly Key[] = [
     const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
     return id === null ? NO_SHAPE : { panel: "shape-number", id };
   }),
-  ofShape("<", "Less of it", changeNumber(-1)),
-  ofShape(">", "More of it", changeNumber(1)),
+  ofShape("<", "Decrease that number", changeNumber(-1)),
+  ofShape(">", "Increase that number", changeNumber(1)),
   ofShape("*", "Next colour of the shape", (shape) => ({
     ...shape,
     color: fromHex(nextColour(toHex(shape.color))),

@@ -1,4 +1,7 @@
-/** What lies over the picture in the page: progress, notices, the first hint, and the ways into stereo and back. */
+/**
+ * Elements over the view in the page: progress, notices, the first hint, and the buttons for stereo
+ * and back.
+ */
 import { hasFullScreen } from "../dom/full_screen";
 import { isTouch } from "../dom/is_touch";
 import type { PartHost } from "../host/part";
@@ -7,7 +10,7 @@ import { arAddress, EntryButtons } from "../panel/html/entry_buttons";
 import { Announcement, BackButton, FirstHint, Notices, ProgressBar } from "../panel/html/overlays";
 import { wayToStereo } from "../xr/support";
 
-/** Whether someone has taken the page in hand, which another view of the specimen may have taken over since. */
+/** Whether the user has touched the page. It stays true if a newer view replaces this one. */
 let wasTouched = false;
 
 export class Overlays {
@@ -39,7 +42,7 @@ export class Overlays {
     notices.update(host.state);
   }
 
-  /** The view of the address is open: the hint stays until someone takes the page in hand. */
+  /** Shows the hint until the user touches the page; called when the view of the address is open. */
   begin(): void {
     this.hint.update(this.host.state);
     const touched = new AbortController();
@@ -55,7 +58,7 @@ export class Overlays {
     for (const kind of ["pointerdown", "wheel", "keydown"]) addEventListener(kind, touch, options);
   }
 
-  /** Offers the ways into stereo, the user's room and the full screen that this device has. */
+  /** Offers the kinds of stereo, augmented reality and the full screen that this device has. */
   async offerWaysIn(): Promise<void> {
     const { host, page, entryButtons } = this;
     const support = await host.service("stereoSupport")?.found;

@@ -1,4 +1,7 @@
-/** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
+/**
+ * The panel in the page: shows the content of the panel's model, and carries out the requests of
+ * controls and keys.
+ */
 import { toggleFullScreen } from "../dom/full_screen";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
@@ -10,10 +13,10 @@ import { Keyboard } from "./keyboard";
 import { Overlays } from "./overlays";
 import { rememberChange, rememberedView } from "./remembered";
 
-/** Time between updates of the figures that change with each frame, ms. */
+/** Milliseconds between updates of the figures that change with each frame. */
 const REFRESH_MS = 250;
-const FEWER_PIXELS = "Drawn with fewer pixels until this tab is closed.";
-const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
+const FEWER_PIXELS = "The view has fewer pixels until this tab is closed.";
+const NO_FULL_SCREEN = "This browser does not support the full screen for this page.";
 
 class PagePart implements Part, PagePanel {
   readonly id = "page";
@@ -41,7 +44,7 @@ class PagePart implements Part, PagePanel {
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
     host.drawn.subscribe(() => this.refreshSoon());
-    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    // a link to another view of the same bundle: all other settings are those of the opening
     addEventListener("hashchange", () => location.reload(), { signal });
     host.canvas.addEventListener("webglcontextlost", () => {
       void import("./lost_context").then(({ offerReload }) =>
@@ -72,7 +75,7 @@ class PagePart implements Part, PagePanel {
     panel.noteShown();
   }
 
-  /** Brings the figures to the newest frame now and then. */
+  /** Updates the figures to the newest frame from time to time. */
   private refreshSoon(): void {
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
@@ -104,7 +107,7 @@ class PagePart implements Part, PagePanel {
     this.overlays.said.offer(words, label, act);
   }
 
-  /** Says why a request does nothing now, with a button where something leads on. */
+  /** Announces why a request has no effect now, with a button if the refusal has one. */
   private async explain({ refusal }: Refusal): Promise<void> {
     const { host } = this;
     const words = withKeys(refusal, host.panel.view.keyChanges);
