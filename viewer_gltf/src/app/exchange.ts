@@ -59,7 +59,7 @@ export async function exchange(
     const isLate = isThere.then(() => new Promise((resolve) => setTimeout(resolve, SHARPEN_MS)));
     await Promise.race([after.display.settled(), isLate]);
     await atRest(before);
-    copyView(before, after, start); // what the user has changed meanwhile
+    copyView(before, after, start); // includes the user's changes during the preparation
     await after.display.nextFrame();
   } catch (error) {
     after?.dispose();

@@ -1,6 +1,6 @@
 /**
  * The section of the channels on the panel. A few channels have a card each, in the order of the
- * bundle. Of many, the shown channels have cards, and the others are a list with a search and
+ * bundle. If there are many, the shown channels have cards, and the others are a list with a search and
  * pages, since there may be seventy. No row moves when a channel is shown or hidden. Otherwise the
  * next row would slide under the pointer or the gaze. Pure.
  */
@@ -99,7 +99,7 @@ function cardOf(
         id: `${id}/transfer-function`,
         label: "Transfer function",
         name: `Transfer function of ${name}`,
-        about: "Which values of the volume are visible, and how dense they look.",
+        about: "Decides which values of the volume are visible, and how dense they look.",
         value: channel.transferFunction,
         options: channel.transferFunctions.map((each) => ({
           value: each,

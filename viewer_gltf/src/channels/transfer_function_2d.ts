@@ -116,7 +116,7 @@ function shapeItems(
 ): readonly Control[] {
   const { id } = channel;
   const shape = shapes[selected];
-  const which = `of shape ${selected + 1} of ${shapes.length}`;
+  const which = `shape ${selected + 1} of ${shapes.length}`;
   const set = (changed: Shapes) => setShapes(channel, changed);
   const change = (changed: Shape) => set(replaceShape(shapes, selected, changed));
   const { values, gradients } = shape;
@@ -126,7 +126,7 @@ function shapeItems(
     kind: "slider",
     id: `${id}/shape-${name}`,
     label,
-    name: `${label} ${which}`,
+    name: `${label} of ${which}`,
     value: shape[name],
     steps: PERCENT_STEPS,
     text: percent(shape[name]),
@@ -145,7 +145,7 @@ function shapeItems(
       kind: "window",
       id: `${id}/shape-values`,
       label: "Value",
-      name: `Value ${which}`,
+      name: `Value of ${which}`,
       value: values,
       steps: VALUE_STEPS,
       texts: percents(values),
@@ -159,7 +159,7 @@ function shapeItems(
       kind: "window",
       id: `${id}/shape-gradients`,
       label: "Gradient",
-      name: `Gradient ${which}`,
+      name: `Gradient of ${which}`,
       value: gradients,
       steps: GRADIENT_STEPS,
       texts: percents(gradients),
@@ -175,7 +175,7 @@ function shapeItems(
             kind: "slider",
             id: `${id}/shape-tip`,
             label: "Tip",
-            name: `Tip ${which}`,
+            name: `Tip of ${which}`,
             value: shape.tip,
             steps: VALUE_STEPS,
             text: percent(shape.tip),
@@ -190,7 +190,7 @@ function shapeItems(
       kind: "colour",
       id: `${id}/shape-color`,
       label: "Colour of the shape",
-      name: `Colour ${which}, multiplied by the channel's`,
+      name: `Colour of ${which}, multiplied by the channel's`,
       value: toHex(shape.color),
       palettes: SHAPE_COLORS,
       refusal,

@@ -7,7 +7,7 @@ import { Forms } from "./forms";
 
 const MANIFEST = sampleManifest(2);
 const OPENING = initialState(MANIFEST);
-/** Both channels are shown and have surfaces. A channel without a surface would fill the whole specimen. */
+/** The two channels are shown and have surfaces. A channel without a surface would fill the whole specimen. */
 const STATE = {
   ...OPENING,
   channels: OPENING.channels.map((each) => ({ ...each, shown: true, hasSurface: true })),

@@ -29,7 +29,7 @@ export class StereoTransition {
    * straight ahead.
    *
    * @param larger factor to the opening size, unless the user has resized the specimen
-   * @param table place of the specimen in the user's own room, upright; null: in front of the eyes
+   * @param table upright place in the user's own room; null: in front of the eyes
    */
   enter(larger = 1, table: HandPose | null = null): void {
     const { navigation, specimen } = this;

@@ -1,4 +1,4 @@
-/** Which of many channels have a card above the list. Pure. */
+/** Chooses the channels that have a card above the list, if there are many. Pure. */
 import type { ViewerState } from "../state/viewer_state";
 import type { PanelView } from "./controls";
 

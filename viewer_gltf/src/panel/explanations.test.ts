@@ -31,7 +31,7 @@ describe("the explanations", () => {
     for (const text of sentences) expect(text).toMatch(/^[A-Z0-9].*\.$/);
   });
 
-  it("of choices belong to controls with an explanation", () => {
+  it("exist for choices only if their control has an explanation", () => {
     const explained = CONTROLS.filter(({ about }) => about !== undefined);
     const ids = new Set(explained.map(({ id }) => id.slice(id.lastIndexOf("/") + 1)));
     for (const id of Object.keys(CHOICES)) expect(ids, id).toContain(id);

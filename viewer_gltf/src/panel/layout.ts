@@ -27,7 +27,7 @@ export type Facts = Readonly<{
   /** Samples per pixel of the path-traced image; null: path tracing is off. */
   samples: number | null;
   isLoading: boolean;
-  /** What undo and redo would change, in words; null: nothing. */
+  /** Names of the steps that undo and redo would take; null: none. */
   undo: string | null;
   redo: string | null;
 }>;

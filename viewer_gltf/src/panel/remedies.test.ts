@@ -33,7 +33,7 @@ describe("a refusal", () => {
       expect(text).toMatch(/^[A-Z].{10,}\.$/);
   });
 
-  it("of a setting has a button that makes the setting work after a few presses", () => {
+  it("has a button, which makes a setting work after a few presses", () => {
     const refused = STATES.flatMap((state) =>
       controlsOf(allParameters(), state).flatMap(({ id, refusal }) =>
         refusal ? [{ state, id, refusal }] : [],
@@ -52,7 +52,7 @@ describe("a refusal", () => {
     }
   });
 
-  it("for lack of a tile, a cut or selected objects has a button, too", () => {
+  it("has a button also if a tile, a cut or selected objects are missing", () => {
     expect(afterOffer(start, REFUSED.tile).isolated).toBe(start.middle);
     expect(afterOffer(start, REFUSED.cut).clip.plane).not.toBeNull();
     expect(afterOffer(start, REFUSED.objects).objects.c0.selected).toEqual([1, 2]);

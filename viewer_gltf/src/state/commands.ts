@@ -22,7 +22,7 @@ export const OWN_COMMANDS = [
   "split",
   /** Reads the QR code of a Cardboard viewer with the camera. */
   "scan",
-  /** Measures the size of the screen with a bank card that is held against it. */
+  /** Measures the size of the screen with a bank card on it. */
   "measure-screen",
   /** Shows the page on the full screen, or returns to its window. */
   "full-screen",

@@ -120,7 +120,7 @@ describe("the disc", () => {
     const limit = discLimit(state, 1.2);
     expect(limit).toBe(discReach(state, 1.2, (id) => state.disc.includes(id)));
     expect(limit).toBeLessThan(1.2);
-    expect(discLimit(advanceFocus(FAR_AWAY, input(9, -9, 10)), 0.2)).toBeNull(); // it covers four tiles
+    expect(discLimit(advanceFocus(FAR_AWAY, input(9, -9, 10)), 0.2)).toBeNull(); // the disc covers four tiles
     expect(discLimit(FAR_AWAY, 1.2)).toBeNull();
   });
 

@@ -9,7 +9,7 @@ import { traceLitBy } from "./stage_light";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
 /**
- * Largest number of tiles that open as volumes. Of a larger specimen, only the selected tile does.
+ * Largest number of tiles that open as volumes. In a larger specimen, only the selected tile does.
  */
 export const VOLUME_TILES_AT_START = 16;
 /** DICOM modalities of scans of the body, which are best seen by path tracing. */

@@ -4,7 +4,7 @@ import { groupNotices } from "./notice_groups";
 const missing = (n: number) => `volumes/r0_c${n}/CD8.ktx2: the host answers 404`;
 
 describe("notices", () => {
-  it("of many files with the same fault form one group", () => {
+  it("form one group if many files have the same fault", () => {
     const all = [missing(0), missing(1), missing(2)];
     expect(groupNotices(all)).toEqual([
       { text: `${missing(0)} And 2 more files like it.`, of: all },
@@ -18,7 +18,7 @@ describe("notices", () => {
     expect(group.text).toBe(`${short(1)} And 1 more file like it.`);
   });
 
-  it("with another fault, another kind of file or no file stand alone, newest last", () => {
+  it("stand alone if the fault or the kind of file differs, newest last", () => {
     const texts = [
       missing(0),
       "a.glb: the host answers 404",

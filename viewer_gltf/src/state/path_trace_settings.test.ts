@@ -16,7 +16,7 @@ describe("the settings of path tracing", () => {
     }
   });
 
-  it("of one lamp leave the other lamps unchanged", () => {
+  it("leave the other lamps unchanged if one lamp changes", () => {
     const { lamps } = withLamp(START_TRACE, 1, { isOn: true });
     expect([lamps[0], lamps[2]]).toEqual([START_TRACE.lamps[0], START_TRACE.lamps[2]]);
     expect(lamps[1]).toEqual({ ...START_TRACE.lamps[1], isOn: true });

@@ -46,7 +46,7 @@ function component(table: Uint8Array, i: number): number[][] {
 describe("the table", () => {
   // computed by hand, as in tests/transfer/test_shapes2d.py; values and gradients are 0, 1/4, 1/2,
   // 3/4, 1
-  it("of a rectangle fades towards its edges, but not at the ends of the histogram", () => {
+  it("fades towards the edges of a rectangle, but not at the ends of the histogram", () => {
     const table = rasterise([RECTANGLE], 5, 5);
     expect(component(table, 3)).toEqual([
       [0, 0, 0, 0, 0],
@@ -58,7 +58,7 @@ describe("the table", () => {
     expect(component(table, 1)[3]).toEqual([255, 255, 128, 128, 128]);
   });
 
-  it("of a triangle widens from its tip", () => {
+  it("widens from the tip of a triangle", () => {
     expect(component(rasterise([TRIANGLE], 5, 5), 3)).toEqual([
       [0, 0, 255, 0, 0],
       [0, 0, 255, 0, 0],
@@ -68,20 +68,20 @@ describe("the table", () => {
     ]);
   });
 
-  it("of shapes that overlap shares the colour by their opacities", () => {
+  it("mixes the colours of overlapping shapes by their opacities", () => {
     const cell = 4 * (5 * 4 + 2);
     const table = rasterise([RECTANGLE, TRIANGLE], 5, 5);
     expect([...table.subarray(cell, cell + 4)]).toEqual([64, 32, 191, 255]);
   });
 
-  it("of no shapes is clear and white", () => {
+  it("is transparent and white without shapes", () => {
     const table = rasterise([]);
     expect(table.length).toBe(4 * ROWS * COLUMNS);
     expect([...table.subarray(0, 4)]).toEqual([255, 255, 255, 0]);
     expect(table.every((v, i) => v === (i % 4 === 3 ? 0 : 255))).toBe(true);
   });
 
-  it("with hard edges holds all of a shape or nothing", () => {
+  it("has the full opacity or none at hard edges", () => {
     const hard = { ...RECTANGLE, values: [0.3, 0.6] as const, softness: 0 };
     expect(component(rasterise([hard], 5, 5), 3)).toEqual([
       [0, 0, 0, 0, 0],
@@ -167,7 +167,7 @@ describe("an edit", () => {
     expect(resize(box, "body", at(0, 0))).toBe(box);
   });
 
-  it("of any kind and at any place leaves a valid shape", () => {
+  it("leaves a valid shape, whatever its kind and place", () => {
     const places = [-1, 0, 0.001, 0.4, 0.999, 1, 2];
     const parts = ["tip", "top-left", "bottom-right", "bottom-left", "top", "left"] as const;
     for (const kind of ["rectangle", "triangle"] as const) {

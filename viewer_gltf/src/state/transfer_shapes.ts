@@ -139,7 +139,7 @@ export function outline(shape: Shape): readonly HistogramPoint[] {
  * Returns the topmost shape at a point, which is the last one, and the part of it that is hit.
  *
  * @param reach largest distance to a corner or an edge, in each direction of the histogram
- * @param selected index of the shape whose corners and edges are found before those of others
+ * @param selected index of the shape whose corners and edges are found first
  */
 export function hitTest(
   shapes: Shapes,

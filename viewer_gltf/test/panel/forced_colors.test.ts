@@ -107,7 +107,7 @@ describeInChromium("high contrast", () => {
     const shot = async () => [...decodePng(await page().screenshot({ clip })).rgba];
     await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     const before = await shot();
-    await page().keyboard.press("Tab"); // so that the page is in keyboard mode
+    await page().keyboard.press("Tab"); // switches the page to keyboard mode
     await button.focus();
     expect(difference(before, await shot())).toBeGreaterThan(0.04);
   });

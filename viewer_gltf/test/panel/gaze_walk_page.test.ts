@@ -79,7 +79,7 @@ async function walk(stand: Stand, only = "") {
       const done = new Set<string>();
       const pages = new Set<string>();
       const next = () => ofPage().find((id) => !done.has(id));
-      // a choice may move controls to an earlier page, so all pages are visited once more
+      // a choice may move controls to an earlier page, so all pages are visited again
       for (let stale = 0; stale <= pages.size; stale = next() === undefined ? stale + 1 : 0) {
         pages.add(ofPage().join());
         const again: string[] = [];

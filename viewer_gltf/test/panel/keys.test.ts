@@ -81,7 +81,7 @@ describeInChromium("a key that is pressed by accident", () => {
     const tried = await tryAll(WRITTEN);
     expect(tried.filter(({ fault }) => fault !== "")).toEqual([]);
     expect(tried.filter(({ announced }) => announced === "").map(({ name }) => name)).toEqual([]);
-    // of about ninety keys; the others report why they have no effect
+    // there are about ninety keys; the others report why they have no effect
     const few = where === "as it opens" ? 35 : 40;
     expect(tried.filter(({ changes }) => changes).length).toBeGreaterThan(few);
   });

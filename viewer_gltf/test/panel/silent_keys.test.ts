@@ -31,8 +31,9 @@ describeInChromium("every key", () => {
 
   /**
    * Everything that a user can perceive of the page, except what changes by itself, and the
-   * announcement. `isBefore`: clears announcements and dialogs before a key; else waits for a frame
-   * after it.
+   * announcement.
+   *
+   * @param isBefore clears announcements and dialogs before a key; otherwise waits for a frame after it
    */
   const perceived = (isBefore: boolean) =>
     stand.viewer.page.evaluate(async (isBefore) => {

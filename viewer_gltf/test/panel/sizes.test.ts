@@ -117,7 +117,7 @@ describeInChromium("sizes", () => {
   const page = () => stand.viewer.page;
 
   describe.each(SIZES)("at %i x %i", (width, height) => {
-    it("of all targets are at least 24 px, also in dialogs, and lists have space for their longest choice", async () => {
+    it("are at least 24 px for all targets, also in dialogs, and suit the longest choice of lists", async () => {
       await page().setViewportSize({ width, height });
       await stand.open("&mode=disc");
       expect(await page().evaluate(smallTargets, TARGET_PX)).toEqual([]);
@@ -141,7 +141,7 @@ describeInChromium("sizes", () => {
       }
     });
 
-    it("of texts grow with the user's font size, and no text is cut or covered", async () => {
+    it("grow with the user's font size for texts, of which none is cut or covered", async () => {
       await page().setViewportSize({ width, height });
       await stand.open("&mode=off");
       await openAllSections(stand.viewer);

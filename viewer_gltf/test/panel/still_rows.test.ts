@@ -66,7 +66,7 @@ describe.each([
 ])("the rows of the panel at %i x %i", (width, height) => {
   const viewport = { width, height };
 
-  describeInChromium("of a first visit", () => {
+  describeInChromium("on a first visit", () => {
     const stand = prepareStand({ viewport, isBlind: true, isFirstVisit: true });
 
     it("stay while the bundle loads, and when a tile is selected or a notice appears", async () => {

@@ -108,7 +108,7 @@ describe("the panel on a canvas", () => {
     // the free colours and those of the palettes take the place of any colour
     const isColour = (id: string) => /\/(color|palette)$|^lamp-\d-color$/.test(id);
     const missing = [...offered].filter((id) => !inStereo.has(id) && !isColour(id)).sort();
-    // These need the phone out of its viewer, save files, list keys, or show slices beside the
+    // The missing controls need the phone out of its viewer, save files, list keys, or show slices beside the
     // specimen.
     const phone = ["lens-code", "scan", "measure-screen"];
     const files = SCREEN_CONTROLS.filter((id) => !["next-view", "forget-views"].includes(id));

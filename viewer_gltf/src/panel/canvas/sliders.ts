@@ -21,7 +21,7 @@ type Track = Readonly<{
 /** Draws the text in the upper half and the track in the lower half. The whole row takes a drag. */
 function track(slider: Track, row: Rect): Block {
   const words: Rect = { ...row, height: WORDS };
-  const end = ROW / 2; // so that a knob at either end stays in the region
+  const end = ROW / 2; // a knob at either end then stays in the region
   const length = row.width - 2 * end;
   const at = row.x + end + slider.value * length;
   const middle = row.y + (WORDS + ROW - GAP) / 2;

@@ -1,7 +1,6 @@
 /**
- * Measures the size of this screen with a bank card that is held against it, because no browser
- * reports it. All such cards have the same size (ISO/IEC 7810 ID-1), and their short edge fits an
- * upright phone.
+ * Measures the size of this screen with a bank card on it, because no browser reports the size. All
+ * such cards are equally large (ISO/IEC 7810 ID-1), and their short edge fits an upright phone.
  */
 import { element } from "../../dom/element";
 import { PER_INCH } from "../../state/stereo";

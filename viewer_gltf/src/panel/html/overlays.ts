@@ -78,7 +78,7 @@ export class Notices {
   }
 }
 
-/** What moving closer or waiting shows, by mode. */
+/** Result of moving closer or waiting, by mode. */
 const NEXT_STEP: Readonly<Partial<Record<Mode, string>>> = {
   disc: ", move closer for volumes",
   tile: ", move closer for volumes",

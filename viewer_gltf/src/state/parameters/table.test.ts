@@ -73,7 +73,7 @@ describe("the parameters", () => {
     expect(reduce(START, { type: "set", id: "opacity", value: 1, channel })).toBe(START);
   });
 
-  it("of one channel leave the other channels unchanged", () => {
+  it("leave the other channels unchanged if they belong to one channel", () => {
     const [first, second] = START.channels;
     const set = reduce(START, { type: "set", id: "opacity", value: 0.25, channel: second.id });
     expect(set.channels).toEqual([first, { ...second, opacity: 0.25 }]);

@@ -4,18 +4,18 @@ import { REFUSED } from "../refusals";
 import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } from "./kinds";
 
 /**
- * Where volumes are drawn. `disc`: around the gaze, across tiles. `tile`: in the gazed tile. `all`:
- * in all tiles. `stage`: as the stage specifies, if it draws any tile as a volume. `traced`: in all
- * tiles, by path tracing. `off`: nowhere. `disc` and `tile` draw only tiles within the volume
- * distance.
+ * Where volumes are drawn. Mode `disc` draws them around the gaze, across tiles, and `tile` in the
+ * gazed tile; both only within the volume distance. Mode `all` draws them in all tiles, and `traced`
+ * does so by path tracing. Mode `stage` follows the stage, if that draws any tile as a volume. Mode
+ * `off` draws no volumes.
  */
 const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
 /**
- * How the samples along a ray are combined. `over`: each sample hides those behind it in part.
- * `maximum`: the largest value of each channel, within its window. `sum`: the light of all samples
- * is added, and nothing is hidden.
+ * How the samples along a ray are combined. With `over`, each sample partly hides those behind it.
+ * With `maximum`, only the largest value of each channel counts, within its window. With `sum`, the
+ * light of all samples is added, and nothing is hidden.
  */
 const COMPOSITINGS = ["over", "maximum", "sum"] as const;
 export type Compositing = (typeof COMPOSITINGS)[number];

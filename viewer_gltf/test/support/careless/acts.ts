@@ -230,7 +230,7 @@ export const IN_STEREO: readonly Act[] = [
 
 /** Enters the split screen. */
 export async function enterStereo({ page }: Reader): Promise<void> {
-  // so that letters do not go to a field
+  // otherwise letters would go to a field
   await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
   await page.keyboard.press("P");
   await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);

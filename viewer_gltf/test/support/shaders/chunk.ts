@@ -27,11 +27,10 @@ export type Texture = Readonly<{
 /**
  * Runs a program and returns `oColor`, averaged over the pixels.
  *
- * @param head declarations, with `#include <chunks/...>` lines.
- * @param body body of main().
- * @param uniforms textures, and vectors of four numbers.
- * @param pixels number of pixels in a row, for loops longer than some GPUs allow for one pixel (65
- * 535 in Mesa).
+ * @param head declarations, with `#include <chunks/...>` lines
+ * @param body body of main()
+ * @param uniforms textures and vec4s
+ * @param pixels several share a long loop; Mesa allows 65 535 turns for one
  */
 export async function runProgram(
   page: Page,

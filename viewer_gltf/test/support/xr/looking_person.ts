@@ -36,7 +36,7 @@ const RAD = Math.PI / 180;
 const SPECIMEN: Box = { min: [...SPECIMEN_BOX.min], max: [...SPECIMEN_BOX.max] };
 
 /**
- * Both kinds of stereo are available, and a step can be undone and redone, so that every control
+ * The two kinds of stereo are available, and a step can be undone and redone, so that every control
  * can be operated.
  */
 const FACTS: Facts = {
