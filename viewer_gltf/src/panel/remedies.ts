@@ -25,7 +25,7 @@ const measure = (): Offer => ({ label: "Measure", to: [setTo(TOOL, "measure")] }
 /** Buttons by the refusal that they solve. */
 export type Remedies = Readonly<Record<string, (now: RemedyContext) => Offer>>;
 
-const WAYS: Remedies = {
+const REMEDIES: Remedies = {
   [REFUSED.tile]: ({ state: { middle, tiles } }) => ({
     label: `Only ${tileName(middle, tiles)}`,
     to: [{ type: "isolate", tile: middle }],
@@ -43,7 +43,7 @@ const WAYS: Remedies = {
     to: [{ type: "set-clip", clip: { ...clip, plane: middlePlane(shown) } }],
   }),
   [REFUSED.objects]: ({ objects }) => ({
-    label: "Select all shown objects",
+    label: "Select all shown",
     to: [...objects].map(([channel, selected]) => ({
       ...{ type: "objects", channel, change: { selected } },
     })),
@@ -56,5 +56,5 @@ export function offerFor(
   now: RemedyContext,
   ofParts: Remedies = {},
 ): Offer | null {
-  return (WAYS[refusal] ?? ofParts[refusal])?.(now) ?? null;
+  return (REMEDIES[refusal] ?? ofParts[refusal])?.(now) ?? null;
 }
