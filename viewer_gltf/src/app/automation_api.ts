@@ -1,21 +1,25 @@
 /**
- * `window.stereocell`: what automation may read. Nothing in it changes the viewer; a script drives
- * the page as a person does, through its controls (`[data-channel="<id>"] [data-part="shown"]`,
- * `color`, `volume`, `transfer-function`; `[data-mode]`, `[data-tile-choice]`, `[data-action]`).
+ * `window.stereocell`: the values that automation may read. Nothing in it changes the viewer. A
+ * script operates the page like a user, through its controls (`[data-channel="<id>"]
+ * [data-part="shown"]`, `color`, `volume`, `transfer-function`; `[data-mode]`,
+ * `[data-tile-choice]`, `[data-action]`).
  */
 
 import type { Snapshot } from "../host/snapshot";
 
 export interface StereoCellApi {
   readonly apiVersion: 1;
-  /** Resolves when the overview is on screen; rejects with the words of a fatal error. */
+  /** Resolves when the overview is on screen; rejects with the message of a fatal error. */
   readonly ready: Promise<void>;
-  /** Frames drawn so far. A still picture draws none, but for those by which volumes clear up (`quality` auto). */
+  /**
+   * Number of frames drawn so far. An unchanged view draws no frames, except those that make
+   * volumes clearer (`quality` auto).
+   */
   readonly frames: number;
-  /** Resolves when nothing is loading any more and the picture shows all of it. */
+  /** Resolves when nothing is loading and the view shows everything. */
   settled(): Promise<void>;
   snapshot(): Snapshot;
-  /** The report of the benchmark (`?bench`), as bench/report.ts defines it; null: the benchmark has not run. */
+  /** Report of the benchmark (`?bench`), as bench/report.ts defines it; null: the benchmark has not run. */
   readonly bench: object | null;
 }
 

@@ -1,4 +1,4 @@
-/** Puts a newer view of the same specimen in the place of the one that the page shows, without a jump. */
+/** Replaces the view on the page by a newer one of the same specimen, without a jump. */
 import { element } from "../dom/element";
 import type { Host } from "../host/host";
 import { linkOf } from "../share/link_of";
@@ -8,9 +8,9 @@ import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 
-/** Time between two looks at whether the page may change, ms. */
-const LOOK_MS = 200;
-/** Longest time that a page whose picture is there is prepared for what would make it sharper, ms. */
+/** Milliseconds between two checks whether the page may change. */
+const CHECK_MS = 200;
+/** Milliseconds that a page with a complete view may take at most to become sharp before it is shown. */
 const SHARPEN_MS = 20_000;
 
 let pointersDown = 0;
@@ -24,23 +24,23 @@ for (const kind of ["pointerdown", "pointerup", "pointercancel"]) {
   );
 }
 
-/** Whether someone would notice: in stereo, while a pointer drags, while a text is written. */
-function isInHand(host: Host): boolean {
+/** Returns whether the user would notice a change: in stereo, during a drag, or while typing. */
+function isInUse(host: Host): boolean {
   const { activeElement } = document;
-  const writes = activeElement instanceof HTMLInputElement && activeElement.type === "text";
-  return host.isInRoom || pointersDown > 0 || writes;
+  const isTyping = activeElement instanceof HTMLInputElement && activeElement.type === "text";
+  return host.isInRoom || pointersDown > 0 || isTyping;
 }
 
-/** Resolves once nobody would notice a change. */
+/** Resolves once the user would not notice a change. */
 async function atRest(host: Host): Promise<void> {
-  while (isInHand(host)) await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
+  while (isInUse(host)) await new Promise((resolve) => setTimeout(resolve, CHECK_MS));
 }
 
 /**
- * Makes a second page behind the shown one, brings it to the same view, and shows it once its picture is as
- * sharp, or nearly.
+ * Makes a second page behind the shown one, copies the view to it, and shows it once it is about as
+ * sharp.
  *
- * @param make makes a page's content in an element, and returns its host
+ * @param make makes the content of a page in an element, and returns its host
  */
 export async function exchange(
   before: Host,
@@ -54,12 +54,12 @@ export async function exchange(
   try {
     after = await make(parent);
     const start = after.state;
-    carry(before, after, start);
+    copyView(before, after, start);
     const isThere = after.display.overviewShown();
     const isLate = isThere.then(() => new Promise((resolve) => setTimeout(resolve, SHARPEN_MS)));
     await Promise.race([after.display.settled(), isLate]);
     await atRest(before);
-    carry(before, after, start); // what the user did meanwhile
+    copyView(before, after, start); // includes the user's changes during the preparation
     await after.display.nextFrame();
   } catch (error) {
     after?.dispose();
@@ -73,8 +73,8 @@ export async function exchange(
   return after;
 }
 
-/** Brings a host to the state, the camera and the panel of another one. */
-function carry(before: Host, after: Host, start: ViewerState): void {
+/** Copies the state, the camera and the panel from one host to another. */
+function copyView(before: Host, after: Host, start: ViewerState): void {
   const opening = settingsOf(location.search).reduce(reduce, initialState(before.bundle.manifest));
   const link = linkOf(before, opening);
   const { bounds_um } = after.bundle.manifest.specimen;

@@ -1,4 +1,4 @@
-/** Start: find the bundle, show it, or report on the page why not. */
+/** Entry point: finds the bundle and shows it, or reports on the page why it cannot be shown. */
 import "../panel/html/colors.css";
 import "../panel/html/page.css";
 import "../panel/html/panel.css";
@@ -35,14 +35,14 @@ function checkWebGl2(): void {
   );
 }
 
-/** For example `512 x 205 x 54 um`, or `231 x 215 x 255 mm`. */
+/** Returns the size of the specimen, for example `512 x 205 x 54 um` or `231 x 215 x 255 mm`. */
 function describeSize({ specimen, tiles }: Manifest): string {
   const { min, max } = specimen.bounds_um;
   return `${sizeText(max.map((v, i) => v - min[i]))} · ${tiles.length} ${tiles.length === 1 ? "tile" : "tiles"}`;
 }
 
-/** On the page that stands until there is a picture: see boot/. */
-function sayAtStart(text: string): void {
+/** Shows a text on the start page, which stays until the specimen is drawn (see boot/). */
+function showStartText(text: string): void {
   const words = document.querySelector("[data-boot] p");
   if (words !== null) words.textContent = text;
 }
@@ -50,22 +50,22 @@ function sayAtStart(text: string): void {
 const LIGHT = matchMedia("(prefers-color-scheme: light)");
 const CONTRAST = matchMedia("(prefers-contrast: more)");
 
-/** The page's colours, as the address or the system has them. */
-function dressPage(): Theme {
+/** Applies the theme of the address or the system to the page. */
+function applyTheme(): Theme {
   const theme = isLight(new URL(pageAddress()).search, LIGHT.matches) ? "light" : "dark";
   document.documentElement.dataset.theme = theme;
   return theme;
 }
 
-/** The background of the picture, too; a system's colours may change by night. */
+/** Follows the theme of the system, which may change at night, also with the background of the view. */
 function followSystem(host: Host, search: string): void {
-  const dress = () => host.dress(dressPage(), isPlain(search, CONTRAST.matches));
-  for (const query of [LIGHT, CONTRAST]) query.addEventListener("change", dress);
-  dress();
+  const update = () => host.setTheme(applyTheme(), isPlain(search, CONTRAST.matches));
+  for (const query of [LIGHT, CONTRAST]) query.addEventListener("change", update);
+  update();
 }
 
 async function open(parent: HTMLElement): Promise<Host> {
-  dressPage();
+  applyTheme();
   checkWebGl2();
   const page = pageAddress();
   const { search, hash } = new URL(page);
@@ -83,21 +83,21 @@ async function open(parent: HTMLElement): Promise<Host> {
 }
 
 /**
- * Opens the bundle that the address names, or the source, which the page then reads by itself. If the address names
- * neither and no bundle lies beside the page, the user chooses a source.
+ * Opens the bundle that the address names, or the source, which the page then reads itself. If the
+ * address names neither and there is no bundle beside the page, the user chooses a source.
  */
 async function openShown(parent: HTMLElement, page: string): Promise<ShownSource> {
   const source = sourceAddress(page);
   if (source !== null) {
-    sayAtStart("Reading the source");
+    showStartText("Reading the source");
     const { openAddress } = await import("../source/open_source");
-    return openAddress(source, sayAtStart);
+    return openAddress(source, showStartText);
   }
-  sayAtStart("Reading the bundle");
+  showStartText("Reading the bundle");
   try {
     const base = bundleAddress(page);
     const bundle = loadBundle(base);
-    const shown = isReading() ? whileReading(base, bundle, sayAtStart) : bundle;
+    const shown = isReading() ? whileReading(base, bundle, showStartText) : bundle;
     return { bundle: await shown, notes: [] };
   } catch (error) {
     if (!(error instanceof MissingError) || namesBundle(page)) throw error;
@@ -106,7 +106,7 @@ async function openShown(parent: HTMLElement, page: string): Promise<ShownSource
   }
 }
 
-/** Shows each further file or folder that is dropped, in the place of the one before. */
+/** Shows each file or folder that is dropped, in place of the one before. */
 async function followDrops(parent: HTMLElement): Promise<void> {
   const [{ acceptDrops }, { openLocal }] = await Promise.all([
     import("../source/dropped"),
@@ -131,7 +131,7 @@ function notify(host: Host, notes: readonly string[]): void {
   for (const text of notes) host.dispatch({ type: "notify", text }, false);
 }
 
-/** Follows the build behind the page: each newer view takes the place of the one before. */
+/** Follows the build behind the page: each newer view replaces the one before. */
 function followBuild({ base }: Bundle, live: LiveHost): void {
   const root = base.slice(0, base.length - live.folder.length);
   const show = async (newer: string) => {
@@ -141,7 +141,8 @@ function followBuild({ base }: Bundle, live: LiveHost): void {
     const bundle = newer === root ? loaded : { ...loaded, live };
     if (host === null) return;
     host = await exchange(host, (parent) => openIn(parent, bundle, () => undefined));
-    void host.noteOverview().catch(() => undefined); // the page shows all the same, and is not waited for
+    // the page shows the bundle all the same, so a failure is ignored
+    void host.noteOverview().catch(() => undefined);
   };
   const shown = live.folder === "" ? "" : base;
   const isLate = () => host?.display.isLate ?? false;
@@ -150,7 +151,7 @@ function followBuild({ base }: Bundle, live: LiveHost): void {
   );
 }
 
-/** Makes the page of a bundle in an element. `place` brings it to the view with which it opens. */
+/** Makes the page of a bundle in an element. `place` sets the opening view. */
 async function openIn(
   parent: HTMLElement,
   bundle: Bundle,
@@ -168,11 +169,11 @@ async function openIn(
   return host;
 }
 
-/** The host, with the picture. */
+/** Makes the host and the elements of the view. */
 function makeHost(parent: HTMLElement, bundle: Bundle): Host {
   const stage = element("div", { className: "stage" });
   stage.ariaLabel = "The specimen: the arrow keys turn it, ? lists all keys";
-  stage.role = "group"; // an image would hide the marks and the buttons in it from screen readers
+  stage.role = "group"; // the role "image" would hide the buttons in it from screen readers
   const view = element("main", { className: "view" }, {}, stage);
   parent.replaceChildren(view);
   if (window.parent !== window) leaveWheelToHolder(stage);
@@ -200,13 +201,14 @@ void opened.then(
   },
   () => undefined, // reported above
 );
-void ready.then(() => host?.noteOverview()).catch(() => undefined); // without what comes then the page shows all the same
+// a failure of the parts that load afterwards does not concern the page
+void ready.then(() => host?.noteOverview()).catch(() => undefined);
 watchWaiting((jobs) => host?.noteWaiting(jobs));
-ready.catch(() => undefined); // reported above; a caller that awaits `ready` still sees it
+ready.catch(() => undefined); // reported above; a caller that awaits `ready` still gets the error
 
-/** Bugs: the console has the details, the page reports that something is amiss. */
+/** Reports a bug on the page; the console has the details. */
 function reportBug(error: unknown): void {
-  if (!(error instanceof Error)) return; // such as a ResizeObserver's harmless message
+  if (!(error instanceof Error)) return; // for example the harmless message of a ResizeObserver
   host?.dispatch({ type: "notify", text: `Something in the viewer failed: ${error.message}` });
 }
 addEventListener("error", (event) => reportBug(event.error));

@@ -1,6 +1,7 @@
 /**
- * The parts of the viewer, a line each. Without its line, and its folder, a part is gone and the others still work. Only
- * the folder of `share` has to stay, since the page opens by it what its address asks for.
+ * The parts of the viewer, one line each. Without its line and its folder, a part is removed, and
+ * the others still work. Only the folder of `share` has to stay, because the page reads its address
+ * with it.
  */
 export { additions } from "../additions/part";
 export { annotations } from "../annotations/part";

@@ -162,7 +162,7 @@ class CapturePart implements Part, PosterMaker {
     const { state, isInRoom, undo, viewpoint } = this.host;
     const { keptViews } = state;
     if (isInRoom || keptViews.length === 0) return false;
-    undo.noteLook();
+    undo.noteCameraMove();
     const before = viewpoint.lookNow;
     const { name, ...look } = keptViews[this.nextView++ % keptViews.length];
     viewpoint.lookFlatFrom(look);
@@ -182,6 +182,6 @@ export const capture: PartDefinition = {
   keys: SAVE_KEYS,
   commands: SAVE_COMMANDS,
   settings: CAPTURE_SETTINGS,
-  waysOn: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
+  remedies: { [REFUSED.views]: () => ({ label: "Keep this view", to: ["keep-view"] }) },
   create: (host) => new CapturePart(host),
 };

@@ -1,6 +1,6 @@
-/** The keys of the channels: which one is meant, and how it looks. Pure. */
+/** The keys of the channels: which channel they change, and its appearance. Pure. */
 import { fromHex, toHex } from "../math/color";
-import type { Wish } from "../panel/controls";
+import type { Request } from "../panel/controls";
 import {
   type Key,
   type KeyGroup,
@@ -30,7 +30,7 @@ function pick(by: number): Key["to"] {
 }
 
 function shift(low: number, high: number) {
-  return ({ id, window }: ChannelState): Wish => ({
+  return ({ id, window }: ChannelState): Request => ({
     type: "window",
     channel: id,
     window: [window[0] + low, window[1] + high],

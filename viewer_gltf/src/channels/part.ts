@@ -1,4 +1,4 @@
-/** The channels as a part of the viewer: their cards, their keys, and their two-dimensional transfer functions. */
+/** The channels as a part of the viewer: cards, keys and two-dimensional transfer functions. */
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PanelView, PartSection } from "../panel/controls";
 import { isTwoD } from "../state/transfer_functions_2d";

@@ -1,8 +1,8 @@
 /**
- * The panel's section of the channels. A few channels have a card each, in the bundle's order. Of many, the
- * cards of those that are shown come first; the others are a list to add from, by name, and a page at a
- * time: there may be seventy. No row changes its place when a channel is shown or hidden, since the next
- * row would slide under the pointer or the gaze. Pure.
+ * The section of the channels on the panel. A few channels have a card each, in the order of the
+ * bundle. If there are many, the shown channels have cards, and the others are a list with a search and
+ * pages, since there may be seventy. No row moves when a channel is shown or hidden. Otherwise the
+ * next row would slide under the pointer or the gaze. Pure.
  */
 
 import { toHex } from "../math/color";
@@ -26,17 +26,17 @@ import { transferFunction2dItems } from "./transfer_function_2d";
 
 /** Largest number of channels that all have a card. */
 const FEW = 9;
-/** Channels of a page of the list; fewer need no search. */
+/** Channels on a page of the list. A shorter list has no search. */
 export const PAGE = 6;
-/** Steps of a window's slider: the volumes have 8 bits. */
+/** Steps of a window's slider, for volumes of 8 bits. */
 const WINDOW_STEPS = 255;
 
-/** Facts about the channels that the state does not hold. */
+/** Facts about the channels that are not in the state. */
 export type ChannelFacts = Readonly<{
   ranges: Ranges;
-  /** The joint histogram of the channel whose histogram is open; null: it has not come yet. */
+  /** Joint histogram of the channel whose histogram is open; null: not loaded yet. */
   histogram?: Histogram | null;
-  /** Some colours of each label map's objects. */
+  /** Some colours of the objects of each label map. */
   objectColors?: ReadonlyMap<string, readonly string[]>;
 }>;
 
@@ -56,7 +56,7 @@ function shownToggle({ id, name, shown }: ChannelState): Control {
   };
 }
 
-/** The channel's colour, with those that no other channel has. */
+/** Returns the colour control of a channel, with the colours that no other channel has. */
 function ownColour(channel: ChannelState, channels: readonly ChannelState[]): Colour {
   const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
   return { ...colourOf(COLOR, channel, channel.id), free: freeColours(others) };
@@ -99,7 +99,7 @@ function cardOf(
         id: `${id}/transfer-function`,
         label: "Transfer function",
         name: `Transfer function of ${name}`,
-        about: "Which values of the volume are visible, and how dense they look.",
+        about: "Decides which values of the volume are visible, and how dense they look.",
         value: channel.transferFunction,
         options: channel.transferFunctions.map((each) => ({
           value: each,
@@ -117,7 +117,8 @@ function cardOf(
         id: `${id}/window`,
         label: "Window",
         name: `Window of ${name}`,
-        about: "The values that are darkest and brightest. A narrower window has more contrast.",
+        about:
+          "The values that are shown darkest and brightest. A narrower window has more contrast.",
         value: channel.window,
         steps: WINDOW_STEPS,
         texts: windowTexts(channel.window, range),
@@ -129,7 +130,7 @@ function cardOf(
   };
 }
 
-/** The channels with a card above the list. */
+/** Returns the channels with a card above the list. */
 function withCards(
   { channels }: ViewerState,
   { channelsWithCard: ids }: PanelView,
@@ -138,27 +139,27 @@ function withCards(
   return channels.filter(({ id, shown }) => ids?.includes(id) ?? shown);
 }
 
-/** The channels of the list whose name or id contains the text that is searched for. */
+/** Returns the channels of the list whose name or id contains the search text. */
 function foundChannels(
   state: ViewerState,
   view: PanelView,
   search = view.search,
 ): readonly ChannelState[] {
-  const sought = search.trim().toLowerCase();
+  const text = search.trim().toLowerCase();
   const cards = withCards(state, view);
   return state.channels.filter(
     (channel) =>
       !cards.includes(channel) &&
-      (channel.name.toLowerCase().includes(sought) || channel.id.toLowerCase().includes(sought)),
+      (channel.name.toLowerCase().includes(text) || channel.id.toLowerCase().includes(text)),
   );
 }
 
-/** How many pages the found channels take. */
+/** Returns the number of pages of the found channels. */
 export function pagesOf(state: ViewerState, view: PanelView): number {
   return Math.max(1, Math.ceil(foundChannels(state, view).length / PAGE));
 }
 
-/** Beginnings of the channels' names, as `CD`: the letters up to a digit, three at most. */
+/** Returns beginnings of the channels' names, for example `CD`: the letters up to a digit, at most three. */
 function beginningsOf(channels: readonly ChannelState[]): readonly string[] {
   const found = channels.map(({ name }) => /^\p{L}{1,3}/u.exec(name)?.[0] ?? name.slice(0, 1));
   return [...new Set(found)].sort((a, b) => a.localeCompare(b, "en"));
@@ -190,7 +191,7 @@ function addingOf(
     items.push(rowOf(cardOf(channel, state, facts, view)));
   }
   if (isLong && found.length === 0) {
-    const value = `No channel of the list is called "${view.search.trim()}".`;
+    const value = `No channel in the list matches "${view.search.trim()}".`;
     items.push({ kind: "text", id: "no-channel", label: "Channels", value });
   }
   if (pages > 1) {
@@ -205,7 +206,10 @@ function addingOf(
   return items;
 }
 
-/** A card as a row of the list: swatch and switch, and the rest once the channel is shown and opened. */
+/**
+ * Returns a card as a row of the list: swatch and switch, and the other controls once the channel
+ * is shown and opened.
+ */
 function rowOf(card: Group): Group {
   const canOpen = !card.isDimmed || card.isOpen;
   return { ...card, isCompact: true, more: canOpen ? card.more : [] };

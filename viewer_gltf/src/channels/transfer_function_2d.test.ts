@@ -7,8 +7,8 @@ import {
   changePanel,
   type HistogramEditor,
   type PanelView,
+  type Request,
   START_VIEW,
-  type Wish,
 } from "../panel/controls";
 import { isRefusal } from "../panel/key";
 import { spokenFeedback } from "../panel/spoken_feedback";
@@ -24,7 +24,7 @@ const RECTANGLE = makeShape("rectangle", { value: 0.5, gradient: 0.5 });
 const TRIANGLE = makeShape("triangle", { value: 0.2, gradient: 0.5 });
 const REACH = { value: 0.03, gradient: 0.05 };
 
-/** A panel and a state that wishes change, as the panel's caller keeps them. */
+/** A panel and a state that requests change, like those of the panel's caller. */
 class Controller {
   state: ViewerState = initialState(sampleManifest(3));
   view: PanelView = changePanel(START_VIEW, { panel: "histogram", channel: "c0" });
@@ -35,10 +35,10 @@ class Controller {
     }
   }
 
-  grant(wish: Wish | null): void {
-    if (wish === null || typeof wish === "string") throw new Error(`${wish}`);
-    if ("panel" in wish) this.view = changePanel(this.view, wish);
-    else this.state = reduce(this.state, wish);
+  grant(request: Request | null): void {
+    if (request === null || typeof request === "string") throw new Error(`${request}`);
+    if ("panel" in request) this.view = changePanel(this.view, request);
+    else this.state = reduce(this.state, request);
   }
 
   get channel(): ChannelState {
@@ -79,13 +79,13 @@ class Controller {
 
   press(name: string): void {
     const { state, view } = this;
-    const wish = KEYS.wishOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
-    this.grant(wish === null || isRefusal(wish) ? null : wish);
+    const request = KEYS.requestOf(name, { state, view, shown: SPECIMEN_BOX, focusTile: null });
+    this.grant(request === null || isRefusal(request) ? null : request);
   }
 }
 
-describe("the editor of value and gradient", () => {
-  it("is in a channel's card while it is open there", () => {
+describe("the editor of the joint histogram", () => {
+  it("is in the card of a channel while it is open there", () => {
     const controller = new Controller();
     const ids = () => controller.items().map(({ id }) => id.slice(3));
     expect(ids()).toEqual(["plane", "shapes", "add-rectangle", "add-triangle"]);
@@ -98,13 +98,15 @@ describe("the editor of value and gradient", () => {
     expect([controller.view.picked, ids()]).toEqual(["c1", ["plane"]]);
   });
 
-  it("means the newest shape, or the one that was pressed", () => {
+  it("selects the newest shape, or the one that was pressed", () => {
     const controller = new Controller(RECTANGLE);
     controller.click("add-triangle");
     expect(controller.editor.selected).toBe(1);
-    controller.grant(controller.editor.press({ value: 0.5, gradient: 0.62 }, REACH)); // above the triangle
+    // above the triangle
+    controller.grant(controller.editor.press({ value: 0.5, gradient: 0.62 }, REACH));
     expect(controller.editor.selected).toBe(0);
-    controller.grant(controller.editor.press({ value: 0.99, gradient: 0.99 }, REACH)); // beside all
+    // outside all shapes
+    controller.grant(controller.editor.press({ value: 0.99, gradient: 0.99 }, REACH));
     expect(controller.editor.selected).toBe(0);
     controller.click("remove-shape");
     expect(controller.shapes.map(({ kind }) => kind)).toEqual(["triangle"]);
@@ -112,9 +114,9 @@ describe("the editor of value and gradient", () => {
     expect([controller.shapes, controller.editor.selected]).toEqual([[], null]);
   });
 
-  it("draws a corner to where the pointer is, and a body along", () => {
+  it("moves a corner with the pointer, and a whole shape", () => {
     const controller = new Controller(RECTANGLE); // values 0.4..0.6, gradients 0.35..0.65
-    controller.drag([0.61, 0.64], [0.81, 0.94]); // a little beside the corner: no jump
+    controller.drag([0.61, 0.64], [0.81, 0.94]); // slightly beside the corner, which must not jump
     expect(controller.shapes[0].values[1]).toBeCloseTo(0.8, 3);
     expect(controller.shapes[0].gradients[1]).toBeCloseTo(0.95, 3);
     controller.drag([0.5, 0.5], [0.3, 0.45]);
@@ -123,7 +125,7 @@ describe("the editor of value and gradient", () => {
     expect(controller.shapes[0].gradients[0]).toBeCloseTo(0.3, 3);
   });
 
-  it("moves nothing by a press alone, and goes back to where a drag began", () => {
+  it("moves nothing by a press alone, and returns exactly to the start of a drag", () => {
     const controller = new Controller(RECTANGLE);
     const [start] = controller.shapes;
     controller.grant(controller.editor.press({ value: 0.5, gradient: 0.5 }, REACH));
@@ -132,10 +134,10 @@ describe("the editor of value and gradient", () => {
     controller.grant(controller.editor.drag({ value: 0.5, gradient: 0.5 }));
     expect(controller.shapes).toEqual([start]);
     controller.grant(controller.editor.press({ value: 0.05, gradient: 0.95 }, REACH));
-    expect(controller.editor.drag({ value: 0.2, gradient: 0.5 })).toBeNull(); // nothing was taken
+    expect(controller.editor.drag({ value: 0.2, gradient: 0.5 })).toBeNull(); // no shape was hit
   });
 
-  it("refuses while the bundle's shapes have not come, and beyond so many", () => {
+  it("refuses edits until the shapes of the bundle are loaded, and beyond the largest number", () => {
     const full = new Controller(...Array.from({ length: MAX_SHAPES }, () => RECTANGLE));
     expect(full.item("add-rectangle").refusal).toContain(String(MAX_SHAPES));
     const controller = new Controller();
@@ -146,7 +148,7 @@ describe("the editor of value and gradient", () => {
     };
     const items = (channel: ChannelState) =>
       transferFunction2dItems(channel, controller.view, null, String);
-    expect(items(unknown)[1].refusal).toBe("Its shapes have not come.");
+    expect(items(unknown)[1].refusal).toBe("The shapes are not loaded yet.");
     const known = {
       ...unknown,
       transfer2d: { gradient_max: 0.5, functions: { soft: [TRIANGLE] } },
@@ -154,7 +156,7 @@ describe("the editor of value and gradient", () => {
     expect(items(known)[1]).toMatchObject({ refusal: "", shapes: [TRIANGLE] });
   });
 
-  it("is worked by keys, which announce what they did", () => {
+  it("is operated by keys, which announce their effect", () => {
     const controller = new Controller();
     const before = controller.state;
     controller.press("Q");
@@ -170,7 +172,7 @@ describe("the editor of value and gradient", () => {
         "opacity 50 %, softness 50 %",
     );
     controller.press("Y");
-    controller.press("J"); // from the newest round to the first
+    controller.press("J"); // from the newest shape cyclically to the first
     expect(controller.editor.selected).toBe(0);
     controller.press(">");
     expect(controller.shapes[0].values[0]).toBeCloseTo(0.2 + 5 / 255, 3);
@@ -187,21 +189,21 @@ describe("the editor of value and gradient", () => {
   });
 });
 
-describe("its block on the panel in the room", () => {
-  it("presses and drags where the ray is, up being steep", () => {
+describe("its block on the canvas panel", () => {
+  it("presses and drags at the place of the ray, with steep gradients at the top", () => {
     const controller = new Controller(RECTANGLE);
     const [block] = blocksOf(controller.editor, 760);
     const [region] = block.regions;
     expect(region.isSlide).toBe(true);
     const pressed = region.press?.(0.6, 0.35); // the upper right corner
-    expect(pressed).toMatchObject({ panel: "shape", grasp: { index: 0, part: "top-right" } });
-    controller.grant(pressed as Wish);
+    expect(pressed).toMatchObject({ panel: "shape", grab: { index: 0, part: "top-right" } });
+    controller.grant(pressed as Request);
     const [{ regions }] = blocksOf(controller.editor, 760);
-    const wish = regions[0].to(0.9, 0.1);
-    controller.grant(wish as Wish);
+    const request = regions[0].to(0.9, 0.1);
+    controller.grant(request as Request);
     expect(controller.shapes[0].values[1]).toBeCloseTo(0.9, 2);
     expect(controller.shapes[0].gradients[1]).toBeCloseTo(0.9, 2);
-    expect(block.height).toBeLessThan(600); // fits a page way on
+    expect(block.height).toBeLessThan(600); // the block fits on a page
   });
 
   it("reports why it refuses", () => {

@@ -3,7 +3,13 @@
 import { MAX_SHAPES, type Shape, type Shapes } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
 import type { Control, Histogram, PanelView } from "../panel/controls";
-import { draggedTo, editedShapes, graspAt, meantShape, withNewShape } from "../panel/edit_shapes";
+import {
+  draggedTo,
+  editedShapes,
+  grabAt,
+  selectedShapeIndex,
+  withNewShape,
+} from "../panel/edit_shapes";
 import { PALETTES } from "../panel/palettes";
 import type { Action } from "../state/actions";
 import { REFUSED } from "../state/refusals";
@@ -11,31 +17,31 @@ import { editedName } from "../state/transfer_functions_2d";
 import { removeShape, replaceShape, resize } from "../state/transfer_shapes";
 import type { ChannelState } from "../state/viewer_state";
 
-/** White leaves the channel's own. */
+/** Colours of shapes, which multiply the channel's colour. White leaves it unchanged. */
 const SHAPE_COLORS = PALETTES.slice(1).map(({ colors }) => ({
-  name: "Colour, times the channel's",
+  name: "Colour, multiplied by the channel's",
   colors,
 }));
 const PERCENT_STEPS = 100;
 const VALUE_STEPS = 255;
 const GRADIENT_STEPS = 63;
 
-/** New shapes for the edited function of a channel. */
+/** Returns the action that gives the edited function of a channel new shapes. */
 export function setShapes(channel: ChannelState, shapes: Shapes): Action {
   return { type: "set-shapes", channel: channel.id, name: editedName(channel), shapes };
 }
 
-/** Why no shapes can be edited now; "": they can. */
+/** Returns why the shapes cannot be edited now; "": they can. */
 export function refusalOf(channel: ChannelState): string {
   if (!channel.volume) return REFUSED.transfer;
   const name = editedName(channel);
   const isOfBundle =
     channel.transferFunctions2d.includes(name) && !Object.hasOwn(channel.shapes, name);
-  return channel.transfer2d === null && isOfBundle ? "Its shapes have not come." : "";
+  return channel.transfer2d === null && isOfBundle ? "The shapes are not loaded yet." : "";
 }
 
 /**
- * @param valueText of 0 and 1 of the window, as the source counts intensities
+ * @param valueText returns a share of the intensities as a value of the source
  */
 export function transferFunction2dItems(
   channel: ChannelState,
@@ -55,9 +61,10 @@ export function transferFunction2dItems(
   };
   if (!isOpen) return [toggle];
   const shapes = editedShapes(channel);
-  const selected = meantShape(view.shape, shapes);
+  const selected = selectedShapeIndex(view.shape, shapes);
   const refusal = refusalOf(channel);
-  const full = shapes.length >= MAX_SHAPES ? `There are ${MAX_SHAPES} shapes: no more.` : "";
+  const full =
+    shapes.length >= MAX_SHAPES ? `A transfer function has at most ${MAX_SHAPES} shapes.` : "";
   const count = shapes.length;
   const set = (changed: Shapes) => setShapes(channel, changed);
   const most =
@@ -86,12 +93,12 @@ export function transferFunction2dItems(
       color: channel.color,
       texts: [valueText(window[0]), valueText(window[1]), steepest],
       press: (at, reach) => {
-        const grasp = graspAt(shapes, at, reach, selected);
-        const index = grasp?.index ?? selected;
-        return { panel: "shape", shape: index === null ? null : { index, count }, grasp };
+        const grab = grabAt(shapes, at, reach, selected);
+        const index = grab?.index ?? selected;
+        return { panel: "shape", shape: index === null ? null : { index, count }, grab };
       },
       drag: (at) => {
-        const dragged = view.grasp === null ? null : draggedTo(shapes, view.grasp, at);
+        const dragged = view.grab === null ? null : draggedTo(shapes, view.grab, at);
         return dragged === null ? null : set(dragged);
       },
     },
@@ -109,7 +116,7 @@ function shapeItems(
 ): readonly Control[] {
   const { id } = channel;
   const shape = shapes[selected];
-  const which = `of shape ${selected + 1} of ${shapes.length}`;
+  const which = `shape ${selected + 1} of ${shapes.length}`;
   const set = (changed: Shapes) => setShapes(channel, changed);
   const change = (changed: Shape) => set(replaceShape(shapes, selected, changed));
   const { values, gradients } = shape;
@@ -119,7 +126,7 @@ function shapeItems(
     kind: "slider",
     id: `${id}/shape-${name}`,
     label,
-    name: `${label} ${which}`,
+    name: `${label} of ${which}`,
     value: shape[name],
     steps: PERCENT_STEPS,
     text: percent(shape[name]),
@@ -138,7 +145,7 @@ function shapeItems(
       kind: "window",
       id: `${id}/shape-values`,
       label: "Value",
-      name: `Value ${which}`,
+      name: `Value of ${which}`,
       value: values,
       steps: VALUE_STEPS,
       texts: percents(values),
@@ -152,7 +159,7 @@ function shapeItems(
       kind: "window",
       id: `${id}/shape-gradients`,
       label: "Gradient",
-      name: `Gradient ${which}`,
+      name: `Gradient of ${which}`,
       value: gradients,
       steps: GRADIENT_STEPS,
       texts: percents(gradients),
@@ -168,7 +175,7 @@ function shapeItems(
             kind: "slider",
             id: `${id}/shape-tip`,
             label: "Tip",
-            name: `Tip ${which}`,
+            name: `Tip of ${which}`,
             value: shape.tip,
             steps: VALUE_STEPS,
             text: percent(shape.tip),
@@ -183,7 +190,7 @@ function shapeItems(
       kind: "colour",
       id: `${id}/shape-color`,
       label: "Colour of the shape",
-      name: `Colour ${which}, times the channel's`,
+      name: `Colour of ${which}, multiplied by the channel's`,
       value: toHex(shape.color),
       palettes: SHAPE_COLORS,
       refusal,

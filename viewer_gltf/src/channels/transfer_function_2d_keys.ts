@@ -1,8 +1,13 @@
 /** The keys of the shapes of a two-dimensional transfer function. Pure. */
 import { MAX_SHAPES, type Shape } from "../bundle/transfer_2d";
 import { fromHex, toHex } from "../math/color";
-import type { PanelView, Refusal, Wish } from "../panel/controls";
-import { editedShapes, meantShape, SHAPE_NUMBERS, withNewShape } from "../panel/edit_shapes";
+import type { PanelView, Refusal, Request } from "../panel/controls";
+import {
+  editedShapes,
+  SHAPE_NUMBERS,
+  selectedShapeIndex,
+  withNewShape,
+} from "../panel/edit_shapes";
 import { type Key, key, neighbour, no, ofChannel, withChannel } from "../panel/key";
 import { nextColour } from "../panel/palettes";
 import { REFUSED } from "../state/refusals";
@@ -10,13 +15,13 @@ import { removeShape, replaceShape } from "../state/transfer_shapes";
 import type { ChannelState } from "../state/viewer_state";
 import { refusalOf, setShapes } from "./transfer_function_2d";
 
-/** One step of a shape's number, 0..1: five cells of its table. */
+/** Step of a shape's number, 0..1: five columns of the table. */
 const SHAPE_STEP = 5 / 255;
 
 const NO_SHAPE = no(REFUSED.shape);
 
 function addShapeOf(kind: Shape["kind"]) {
-  return (channel: ChannelState): Wish | Refusal => {
+  return (channel: ChannelState): Request | Refusal => {
     const reason = refusalOf(channel);
     if (reason !== "") return no(reason);
     const shapes = withNewShape(channel, kind);
@@ -26,7 +31,7 @@ function addShapeOf(kind: Shape["kind"]) {
   };
 }
 
-/** A key of the meant shape of the meant channel; `shape` null: without it. */
+/** Returns a key that changes the selected shape of the chosen channel; `to` returns null to remove it. */
 function ofShape(
   name: string,
   label: string,
@@ -37,7 +42,7 @@ function ofShape(
       const reason = refusalOf(channel);
       if (reason !== "") return no(reason);
       const shapes = editedShapes(channel);
-      const index = meantShape(context.view.shape, shapes);
+      const index = selectedShapeIndex(context.view.shape, shapes);
       if (index === null) return NO_SHAPE;
       const changed = to(shapes[index], context.view);
       return setShapes(
@@ -57,19 +62,19 @@ function changeNumber(steps: number) {
 }
 
 export const SHAPE_KEYS: readonly Key[] = [
-  ofChannel("H", "Plane of value and gradient: open or close", ({ id }) => ({
+  ofChannel("H", "Joint histogram of value and gradient: open or close", ({ id }) => ({
     panel: "histogram",
     channel: id,
   })),
   ofChannel("Q", "Add a rectangle", addShapeOf("rectangle")),
   ofChannel("Y", "Add a triangle", addShapeOf("triangle")),
-  key("J", "Next shape: the keys below mean it", (context) =>
+  key("J", "Next shape, which the keys below change", (context) =>
     withChannel(context, (channel) => {
       const shapes = editedShapes(channel);
-      const present = meantShape(context.view.shape, shapes);
+      const present = selectedShapeIndex(context.view.shape, shapes);
       if (present === null) return NO_SHAPE;
       const { length: count } = shapes;
-      return { panel: "shape", shape: { index: (present + 1) % count, count }, grasp: null };
+      return { panel: "shape", shape: { index: (present + 1) % count, count }, grab: null };
     }),
   ),
   key(";", "Next number of the shape", ({ view }) => {
@@ -77,8 +82,8 @@ export const SHAPE_KEYS: readonly Key[] = [
     const id = neighbour(ids, view.shapeNumber ?? ids[0], 1);
     return id === null ? NO_SHAPE : { panel: "shape-number", id };
   }),
-  ofShape("<", "Less of it", changeNumber(-1)),
-  ofShape(">", "More of it", changeNumber(1)),
+  ofShape("<", "Decrease that number", changeNumber(-1)),
+  ofShape(">", "Increase that number", changeNumber(1)),
   ofShape("*", "Next colour of the shape", (shape) => ({
     ...shape,
     color: fromHex(nextColour(toHex(shape.color))),

@@ -11,7 +11,8 @@ const SHAPE = makeShape("triangle", { value: 0.5, gradient: 0.5 });
 const HISTOGRAM = writeKtx2([256, 64, 1], 1, [new Uint8Array(256 * 64)]).file;
 
 function refOf(path: string, bytes: Uint8Array | string): FileRef {
-  return { path, bytes: new Blob([bytes as string]).size, sha256: "" }; // no secure context
+  // without a secure context, hashes are not checked
+  return { path, bytes: new Blob([bytes as string]).size, sha256: "" };
 }
 
 function textOf(functions: object): string {
@@ -19,18 +20,18 @@ function textOf(functions: object): string {
   return JSON.stringify({ gradient_max: 0.4, functions, histogram, most: 3 });
 }
 
-describe("what a bundle has of two-dimensional transfer functions", () => {
-  const asked: string[] = [];
+describe("the two-dimensional transfer functions of a bundle", () => {
+  const requested: string[] = [];
   const faults: unknown[] = [];
   const learned: Transfer2d[] = [];
   let text = "";
 
   beforeEach(() => {
-    for (const list of [asked, faults, learned]) list.length = 0;
+    for (const list of [requested, faults, learned]) list.length = 0;
     vi.stubGlobal("Worker", WorkerStub);
     vi.stubGlobal("fetch", async (address: URL | string) => {
       const path = String(address).slice(BASE.length);
-      asked.push(path);
+      requested.push(path);
       return new Response(path === "histogram2d.ktx2" ? HISTOGRAM : text);
     });
   });
@@ -50,25 +51,25 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
     );
   }
 
-  const come = (set: TransferFunctions2dLoader) => vi.waitUntil(() => !set.isLoading);
+  const loaded = (set: TransferFunctions2dLoader) => vi.waitUntil(() => !set.isLoading);
 
-  it("is fetched once, the histogram only when it is to be seen", async () => {
+  it("are fetched once, and the histogram only when it is shown", async () => {
     const set = loader({ soft: [SHAPE] });
     for (let i = 0; i < 3; i++) set.want("c0");
     expect(set.isLoading).toBe(true);
-    await come(set);
+    await loaded(set);
     set.want("c0");
-    expect(asked).toEqual(["transfer2d.json"]);
+    expect(requested).toEqual(["transfer2d.json"]);
     expect(learned).toEqual([{ gradient_max: 0.4, functions: { soft: [SHAPE] } }]);
     for (let i = 0; i < 3; i++) expect(set.histogram("c0")).toBeNull();
-    await come(set);
+    await loaded(set);
     expect(set.histogram("c0")?.cells).toHaveLength(256 * 64);
-    expect(asked).toEqual(["transfer2d.json", "histogram2d.ktx2"]);
+    expect(requested).toEqual(["transfer2d.json", "histogram2d.ktx2"]);
     expect(JSON.stringify(set.histogram("c0"))).toBe('"histogram2d.ktx2"');
     expect(faults).toEqual([]);
   });
 
-  it("reports a fault once, and is asked for again when that is wanted", async () => {
+  it("report a fault once, and are fetched again on request", async () => {
     const wrong = [
       [{ ...SHAPE, values: [0.6, 0.4] }, "functions.soft.0: values are (0.6, 0.4)"],
       [{ ...SHAPE, opacity: 2 }, "functions.soft.0.opacity"],
@@ -77,18 +78,18 @@ describe("what a bundle has of two-dimensional transfer functions", () => {
       faults.length = 0;
       const set = loader({ soft: [shape] });
       set.want("c0");
-      await come(set);
+      await loaded(set);
       set.want("c0");
-      await come(set);
+      await loaded(set);
       expect(faults.map(String)).toEqual([expect.stringContaining(`transfer2d.json: ${words}`)]);
       set.retryFailed();
       set.want("c0");
-      await come(set);
+      await loaded(set);
       expect(faults).toHaveLength(2);
     }
     const many = loader({ soft: Array.from({ length: 33 }, () => SHAPE) });
     many.want("c0");
-    await come(many);
+    await loaded(many);
     expect(String(faults.at(-1))).toContain("expected at most 32 shapes, found 33");
     expect(learned).toEqual([]);
   });

@@ -1,6 +1,6 @@
 /**
- * What a bundle has of two-dimensional transfer functions: shapes are fetched when one is to be drawn
- * or edited, the histogram when it is to be seen.
+ * Loads the two-dimensional transfer functions of a bundle. The shapes are fetched when one is
+ * drawn or edited, the histogram when it is shown.
  */
 
 import type { FileRef } from "../bundle/generated/bundle";
@@ -12,8 +12,8 @@ import type { Histogram } from "../panel/controls";
 export class TransferFunctions2dLoader {
   private readonly refs = new Map<string, FileRef>();
   private readonly histograms = new Map<string, Histogram>();
-  private readonly underWay = new Set<string>();
-  /** After a fault, which was reported, nothing is tried again until that is asked for. */
+  private readonly loading = new Set<string>();
+  /** Keys that failed, which was reported. They are not tried again until `retryFailed`. */
   private readonly failed = new Set<string>();
 
   constructor(
@@ -24,10 +24,10 @@ export class TransferFunctions2dLoader {
   ) {}
 
   get isLoading(): boolean {
-    return this.underWay.size > 0;
+    return this.loading.size > 0;
   }
 
-  /** Fetch a channel's functions, unless that was done. */
+  /** Fetches the functions of a channel, unless that has been done. */
   want(channel: string): void {
     if (this.refs.has(channel)) return;
     void this.once(channel, async () => {
@@ -38,7 +38,7 @@ export class TransferFunctions2dLoader {
     });
   }
 
-  /** null: it has not come; then it is fetched. */
+  /** Returns the histogram; null: not loaded yet, so it is fetched. */
   histogram(channel: string): Histogram | null {
     const found = this.histograms.get(channel);
     if (found !== undefined) return found;
@@ -63,15 +63,15 @@ export class TransferFunctions2dLoader {
   }
 
   private async once(key: string, load: () => Promise<void>): Promise<void> {
-    if (this.underWay.has(key) || this.failed.has(key)) return;
-    this.underWay.add(key);
+    if (this.loading.has(key) || this.failed.has(key)) return;
+    this.loading.add(key);
     try {
       await load();
     } catch (error) {
       this.failed.add(key);
       this.onError(error);
     } finally {
-      this.underWay.delete(key);
+      this.loading.delete(key);
       this.onChange();
     }
   }

@@ -1,7 +1,7 @@
-/** Ask for a file of the user's. Must be called from within a click or a key. */
+/** Asks the user for a file. Must be called within a click or a key. */
 import { element } from "./element";
 
-/** @param accept suffixes, as an input's `accept` has them. @returns null: none was chosen */
+/** @param accept suffixes, as in an input's `accept` @returns null: no file was chosen */
 export function chooseFile(accept: string): Promise<File | null> {
   const input = element("input", { type: "file", accept });
   return new Promise((resolve) => {

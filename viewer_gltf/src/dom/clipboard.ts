@@ -1,6 +1,6 @@
-/** Put a text into the clipboard. False where the browser has none for this page, or refuses. */
+/** Copies a text to the clipboard. Returns false if the page has no clipboard, or the browser refuses. */
 export async function copyText(text: string): Promise<boolean> {
-  // Outside a secure address there is no clipboard, in spite of the types.
+  // An insecure address has no clipboard, although the types say so.
   const clipboard: Clipboard | undefined = navigator.clipboard;
   if (clipboard === undefined) return false;
   try {

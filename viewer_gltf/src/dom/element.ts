@@ -1,4 +1,4 @@
-/** Make an element with its properties, `data-` attributes and children. */
+/** Makes an element with its properties, `data-` attributes and children. */
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   properties: Partial<HTMLElementTagNameMap[K]> = {},
@@ -11,14 +11,17 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** Write a text only if it differs: what is written anew is read out anew, and laid out anew. */
+/**
+ * Sets a text only if it differs. Otherwise the browser would lay it out again and a screen reader
+ * would read it again.
+ */
 export function setText(target: HTMLElement, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }
 
 /**
- * Make these the children, in this order. Those that are in place are not touched, so that they keep
- * focus and scroll.
+ * Sets the children of an element, in order. Children that are in place already are not touched,
+ * and keep focus and scroll position.
  */
 export function arrange(parent: HTMLElement, children: readonly HTMLElement[]): void {
   const wanted = new Set<Element>(children);

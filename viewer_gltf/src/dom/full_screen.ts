@@ -1,4 +1,4 @@
-/** The whole page on the full screen, where the browser can: iPhones and frames without leave can't. */
+/** The page on the full screen. iPhones and frames without permission do not support it. */
 
 export function hasFullScreen(): boolean {
   return document.fullscreenEnabled === true;
@@ -8,7 +8,7 @@ export function isFullScreen(): boolean {
   return document.fullscreenElement !== null;
 }
 
-/** Must be called from within a click or a key. Resolves to whether the browser did it. */
+/** Must be called within a click or a key. Resolves to whether the browser did it. */
 export async function toggleFullScreen(): Promise<boolean> {
   if (!hasFullScreen()) return false;
   try {

@@ -1,2 +1,2 @@
-/** Whether fingers point on this device, where a mouse does elsewhere. */
+/** Returns whether the main pointer of this device is a finger. */
 export const isTouch = (): boolean => matchMedia("(pointer: coarse)").matches;

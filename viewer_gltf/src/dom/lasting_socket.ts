@@ -1,6 +1,6 @@
-/** A websocket that connects again whenever the connection is lost. */
+/** A websocket that reconnects after each loss of the connection. */
 
-/** Time after which a lost connection is tried again, ms: first, and at most. */
+/** Milliseconds until a lost connection is tried again: after the first loss, and at most. */
 const FIRST_MS = 500;
 const MOST_MS = 10_000;
 
@@ -11,8 +11,8 @@ export class LastingSocket {
   private isDisposed = false;
 
   /**
-   * @param onMessage is given each text; it returns whether the text is one that the page knows
-   * @param onLost the server does not answer
+   * @param onMessage receives each text; returns whether the page knows the message
+   * @param onLost called when the server does not answer
    */
   constructor(
     private readonly address: string,

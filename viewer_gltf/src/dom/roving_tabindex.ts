@@ -1,6 +1,6 @@
 /**
- * Many buttons, one stop of the Tab key: the arrows go from one to the next, in rows of `columns`
- * (the "roving tabindex" of the ARIA Authoring Practices Guide).
+ * Makes many buttons one stop of the Tab key. The arrow keys move between them, in rows of
+ * `columns` (the "roving tabindex" of the ARIA Authoring Practices Guide).
  */
 export class RovingTabindex {
   private buttons: readonly HTMLElement[] = [];
@@ -21,7 +21,7 @@ export class RovingTabindex {
     });
   }
 
-  /** @param start where Tab stops at first */
+  /** @param start index of the first button that Tab reaches */
   follow(buttons: readonly HTMLElement[], columns: number, start = 0): void {
     this.buttons = buttons;
     this.columns = columns;

@@ -1,7 +1,7 @@
-/** Hand a file to the user, as a download. */
+/** Saves a file on the user's device, as a download. */
 import { element } from "./element";
 
-/** Time for the browser to read it, ms. */
+/** Milliseconds for which the file stays available to the browser. */
 const KEPT_MS = 60_000;
 
 export function saveFile(name: string, content: Blob): void {
@@ -13,8 +13,8 @@ export function saveFile(name: string, content: Blob): void {
   setTimeout(() => URL.revokeObjectURL(href), KEPT_MS);
 }
 
-/** A name for files of a specimen: letters, digits and lines alone. */
-export function fileName(specimen: string, what: string, suffix: string): string {
+/** Returns a name for files of a specimen, from letters, digits and hyphens. */
+export function fileName(specimen: string, content: string, suffix: string): string {
   const plain = specimen.replaceAll(/[^\p{L}\p{N}]+/gu, "-").replaceAll(/^-+|-+$/g, "");
-  return `${[plain.slice(0, 60), what].filter((part) => part !== "").join("-")}.${suffix}`;
+  return `${[plain.slice(0, 60), content].filter((part) => part !== "").join("-")}.${suffix}`;
 }

@@ -1,10 +1,10 @@
-/** Texts that the browser keeps for this page: for good, or until the tab is closed. */
+/** Texts that the browser stores for this page: permanently, or until the tab is closed. */
 
 function storageOf(lasts: "for-good" | "in-tab"): Storage {
   return lasts === "in-tab" ? sessionStorage : localStorage;
 }
 
-/** null: nothing is kept, or this browser keeps nothing. */
+/** Returns a stored text; null: there is none, or this browser stores nothing. */
 export function stored(key: string, lasts: "for-good" | "in-tab" = "for-good"): string | null {
   try {
     return storageOf(lasts).getItem(key);
@@ -13,7 +13,7 @@ export function stored(key: string, lasts: "for-good" | "in-tab" = "for-good"): 
   }
 }
 
-/** A browser that keeps nothing is no fault: the next visit begins without the text. */
+/** Stores a text. If the browser stores nothing, the next visit begins without the text. */
 export function store(
   key: string,
   text: string | null,

@@ -1,4 +1,4 @@
-/** The background of the flat picture; the specimen has the same colours before all of them. */
+/** The background of the flat view. The specimen has the same colours in front of every background. */
 import type { Backdrop } from "../render/backdrop";
 import type { Room } from "../render/scene";
 import type { Theme } from "../render/theme";
@@ -12,19 +12,22 @@ export class Background {
     private readonly onChange: () => void,
   ) {}
 
-  /** @param isPlain one colour and no shadow: for cutting out, and for readers who ask for more contrast */
-  dress(theme: Theme, isPlain: boolean): void {
-    const dressIn = (backdrop: Backdrop | null) => {
+  /**
+   * @param isPlain one colour without a shadow, for cutting out the specimen and for users who need
+   * more contrast
+   */
+  setTheme(theme: Theme, isPlain: boolean): void {
+    const use = (backdrop: Backdrop | null) => {
       this.room.dress(theme, backdrop);
       this.onChange();
     };
-    dressIn(null);
+    use(null);
     const fetched = isPlain ? Promise.resolve() : import("../render/backdrop");
     const settled: Promise<void> = fetched.then(
       (part) => {
-        if (part && this.settled === settled) dressIn(new part.Backdrop());
+        if (part && this.settled === settled) use(new part.Backdrop());
       },
-      () => undefined, // a picture without it is as true
+      () => undefined, // the view is correct without the background
     );
     this.settled = settled;
   }

@@ -1,15 +1,15 @@
-/** The canvas that the viewer draws on: its size, the screen's own stereo, and a graphics context that is lost. */
+/** The canvas that the viewer draws on: its size, and its width in side-by-side stereo. */
 import { WebGLRenderer } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
 import { StageSize } from "../render/canvas_size";
 import { pixelShare } from "../render/pixel_share";
 
-/** Most device pixels to a CSS pixel: a phone's third one costs more than it shows. */
+/** Largest number of device pixels per CSS pixel. A third one on a phone costs more than it shows. */
 const MAX_PIXEL_RATIO = 2;
 
 export function makeRenderer(stage: HTMLElement): WebGLRenderer {
   const renderer = new WebGLRenderer({
-    antialias: false, // the picture's own target is multisampled
+    antialias: false, // the frame has a multisampled target of its own
     depth: false,
     powerPreference: "high-performance",
   });
@@ -31,7 +31,7 @@ export class CanvasFit {
     this.fit();
   }
 
-  /** Brings the canvas to the size of the stage. */
+  /** Sets the size of the canvas to that of the stage. */
   fit(): void {
     const { renderer, stage } = this;
     if (renderer.xr.isPresenting) return;

@@ -1,18 +1,18 @@
-/** Carries out commands: those of the parts, the host's own, and those that move the specimen or the camera. */
-import { CANT, type Command, STAYS } from "../state/commands";
+/** Runs commands: those of the parts, of the host, and those that move the specimen or the camera. */
+import { type Command, UNAVAILABLE, UNCHANGED_VIEW } from "../state/commands";
 import type { CommandTable, PartHost } from "./part";
 import type { Parts } from "./parts";
 import type { Taps } from "./taps";
 
-/** Commands before which the place from which the specimen is seen is a step of its own. */
-const ENDS_A_LOOK: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
+/** Commands before which an earlier move of the camera becomes a step of its own. */
+const CAMERA_COMMANDS: ReadonlySet<Command> = new Set(["front", "side", "top", "reset"]);
 const NOTHING_AHEAD = "Nothing is in the middle of the view.";
 
 export type CommandOptions = Readonly<{
   host: PartHost;
   parts: Parts;
   taps: Taps;
-  /** Asks again for all that has failed. */
+  /** Requests all files again that failed to load. */
   retry: () => void;
 }>;
 
@@ -20,28 +20,28 @@ export class Commands {
   constructor(private readonly options: CommandOptions) {}
 
   /**
-   * Returns whether the command could be carried out.
+   * Runs a command. Returns whether that was possible.
    *
-   * @param isOnPage false: by the panel in the room
+   * @param isOnPage false: the panel in the scene has sent the command
    */
   run(command: Command, isOnPage: boolean): boolean {
     const { host, parts } = this.options;
     const { state, viewpoint } = host;
     const before = host.isInRoom ? null : viewpoint.lookNow;
     if (parts.run(command, isOnPage)) return true;
-    if (ENDS_A_LOOK.has(command)) host.undo.noteLook();
-    if (!this.carryOut(command)) {
-      host.announce(CANT);
+    if (CAMERA_COMMANDS.has(command)) host.undo.noteCameraMove();
+    if (!this.runOwn(command)) {
+      host.announce(UNAVAILABLE);
       return false;
     }
-    const stays = STAYS[command];
+    const unchanged = UNCHANGED_VIEW[command];
     const isSame = host.state === state && before !== null && viewpoint.isAt(before);
-    if (isSame && stays !== undefined) host.announce(stays);
+    if (isSame && unchanged !== undefined) host.announce(unchanged);
     host.display.redraw();
     return true;
   }
 
-  private carryOut(command: Command): boolean {
+  private runOwn(command: Command): boolean {
     const own = this.own[command];
     if (own !== undefined) return own() !== false;
     const { host } = this.options;

@@ -1,4 +1,7 @@
-/** The interface between the host and the parts that draw the specimen: by surfaces, volumes, or paths of light. */
+/**
+ * The interface between the host and the parts that draw the specimen: as surfaces, volumes, or by
+ * path tracing.
+ */
 import type { Camera } from "three";
 import type { Vec3 } from "../math/vec3";
 import type { BlendedScene } from "../render/blend_material";
@@ -7,54 +10,54 @@ import type { FocusState } from "../state/focus_tiles";
 import type { Progress } from "../state/overview_progress";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 
-/** Screen-space error, in pixels, down to which surfaces are refined where frames come in time. */
+/** Largest error of surfaces on screen, in pixels, if frames are in time. */
 export const ERROR_TARGET_PX = 2;
 
-/** Which tiles the gaze makes volumes of, and which volumes may come. */
+/** The tiles that the gaze shows as volumes, and the volumes that may be loaded. */
 export type Focus = Readonly<{
   focusTiles: FocusState;
   /** Whether the gaze has rested, so that finer levels may be fetched. */
   mayRefine: boolean;
-  /** Whether all tiles have their first picture: volumes come after it. */
+  /** Whether the overview of all tiles is loaded. Volumes are loaded after it. */
   hasOverview: boolean;
 }>;
 
-/** The values that a form is given for each eye. */
+/** View of one eye for streaming. */
 export type StreamView = Readonly<{
   camera: Camera;
   width_px: number;
   height_px: number;
-  /** Largest error on screen. */
+  /** Largest error on screen, in pixels. */
   error_px: number;
 }>;
 
 /** A way to draw the specimen. */
 export interface Form {
-  /** How far the first picture of all tiles has come. */
+  /** Loading progress of the overview of all tiles. */
   readonly overview?: Progress;
-  /** Whether all tiles show, in the first channel. */
+  /** Whether all tiles of the first channel are shown. */
   readonly hasFirst?: boolean;
-  /** Whether a piece of the frame is missing, not merely coarse. */
+  /** Whether a part of the frame is missing, and not only coarse. */
   readonly isIncomplete?: boolean;
   /** Triangles on screen. */
   readonly triangles?: number;
-  /** Surfaces that are not opaque now. */
+  /** Surfaces that are translucent now. */
   readonly panes?: readonly BlendedScene[];
   readonly marched?: MarchedVolumes;
   readonly traced?: TracedVolumes;
   /**
-   * Outermost points (um, world) of what shows of a channel. null: not known yet; undefined: the channel is not drawn
-   * in this way now.
+   * Returns the outermost points (um, world) of the visible part of a channel. null: not known yet;
+   * undefined: this form does not draw the channel now.
    */
   outline?(state: ViewerState, channel: ChannelState): readonly Vec3[] | null | undefined;
-  /** Draws volumes of at most so many voxels along a tile's edge, from the next `sync` on. */
+  /** Limits volumes to a number of voxels along a tile's edge, from the next `sync` on. */
   limitEdge?(edge: number): void;
-  /** The graphics context is gone, and the texels with it. */
+  /** Drops the textures after the graphics context was lost. */
   forget?(): void;
-  /** Goes on with what fades, by so long. Returns whether anything still fades. */
+  /** Advances fades by a time. Returns whether anything still fades. */
   fade?(fade_s: number): boolean;
-  /** Fetches what the eye needs, and drops what it does not. */
+  /** Fetches the files that the view needs, and drops those that it does not need. */
   stream?(view: StreamView): void;
-  /** Called before each frame, when the volumes have faded as far as it shows. */
+  /** Called before each frame, after the volumes have faded. */
   dress?(): void;
 }

@@ -7,7 +7,7 @@ import { Forms } from "./forms";
 
 const MANIFEST = sampleManifest(2);
 const OPENING = initialState(MANIFEST);
-/** Both channels show, and have surfaces: one without a surface may lie anywhere in the specimen. */
+/** The two channels are shown and have surfaces. A channel without a surface would fill the whole specimen. */
 const STATE = {
   ...OPENING,
   channels: OPENING.channels.map((each) => ({ ...each, shown: true, hasSurface: true })),
@@ -18,7 +18,7 @@ const progress = (done: number, total: number) => ({
 });
 
 describe("the forms of a specimen", () => {
-  it("have an overview once each has its own, and tell of it once", () => {
+  it("have an overview once each form has its own, and report that once", () => {
     expect(formsOf(progress(1, 2), {}).hasJustBegun()).toBe(false);
     const whole = formsOf(progress(2, 2), {}, progress(3, 3));
     expect(whole.overview).toEqual({ done: 5, total: 5, isComplete: true });
@@ -26,7 +26,7 @@ describe("the forms of a specimen", () => {
     expect(whole.hasOverview).toBe(true);
   });
 
-  it("are complete where there are none", () => {
+  it("are complete if there are none", () => {
     const none = formsOf();
     expect([none.overview.isComplete, none.isIncomplete, none.marched]).toEqual([
       true,
@@ -37,7 +37,7 @@ describe("the forms of a specimen", () => {
     expect(none.shownPoints(STATE)).toEqual([]);
   });
 
-  it("lie where each channel's own form has it, and nowhere known until that has come", () => {
+  it("have the outline of each channel's own form, and none until it is known", () => {
     const point: Vec3 = [1, -2, 3];
     const [first] = STATE.channels;
     const ofFirst: Form = { outline: (_, { id }) => (id === first.id ? [point] : undefined) };
@@ -46,7 +46,7 @@ describe("the forms of a specimen", () => {
     expect(formsOf(ofFirst, late).shownPoints(STATE)).toBeNull();
   });
 
-  it("are the box of a channel without a surface, and what its volume shows while it is built", () => {
+  it("fill the box for a channel without a surface, but have the outline of its volume during the build", () => {
     const point: Vec3 = [1, -2, 3];
     const channels = STATE.channels.map((each) => ({ ...each, hasSurface: false }));
     const built = { ...STATE, channels };
@@ -58,7 +58,7 @@ describe("the forms of a specimen", () => {
     expect(others.every((each) => `${each}` === `${point}`)).toBe(true);
   });
 
-  it("go on with all fades, also after one that has not ended", () => {
+  it("advance all fades, also after one that has not ended", () => {
     let count = 0;
     const fading = (isFading: boolean): Form => ({
       fade: () => {

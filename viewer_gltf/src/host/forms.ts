@@ -1,4 +1,4 @@
-/** All ways in which parts draw the specimen: each question goes to those that can answer it. */
+/** All forms in which parts draw the specimen. Each question goes to the forms that can answer it. */
 import type { Manifest } from "../bundle/generated/bundle";
 import { cornersOf } from "../math/box";
 import { behindPlane, keptPoints } from "../math/clip";
@@ -13,12 +13,12 @@ import type { ChannelState, ViewerState } from "../state/viewer_state";
 import type { Form, StreamView } from "./form";
 
 export class Forms {
-  /** Whether all tiles have their first picture. */
+  /** Whether the overview of all tiles is loaded. */
   hasOverview = false;
-  /** Whether it is known for good where all lies that shows at the opening. */
+  /** Whether the outline of the opening view is final. */
   private isOutlined = false;
-  /** The parts of the state that `shownPoints` has answered for. */
-  private asked: readonly unknown[] = [];
+  /** The values for which `shownPoints` has last returned points. */
+  private answeredFor: readonly unknown[] = [];
 
   constructor(
     private readonly parts: Readonly<{ forms: readonly Form[] }>,
@@ -36,7 +36,7 @@ export class Forms {
     return { done: sum("done"), total: sum("total"), isComplete };
   }
 
-  /** Whether all tiles show, in the first channel. */
+  /** Whether all tiles of the first channel are shown. */
   get hasFirst(): boolean {
     return this.all.every(({ hasFirst = true }) => hasFirst);
   }
@@ -57,20 +57,20 @@ export class Forms {
     return this.all.flatMap(({ traced = [] }) => traced)[0] ?? null;
   }
 
-  /** Whether a view at rest still gathers samples of light. */
+  /** Whether an unchanged view still gathers samples of light. */
   get isGathering(): boolean {
     return this.traced?.isGathering ?? false;
   }
 
-  /** Draws volumes of at most so many voxels along a tile's edge, from the next `sync` on. */
+  /** Limits volumes to a number of voxels along a tile's edge, from the next `sync` on. */
   limitEdge(edge: number): void {
     for (const form of this.all) form.limitEdge?.(edge);
   }
 
   /**
-   * Returns the outermost points (um, world) of all that shows and is not cut away, as far as they are known.
-   * Returns null if none are known, or if nothing has improved since the last call. A channel without a surface may
-   * show in all of the specimen.
+   * Returns the outermost points (um, world) of everything that is shown and not cut away, as far
+   * as they are known. Returns null if none are known, or if nothing has improved since the last
+   * call. A channel without a surface may fill the whole specimen.
    */
   outline(state: ViewerState): readonly Vec3[] | null {
     if (this.isOutlined) return null;
@@ -84,20 +84,21 @@ export class Forms {
   }
 
   /**
-   * Returns points (um, world) whose box holds what is shown now; no points if nothing is. Returns null if they are not
-   * known yet, or if nothing has changed since the last call.
+   * Returns points (um, world) whose box contains everything that is shown now; no points if
+   * nothing is shown. Returns null if they are not known yet, or if nothing has changed since the
+   * last call.
    */
   shownPoints(state: ViewerState): readonly Vec3[] | null {
     const { channels, mode, isolated, clip } = state;
-    const asked = [channels, mode, isolated, clip, this.hasOverview];
-    if (asked.every((each, i) => each === this.asked[i])) return null;
+    const inputs = [channels, mode, isolated, clip, this.hasOverview];
+    if (inputs.every((each, i) => each === this.answeredFor[i])) return null;
     const points = this.pointsOf(state);
     if (points === null) return null;
-    this.asked = asked;
+    this.answeredFor = inputs;
     return keptPoints(points, clip, shownBox(this.manifest, isolated));
   }
 
-  /** Outermost points (um, world) of all channels that are shown, uncut; null: not known yet. */
+  /** Returns the outermost points (um, world) of all shown channels, uncut; null: not known yet. */
   private pointsOf(state: ViewerState): readonly Vec3[] | null {
     const points: Vec3[] = [];
     for (const channel of state.channels.filter(({ shown }) => shown)) {
@@ -115,17 +116,17 @@ export class Forms {
       const points = form.outline?.(state, channel);
       if (points !== undefined) return points;
     }
-    return []; // no part draws it
+    return []; // no part draws the channel
   }
 
-  /** True once, when the overview has come: then `sync` again. */
+  /** Returns true once, when the overview is complete. The caller then calls `sync` again. */
   hasJustBegun(): boolean {
     if (this.hasOverview || !this.overview.isComplete) return false;
     this.hasOverview = true;
     return true;
   }
 
-  /** Goes on with what fades, by so long. Returns whether anything still fades. */
+  /** Advances fades by a time. Returns whether anything still fades. */
   fade(fade_s: number): boolean {
     const fading = this.all.map((form) => form.fade?.(fade_s) ?? false);
     return fading.includes(true);
@@ -137,12 +138,12 @@ export class Forms {
     return (traced?.isShown ? traced : marched)?.shown() ?? [];
   }
 
-  /** Whether a piece of the frame is missing, not merely coarse. */
+  /** Whether a part of the frame is missing, and not only coarse. */
   get isIncomplete(): boolean {
     return !this.overview.isComplete || this.all.some(({ isIncomplete = false }) => isIncomplete);
   }
 
-  /** The graphics context is gone, and the texels with it. */
+  /** Drops the textures after the graphics context was lost. */
   forget(): void {
     for (const form of this.all) form.forget?.();
   }
@@ -152,16 +153,16 @@ export class Forms {
     for (const form of this.all) form.dress?.();
   }
 
-  /** Streams what the eye needs, down to an error on screen. */
+  /** Streams files for a view, down to an error on screen. */
   stream(view: StreamView): void {
     for (const form of this.all) form.stream?.(view);
   }
 }
 
-/** Additions widen the view as far as this beside the specimen, in its longest edges. */
+/** Largest distance that additions widen the view beside the specimen, in its longest edges. */
 const WIDEST = 0.5;
 
-/** Corners of the box round what a layer adds, um, world, as far as it lies beside the specimen. */
+/** Returns the corners of the box around the additions of a layer (um, world), limited to WIDEST. */
 function addedCorners({ additions, specimen: { bounds_um } }: Manifest): readonly Vec3[] {
   if (additions === undefined) return [];
   const longest = Math.max(...bounds_um.max.map((v, k) => v - bounds_um.min[k]));

@@ -1,4 +1,4 @@
-/** Draws frames, only when something has changed, each as well as its budget allows. */
+/** Draws frames only when something has changed, each as fine as its time budget allows. */
 import type { Camera } from "three";
 import { Pace } from "../render/pacing/frame_budget";
 import { RestPace } from "../render/pacing/redraw_at_rest";
@@ -12,21 +12,24 @@ import { Pulse } from "./pulse";
 import { SceneFrame, type SceneFrameOptions } from "./scene_frame";
 import { Studio } from "./studio";
 
-/** Longest time that a frame counts, s: nobody looked at a page that slept. */
+/** Largest time step of a frame, s. A page that slept has shown nothing meanwhile. */
 const LONGEST_FRAME_S = 0.1;
 /**
- * The same for fades and notices, after a frame that was drawn and took as long: on a slow device, too, they end
- * when they shall.
+ * Largest time step of fades and notices, s, after a drawn frame that took as long. They end in
+ * time even on a slow device.
  */
 const LONGEST_FADE_S = 1;
-/** Pixels of the volumes, as a share of the picture's along an edge: with fewer they are blocks. */
+/**
+ * Smallest share of the frame's pixels along an edge at which the specimen may turn by itself.
+ * Volumes with fewer pixels look like blocks.
+ */
 const MIN_TURNING = 0.5;
 
 export type FrameOptions = SceneFrameOptions &
   Readonly<{
-    /** The overview has loaded, so volumes may be shown. */
+    /** Called when the overview is loaded, so that volumes may be shown. */
     onOverview: () => void;
-    /** Called after every frame drawn. */
+    /** Called after every frame. */
     onFrame: () => void;
   }>;
 
@@ -41,13 +44,13 @@ export class FrameLoop {
   private readonly gathering: GatherPace;
   private readonly resting: RestPace;
   private last_ms = 0;
-  /** Whether what is looked at, or from where, has changed since the last frame. */
+  /** Whether the scene or the camera has changed since the last frame. */
   private isStale = true;
-  /** Whether something has come for the picture since the last frame, which may be at rest. */
-  private hasCome = false;
-  /** Whether the frame before was one of a moving picture, drawn in its budget. */
+  /** Whether something has been loaded since the last frame, which an unchanged view has to show. */
+  private hasNews = false;
+  /** Whether the previous frame was part of a motion, and was drawn in its budget. */
   private wasMoving = false;
-  /** Whether the last turn of the page drew a frame. */
+  /** Whether the last turn of the loop drew a frame. */
   private hasDrawn = false;
   private waiting: (() => void)[] = [];
   private drawn: (() => void)[] = [];
@@ -78,15 +81,15 @@ export class FrameLoop {
     this.pulse.stop();
   }
 
-  /** The view or the specimen in it has changed: the picture has to follow at once. */
+  /** Draws again at once, because the view or the specimen has changed. */
   redraw(): void {
     this.isStale = true;
     this.pulse.wake();
   }
 
-  /** Something has come for the picture, which may be at rest. */
+  /** Draws again soon, because something was loaded; the view may be unchanged. */
   requestFrame(): void {
-    this.hasCome = true;
+    this.hasNews = true;
     this.pulse.wake();
   }
 
@@ -94,22 +97,22 @@ export class FrameLoop {
     this.pace.setLevel(level);
   }
 
-  /** Between the last two frames of a moving picture, smoothed. */
+  /** Smoothed time between two frames of a motion, ms. */
   get frame_ms(): number {
     return this.pace.frame_ms;
   }
 
-  /** Whether the picture moves now, and its frames are late. */
+  /** Whether the view is moving now, and its frames are late. */
   get isLate(): boolean {
     return this.pace.isLate;
   }
 
-  /** The settings of the last frame. */
+  /** Settings of the last frame. */
   get settings(): QualitySettings {
     return this.pace.settings;
   }
 
-  /** Resolves when nothing loads any more and the picture shows all of it. */
+  /** Resolves when nothing is loading and the view shows everything. */
   settled(): Promise<void> {
     this.pulse.wake();
     return new Promise((resolve) => this.waiting.push(resolve));
@@ -120,13 +123,13 @@ export class FrameLoop {
     return new Promise((resolve) => this.drawn.push(resolve));
   }
 
-  /** The graphics context is gone, and the times that were asked of it. */
+  /** Drops the GPU timers after the graphics context was lost. */
   forget(): void {
     this.gathering.forget();
     this.resting.forget();
   }
 
-  /** There is a graphics context again. */
+  /** Makes new GPU timers after the graphics context was restored. */
   renew(): void {
     this.pace = new Pace(this.gl);
   }
@@ -135,7 +138,7 @@ export class FrameLoop {
     return this.options.shown().parts.isLoading;
   }
 
-  /** Draws a frame if one is due. Returns whether nothing more is to be drawn until something changes. */
+  /** Draws a frame if one is due. Returns whether nothing has to be drawn until something changes. */
   private frame(time_ms: number): boolean {
     const { renderer } = this.options;
     if (renderer.getContext().isContextLost()) return true; // there is nothing to draw on
@@ -147,26 +150,27 @@ export class FrameLoop {
     const passed_s = Math.max(0, interval_ms / 1000);
     const { camera, isStereo, isChanging, isFading } = this.advance(passed_s);
     const isGathering = forms.isGathering && this.gathering.isReady(time_ms);
-    const isDue = this.resting.isDue(time_ms) && this.hasCome;
+    const isDue = this.resting.isDue(time_ms) && this.hasNews;
     const isMoving = isStereo || this.isStale;
-    // a picture that came to rest is drawn once more, as well as can be
+    // after a motion, one more frame is drawn in full quality
     const isWanted = isMoving || this.wasMoving || isGathering || isDue;
-    // "High" and "low" are alike in all frames
+    // the levels "high" and "low" are the same in all frames
     const canGather = this.options.shown().state.quality === "auto" && picture.canGather;
     const gathers = !isWanted && canGather && this.resting.isDue(time_ms);
-    // someone waits: what is missing is looked for, and a picture that shows all is not drawn again
+    // a caller waits for a complete view: missing files are streamed, and a complete view is not
+    // drawn again
     const isAwaited = this.waiting.length > 0;
-    if (!isWanted && !gathers && !wasLoading && !this.hasCome && !isAwaited) {
+    if (!isWanted && !gathers && !wasLoading && !this.hasNews && !isAwaited) {
       return !canGather && !forms.isGathering;
     }
     const settings = this.begin(isMoving, interval_ms);
     this.stream(camera, settings);
     if (isWanted || gathers) {
       this.isStale = isChanging;
-      this.hasCome = isFading;
+      this.hasNews = isFading;
       forms.dress();
       const { passes } = this.gathering;
-      // late frames give up smooth edges first
+      // late frames first lose their smooth edges
       const isSmooth = !isMoving || settings.steps >= MAX_STEPS;
       this.scene.draw({ resolution: settings.resolution, isMoving, passes, isSmooth, gathers });
       if (isGathering) this.gathering.submit(time_ms);
@@ -178,14 +182,14 @@ export class FrameLoop {
     }
     this.pace.end();
     this.wasMoving = isMoving;
-    const isAtRest = isStereo || (!isMoving && !this.hasCome);
+    const isAtRest = isStereo || (!isMoving && !this.hasNews);
     if (isAwaited && !this.isLoading && !this.isStale && isAtRest) {
       for (const resolve of this.waiting.splice(0)) resolve();
     }
     return false;
   }
 
-  /** Poses the eyes, and goes on with what moves and with what fades. */
+  /** Poses the eyes, and advances motions and fades. */
   private advance(passed_s: number) {
     const { onOverview } = this.options;
     const { forms, stereo, viewpoint } = this.options.shown();
@@ -202,7 +206,7 @@ export class FrameLoop {
     }
     const { isChanging, isFading } = this.scene.advance(dt_s, fade_s);
     if (isChanging) this.isStale = true;
-    if (isFading) this.hasCome = true;
+    if (isFading) this.hasNews = true;
     return { camera, isStereo: inRoom !== null, isChanging, isFading };
   }
 
@@ -210,7 +214,7 @@ export class FrameLoop {
   private begin(isMoving: boolean, interval_ms: number): QualitySettings {
     const { stereo, viewpoint, state } = this.options.shown();
     const settings = this.pace.begin(isMoving, interval_ms, stereo.headset.rate_hz);
-    // too slow a device to turn the specimen by itself shows it at rest, as well as can be
+    // a device that is too slow to turn the specimen shows it at rest, in full quality
     if (settings.resolution < MIN_TURNING) viewpoint.navigation.stopTurning();
     this.scene.picture.marchFrame.uSteps.value = stepsOf(state) ?? settings.steps;
     this.options.hybrid.radiusShare = settings.discShare;
@@ -218,7 +222,7 @@ export class FrameLoop {
   }
 
   private stream(camera: Camera, { errorFactor }: QualitySettings): void {
-    const [eye] = this.scene.picture.eyes.all; // a headset has none before its first pose
+    const [eye] = this.scene.picture.eyes.all; // a headset has no eyes before its first pose
     if (eye === undefined) return;
     const { forms, stereo } = this.options.shown();
     const { z, w } = eye.viewport;
@@ -232,7 +236,7 @@ export class FrameLoop {
   }
 }
 
-/** Steps of the march that stands in for paths of light; null: as many as the frame's budget allows. */
+/** Returns the steps of the march that stands in for path tracing; null: as many as the budget allows. */
 function stepsOf({ mode, trace: { steps } }: ViewerState): number | null {
   return isTraced({ mode }) && steps > 0 ? Math.min(REST_STEPS, Math.ceil(steps)) : null;
 }

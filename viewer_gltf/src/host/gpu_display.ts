@@ -1,4 +1,4 @@
-/** All that draws the specimen: the scene, its contents, the eyes before it, and the loop of frames. */
+/** Everything that draws the specimen: the scene, its contents, the eyes and the frame loop. */
 import type { Object3D, WebGLRenderer } from "three";
 import type { Bundle } from "../bundle/load";
 import { ValuesHost } from "../bundle/values_host";
@@ -26,25 +26,25 @@ import { Viewpoint } from "./viewpoint";
 export type DisplayOptions = Readonly<{
   bundle: Bundle;
   renderer: WebGLRenderer;
-  /** Holds the canvas. */
+  /** Contains the canvas. */
   stage: HTMLElement;
   parts: Parts;
   state: () => ViewerState;
   dispatch: (action: Action, isStep?: boolean) => void;
   report: (error: unknown) => void;
-  stereo: Pick<StereoOptions, "layOut" | "onCommand" | "onLenses" | "onChoose">;
-  /** Brings the display and the parts to the state once more. */
+  stereo: Pick<StereoOptions, "buildPanel" | "onCommand" | "onLenses" | "onChoose">;
+  /** Updates the display and the parts to the state again. */
   follow: () => void;
-  /** Stereo has begun, or has ended. */
+  /** Called when stereo has begun or ended. */
   onStereo: () => void;
-  /** Called after every frame drawn. */
+  /** Called after every frame. */
   onFrame: () => void;
 }>;
 
 export class GpuDisplay implements Display {
   readonly renderer: WebGLRenderer;
   readonly forms: Forms;
-  /** Voxels as they were measured; null: the page's host has none. */
+  /** Voxel values as they were measured; null: the host of the page does not serve them. */
   readonly values: ValuesHost | null;
   readonly reading: Reading;
   readonly viewpoint: Viewpoint;
@@ -54,7 +54,7 @@ export class GpuDisplay implements Display {
   private readonly hybrid: Hybrid;
   private readonly loop: FrameLoop;
   private readonly canvas: CanvasFit;
-  /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
+  /** CSS pixels per inch of this screen; null: estimated from the name of the browser. */
   private perInch: number | null = null;
 
   constructor(private readonly options: DisplayOptions) {
@@ -78,7 +78,7 @@ export class GpuDisplay implements Display {
     this.canvas = new CanvasFit(renderer, stage, this.viewpoint.navigation, onChange);
   }
 
-  /** Starts to draw. The parts have been made by now. */
+  /** Starts to draw, after all parts have been made. */
   start(): void {
     const { parts, follow } = this.options;
     for (const group of parts.groups) this.room.specimen.group.add(group);
@@ -86,7 +86,7 @@ export class GpuDisplay implements Display {
     this.loop.start();
   }
 
-  /** Brings all but the parts to a state. */
+  /** Updates everything but the parts to a state. */
   sync(state: ViewerState): void {
     const { isolated, selected, quality, eyeDistance_mm, stereoStrength } = state;
     this.stereo.setEyes({
@@ -127,7 +127,7 @@ export class GpuDisplay implements Display {
     return this.loop.nextFrame();
   }
 
-  /** Resolves once every shown channel's overview is on screen. */
+  /** Resolves once the overview of every shown channel is on screen. */
   async overviewShown(): Promise<void> {
     for (;;) {
       const before = this.frames;
@@ -146,12 +146,12 @@ export class GpuDisplay implements Display {
     return { focusTiles, mayRefine, hasOverview: this.forms.hasOverview };
   }
 
-  /** The renderer of frames, whose uniforms all shaders of the scene share. */
+  /** The renderer of frames. All shaders of the scene share its uniforms. */
   get frame(): FrameRenderer {
     return this.loop.scene.picture;
   }
 
-  /** The object of the scene that holds the specimen: from um to the room. */
+  /** The scene object that contains the specimen; its matrix maps um to metres of the scene. */
   get specimen(): Object3D {
     return this.room.specimen.group;
   }
@@ -187,15 +187,15 @@ export class GpuDisplay implements Display {
     return snapshotOf({ ...drawn, state: state(), isLoading, measuredValues });
   }
 
-  /** The graphics context is gone, and with it the texels and the times that were asked of it. */
+  /** Drops the textures and timers after the graphics context was lost. */
   forget(): void {
     this.forms.forget();
     this.loop.forget();
   }
 
-  /** There is a graphics context again. */
+  /** Makes new textures and timers after the graphics context was restored. */
   renew(): void {
-    this.forms.forget(); // texels that have come since
+    this.forms.forget(); // textures that were made since the loss
     this.loop.renew();
     this.options.follow();
   }
@@ -269,7 +269,7 @@ export class GpuDisplay implements Display {
     });
   }
 
-  /** Brings the page's own screen to the stereo that is asked for. */
+  /** Switches the stereo on the page's own screen to the one in the state. */
   private followScreenStereo({ screenStereo }: ViewerState): void {
     const { stage, dispatch, report } = this.options;
     if (stage.dataset.stereo === screenStereo) return;

@@ -1,22 +1,22 @@
-/** A graphics context that the driver drops, and gives back. */
+/** Handles a graphics context that the driver drops and restores. */
 import type { Action } from "../state/actions";
 import { DROPPED } from "./faults";
 
-/** An owner of textures and buffers: `forget` drops those of a lost context, `renew` makes them again. */
-type Holder = Readonly<{ forget: () => void; renew: () => void }>;
+/** An owner of GPU objects: `forget` drops those of a lost context, `renew` makes them again. */
+type GpuOwner = Readonly<{ forget: () => void; renew: () => void }>;
 
-/** Forgets what a lost context held, and says so as long as it is lost. */
+/** Drops the objects of a lost context, and shows a notice until it is restored. */
 export function watchContext(
   canvas: HTMLCanvasElement,
-  holder: Holder,
+  owner: GpuOwner,
   dispatch: (action: Action) => void,
 ): void {
   canvas.addEventListener("webglcontextlost", () => {
     dispatch({ type: "notify", text: DROPPED });
-    holder.forget();
+    owner.forget();
   });
   canvas.addEventListener("webglcontextrestored", () => {
-    holder.renew();
+    owner.renew();
     dispatch({ type: "dismiss", texts: [DROPPED] });
   });
 }

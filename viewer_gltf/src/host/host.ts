@@ -1,11 +1,11 @@
-/** The host of the viewer's parts: the state, its history, the parts, and what draws them. */
+/** The host of the viewer's parts: the state, its history, the parts, and the display. */
 import type { Object3D, Vector2 } from "three";
 import type { Bundle } from "../bundle/load";
 import type { ValuesHost } from "../bundle/values_host";
 import type { Ray } from "../math/vec3";
 import type { Lenses } from "../panel/controls";
 import type { KeyTable } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Reading } from "../probe/probe_reader";
 import type { Theme } from "../render/theme";
 import type { Action } from "../state/actions";
@@ -97,12 +97,12 @@ export class Host implements PartHost {
     this.parts.begin();
   }
 
-  /** The view that the address asks for is open. */
+  /** Called when the view of the address is open. */
   noteOpening(): Promise<void> {
     return this.parts.afterOpening();
   }
 
-  /** The overview is on screen. */
+  /** Called when the overview is on screen. */
   noteOverview(): Promise<void> {
     return this.parts.afterOverview();
   }
@@ -114,17 +114,17 @@ export class Host implements PartHost {
     const notice = newNotice(previous, next);
     const announcement = announcementOf(previous, next, this.bundle.manifest.tiles);
     const { stereo } = this;
-    const larger = next.specimenSize_m / previous.specimenSize_m;
+    const growth = next.specimenSize_m / previous.specimenSize_m;
     if (isStep) this.undo.add(action, next);
     this.state = next;
-    if (larger !== 1) stereo.resize(larger, next);
+    if (growth !== 1) stereo.resize(growth, next);
     if (notice !== null) stereo.announce(notice);
     if (announcement !== null) this.announce(announcement);
     this.follow(previous);
     this.changed.emit(this.state);
   }
 
-  /** @param isOnPage false: by the panel in the room */
+  /** @param isOnPage false: the panel in the scene has sent the command */
   run(command: Command, isOnPage = true): boolean {
     return this.commands.run(command, isOnPage);
   }
@@ -133,8 +133,8 @@ export class Host implements PartHost {
     return this.parts.keys;
   }
 
-  get waysOn(): WaysOn {
-    return this.parts.waysOn;
+  get remedies(): Remedies {
+    return this.parts.remedies;
   }
 
   get hasStandingPart(): boolean {
@@ -194,7 +194,7 @@ export class Host implements PartHost {
     this.faults.report(error);
   }
 
-  /** Shows a notice while files wait for another try; 0 takes it away. */
+  /** Shows a notice while files wait for another attempt; 0 removes it. */
   noteWaiting(files: number): void {
     this.faults.noteWaiting(files);
   }
@@ -207,9 +207,9 @@ export class Host implements PartHost {
     return this.parts.pick(ray, ({ object }) => object !== undefined);
   }
 
-  /** Draws the background of the flat picture. */
-  dress(theme: Theme, isPlain: boolean): void {
-    this.display.background.dress(theme, isPlain);
+  /** Draws the background of the flat view. */
+  setTheme(theme: Theme, isPlain: boolean): void {
+    this.display.background.setTheme(theme, isPlain);
   }
 
   private makeDisplay(renderer: GpuDisplay["renderer"]): GpuDisplay {
@@ -220,7 +220,7 @@ export class Host implements PartHost {
       report: (error) => this.report(error),
       follow: () => this.follow(),
       stereo: {
-        layOut: (view) => this.panel.layOut(view),
+        buildPanel: (view) => this.panel.buildPanel(view),
         onCommand: (command) => this.run(command, false),
         onLenses: (lenses) => this.lensesChosen.emit(lenses),
         onChoose: (ray, tile, isByGaze) => this.taps.choose(ray, tile, isByGaze),
@@ -230,15 +230,15 @@ export class Host implements PartHost {
     });
   }
 
-  /** Brings the display and the parts to the state. */
+  /** Updates the display and the parts to the state. */
   private follow(previous = this.state): void {
     this.display.sync(this.state);
     this.parts.sync(this.state, previous);
   }
 
-  /** Asks again for all that has failed. */
+  /** Requests all files again that failed to load. */
   private retry(): void {
-    this.dispatch({ type: "dismiss", texts: this.state.mendable });
+    this.dispatch({ type: "dismiss", texts: this.state.retryable });
     this.parts.retryFailed();
     this.follow();
   }

@@ -1,4 +1,4 @@
-/** The panel as plain data: what is open and meant in it, and its content for the present state. */
+/** The panel as plain data: its own state, and its content for the present state of the viewer. */
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Box } from "../math/box";
 import { shownBox } from "../math/pick";
@@ -11,7 +11,7 @@ import {
   type PartSection,
   START_VIEW,
 } from "../panel/controls";
-import { type Facts, layOut, MORE } from "../panel/layout";
+import { buildPanel, type Facts, MORE } from "../panel/layout";
 import type { Ranges } from "../panel/window_texts";
 import { unitOf } from "../probe/measure";
 import { Signal } from "../state/signal";
@@ -20,7 +20,7 @@ import type { ViewerState } from "../state/viewer_state";
 import type { Snapshot } from "./snapshot";
 import type { Undo } from "./undo";
 
-/** The facts about page and browser on which the panel depends. */
+/** The facts about the page and the browser that the panel shows. */
 export type PageFacts = Readonly<{
   subtitle: string;
   stereo: XrSupport;
@@ -38,14 +38,14 @@ export type PanelSource = Readonly<{
   sections: (view: PanelView) => readonly PartSection[];
 }>;
 
-/** Whether a change gives the cards to the channels that are shown by then. */
-const laysOutCards = (change: PanelChange) =>
+/** Returns whether a change gives cards to the channels that are shown afterwards. */
+const renewsCards = (change: PanelChange) =>
   change.panel === "find" || (change.panel === "unfold" && change.section === "channels");
 
 export class PanelModel {
-  /** The view of the panel in the page; a panel in the room has its own. */
+  /** State of the panel in the page. A panel in the scene has its own. */
   view: PanelView = START_VIEW;
-  /** In the source's values, by channel. */
+  /** Ranges by channel, in the values of the source. */
   readonly ranges: Ranges;
   private readonly changed = new Signal<void>();
   private readonly shownByPage = new Signal<void>();
@@ -62,22 +62,22 @@ export class PanelModel {
     this.ranges = new Map(manifest.channels.map(({ id, window }) => [id, [...window, unit]]));
   }
 
-  /** Calls back when the panel in the page has to show something else. */
+  /** Adds a listener for changes of the panel in the page. */
   onChange(listener: () => void): void {
     this.changed.subscribe(listener);
   }
 
-  /** Makes the panel in the page show its content anew. */
+  /** Makes the panel in the page show its content again. */
   refresh(): void {
     this.changed.emit();
   }
 
-  /** Calls back when the panel in the page shows the present state. */
+  /** Adds a listener that is called when the panel in the page shows the present state. */
   onShown(listener: () => void): void {
     this.shownByPage.subscribe(listener);
   }
 
-  /** The panel in the page shows the present state. */
+  /** Called when the panel in the page shows the present state. */
   noteShown(): void {
     this.shownByPage.emit();
   }
@@ -86,7 +86,7 @@ export class PanelModel {
     return this.page;
   }
 
-  /** Learns more of what the page and the browser offer. */
+  /** Adds facts about the page and the browser. */
   learn(facts: Partial<PageFacts>): void {
     this.page = { ...this.page, ...facts };
     this.changed.emit();
@@ -94,11 +94,11 @@ export class PanelModel {
 
   change(change: PanelChange): void {
     this.view = changePanel(this.view, change);
-    if (laysOutCards(change)) this.view = { ...this.view, channelsWithCard: null };
+    if (renewsCards(change)) this.view = { ...this.view, channelsWithCard: null };
     this.changed.emit();
   }
 
-  /** Sets parts of the view. */
+  /** Changes fields of the panel's state. */
   show(view: Partial<PanelView>): void {
     this.view = { ...this.view, ...view };
     this.changed.emit();
@@ -108,22 +108,22 @@ export class PanelModel {
     this.show({ open: [...new Set([...this.view.open, section, MORE])] });
   }
 
-  /** The specimen, or the isolated tile; um, world. */
+  /** Bounds of the specimen or the isolated tile, um, world. */
   get shown(): Box {
     const { manifest, state } = this.source();
     return shownBox(manifest, state.isolated);
   }
 
-  /** The content of the panel in the page. */
-  layOutPage(): Layout {
+  /** Returns the content of the panel in the page. */
+  buildPagePanel(): Layout {
     this.view = keepPlaces(this.view, this.source().state);
-    return this.layOut(this.view);
+    return this.buildPanel(this.view);
   }
 
-  /** The content of a panel; one in the room has its own sections open. */
-  layOut(view: PanelView): Layout {
+  /** Returns the content of a panel. A panel in the scene has its own open sections. */
+  buildPanel(view: PanelView): Layout {
     const source = this.source();
-    return layOut(source.state, this.factsFor(source), view, source.sections(view));
+    return buildPanel(source.state, this.factsFor(source), view, source.sections(view));
   }
 
   private factsFor(source: PanelSource): Facts {

@@ -9,7 +9,7 @@ import type { Ray, Vec3 } from "../math/vec3";
 import type { Lenses, PanelView, PartSection } from "../panel/controls";
 import type { KeyGroup } from "../panel/key";
 import type { KeyTable } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Cone, Probed } from "../probe/probe";
 import type { Reading } from "../probe/probe_reader";
 import type { FrameRenderer } from "../render/frame_renderer";
@@ -27,52 +27,55 @@ import type { StillMaker } from "./still";
 import type { Undo } from "./undo";
 import type { Viewpoint } from "./viewpoint";
 
-/** A flat picture. */
+/** The flat view on the screen. */
 export type FlatScreen = Readonly<{
   camera: PerspectiveCamera;
-  /** CSS pixels. */
+  /** Height in CSS pixels. */
   height_px: number;
-  /** The point that is looked at, in the scene, m: the scale bar is true there. */
+  /** The point that the camera turns around, in metres of the scene. The scale bar is exact there. */
   focus: Vector3;
 }>;
 
-/** From where the specimen is seen in a frame. */
+/** Pose of the viewer and the specimen in a frame. */
 export type FrameView = Readonly<{
-  /** Pose of the head or of the mono camera, room. */
+  /** Pose of the head or of the flat camera, in the scene. */
   head: Matrix4;
-  /** From um to the room. */
+  /** Matrix from um to metres of the scene. */
   specimen: Matrix4;
   /** null in stereo. */
   screen: FlatScreen | null;
-  /** Straight ahead, um. */
+  /** Ray straight ahead, um. */
   gaze: Ray;
-  /** Where volumes show in disc mode. */
+  /** The cone in which volumes are shown in disc mode. */
   disc: Cone | null;
-  /** The panel lies beside the specimen, and ruler and axes would lie across it. */
+  /**
+   * Whether the panel is open beside the specimen. Ruler and axes are hidden then, because they
+   * would cross it.
+   */
   isPanelOpen: boolean;
-  /** The bar of stereo hangs below the specimen. */
+  /** Whether the bar of stereo is below the specimen. */
   isBarBelow: boolean;
-  /** The eye in the specimen's space. */
+  /** The eye in the space of the specimen. */
   sight: Sight;
   dt_s: number;
 }>;
 
-/** A part's objects in the scene, and how the passes of a frame treat them. */
+/** The objects of a part in the scene, and how the passes of a frame treat them. */
 export type PartScene = Readonly<{
-  /** Hangs in the specimen's space: um, world. */
+  /** Group in the space of the specimen: um, world. */
   group: Object3D;
-  /** Objects that the pass for the depth leaves out. */
+  /** Objects that are not in the depth pass. */
   overlays: readonly Object3D[];
   /** A number that changes with what the part hides; 0: nothing. */
   solid: number;
-  /** Whether the objects fill the picture even where no channel shows. */
+  /** Whether the objects are visible even if no channel is shown. */
   isStanding: boolean;
 }>;
 
-/** The place where a ray meets a part. */
+/** The place where a ray hits a part. */
 export type Hit = Probed &
   Readonly<{
-    /** The object of a label map that is met; absent: the hit is none. */
+    /** The object of a label map that is hit; absent: none. */
     object?: Readonly<{ row: number; name: string; label: string | null }>;
   }>;
 
@@ -80,53 +83,56 @@ export type Hit = Probed &
 export type Tap = Readonly<{
   ray: Ray;
   by: "pointer" | "key" | "hand" | "gaze";
-  /** On the page's clock. */
+  /** Time on the clock of the page, ms. */
   time_ms: number;
 }>;
 
-/** "used": nothing else is to happen; "met": the part has done something, and a tile may be chosen, too. */
+/**
+ * "used": nothing else happens; "met": the part has done something, and a tile may still be
+ * selected; null: no hit.
+ */
 export type TapAnswer = "used" | "met" | null;
 
-/** Functions by the name of the command. One that returns false leaves the command to others. */
+/** Functions by the name of the command. A function that returns false leaves the command to others. */
 export type CommandTable = Readonly<Partial<Record<Command, () => unknown>>>;
 
 /**
- * One feature of the viewer. The host calls these; a part never calls the host's other parts. What a part asks of the
- * host is at most two dots away from it: scripts/reach.ts holds that.
+ * One feature of the viewer. The host calls these members; a part never calls the host's other
+ * parts. A part reaches at most two properties deep into the host, which scripts/reach.ts checks.
  */
 export interface Part {
   readonly id: string;
-  /** Called once, when all parts of the list are made. */
+  /** Called once, when all parts have been made. */
   begin?(): void;
-  /** Called once, when the view that the address asks for is open. */
+  /** Called once, when the view of the address is open. */
   afterOpening?(): unknown;
-  /** Called once, when the overview is on screen: then comes what nobody needs before the first picture. */
+  /** Called once, when the overview is on screen. Parts load here what the first view does not need. */
   afterOverview?(): unknown;
-  /** Brings the part to a state; called after every change, and at the start. */
+  /** Updates the part to a state; called after every change, and at the start. */
   sync?(state: ViewerState, previous: ViewerState): void;
-  /** Animation, before each frame. */
+  /** Advances animations, before each frame. */
   advance?(frame: FrameView): void;
   readonly scene?: PartScene;
-  /** Planes before which the specimen is cut away for an eye, um. */
+  /** Returns the planes in front of which the specimen is cut away for an eye, um. */
   cutBefore?(eye: Vec3): readonly ClipPlane[] | undefined;
-  /** The nearest place where a ray (um) meets the part; null: none. */
+  /** Returns the nearest hit of a ray (um); null: none. */
   pick?(ray: Ray): Hit | null;
-  /** Hears of every choice in the picture, before it has an effect. */
+  /** Called for every choice in the view, before it has an effect. */
   hearTap?(tap: Tap): void;
   tap?(tap: Tap): TapAnswer;
-  /** A choice on the flat screen that no part has used. */
+  /** Called for a choice on the flat screen that no part has used. */
   openCard?(tap: Tap): void;
   /** Targets of gaze and hands in stereo. */
   readonly targets?: readonly Target[];
   readonly commands?: CommandTable;
-  /** Commands of the page, which do nothing in stereo. */
+  /** Commands of the page, which are not available in stereo. */
   readonly pageCommands?: CommandTable;
   panel?(view: PanelView): readonly PartSection[];
   readonly services?: Partial<Services>;
   /** A way to draw the specimen. */
   readonly form?: Form;
   readonly isLoading?: boolean;
-  /** Asks again for what has failed. */
+  /** Requests again what has failed. */
   retryFailed?(): void;
   dispose(): void;
 }
@@ -135,97 +141,100 @@ export interface Part {
 export type PartDefinition = Readonly<{
   id: string;
   keys?: readonly KeyGroup[];
-  /** Place among the parts that are made and follow changes first; absent: after those. */
+  /** Order in which parts are made and updated; absent: after all parts with a rank. */
   rank?: number;
-  /** Whether the part traces paths of light on a device. */
+  /** Returns whether the part can trace paths on a device. */
   canTrace?: (gl: WebGLRenderingContext | WebGL2RenderingContext) => boolean;
   /** Names of commands that no other part has. Each has a key. */
   commands?: readonly Command[];
-  /** The settings and actions that the part adds to the state. */
+  /** Settings and actions that the part adds to the state. */
   settings?: PartSettings;
-  /** Buttons that lead on from the part's refusals. */
-  waysOn?: WaysOn;
+  /** Buttons that solve the part's refusals. */
+  remedies?: Remedies;
   create: (host: PartHost) => Part;
 }>;
 
-/** The scene and all that draws it. */
+/** The scene and everything that draws it. */
 export interface Display {
   readonly renderer: WebGLRenderer;
   readonly studio: StillMaker;
-  /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
+  /** CSS pixels per inch of this screen; null: estimated from the name of the browser. */
   readonly cssPixelsPerInch: number | null;
   setScreen(perInch: number | null): void;
-  /** Something has come for the picture, which may be at rest. */
+  /** Draws again soon, because something was loaded; the view may be unchanged. */
   requestFrame(): void;
-  /** The picture has to change at once. */
+  /** Draws again at once. */
   redraw(): void;
-  /** Brings the canvas to the size of the stage. */
+  /** Sets the size of the canvas to that of the stage. */
   fit(): void;
-  /** Draws volumes of at most so many voxels along a tile's edge. */
+  /** Limits volumes to a number of voxels along a tile's edge. */
   limitEdge(edge: number): void;
-  /** Frames drawn so far. */
+  /** Number of frames drawn so far. */
   readonly frames: number;
-  /** Whether the picture moves now, and its frames are late. */
+  /** Whether the view is moving now, and its frames are late. */
   readonly isLate: boolean;
   /** Resolves when the next frame has been drawn. */
   nextFrame(): Promise<void>;
-  /** Resolves when nothing loads any more and the picture shows all of it. */
+  /** Resolves when nothing is loading and the view shows everything. */
   settled(): Promise<void>;
   readonly isLoading: boolean;
   snapshot(): Snapshot;
 }
 
-/** The uniforms that the shaders of a frame share by reference, and the place where a form adds objects over the scene. */
+/**
+ * The uniforms that the shaders of a frame share by reference, and the function by which a form
+ * adds objects to the scene.
+ */
 export type SharedFrame = Pick<FrameRenderer, "marchFrame" | "surfaceFrame" | "sceneDepth" | "add">;
 
 /** The host as the parts see it. */
 export interface PartHost {
   readonly bundle: Bundle;
   readonly state: ViewerState;
-  /** Holds the canvas. */
+  /** Contains the canvas. */
   readonly stage: HTMLElement;
   readonly canvas: HTMLCanvasElement;
   /** The part of the page with the stage. */
   readonly view: HTMLElement;
   readonly display: Display;
-  /** The object of the scene that holds the specimen: from um to the room. */
+  /** The scene object that contains the specimen; its matrix maps um to metres of the scene. */
   readonly specimen: Object3D;
   readonly viewpoint: Viewpoint;
   readonly stereo: Stereo;
   readonly reading: Reading;
   readonly focus: Focus;
   readonly frame: SharedFrame;
-  /** Voxels as they were measured; null: the page's host has none. */
+  /** Voxel values as they were measured; null: the host of the page does not serve them. */
   readonly values: ValuesHost | null;
   readonly panel: PanelModel;
   readonly undo: Undo;
   readonly keys: KeyTable;
-  readonly waysOn: WaysOn;
+  readonly remedies: Remedies;
   readonly changed: Signal<ViewerState>;
   readonly drawn: Signal<void>;
-  /** Words to say on the page; the host says them in stereo. */
+  /** Announcements for the page. In stereo, the host announces them itself. */
   readonly announced: Signal<string>;
-  /** The control with which a card begins that a tap or a key has opened. */
+  /** Id of the first control of a card that a tap or a key has opened. */
   readonly revealed: Signal<string>;
-  /** A second quick tap asks to fly there, so the first one was no choice. */
+  /** Emitted after a double tap, which flies to the place. Its first tap was then not a choice. */
   readonly doubleTapped: Signal<void>;
   /** The user has chosen another lens profile in stereo. */
   readonly lensesChosen: Signal<Lenses>;
-  /** Whether the user is in stereo, where the page is not seen. */
+  /** Whether the user is in stereo, where the page is not visible. */
   readonly isInRoom: boolean;
-  /** @param isStep whether undoing goes back to before it */
+  /** @param isStep whether the action is a step that undo takes back */
   dispatch(action: Action, isStep?: boolean): void;
-  /** Returns whether the command could be carried out. */
+  /** Runs a command. Returns whether that was possible. */
   run(command: Command): boolean;
   announce(text: string): void;
-  /** Shows a fault of the bundle or the network; throws any other error. */
+  /** Shows a fault of the bundle or the network as a notice; throws any other error. */
   report(error: unknown): void;
-  /** The ray (um) under a point of the screen, -1..1. */
+  /** Returns the ray (um) under a point of the screen, -1..1. */
   rayAt(point: Vector2): Ray;
-  /** A part's service; null: no part offers it. */
+  /** Returns a service by its name; null: no part offers it. */
   service<K extends keyof Services>(name: K): Services[K] | null;
-  /** The nearest object of a label map along a ray, um; null: none. */
+  /** Returns the nearest object of a label map along a ray (um); null: none. */
   objectAlong(ray: Ray): Hit | null;
-  /** Whether a part shows something besides surfaces and volumes. */
+  /** Whether a part shows anything besides surfaces and volumes. */
   readonly hasStandingPart: boolean;
 }

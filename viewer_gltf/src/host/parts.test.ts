@@ -15,7 +15,7 @@ function partsOf(...all: readonly Partial<Part>[]): Parts {
 }
 
 describe("the parts of a viewer", () => {
-  it("are made by rank, and those without one after them, as they are listed", () => {
+  it("are made by rank; those without a rank follow in the order of the list", () => {
     const listed = [
       definition("b"),
       definition("last", 30),
@@ -25,7 +25,7 @@ describe("the parts of a viewer", () => {
     expect(inOrder(listed).map(({ id }) => id)).toEqual(["one", "last", "b", "a"]);
   });
 
-  it("all hear of the opening, and what waits for it waits for the slowest", async () => {
+  it("are all notified of the opening, which ends with the slowest part", async () => {
     const heard: string[] = [];
     const slow = async () => {
       await new Promise((resolve) => setTimeout(resolve, 5));
@@ -36,14 +36,14 @@ describe("the parts of a viewer", () => {
     expect(heard).toEqual(["quick", "slow"]);
   });
 
-  it("give a service by its name, and null where no part offers it", () => {
+  it("return a service by its name, or null if no part offers it", () => {
     const links = { load: () => Promise.reject(new Error("none")), writeAddress: () => undefined };
     const parts = partsOf({}, { services: { links } });
     expect(parts.service("links")).toBe(links);
     expect(parts.service("volumes")).toBeNull();
   });
 
-  it("list their forms, which the host asks", () => {
+  it("list their forms", () => {
     const forms = [{ triangles: 3 }, { triangles: 4 }];
     const parts = partsOf({ form: forms[0] }, {}, { form: forms[1] });
     expect(parts.forms).toEqual(forms);

@@ -1,11 +1,11 @@
-/** The parts of a viewer: each question of the host goes to all of them. */
+/** The parts of a viewer. Each call of the host goes to all of them. */
 import type { Object3D } from "three";
 import type { Target } from "../interaction/ray_pointer";
 import type { ClipPlane } from "../math/clip";
 import type { Ray, Vec3 } from "../math/vec3";
 import type { PanelView, PartSection } from "../panel/controls";
 import { KeyTable, OWN_KEYS } from "../panel/keys";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import type { Command } from "../state/commands";
 import type { ViewerState } from "../state/viewer_state";
 import type { Form } from "./form";
@@ -14,7 +14,7 @@ import type { Services } from "./services";
 
 const LAST = Number.POSITIVE_INFINITY;
 
-/** Parts with a rank come first, as others use their services and follow after them. */
+/** Orders parts by rank, because others use their services and are updated after them. */
 export function inOrder(definitions: readonly PartDefinition[]): readonly PartDefinition[] {
   const place = ({ rank = LAST }: PartDefinition) => rank;
   return definitions.toSorted((a, b) => (place(a) < place(b) ? -1 : Number(place(a) > place(b))));
@@ -22,14 +22,14 @@ export function inOrder(definitions: readonly PartDefinition[]): readonly PartDe
 
 export class Parts {
   readonly keys: KeyTable;
-  readonly waysOn: WaysOn;
+  readonly remedies: Remedies;
   private all: readonly Part[] = [];
-  /** The newest state: a part may change it while the parts follow an older one. */
+  /** The newest state. A part may change the state while the parts are updated to an older one. */
   private newest: ViewerState | null = null;
 
   constructor(definitions: readonly PartDefinition[]) {
     this.keys = new KeyTable([...OWN_KEYS, ...definitions.flatMap(({ keys = [] }) => keys)]);
-    this.waysOn = Object.assign({}, ...definitions.map(({ waysOn = {} }) => waysOn));
+    this.remedies = Object.assign({}, ...definitions.map(({ remedies = {} }) => remedies));
   }
 
   add(part: Part): void {
@@ -40,7 +40,7 @@ export class Parts {
     for (const part of this.all) part.begin?.();
   }
 
-  /** Resolves when all parts have done what they do there. */
+  /** Resolves when all parts have finished their work after the opening. */
   async afterOpening(): Promise<void> {
     await Promise.all(this.all.map((part) => part.afterOpening?.()));
   }
@@ -53,7 +53,8 @@ export class Parts {
     this.newest = state;
     for (const part of this.all) {
       part.sync?.(state, previous);
-      if (this.newest !== state) return; // a part has changed the state, and all have followed that
+      // a part has changed the state, and all parts have been updated to that state
+      if (this.newest !== state) return;
     }
   }
 
@@ -61,7 +62,7 @@ export class Parts {
     for (const part of this.all) part.advance?.(frame);
   }
 
-  /** The ways to draw the specimen. */
+  /** The forms in which the specimen is drawn. */
   get forms(): readonly Form[] {
     return this.all.flatMap(({ form = [] }) => form);
   }
@@ -95,9 +96,9 @@ export class Parts {
     return cuts.find((each) => each !== undefined);
   }
 
-  /** The nearest hit of a kind; null: none. */
-  pick(ray: Ray, isMeant: (hit: Hit) => boolean): Hit | null {
-    const hits = this.all.flatMap((part) => part.pick?.(ray) ?? []).filter(isMeant);
+  /** Returns the nearest hit of a kind; null: none. */
+  pick(ray: Ray, isWanted: (hit: Hit) => boolean): Hit | null {
+    const hits = this.all.flatMap((part) => part.pick?.(ray) ?? []).filter(isWanted);
     if (hits.length === 0) return null;
     return hits.reduce((a, b) => (b.distance_um < a.distance_um ? b : a));
   }
@@ -106,7 +107,7 @@ export class Parts {
     for (const part of this.all) part.hearTap?.(tap);
   }
 
-  /** Gives a tap to the parts until one has used it. */
+  /** Passes a tap to the parts until one has used it. */
   tap(tap: Tap): "used" | "met" | null {
     let answer: "met" | null = null;
     for (const part of this.all) {
@@ -121,14 +122,14 @@ export class Parts {
     for (const part of this.all) part.openCard?.(tap);
   }
 
-  /** Carries out a command; false: no part knows it. @param isOnPage false: by the panel in the room */
+  /** Runs a command; false: no part has it. @param isOnPage false: the panel in the scene has sent it */
   run(command: Command, isOnPage: boolean): boolean {
     const tables = this.all.flatMap(({ commands = {}, pageCommands = {} }): CommandTable[] =>
       isOnPage ? [commands, pageCommands] : [commands],
     );
     return tables.some((table) => {
-      const carryOut = table[command];
-      return carryOut !== undefined && carryOut() !== false;
+      const run = table[command];
+      return run !== undefined && run() !== false;
     });
   }
 

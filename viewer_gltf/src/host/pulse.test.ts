@@ -43,21 +43,21 @@ describe("frames", () => {
     vi.useRealTimers();
   });
 
-  /** Of so long. */
+  /** Number of frames in a time. */
   const beatsOf = (ms: number) => {
     const before = beats;
     vi.advanceTimersByTime(ms);
     return beats - before;
   };
 
-  it("follow the screen while something changes, and some time after", () => {
+  it("follow the screen while something changes, and for some time afterwards", () => {
     rests = false;
     expect(beatsOf(2000)).toBe(2000 / FRAME_MS);
     rests = true;
     expect(beatsOf(400)).toBe(400 / FRAME_MS);
   });
 
-  it("are few at rest, and as many as before at once where something changes", () => {
+  it("are few at rest, and follow the screen at once after a change", () => {
     beatsOf(1000);
     expect(beatsOf(1000)).toBeLessThanOrEqual(10);
     pulse.wake();
@@ -65,20 +65,20 @@ describe("frames", () => {
     expect(beatsOf(160)).toBe(10);
   });
 
-  it("find by themselves that something changes", () => {
+  it("detect a change by themselves", () => {
     beatsOf(1000);
     rests = false;
     beatsOf(120);
     expect(beatsOf(160)).toBe(10);
   });
 
-  it("are one for each of the screen's, whoever wakes them", () => {
+  it("are one per frame of the screen, however often they are woken", () => {
     rests = false;
     for (let i = 0; i < 5; i++) pulse.wake();
     expect(beatsOf(160)).toBe(10);
   });
 
-  it("are the headset's while it has some", () => {
+  it("are left to the headset while it presents", () => {
     isPresenting = true;
     expect(beatsOf(2000)).toBe(0);
     isPresenting = false;

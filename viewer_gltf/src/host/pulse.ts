@@ -1,32 +1,32 @@
 /**
- * When frames are due: with the screen's while something changes, else ten times a second.
+ * Decides when frames are due: with the screen's frames while something changes, else ten times a
+ * second.
  *
- * To ask each of the screen's frames whether anything has changed takes a fifth of a slow core, and
- * of a phone's charge.
+ * A check at each frame of the screen would take a fifth of a slow core, and of a phone's battery.
  */
 import type { WebGLRenderer } from "three";
 
-/** Frames go on for so long after the last that changed anything, ms. */
+/** Milliseconds for which frames go on after the last change. */
 const AWAKE_MS = 500;
-/** Between two looks whether something has changed after all, ms. */
-const LOOK_MS = 100;
+/** Milliseconds between two checks for a change at rest. */
+const CHECK_MS = 100;
 
 export class Pulse {
-  /** Of the window's next frame; 0: none is asked for. */
+  /** Id of the window's next frame; 0: none is requested. */
   private request = 0;
-  /** Until the next look. */
+  /** Timer of the next check. */
   private timer: ReturnType<typeof setTimeout> | undefined;
   private isOn = false;
   private changed_ms = 0;
 
-  /** @param beat draws what there is to draw; whether nothing more is to come of itself */
+  /** @param beat draws a frame if needed; returns whether nothing will change without `wake` */
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly beat: (time_ms: number) => boolean,
   ) {
     renderer.xr.addEventListener("sessionend", () => {
       if (!this.isOn) return;
-      this.stop(); // three's own loop in the window, too, which it starts now
+      this.stop(); // three.js starts its own loop in the window at this point
       this.start();
     });
   }
@@ -39,13 +39,13 @@ export class Pulse {
 
   stop(): void {
     this.isOn = false;
-    this.renderer.setAnimationLoop(null); // in a headset, too
+    this.renderer.setAnimationLoop(null); // also in a headset
     cancelAnimationFrame(this.request);
     clearTimeout(this.timer);
     this.request = 0;
   }
 
-  /** Something has changed. */
+  /** Draws again soon, because something has changed. */
   wake(): void {
     this.changed_ms = performance.now();
     if (this.isOn && this.request === 0) this.next();
@@ -63,6 +63,6 @@ export class Pulse {
     if (!rests) this.wake();
     if (!this.isOn || this.request !== 0) return;
     if (performance.now() - this.changed_ms < AWAKE_MS) this.next();
-    else this.timer = setTimeout(() => this.next(), LOOK_MS);
+    else this.timer = setTimeout(() => this.next(), CHECK_MS);
   }
 }

@@ -1,4 +1,4 @@
-/** One frame of the scene: poses the eyes, moves what moves, and draws. */
+/** One frame of the scene: poses the eyes, advances motions, and draws. */
 import { type Camera, type Matrix4, Vector3, type WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import { rayAhead } from "../interaction/rays";
@@ -20,9 +20,9 @@ export type SceneFrameOptions = Readonly<{
   stage: HTMLElement;
   room: Room;
   hybrid: Hybrid;
-  /** The box of the specimen, um. */
+  /** Box of the specimen, um. */
   bounds: Bounds;
-  /** What the frames show. It is made after the renderer of frames, whose uniforms the shaders share. */
+  /** Content of the frames. It is made after the renderer of frames, whose uniforms its shaders use. */
   shown: () => Readonly<{
     forms: Forms;
     parts: Parts;
@@ -30,9 +30,9 @@ export type SceneFrameOptions = Readonly<{
     viewpoint: Viewpoint;
     state: ViewerState;
   }>;
-  /** A part needs the frame's view before it is drawn. */
+  /** Called with the view of the frame before it is drawn. */
   onAdvance: (frame: FrameView) => void;
-  /** The gaze has moved to another tile, so other forms show. */
+  /** Called when the gaze has moved to another tile, so that other forms are shown. */
   onFocus: () => void;
 }>;
 
@@ -45,7 +45,7 @@ export class SceneFrame {
     this.picture = new FrameRenderer(renderer, room, hybrid);
   }
 
-  /** Places the flat camera. Returns it. */
+  /** Poses the flat camera, and returns it. */
   poseMono(dt_s: number): Camera {
     const { viewpoint, forms, state } = this.options.shown();
     const { navigation } = viewpoint;
@@ -58,14 +58,14 @@ export class SceneFrame {
     return navigation.camera;
   }
 
-  /** Places the eyes before the page's own screen. */
+  /** Poses the eyes for stereo on the page's own screen. */
   followScreen(): void {
     const { stereo, viewpoint } = this.options.shown();
     const { camera, controls } = viewpoint.navigation;
     stereo.followScreen(this.picture.eyes, camera, controls.target);
   }
 
-  /** Follows the gaze, and goes on with what moves and what fades. Returns whether each goes on. */
+  /** Follows the gaze, and advances motions and fades. Returns whether each goes on. */
   advance(dt_s: number, fade_s = dt_s): Readonly<{ isChanging: boolean; isFading: boolean }> {
     const { hybrid, room, onFocus } = this.options;
     const { forms, stereo, viewpoint, state } = this.options.shown();
@@ -122,7 +122,7 @@ export class SceneFrame {
     return room.boundsOf(marchedTile(state, hybrid.focusTiles));
   }
 
-  /** um, world. */
+  /** Returns the place of the eye, um, world. */
   private eyeOnSpecimen(head: Matrix4): Vec3 {
     const { group } = this.options.room.specimen;
     return group.worldToLocal(this.eye.setFromMatrixPosition(head)).toArray();

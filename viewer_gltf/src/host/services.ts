@@ -1,11 +1,11 @@
 /**
- * Services that a part offers to the others, by name. A part that uses one asks the host for it and gets null if no
- * part offers it, so that every part can be left out of the viewer.
+ * Services that a part offers to the others, by name. A part asks the host for a service, and gets
+ * null if no part offers it. Every part can therefore be removed from the viewer.
  */
 import type { Object3D } from "three";
 import type { HandleId } from "../marks/clip_handles";
 import type { Vec3 } from "../math/vec3";
-import type { Refusal, Wish } from "../panel/controls";
+import type { Refusal, Request } from "../panel/controls";
 import type { BlendedSurface } from "../render/blend_material";
 import type { Action } from "../state/actions";
 import type { CameraView } from "../state/camera_view";
@@ -18,110 +18,122 @@ import type { Appearance } from "../voxels/march_tables";
 import type { VolumeLimits } from "../voxels/mip_levels";
 import type { VolumeSource } from "../voxels/volume_source";
 
-/** `column`: the name of the one that colours. Of a row, one colour, or a palette's from end to end; none: words alone. */
+/**
+ * `column` is the name of the column that colours. A row has one colour, the colours of a palette
+ * from end to end, or none for a text alone.
+ */
 export type ColorLegend = Readonly<{
   column: string;
   rows: readonly Readonly<{ colors: readonly string[]; text: string }>[];
 }>;
 
-/** The objects of the label maps that are shown. */
+/** The objects of the shown label maps. */
 export interface ObjectMaps {
-  /** Returns the legend of a channel's objects; null: they have the stage's colours, or have not come. */
+  /**
+   * Returns the legend of a channel's objects; null: they have the stage's colours, or are not
+   * loaded yet.
+   */
   legend(channel: string): ColorLegend | null;
-  /** Some of the objects' colours, by channel. */
+  /** Some colours of the objects, by channel. */
   readonly colors: ReadonlyMap<string, readonly string[]>;
-  /** Returns a link's text on a channel's objects, and how many it leaves out; null: their table has not come. */
+  /**
+   * Returns the text of a link for a channel's objects, and the number of objects that it omits;
+   * null: not loaded yet.
+   */
   linked(channel: string, view: ObjectView): Readonly<{ text: string; leftOut: number }> | null;
-  /** Rows of the objects that show, by channel. */
+  /** Rows of the shown objects, by channel. */
   readonly rowsShown: ReadonlyMap<string, readonly number[]>;
-  /** How many objects of a channel show; null: their table has not come. */
+  /** Returns the number of a channel's objects that are shown; null: their table is not loaded yet. */
   left(channel: string): number | null;
 }
 
-/** Pictures of the view, for whatever saves them. */
+/** Images of the view. */
 export interface PosterMaker {
-  /** Makes an image of the screen, with a longest edge of at most so many pixels. Rejects with a DOMException. */
+  /**
+   * Makes an image of the screen, with a longest edge of at most `longest_px` pixels. Rejects with
+   * a DOMException.
+   */
   poster(longest_px: number): Promise<Blob>;
 }
 
-/** The handles of cuts and lamps in the picture. */
+/** The handles of cuts and lamps in the scene. */
 export interface HandleLights {
-  /** Lights up a handle; null: none. */
+  /** Highlights a handle; null: none. */
   highlight(handle: HandleId | null): void;
 }
 
-/** The measured points. */
+/** The points of the measurement. */
 export interface MeasuredPoints {
-  /** For each measured point the values of the shown channels that have come, as `DAPI 1210`. */
+  /** For each measured point, the values of the shown channels that are loaded, for example `DAPI 1210`. */
   readonly values: readonly (readonly string[])[];
 }
 
 /** The panel in the page. */
 export interface PagePanel {
-  /** Grants a request of the panel or of a card. */
-  perform(wish: Wish | Refusal): void;
-  /** Brings the keyboard to a control, also of a panel that is hidden. Returns whether there is one. */
+  /** Carries out a request of the panel or of a card. */
+  perform(request: Request | Refusal): void;
+  /** Focuses a control, also in a hidden panel. Returns whether it exists. */
   focus(section: string, control: string): boolean;
-  /** Shows words on the page alone. */
+  /** Shows an announcement only on the page. */
   say(words: string): void;
-  /** Offers a button beside the words that were announced last. */
+  /** Adds a button to the last announcement. */
   offer(words: string, label: string, act: () => void): void;
 }
 
-/** The buttons that lead on from a refusal. */
+/** The buttons that solve a refusal. */
 export interface MessageButtons {
-  /** null: nothing leads on. */
+  /** Returns the button of a refusal; null: it has none. */
   buttonFor(refusal: string): Promise<Readonly<{ label: string; act: () => void }> | null>;
 }
 
-/** The channels' volumes. */
+/** The volumes of the channels. */
 export interface Volumes {
-  /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
+  /** Returns the source of a channel's volume in a tile; null: not known yet, or none. */
   source(tile: string, channel: string): VolumeSource | null;
-  /** The same, once it is known; null also after a fault, which was reported. */
+  /** Resolves to the source once it is known; null: none, or a fault that was reported. */
   sourceOf(tile: string, channel: string): Promise<VolumeSource | null>;
-  /** All volumes of a channel, by tile; null: its list has not come, which was reported. */
+  /** Resolves to all volumes of a channel, by tile; null: a fault that was reported. */
   sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null>;
-  /** Outermost points (um, world) of what a channel shows as volumes; null: not all has come. */
+  /** Returns the outermost points (um, world) of a channel's volumes; null: not all are loaded. */
   outline(channel: string): readonly Vec3[] | null;
-  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  /** Returns how far the volume of a channel in a tile has faded in, 0..1. */
   presence(tile: string, channel: string): number;
-  /** Whether all that is marched shows in the disc alone. */
+  /** Whether all marched volumes are shown only in the focus disc. */
   readonly isInDisc: boolean;
   readonly appearances: Readonly<{ of: (state: ViewerState, channel: string) => Appearance }>;
 }
 
-/** What the texels of volumes may take, and where they come from. */
+/** Limits of the textures of volumes, and the source of their voxels. */
 export type VolumeTexels = Readonly<{
   limits: VolumeLimits;
-  /** From a host that sends bricks by view; null: volumes come as files. */
+  /** The service of a host that sends bricks by view; null: volumes are files. */
   bricks: BrickService | null;
 }>;
 
 export type LoadedSurface = Readonly<{ scene: Object3D; tile: string; blend: BlendedSurface }>;
 
-/** The channels' surfaces. */
+/** The surfaces of the channels. */
 export interface Surfaces {
   /** The meshes on screen. */
   readonly meshes: readonly ShownSurface[];
-  /** All that have come of a channel. */
+  /** Returns all loaded surfaces of a channel. */
   of(channel: string): readonly LoadedSurface[];
-  /** Calls back when another one has come. */
+  /** Adds a listener for surfaces that have been loaded. */
   onLoaded(listener: (channel: string, surface: LoadedSurface) => void): void;
-  /** Outermost points (um, world) of a channel's surfaces; null: not known yet. */
+  /** Returns the outermost points (um, world) of a channel's surfaces; null: not known yet. */
   outline(channel: string): readonly Vec3[] | null;
 }
 
-/** The stereo that browser and device offer. */
+/** The kinds of stereo that the browser and the device offer. */
 export interface StereoFinder {
   readonly found: Promise<Readonly<{ stereo: XrSupport; hasRoom: boolean }>>;
 }
 
-/** Links to the view, for a part that shares it in another way. */
+/** Reads and writes links to the view, for a part that shares the view in another way. */
 export type LinkCode = Readonly<{
-  /** The link to the present view. */
+  /** Returns the link to the present view. */
   link: () => string;
-  /** What a link changes, and from where it looks; null: as the view opens. */
+  /** Returns the actions and the camera of a link; null: the opening camera. */
   read: (
     link: string,
     state: ViewerState,
@@ -130,13 +142,13 @@ export type LinkCode = Readonly<{
 export interface Links {
   /** Loads the code that writes and reads links. */
   load(): Promise<LinkCode>;
-  /** Brings the page's address to the view at once, as before a reload. */
+  /** Writes the present view to the page's address at once, for example before a reload. */
   writeAddress(): void;
 }
 
-/** What the benchmark has found. */
+/** The result of the benchmark. */
 export interface BenchResult {
-  /** null: it has not been run. */
+  /** null: the benchmark has not run. */
   readonly report: object | null;
 }
 

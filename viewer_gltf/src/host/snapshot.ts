@@ -1,4 +1,4 @@
-/** The viewer in numbers: for automation, the panel and the benchmark. */
+/** The viewer in numbers, for automation, the panel and the benchmark. */
 import type { WebGLRenderer } from "three";
 import type { Look } from "../interaction/named_views";
 import type { VolumeStatus } from "../render/drawn_forms";
@@ -15,44 +15,44 @@ import type { Viewpoint } from "./viewpoint";
 
 export type Snapshot = Readonly<{
   state: ViewerState;
-  /** From where the flat camera sees the specimen, m of the room. */
+  /** Pose of the flat camera, in metres of the scene. */
   look: Look;
-  /** Whether all tiles show, in the first channel. */
+  /** Whether all tiles of the first channel are shown. */
   hasFirstPicture: boolean;
-  /** The progress of the overviews of all shown channels. */
+  /** Loading progress of the overviews of all shown channels. */
   overview: Progress;
   isLoading: boolean;
   /** Triangles of the surfaces on screen. */
   triangles: number;
-  /** Of the last frame, both eyes and all passes. */
+  /** Draw calls of the last frame, for both eyes and all passes. */
   drawCalls: number;
   volumes: readonly VolumeStatus[];
-  /** Of the GPU's memory. */
+  /** Bytes of the volumes in GPU memory. */
   volumeBytes: number;
-  /** The path-traced picture's samples of a pixel and its mip level; null: there is no such picture. */
+  /** Samples per pixel and mip level of the path-traced image; level null: path tracing is off. */
   traced: Readonly<{ samples: number; level: number | null }>;
   /** The tile in the middle of the view, if it is near. */
   gazed: string | null;
-  /** Of the disc as it is now; 0: closed. */
+  /** Present radius of the focus disc, degrees; 0: closed. */
   discRadius_deg: number;
-  /** Where the limit of tiles in the disc ends it; null: it covers no more. */
+  /** Radius at which the limit of tiles ends the focus disc, degrees; null: it covers fewer tiles. */
   discLimit_deg: number | null;
-  /** Between two frames of a moving picture. */
+  /** Time between two frames of a motion, ms. */
   frame_ms: number;
-  /** The settings of the last frame. */
+  /** Settings of the last frame. */
   settings: QualitySettings;
-  /** For each measured point the value of each shown channel there. */
+  /** For each measured point, the value of each shown channel. */
   measuredValues: readonly (readonly string[])[];
-  /** Of three's own count. */
+  /** Objects on the GPU, as three.js counts them. */
   gpuObjects: Readonly<{ geometries: number; textures: number; programs: number }>;
   isStereo: boolean;
-  /** The specimen's middle in the room, m. */
+  /** Place of the specimen's middle, in metres of the scene. */
   specimenAt: readonly [number, number, number];
-  /** Its turn there: a quaternion. */
+  /** Rotation of the specimen in the scene, a quaternion. */
   specimenTurn: readonly [number, number, number, number];
-  /** The notices before the eyes now, in stereo. */
+  /** Notices that are visible in stereo now. */
   told: readonly string[];
-  /** The controls of the panel in the room now, its button first; none on a flat screen. */
+  /** Controls of the panel in the scene now, its button first; none on a flat screen. */
   menu: readonly MenuEntry[];
 }>;
 

@@ -1,6 +1,6 @@
 /**
- * The user's steps, for undo and redo: states of the viewer, and from where the specimen was seen then.
- * Moving the camera goes by no action: it is noted before whatever ends it.
+ * The user's steps for undo and redo: states of the viewer, each with the camera at that time. A
+ * move of the camera is not an action, so it is noted before the next step.
  */
 import type { CameraView } from "../state/camera_view";
 import { type History, NO_HISTORY, redone, undone, withStep } from "../state/history";
@@ -8,20 +8,20 @@ import type { ViewerState } from "../state/viewer_state";
 
 export type Moment = Readonly<{
   state: ViewerState;
-  /** null: as it opens. */
+  /** null: the opening camera. */
   camera: CameraView | null;
-  /** In stereo the head looks: there the camera means nothing. */
+  /** Whether the user was in stereo. The camera has no meaning there, because the head looks. */
   isInRoom: boolean;
 }>;
 
-/** The name of a step of the camera. */
-const LOOK = "viewpoint";
-/** Largest difference of two numbers of a place that is the same, m. */
+/** Name of a step that moves the camera. */
+const CAMERA_STEP = "viewpoint";
+/** Largest difference between two coordinates that count as equal, m. */
 const SAME_M = 1e-4;
 
 export class Steps {
   private history: History<Moment> = NO_HISTORY;
-  /** From where the specimen was seen after the last step. */
+  /** The camera after the last step. */
   private seenFrom: CameraView | null;
   private gesture = 0;
   private held = 0;
@@ -43,7 +43,7 @@ export class Steps {
 
   get undoes(): string | null {
     const { camera, isInRoom } = this.now();
-    if (!isInRoom && !isSame(camera, this.seenFrom)) return LOOK;
+    if (!isInRoom && !isSame(camera, this.seenFrom)) return CAMERA_STEP;
     return this.history.past.at(-1)?.name ?? null;
   }
 
@@ -51,15 +51,15 @@ export class Steps {
     return this.history.future[0]?.name ?? null;
   }
 
-  /** Make a step of how the camera was moved since the last one, if it was. */
+  /** Makes a step of a move of the camera since the last step, if there was one. */
   note(): void {
     const moment = this.now();
     if (moment.isInRoom || isSame(moment.camera, this.seenFrom)) return;
-    this.push({ ...moment, camera: this.seenFrom }, LOOK, null);
+    this.push({ ...moment, camera: this.seenFrom }, CAMERA_STEP, null);
     this.seenFrom = moment.camera;
   }
 
-  /** Before the state changes. */
+  /** Adds a step; called before the state changes. */
   add(name: string, key: string | null): void {
     this.note();
     this.push(this.now(), name, key);
@@ -75,12 +75,12 @@ export class Steps {
     return this.take(redone(this.history, moment));
   }
 
-  /** The newest step; null: there is none. It marks a place in the history. */
+  /** The newest step, which marks a place in the history; null: none. */
   get newest(): object | null {
     return this.history.past.at(-1) ?? null;
   }
 
-  /** How many steps were made since that one was the newest, moves of the camera included. */
+  /** Returns the number of steps since a mark, including moves of the camera. */
   since(newest: object | null): number {
     this.note();
     const past: readonly (object | null)[] = this.history.past;

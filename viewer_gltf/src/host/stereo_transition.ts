@@ -1,6 +1,6 @@
 /**
- * From where the specimen is seen, on the screen and in stereo: what was looked at on the one is
- * looked at in the other, and back.
+ * Keeps the view of the specimen between the screen and stereo. The part in the middle of the
+ * screen is in front of the eyes in stereo, and vice versa.
  */
 import { Euler, Quaternion, Vector3 } from "three";
 import type { Navigation } from "../interaction/orbit_camera";
@@ -11,7 +11,7 @@ import type { Specimen } from "../render/specimen_pose";
 import type { CameraView } from "../state/camera_view";
 
 export class StereoTransition {
-  /** In stereo: where the specimen was when it began, in the room and on the screen. */
+  /** Poses of the specimen in the scene and on the screen at the start of stereo; null: no stereo. */
   private entered: Readonly<{
     inRoom: SpecimenPose;
     onScreen: SpecimenPose | null;
@@ -25,10 +25,11 @@ export class StereoTransition {
   ) {}
 
   /**
-   * The specimen turns the same side to the head as to the screen, what was looked at ahead.
+   * Turns the side of the specimen that faces the screen to the head, with the middle of the view
+   * straight ahead.
    *
-   * @param larger than it opens, unless someone has made it as large as it is
-   * @param table where it stands in the user's own room, upright; null: before the eyes
+   * @param larger factor to the opening size, unless the user has resized the specimen
+   * @param table upright place in the user's own room; null: in front of the eyes
    */
   enter(larger = 1, table: HandPose | null = null): void {
     const { navigation, specimen } = this;
@@ -47,7 +48,7 @@ export class StereoTransition {
     this.entered = { inRoom: specimen.pose, onScreen, hold, facing };
   }
 
-  /** What was looked at stays. */
+  /** Keeps the middle of the view when stereo ends. */
   leave(): void {
     const { navigation, specimen, poseOnScreen: pose } = this;
     this.entered = null;
@@ -56,7 +57,7 @@ export class StereoTransition {
     if (pose !== null) specimen.moveTo(pose, navigation.camera.position);
   }
 
-  /** From where the specimen is seen; null: as it opens. */
+  /** The view of the specimen; null: the opening view. */
   get cameraView(): CameraView | null {
     const { navigation, poseOnScreen: pose } = this;
     const eye = pose === null ? navigation.look : navigation.lookNow;
@@ -66,7 +67,7 @@ export class StereoTransition {
     return { ...eye, specimen };
   }
 
-  /** Back to where `cameraView` was. */
+  /** Returns to an earlier `cameraView`. */
   restore(view: CameraView | null): void {
     this.specimen.goHome();
     if (view === null) this.navigation.reset();
@@ -84,25 +85,26 @@ export class StereoTransition {
     this.specimen.moveTo(pose, this.navigation.camera.position);
   }
 
-  /** The flat camera, held as a hand holds a thing: by the point that it is turned about. */
+  /** The flat camera as a hand that holds the point it turns around. */
   private get screenHold(): HandPose {
     const { target, object } = this.navigation.controls;
     return { position: target, orientation: object.quaternion };
   }
 
-  /** Where the specimen is to the flat camera, also while there is stereo; null: where it opens. */
+  /** Pose of the specimen for the flat camera, also in stereo; null: the opening pose. */
   private get poseOnScreen(): SpecimenPose | null {
     const { entered, navigation } = this;
     const { anchor, home, isMoved, pose } = this.specimen;
     if (entered === null) return isMoved ? pose : null;
-    if (pose === entered.inRoom) return entered.onScreen; // nobody has moved it there
+    // the user has not moved the specimen in stereo
+    if (pose === entered.inRoom) return entered.onScreen;
     if (!isMoved && navigation.isStraight) return null;
     const there = zoomAbout(isMoved ? pose : home, anchor, 1 / this.specimen.size);
     return ontoScreen(there, entered.hold, anchor, entered.facing);
   }
 }
 
-/** The same without its tilt: a thing on a table stands upright. */
+/** Returns a pose without its tilt, because an object on a table stands upright. */
 function levelled({ position, orientation }: HandPose): HandPose {
   const { y } = new Euler().setFromQuaternion(orientation, "YXZ");
   return { position, orientation: new Quaternion().setFromEuler(new Euler(0, y, 0)) };

@@ -1,21 +1,21 @@
-/** Pictures that are drawn apart from the page's own frames. */
+/** Frames that are drawn apart from the page's own, for saved images. */
 
-/** Samples of each pixel where it is traced: with so many nothing has to be denoised. */
+/** Samples per pixel of a path-traced image, enough to need no denoising. */
 export const TRACED_SAMPLES = 192;
 
-/** How far a picture that is saved has come. */
+/** Progress of a saved image. */
 export type Still = Readonly<{
   frames: number;
   isDone: boolean;
-  /** Samples of each pixel, where it is traced; null: it is not. */
+  /** Samples per pixel; null: not path-traced. */
   samples: number | null;
 }>;
 
 export interface StillMaker {
-  /** Keeps the page's own frames from drawing while a job runs. */
+  /** Runs a job while the page's own frames are stopped. */
   apart<T>(job: () => Promise<T>): Promise<T>;
-  /** Follows the camera, as long in seconds as a frame takes, until what it sees has come: so many ms at most. */
+  /** Moves the camera by a time step of `dt_s`, and waits until its view is loaded, for at most `most_ms`. */
   arrive(dt_s: number, most_ms: number): Promise<void>;
-  /** Draws the view as well as can be in so many ms; `begun`: goes on with it. */
+  /** Draws the view in full quality for at most `most_ms`; `begun`: continues an earlier result. */
   drawStill(most_ms: number, begun?: Still | null): Still;
 }

@@ -1,21 +1,21 @@
-/** Frames that are drawn apart from the page's own: pictures that are saved, and videos. */
+/** Frames that are drawn apart from the page's own: saved images and videos. */
 import type { WebGLRenderer } from "three";
 import { ERROR_TARGET_PX } from "./form";
 import type { SceneFrame, SceneFrameOptions } from "./scene_frame";
 import { type Still, type StillMaker, TRACED_SAMPLES } from "./still";
 
-/** Most frames of a picture that is saved that are averaged, where it is marched. */
+/** Largest number of frames that are averaged for a saved image of marched volumes. */
 const MAX_SAMPLES = 64;
-/** Time between two checks whether everything has loaded, ms. */
+/** Milliseconds between two checks whether everything is loaded. */
 const POLL_MS = 20;
 
 export type StudioOptions = Readonly<{
   renderer: WebGLRenderer;
   scene: SceneFrame;
   shown: SceneFrameOptions["shown"];
-  /** The overview has loaded, so volumes may be shown. */
+  /** Called when the overview is loaded, so that volumes may be shown. */
   onOverview: () => void;
-  /** Stops the page's own frames, and starts them again. */
+  /** Stops and starts the page's own frames. */
   stop: () => void;
   start: () => void;
 }>;
@@ -25,7 +25,7 @@ export class Studio implements StillMaker {
 
   constructor(private readonly options: StudioOptions) {}
 
-  /** Keeps the page's own frames from drawing while a job draws by `drawStill`. */
+  /** Runs a job, which draws with `drawStill`, while the page's own frames are stopped. */
   async apart<T>(job: () => Promise<T>): Promise<T> {
     this.options.stop();
     try {
@@ -35,7 +35,7 @@ export class Studio implements StillMaker {
     }
   }
 
-  /** Follows the flat camera until what it sees has come, for so long at most. */
+  /** Moves the flat camera, and waits until its view is loaded, for at most `most_ms`. */
   async arrive(dt_s: number, most_ms: number): Promise<void> {
     const start_ms = performance.now();
     this.follow(dt_s);
@@ -49,7 +49,7 @@ export class Studio implements StillMaker {
     return this.options.shown().parts.isLoading;
   }
 
-  /** Follows the flat camera, without drawing. */
+  /** Moves the flat camera, and streams its view without drawing. */
   private follow(dt_s: number): void {
     const { scene, renderer, shown, onOverview } = this.options;
     const camera = scene.poseMono(dt_s);
@@ -61,9 +61,10 @@ export class Studio implements StillMaker {
   }
 
   /**
-   * Draws the flat camera's view at once: samples are gathered for so long, but for the quality Low or High.
+   * Draws the view of the flat camera, and gathers samples for at most `most_ms`. The qualities Low
+   * and High take a single frame.
    *
-   * @param begun the earlier result for the same view, to go on with
+   * @param begun earlier result of the same view, to continue
    */
   drawStill(most_ms: number, begun: Still | null = null): Still {
     const { scene, renderer, shown } = this.options;
@@ -83,7 +84,7 @@ export class Studio implements StillMaker {
         samples !== null
           ? samples >= TRACED_SAMPLES
           : state.quality !== "auto" || !scene.picture.canGather || frames >= MAX_SAMPLES;
-      // a pixel that is read waits for the drawing, which `finish` does not where another process draws
+      // reading a pixel waits for the drawing; `finish` does not if another process draws
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, this.pixel);
       if (isDone || performance.now() - start_ms > most_ms) {
         return { frames, isDone, samples: samples === null ? null : Math.floor(samples) };

@@ -1,4 +1,4 @@
-/** Choices in the picture: a click or a tap, a key in the middle of the view, a hand or a gaze in stereo. */
+/** Choices in the view: a click or a tap, a key for the middle of the view, a hand or a gaze in stereo. */
 import { Vector2 } from "three";
 import { listenForClicks } from "../interaction/rays";
 import { pickTile, shownTiles } from "../math/pick";
@@ -8,10 +8,10 @@ import { Signal } from "../state/signal";
 import type { PartHost } from "./part";
 import type { Parts } from "./parts";
 
-const NOTHING_THERE = "Nothing lies there to fly to.";
+const NOTHING_THERE = "There is nothing to fly to.";
 
 export class Taps {
-  /** A second quick tap asks to fly there, so the first one was no choice. */
+  /** Emitted after a double tap, which flies to the place. Its first tap was then not a choice. */
   readonly doubled = new Signal<void>();
 
   constructor(
@@ -31,14 +31,17 @@ export class Taps {
     );
   }
 
-  /** The ray (um) under a point of the screen, -1..1, in the picture of the eye that shows there. */
+  /**
+   * Returns the ray (um) under a point of the screen, -1..1. In side-by-side stereo, the point is
+   * in the image of one eye.
+   */
   rayAt(point: Vector2): Ray {
     const { state, viewpoint } = this.host;
     if (state.screenStereo !== "side-by-side") return viewpoint.rayAt(point);
     return viewpoint.rayAt(new Vector2(2 * point.x + (point.x < 0 ? 1 : -1), point.y));
   }
 
-  /** A tap on the flat picture: measures, or selects what lies there. Returns whether it met anything. */
+  /** Taps the flat view: measures or selects what is hit. Returns whether anything was hit. */
   tap(ray: Ray, by: "pointer" | "key" = "pointer"): boolean {
     const { state, bundle } = this.host;
     const { tiles } = bundle.manifest;
@@ -47,7 +50,7 @@ export class Taps {
     const answer = this.parts.tap(tap);
     if (answer === "used") return true;
     const tile = pickTile(ray, shownTiles(tiles, state.isolated), state.clip)?.id ?? null;
-    // a single tile has no others to be told apart from
+    // a single tile needs no selection
     if (answer === null && tiles.length > 1 && tile !== null) {
       this.host.dispatch({ type: "select", tile });
     }
@@ -56,8 +59,8 @@ export class Taps {
   }
 
   /**
-   * In stereo this measures, or chooses the tile; a specimen of a single tile has nothing to choose. A choice by a
-   * resting gaze is no step that *Undo* takes back, since nobody asked for it.
+   * Measures in stereo, or chooses a tile if there are several. A choice by a resting gaze is not a
+   * step of *Undo*, because it may be unintended.
    */
   choose(ray: Ray, tile: string | null, isByGaze: boolean): void {
     const { state } = this.host;
@@ -74,16 +77,16 @@ export class Taps {
     else void this.flyAlong(ray);
   }
 
-  /** Flies to the place that a ray (um) meets. Where it meets nothing the view stays, and the page says so. */
+  /** Flies to the place that a ray (um) hits. If it hits nothing, the view stays, which is announced. */
   private async flyAlong(ray: Ray): Promise<void> {
     const { reading, undo, viewpoint } = this.host;
-    const met = await reading.probe(ray);
+    const hit = await reading.probe(ray);
     if (this.signal.aborted) return;
-    if (met === null) {
+    if (hit === null) {
       this.host.announce(NOTHING_THERE);
       return;
     }
-    undo.noteLook();
-    viewpoint.flyTowards(met.point);
+    undo.noteCameraMove();
+    viewpoint.flyTowards(hit.point);
   }
 }

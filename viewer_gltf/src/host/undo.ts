@@ -1,4 +1,4 @@
-/** Undo and redo of the user's steps, and the way back from a single change. */
+/** Undo and redo of the user's steps, and the return from a single change. */
 import type { Look } from "../interaction/named_views";
 import { isSameLook } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
@@ -9,7 +9,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { Steps } from "./steps";
 import type { Viewpoint } from "./viewpoint";
 
-/** A moment that `takeBack` can return to. */
+/** A moment to which `takeBack` can return. */
 export type Mark = Readonly<{
   state: ViewerState;
   camera: CameraView | null;
@@ -23,7 +23,7 @@ export type UndoOptions = Readonly<{
   isInRoom: () => boolean;
   restore: (state: ViewerState) => void;
   announce: (text: string) => void;
-  /** The panel has to show what can be undone now. */
+  /** Called when the panel has to show what can be undone now. */
   onChange: () => void;
   signal: AbortSignal;
 }>;
@@ -37,10 +37,10 @@ export class Undo {
       () => ({ state: state(), camera: viewpoint.cameraView, isInRoom: isInRoom() }),
       signal,
     );
-    viewpoint.navigation.controls.addEventListener("start", () => this.noteLook());
+    viewpoint.navigation.controls.addEventListener("start", () => this.noteCameraMove());
   }
 
-  /** Names the change that undoing would take back; null: there is none. */
+  /** Name of the change that undo would take back; null: none. */
   get undoes(): string | null {
     return this.steps.undoes;
   }
@@ -49,8 +49,8 @@ export class Undo {
     return this.steps.redoes;
   }
 
-  /** Makes a step of how the camera was moved since the last one, if it was. */
-  noteLook(): void {
+  /** Makes a step of a move of the camera since the last step, if there was one. */
+  noteCameraMove(): void {
     this.steps.note();
   }
 
@@ -69,7 +69,7 @@ export class Undo {
     }
     const { state, camera, isInRoom: wasInRoom } = found.moment;
     restore(state);
-    // in a room the head looks, and what stands there was put there
+    // in stereo the head looks, and the specimen stays where it was placed
     if (!wasInRoom && !isInRoom()) viewpoint.restore(camera);
     announce(`${command === "undo" ? "Undone" : "Redone"}: ${found.name}.`);
     onChange();
@@ -81,22 +81,22 @@ export class Undo {
     return { state: state(), camera, look: navigation.lookNow, newest: this.steps.newest };
   }
 
-  /** Whether the user would see a difference since then. */
+  /** Returns whether the user would see a difference since a mark. */
   hasChangedSince({ state, look }: Mark): boolean {
     const { viewpoint, state: now } = this.options;
     return !isSameView(state, now()) || !isSameLook(look, viewpoint.navigation);
   }
 
-  /** The newest step of the history; it marks a place there. */
+  /** The newest step of the history, which marks a place in it. */
   get newest(): object | null {
     return this.steps.newest;
   }
 
-  /** Returns to the state of a moment and to where the specimen was seen from. */
+  /** Returns to the state and the camera of a mark. */
   takeBack({ state, camera, newest }: Mark): void {
     const { viewpoint, isInRoom, onChange } = this.options;
     if (!isSameView(state, this.options.state())) {
-      // a change that was joined with the step before it made no step of its own
+      // a change that was joined to the previous step made no step of its own
       for (let left = Math.max(1, this.steps.since(newest)); left > 0; left--) this.step("undo");
     }
     if (!isInRoom()) viewpoint.restore(camera);

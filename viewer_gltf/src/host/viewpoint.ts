@@ -1,4 +1,4 @@
-/** From where the specimen is seen, and where it stands: the flat camera, the head in stereo, the specimen's pose. */
+/** The viewpoint: the flat camera, the head in stereo, and the pose of the specimen. */
 import { type Matrix4, Quaternion, type Vector2, Vector3 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { Look, Stand } from "../interaction/named_views";
@@ -22,24 +22,24 @@ import { ahead } from "../xr/head_pose";
 import type { Stereo } from "../xr/stereo";
 import { StereoTransition } from "./stereo_transition";
 
-/** Distance of the eye from an object that it flies to, in the object's lengths, and at least, m. */
+/** Distance of the eye from an object that it flies to, in lengths of the object, and at least in m. */
 const NEAREST_OBJECT = 6;
 const NEAREST_OBJECT_M = 0.08;
-/** Directions from which an object may be seen: corners, edges and faces of a cube, the front ones first. */
-const ASIDE = [1, 0, -1].flatMap((z) =>
+/** Directions from which to view an object: corners, edges and faces of a cube, from the front first. */
+const VIEW_DIRECTIONS = [1, 0, -1].flatMap((z) =>
   [0, 1, -1].flatMap((y) => [0, 1, -1].flatMap((x) => (x || y || z ? [[x, y, z] as const] : []))),
 );
-/** Least length of an object that is brought before the eyes in stereo, m. */
+/** Smallest length of an object that is brought in front of the eyes in stereo, m. */
 const OBJECT_IN_ROOM_M = 0.15;
 
 export type ViewpointOptions = Readonly<{
   canvas: HTMLCanvasElement;
-  /** The box of the specimen, um. */
+  /** Box of the specimen, um. */
   bounds: Bounds;
   specimen: Specimen;
   /** Made after the viewpoint. */
   stereo: () => Stereo;
-  /** The picture has to change at once. */
+  /** Called when the view has to be drawn again at once. */
   onChange: () => void;
 }>;
 
@@ -53,22 +53,22 @@ export class Viewpoint {
     this.transition = new StereoTransition(this.navigation, specimen);
   }
 
-  /** Pose of the head in the room, or of the mono camera. */
+  /** Pose of the head or of the flat camera, in the scene. */
   get head(): Matrix4 {
     return this.options.stereo().head ?? this.navigation.camera.matrixWorld;
   }
 
-  /** From um to the room. */
+  /** Matrix from um to metres of the scene. */
   get specimen(): Matrix4 {
     return this.options.specimen.group.matrixWorld;
   }
 
-  /** From where the specimen is seen; null: as it opens. */
+  /** The view of the specimen; null: the opening view. */
   get cameraView(): CameraView | null {
     return this.transition.cameraView;
   }
 
-  /** From where the specimen is seen now, also where nobody has moved. */
+  /** The present view of the specimen, also if it is the opening view. */
   get viewNow(): CameraView {
     return this.cameraView ?? { ...this.navigation.lookNow, specimen: null };
   }
@@ -78,72 +78,72 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** From where the flat camera looks, m of the scene. */
+  /** Pose of the flat camera, in metres of the scene. */
   get lookNow(): Look {
     return this.navigation.lookNow;
   }
 
-  /** Places the flat camera; the specimen stays where it is. */
+  /** Places the flat camera without moving the specimen. */
   lookFlatFrom(look: Look): void {
     this.navigation.lookFrom(look);
     this.options.onChange();
   }
 
-  /** Whether the flat camera looks from there. */
+  /** Returns whether the flat camera has a pose. */
   isAt(look: Look): boolean {
     return isSameLook(look, this.navigation);
   }
 
-  /** The named view that still holds; null: someone has moved. */
+  /** The present named view; null: the user has moved the camera. */
   get standing(): Stand | null {
     return this.navigation.standing;
   }
 
-  /** From the eye to the middle of the specimen as it opens, m. */
+  /** Distance from the eye to the middle of the specimen in the opening view, m. */
   get openingDistance_m(): number {
     return this.navigation.openingDistance_m;
   }
 
-  /** Turns slowly to and fro, as long as nobody moves and the opening holds. */
+  /** Turns the specimen slowly to and fro, until the user moves it or the opening view is left. */
   turnSlowly(): void {
     this.navigation.turnSlowly();
     this.options.onChange();
   }
 
-  /** The place (-1..1) of a point (um) in the flat picture, and its depth. */
+  /** Returns the place of a point (um) in the flat view, -1..1, and its depth. */
   project(point: Vec3): Vector3 {
     return new Vector3(...point).applyMatrix4(this.specimen).project(this.navigation.camera);
   }
 
-  /** From um to the scene, m. */
+  /** Converts a point from um to metres of the scene. */
   toScene(point: Vec3): Vec3 {
     return new Vector3(...point).applyMatrix4(this.specimen).toArray();
   }
 
-  /** From the scene (m) to um. */
+  /** Converts a point from metres of the scene to um. */
   toSpecimen(place: Vec3): Vec3 {
     const toSpecimen = this.specimen.clone().invert();
     return new Vector3(...place).applyMatrix4(toSpecimen).toArray();
   }
 
-  /** Goes back to an earlier `cameraView`. */
+  /** Returns to an earlier `cameraView`. */
   restore(view: CameraView | null): void {
     this.transition.restore(view);
     this.options.onChange();
   }
 
-  /** Opens the view at a stand, or as the specimen opens. */
+  /** Opens with a named view, or with the opening view of the specimen. */
   openAt(stand: Stand): void {
     this.navigation.openAt(stand);
     this.options.onChange();
   }
 
-  /** Someone has touched the page. */
+  /** Stops the slow turning after the user has touched the page. */
   stopTurning(): void {
     this.navigation.stopTurning();
   }
 
-  /** The ray (um) under a point of the picture, -1..1. */
+  /** Returns the ray (um) under a point of the view, -1..1. */
   rayAt(point: Vector2): Ray {
     return rayUnder(point, this.navigation.camera, this.options.specimen.group);
   }
@@ -153,7 +153,7 @@ export class Viewpoint {
     return rayAhead(this.head, this.options.specimen.group);
   }
 
-  /** Steps back until points (um) are in the picture. */
+  /** Moves the camera back until points (um) are in the view. */
   stepBackFor(points: readonly Vec3[]): void {
     this.navigation.stepBackFor(
       points.map((point) => new Vector3(...point).applyMatrix4(this.specimen)),
@@ -166,7 +166,7 @@ export class Viewpoint {
     this.options.onChange();
   }
 
-  /** Brings the specimen to where it opens: in stereo straight before the head, at its height. */
+  /** Returns the specimen to its opening place: in stereo straight in front of the head, at its height. */
   recentre(): void {
     const { specimen } = this.options;
     const stereo = this.options.stereo();
@@ -186,7 +186,7 @@ export class Viewpoint {
     const { specimen } = this.options;
     this.transition.enter(size_m / START_TOOLS.specimenSize_m, table);
     specimen.isJumping = true;
-    specimen.takeJump(); // there is no picture yet to fade from
+    specimen.takeJump(); // there is no earlier frame to fade from
   }
 
   leaveStereo(): void {
@@ -195,10 +195,11 @@ export class Viewpoint {
   }
 
   /**
-   * Brings an object near: the flat camera goes to where nothing lies before it, if there is such a place; in stereo
-   * the object comes before the eyes. Returns whether nothing lies before it.
+   * Brings an object near. The flat camera flies to a place where nothing hides the object, if
+   * there is one. In stereo the object moves in front of the eyes. Returns whether nothing hides
+   * it.
    *
-   * @param isSeen whether an eye (um) sees the object
+   * @param isSeen returns whether an eye (um) sees the object
    */
   flyTo(box: Box, isSeen: (eye: Vec3) => boolean): boolean {
     const { specimen } = this.options;
@@ -218,7 +219,7 @@ export class Viewpoint {
     const { position, target } = this.navigation.lookNow;
     const distance_m = Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M);
     const now = new Vector3(...position).sub(new Vector3(...target));
-    const eyes = [now, ...ASIDE.map((way) => new Vector3(...way))].map((way) =>
+    const eyes = [now, ...VIEW_DIRECTIONS.map((way) => new Vector3(...way))].map((way) =>
       way.setLength(distance_m).add(middle),
     );
     const free = eyes.find((eye) => isSeen(eye.clone().applyMatrix4(toSpecimen).toArray()));
@@ -227,7 +228,7 @@ export class Viewpoint {
     return free !== undefined;
   }
 
-  /** Where things stand in the user's own room, facing a head. */
+  /** Returns the place for the specimen in the user's own room, facing the head. */
   private tableBefore(head: Matrix4): HandPose {
     const position = ahead(head, ROOM_DISTANCE_M);
     const eye = new Vector3().setFromMatrixPosition(head);

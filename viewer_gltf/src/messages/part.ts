@@ -1,13 +1,13 @@
-/** Messages over the picture as a part of the viewer. Their code loads when the first message is due. */
+/** Messages over the view, as a part of the viewer. Their code is loaded when the first message is due. */
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { MessageButtons } from "../host/services";
 import type { ViewerState } from "../state/viewer_state";
 import type { PictureMessage } from "./picture_message";
 
-/** Parts of the state that can leave the picture empty. */
+/** Parts of the state that can make the view empty. */
 const EMPTYING = ["channels", "clip", "isolated", "selected", "objects"] as const;
 
-/** Whether the picture may be empty by a setting: then the part of the page that says why is loaded. */
+/** Returns whether a setting may have made the view empty, so that the code that reports it is loaded. */
 const mayBeEmpty = (state: ViewerState, opening: ViewerState) =>
   EMPTYING.some((key) => state[key] !== opening[key]) ||
   (state.mode === "off" && !state.channels.some(({ shown, hasSurface }) => shown && hasSurface));

@@ -1,15 +1,18 @@
-/** Messages over the picture say why it is empty, or why a request was refused. Each offers a way back. */
+/**
+ * Messages over the view that report why it is empty, or why a request was refused. Each offers a
+ * button that solves the problem.
+ */
 import type { PartHost } from "../host/part";
 import type { Offer } from "../panel/controls";
 import { type Content, emptyViewOf } from "../panel/empty_view";
 import { type Message, ViewMessage } from "../panel/html/view_message";
-import { offerFor } from "../panel/ways_on";
+import { offerFor } from "../panel/remedies";
 import type { ViewerState } from "../state/viewer_state";
 
 export class PictureMessage {
   private readonly message: ViewMessage;
-  /** Channels whose list of volumes was asked for. */
-  private readonly asked = new Set<string>();
+  /** Channels whose lists of volumes have been requested. */
+  private readonly requested = new Set<string>();
   private readonly known = new Set<string>();
 
   constructor(
@@ -19,7 +22,7 @@ export class PictureMessage {
     this.message = new ViewMessage(host.view);
   }
 
-  /** Brings the message to the present state and to the files that have arrived. */
+  /** Updates the message to the present state and to the files that have arrived. */
   update(): void {
     const { state, display, isInRoom, hasStandingPart } = this.host;
     if (display.isLoading) return;
@@ -27,18 +30,18 @@ export class PictureMessage {
     this.message.show(empty && { text: empty.text, ...this.buttonOf(empty.offer) });
   }
 
-  /** The button that leads on from a refusal; null: nothing does. */
+  /** Returns the button that solves a refusal; null: none. */
   buttonFor(refusal: string): Omit<Message, "text"> | null {
     const { host } = this;
     const objects = host.service("objects")?.rowsShown ?? new Map();
     const now = { state: host.state, shown: host.panel.shown, objects };
-    const offer = offerFor(refusal, now, host.waysOn);
+    const offer = offerFor(refusal, now, host.remedies);
     return offer && this.buttonOf(offer);
   }
 
   private buttonOf({ label, to }: Offer): Omit<Message, "text"> {
     const act = () => {
-      // one step for all: undoing leads back to before the first
+      // undo takes all actions of the button back as one step
       to.forEach((each, i) => {
         if (typeof each === "string") this.host.run(each);
         else this.host.dispatch(each, i === 0);
@@ -59,17 +62,17 @@ export class PictureMessage {
       hasSurface: (channel, tile) =>
         surfaces?.of(channel).some((each) => each.tile === tile) ?? false,
       hasVolume: (channel, tile) => {
-        this.ask(channel);
+        this.requestList(channel);
         return this.known.has(channel) ? volumes?.source(tile, channel) != null : null;
       },
       objectsLeft: (channel) => host.service("objects")?.left(channel) ?? null,
     };
   }
 
-  /** Asks which tiles have volumes of a channel; surfaces alone do not need to know. */
-  private ask(channel: string): void {
-    if (this.asked.has(channel)) return;
-    this.asked.add(channel);
+  /** Requests the list of a channel's volumes, which surfaces do not need. */
+  private requestList(channel: string): void {
+    if (this.requested.has(channel)) return;
+    this.requested.add(channel);
     void this.host
       .service("volumes")
       ?.sourcesOf(channel)

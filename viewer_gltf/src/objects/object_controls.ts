@@ -1,6 +1,6 @@
 /** Makers of the controls in a label map's section: each has an id of the channel, and changes its view of objects. */
 import type { ObjectColumn } from "../bundle/generated/objects";
-import type { Control, Wish } from "../panel/controls";
+import type { Control, Request } from "../panel/controls";
 import type { ObjectView } from "../state/objects";
 
 export class ObjectControls {
@@ -10,7 +10,7 @@ export class ObjectControls {
     return `${this.channel}/objects-${part}`;
   }
 
-  change(change: Partial<ObjectView>): Wish {
+  change(change: Partial<ObjectView>): Request {
     return { type: "objects", channel: this.channel, change };
   }
 

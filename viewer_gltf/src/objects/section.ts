@@ -203,7 +203,7 @@ class ObjectSection {
         "Selected",
         selected.length === 0 ? "none" : `${selected.length} objects`,
       ),
-      this.controls.button("select-shown", "Select all that show", { selected: objects.shown }),
+      this.controls.button("select-shown", "Select all shown", { selected: objects.shown }),
       this.controls.button(
         "hide-selected",
         "Hide the selected",

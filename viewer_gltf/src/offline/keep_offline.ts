@@ -3,7 +3,7 @@
 import type { Bundle } from "../bundle/load";
 import { allCome, keyOf } from "../bundle/request_log";
 import type { PartHost } from "../host/part";
-import { arAddress } from "../panel/html/ways_in";
+import { arAddress } from "../panel/html/entry_buttons";
 import { showsVolumes } from "../state/viewer_state";
 import { type Coverage, coverageOf, coverageText } from "./coverage";
 import { OfflineLayers } from "./layers";

@@ -1,17 +1,17 @@
-/** The keys of the page: each grants its request, is announced, and can be taken back. */
+/** The keys of the page. The effect of each key is announced, and can be taken back. */
 import { NOT_LOADED } from "../host/later";
 import type { PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
 import type { Mark } from "../host/undo";
 import { handleOf } from "../panel/clip_by_key";
-import type { PanelView, Wish } from "../panel/controls";
+import type { PanelView, Request } from "../panel/controls";
 import type { Help } from "../panel/html/key_list";
 import { isRefusal, type KeyContext } from "../panel/key";
 import { isWritten, listenForKeys } from "../panel/key_events";
 import { spokenFeedback } from "../panel/spoken_feedback";
 import { announcementOf } from "../state/announce_change";
 
-/** The step and the panel's view before a key was pressed; *Undo* returns to them. */
+/** The moment and the state of the panel before a key was pressed; *Undo* returns to them. */
 type Before = Readonly<{ mark: Mark; view: PanelView }>;
 const HIDDEN: Readonly<Record<string, string>> = {
   true: "The panel is hidden.",
@@ -19,9 +19,9 @@ const HIDDEN: Readonly<Record<string, string>> = {
 };
 
 export class Keyboard {
-  /** The list of keys; null until it is first opened. */
+  /** The list of keys; null: not opened yet. */
   private help: Help | null = null;
-  /** The change by a key that can still be taken back, with the newest step after it. */
+  /** The last change by a key that can still be taken back, with the newest step after it. */
   private accident: (Before & Readonly<{ after: object | null }>) | null = null;
 
   constructor(
@@ -33,18 +33,18 @@ export class Keyboard {
     host.announced.subscribe(() => {
       this.accident = null;
     });
-    // the keys are for the page that is shown, not for one that is prepared behind it
+    // an inert page is being prepared behind the shown one, and must not react to keys
     listenForKeys((name) => !parent.inert && this.press(name), signal);
   }
 
-  /** Takes back the change of the newest key; false: there is none to take back. */
+  /** Takes back the change by the last key; returns false if there is none. */
   undo(): boolean {
     if (this.accident === null) return false;
     this.takeBack(this.accident);
     return true;
   }
 
-  /** Brings the list of keys to the panel's view. Returns whether a change can no longer be taken back. */
+  /** Updates the list of keys. Returns whether the last change can no longer be taken back. */
   update(): boolean {
     const { isHelpOpen, keyChanges } = this.host.panel.view;
     this.help?.update(isHelpOpen, keyChanges);
@@ -63,16 +63,17 @@ export class Keyboard {
       return true;
     }
     const name = host.keys.standsFor(pressed, view.keyChanges);
-    const wish = name === null ? null : host.keys.wishOf(name, this.context);
-    if (name === null || wish === null) {
-      if (isWritten(pressed)) host.announce(`No key ${pressed}: ? lists the keys.`);
+    const request = name === null ? null : host.keys.requestOf(name, this.context);
+    if (name === null || request === null) {
+      if (isWritten(pressed))
+        host.announce(`${pressed} is not a key of the viewer: ? lists the keys.`);
       return false;
     }
-    if (isRefusal(wish)) {
-      this.page.perform(wish);
+    if (isRefusal(request)) {
+      this.page.perform(request);
       return false;
     }
-    this.grant(wish, name, isWritten(pressed));
+    this.grant(request, name, isWritten(pressed));
     return true;
   }
 
@@ -82,28 +83,29 @@ export class Keyboard {
     return { state, view, shown, focusTile: display.snapshot().gazed };
   }
 
-  private grant(wish: Wish, name: string, canBeAccident: boolean): void {
+  private grant(request: Request, name: string, canBeAccident: boolean): void {
     const { host } = this;
     const before = host.state;
     const { mark } = host.undo;
     const { view, ranges } = host.panel;
-    this.page.perform(wish);
-    if (typeof wish !== "string" && "panel" in wish && wish.panel === "clip-part") {
-      host.service("handles")?.highlight(handleOf(wish.clipPart));
+    this.page.perform(request);
+    if (typeof request !== "string" && "panel" in request && request.panel === "clip-part") {
+      host.service("handles")?.highlight(handleOf(request.clipPart));
     }
     const { tiles } = host.bundle.manifest;
     const text =
-      announcementOf(before, host.state, tiles) ?? spokenFeedback(wish, before, host.state, ranges);
+      announcementOf(before, host.state, tiles) ??
+      spokenFeedback(request, before, host.state, ranges);
     const words = text || host.keys.labelOf(name);
-    if (canBeAccident && this.offerBack(wish, words, { mark, view })) return;
+    if (canBeAccident && this.offerBack(request, words, { mark, view })) return;
     if (text !== "") host.announce(text);
   }
 
-  /** Announces the change by a key, and offers to take it back: the key may have been hit by accident. */
-  private offerBack(wish: Wish, text: string, { mark, view }: Before): boolean {
+  /** Announces the change by a key, and offers to take it back, since it may have been an accident. */
+  private offerBack(request: Request, text: string, { mark, view }: Before): boolean {
     const { host } = this;
     const now = host.panel.view;
-    const isOwnAnswer = wish === "share" || now.isHelpOpen || host.isInRoom;
+    const isOwnAnswer = request === "share" || now.isHelpOpen || host.isInRoom;
     if (isOwnAnswer || !(host.undo.hasChangedSince(mark) || view !== now)) return false;
     const words = view.isHidden === now.isHidden ? text : HIDDEN[String(now.isHidden)];
     const accident = { mark, view, after: host.undo.newest };

@@ -1,19 +1,19 @@
-/** The graphics driver has dropped the picture: where it does not come back, a reload with fewer pixels may do. */
+/** Offers a reload with fewer pixels if the graphics driver does not restore a lost context. */
 import "./lost_context.css";
 import { element } from "../dom/element";
 import { DROPPED } from "../host/faults";
 import type { PartHost } from "../host/part";
 import { takeFewerPixels } from "../render/pixel_share";
 
-/** Time until the page offers a reload, ms: most drivers are back within a second. */
+/** Milliseconds until the page offers a reload. Most drivers restore the context within a second. */
 const PATIENCE_MS = 5000;
-const LOST = "The graphics driver has dropped the picture and does not give it back.";
+const LOST = "The graphics driver has dropped the picture and has not restored it.";
 const OFFER = "Reload with fewer pixels";
 
 /**
- * Offer the reload once the driver has had its time. The offer goes when the picture comes back.
+ * Offers the reload after some time. The offer disappears if the context is restored.
  *
- * @param beforeReload called before the page is loaded again, to keep the view
+ * @param beforeReload called before the reload, to save the view
  */
 export function offerReload(host: PartHost, beforeReload: () => void): void {
   const reload = () => {
@@ -28,14 +28,14 @@ export function offerReload(host: PartHost, beforeReload: () => void): void {
     element("p", { textContent: LOST }),
     element("button", { textContent: OFFER, onclick: reload }, { action: "reload" }),
   );
-  // in the stage, which covers the whole page in the split screen
+  // the stage covers the whole page in the split screen
   const timer = setTimeout(() => {
     host.stage.append(card);
     host.dispatch({ type: "dismiss", texts: [DROPPED] });
   }, PATIENCE_MS);
-  const come = () => {
+  const onRestored = () => {
     clearTimeout(timer);
     card.remove();
   };
-  host.canvas.addEventListener("webglcontextrestored", come, { once: true });
+  host.canvas.addEventListener("webglcontextrestored", onRestored, { once: true });
 }

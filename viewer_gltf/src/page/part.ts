@@ -1,8 +1,11 @@
-/** The panel in the page: shows what the panel's model has, and grants the requests of controls and keys. */
+/**
+ * The panel in the page: shows the content of the panel's model, and carries out the requests of
+ * controls and keys.
+ */
 import { toggleFullScreen } from "../dom/full_screen";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PagePanel } from "../host/services";
-import type { Refusal, Wish } from "../panel/controls";
+import type { Refusal, Request } from "../panel/controls";
 import { Panel } from "../panel/html/panel";
 import { withKeys } from "../panel/keys";
 import { pixelShare } from "../render/pixel_share";
@@ -10,10 +13,10 @@ import { Keyboard } from "./keyboard";
 import { Overlays } from "./overlays";
 import { rememberChange, rememberedView } from "./remembered";
 
-/** Time between updates of the figures that change with each frame, ms. */
+/** Milliseconds between updates of the figures that change with each frame. */
 const REFRESH_MS = 250;
-const FEWER_PIXELS = "Drawn with fewer pixels until this tab is closed.";
-const NO_FULL_SCREEN = "This browser shows the page on no full screen.";
+const FEWER_PIXELS = "The view has fewer pixels until this tab is closed.";
+const NO_FULL_SCREEN = "This browser does not support the full screen for this page.";
 
 class PagePart implements Part, PagePanel {
   readonly id = "page";
@@ -33,7 +36,7 @@ class PagePart implements Part, PagePanel {
     const { signal } = this.disposed;
     const parent = host.view.parentElement ?? host.view;
     this.overlays = new Overlays(host, this, signal);
-    this.html = new Panel((wish) => this.perform(wish));
+    this.html = new Panel((request) => this.perform(request));
     parent.append(this.html.root);
     this.keyboard = new Keyboard(host, this, parent, signal);
     host.announced.subscribe((text) => this.say(text));
@@ -41,7 +44,7 @@ class PagePart implements Part, PagePanel {
     host.changed.subscribe(() => this.refresh());
     host.panel.onChange(() => this.refresh());
     host.drawn.subscribe(() => this.refreshSoon());
-    // A link to another view of the same bundle: what it leaves out is as the bundle opens.
+    // a link to another view of the same bundle: all other settings are those of the opening
     addEventListener("hashchange", () => location.reload(), { signal });
     host.canvas.addEventListener("webglcontextlost", () => {
       void import("./lost_context").then(({ offerReload }) =>
@@ -67,26 +70,26 @@ class PagePart implements Part, PagePanel {
     clearTimeout(this.timer);
     this.timer = 0;
     const { panel } = this.host;
-    this.html.update(panel.layOutPage());
+    this.html.update(panel.buildPagePanel());
     if (this.keyboard.update()) this.overlays.said.withdraw();
     panel.noteShown();
   }
 
-  /** Brings the figures to the newest frame now and then. */
+  /** Updates the figures to the newest frame from time to time. */
   private refreshSoon(): void {
     if (this.timer === 0) this.timer = window.setTimeout(() => this.refresh(), REFRESH_MS);
   }
 
-  perform(wish: Wish | Refusal): void {
+  perform(request: Request | Refusal): void {
     const { host } = this;
-    if (typeof wish === "string") host.run(wish);
-    else if ("refusal" in wish) void this.explain(wish);
-    else if ("panel" in wish) {
-      if (wish.panel === "hide" && host.stereo.togglePanel()) return;
-      host.panel.change(wish);
-      rememberChange(wish, host.panel.view);
-      if (wish.panel === "reveal") this.html.reveal(wish.control);
-    } else host.dispatch(wish);
+    if (typeof request === "string") host.run(request);
+    else if ("refusal" in request) void this.explain(request);
+    else if ("panel" in request) {
+      if (request.panel === "hide" && host.stereo.togglePanel()) return;
+      host.panel.change(request);
+      rememberChange(request, host.panel.view);
+      if (request.panel === "reveal") this.html.reveal(request.control);
+    } else host.dispatch(request);
   }
 
   focus(section: string, control: string): boolean {
@@ -104,7 +107,7 @@ class PagePart implements Part, PagePanel {
     this.overlays.said.offer(words, label, act);
   }
 
-  /** Says why a request does nothing now, with a button where something leads on. */
+  /** Announces why a request has no effect now, with a button if the refusal has one. */
   private async explain({ refusal }: Refusal): Promise<void> {
     const { host } = this;
     const words = withKeys(refusal, host.panel.view.keyChanges);

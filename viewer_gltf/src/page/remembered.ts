@@ -1,4 +1,4 @@
-/** The panel as the reader left it on the visit before. */
+/** The panel's state on the user's previous visit. */
 import { store, stored } from "../dom/stored";
 import { type PanelChange, type PanelView, START_VIEW } from "../panel/controls";
 import type { KeyChanges } from "../panel/keys";
@@ -15,25 +15,28 @@ export function rememberedView(): Partial<PanelView> {
   };
 }
 
-/** The keys that the reader has changed. */
+/** Returns the keys that the user has changed. */
 function rememberedKeys(): KeyChanges {
   try {
     const found: unknown = JSON.parse(stored(KEYS_KEY) ?? "{}");
     const pairs = Object.entries(found ?? {}).filter((pair) => typeof pair[1] === "string");
     return Object.fromEntries(pairs);
   } catch {
-    return {}; // another program's words: then as at first
+    return {}; // the stored text is damaged: the original keys apply
   }
 }
 
-/** The open sections, but for those of label maps: the rows below would move when a table has come. */
+/**
+ * Returns the open sections, except those of label maps, which would move the rows below when their
+ * table is loaded.
+ */
 function rememberedOpen(): readonly string[] {
   const text = stored(OPEN_KEY);
   const sections = text === null ? START_VIEW.open : text.split(" ");
   return sections.filter((id) => !id.startsWith("objects"));
 }
 
-/** @param view after the change */
+/** @param view the panel's state after the change */
 export function rememberChange(change: PanelChange, view: PanelView): void {
   if (change.panel === "unfold") store(OPEN_KEY, view.open.join(" "));
   if (change.panel === "letters") store(LETTERS_KEY, change.areOn ? "on" : "off");

@@ -1,8 +1,8 @@
-/** Which of many channels have a card above the list. Pure. */
+/** Chooses the channels that have a card above the list, if there are many. Pure. */
 import type { ViewerState } from "../state/viewer_state";
 import type { PanelView } from "./controls";
 
-/** Gives the channels that are shown now their cards, which keep their places until the section is opened again. */
+/** Gives the shown channels their cards, which keep their places until the section is opened again. */
 export function keepPlaces(view: PanelView, { channels }: ViewerState): PanelView {
   if (view.channelsWithCard !== null) return view;
   return { ...view, channelsWithCard: channels.filter(({ shown }) => shown).map(({ id }) => id) };

@@ -22,8 +22,8 @@ function moved(clipPart: ClipPart, steps: number, clip = CLIP, shown = SHOWN): C
   return action?.type === "set-clip" ? action.clip : clip;
 }
 
-describe("the grips of the cuts", () => {
-  it("are those of the cuts that there are, each with a name of its own", () => {
+describe("the parts of the cuts", () => {
+  it("belong to the existing cuts, each with a unique name", () => {
     expect(clipPartsOf({ box: null, plane: null })).toEqual([]);
     expect(clipPartsOf({ ...CLIP, box: null })).toEqual([
       "plane-middle",
@@ -36,14 +36,14 @@ describe("the grips of the cuts", () => {
     expect(handleOf("turn-y")).toBe("plane-tip");
   });
 
-  it("are meant as picked, while they are there", () => {
+  it("stay chosen while they exist", () => {
     expect(chosenClipPart(CLIP, "y-max")).toBe("y-max");
     expect(chosenClipPart(CLIP, null)).toBe("x-min");
     expect(chosenClipPart({ ...CLIP, box: null }, "y-max")).toBe("plane-middle");
     expect(chosenClipPart({ box: null, plane: null }, "y-max")).toBeUndefined();
   });
 
-  it("move a face by a fiftieth of the edge, and no other", () => {
+  it("move one face by a fiftieth of the edge", () => {
     expect(moved("x-min", 1)).toEqual({ ...CLIP, box: { min: [12, -20, 10], max: [90, -5, 40] } });
     expect(moved("z-max", -2).box?.max[2]).toBeCloseTo(38);
   });
@@ -57,12 +57,12 @@ describe("the grips of the cuts", () => {
     [Math.sin(Math.PI / 36), 0, Math.cos(Math.PI / 36)].forEach((v, i) => {
       expect(plane?.normal[i]).toBeCloseTo(v);
     });
-    // (50, -10, 25) stays on it
+    // the point (50, -10, 25) stays on the plane
     expect(plane?.offset_um).toBeCloseTo(50 * Math.sin(Math.PI / 36) + 25 * Math.cos(Math.PI / 36));
     expect(moved("turn-z", 1).plane?.normal).toEqual([0, 0, 1]);
   });
 
-  it("go no further than the handles do", () => {
+  it("stay within the limits of the handles", () => {
     const far = moved("x-min", 1000);
     expect(far.box?.min[0]).toBeCloseTo(89);
     expect(moveClipPart("x-min", 1, far, SHOWN)).toBeNull();
@@ -71,13 +71,13 @@ describe("the grips of the cuts", () => {
     expect(moveClipPart("x-min", 1, { ...CLIP, box: null }, SHOWN)).toBeNull();
   });
 
-  it("heed the isolated tile", () => {
+  it("move within the isolated tile", () => {
     const tile: Box = { min: [50, -20, 0], max: [100, 0, 50] };
     expect(moved("x-max", -1, CLIP, tile).box).toEqual({ min: [10, -20, 10], max: [89, -5, 40] });
     expect(moved("x-min", 1, CLIP, tile).box?.min[0]).toBe(51);
   });
 
-  it("are announced with the place that they have now", () => {
+  it("are announced with their new place", () => {
     expect(cutText(CLIP, moved("y-min", 1))).toBe("Box: y from -19.6 µm");
     expect(cutText(CLIP, moved("plane-middle", 1))).toBe("Plane at 27.0 µm");
     expect(cutText(CLIP, moved("turn-x", 6))).toBe("Plane faces 0, -0.5, 0.87");

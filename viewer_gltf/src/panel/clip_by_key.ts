@@ -1,6 +1,6 @@
 /**
- * The cuts by key: one part of them, the grip, is meant, and two keys move or turn it, within the
- * limits that its handle has. Pure.
+ * Changes the cuts by keys. One part of a cut is chosen, and two keys move or turn it within the
+ * limits of its handle. Pure.
  */
 import {
   BOX_HANDLES,
@@ -18,10 +18,13 @@ import type { Action } from "../state/actions";
 
 const TURNS = ["turn-x", "turn-y", "turn-z"] as const;
 type Turn = (typeof TURNS)[number];
-/** A face of the box, the plane along its normal, or the plane about an axis of the specimen. */
+/**
+ * A face of the box, the plane along its normal, or the rotation of the plane about an axis of the
+ * specimen.
+ */
 export type ClipPart = BoxHandleId | "plane-middle" | Turn;
 
-/** One step of a key, as a share of the edge of what is shown. */
+/** Step of a key, as a share of the edge of the shown box. */
 const STEP = 0.02;
 const STEP_RAD = Math.PI / 36;
 const AXIS_NAMES = ["x", "y", "z"] as const;
@@ -33,18 +36,18 @@ export function clipPartsOf({ box, plane }: Clip): readonly ClipPart[] {
   ];
 }
 
-/** The one that is meant: that which was picked, if it is there still, or the first. */
+/** Returns the chosen part: the picked one if it still exists, else the first. */
 export function chosenClipPart(clip: Clip, picked: ClipPart | null): ClipPart | undefined {
   const clipParts = clipPartsOf(clip);
   return clipParts.find((clipPart) => clipPart === picked) ?? clipParts[0];
 }
 
-/** The handle that stands for it in the picture. */
+/** Returns the handle of a part in the scene. */
 export function handleOf(clipPart: ClipPart): HandleId {
   return isTurn(clipPart) ? "plane-tip" : clipPart;
 }
 
-/** @param steps below zero: the other way. @returns null where it can go no further */
+/** @param steps negative: backwards @returns null at the limit */
 export function moveClipPart(
   clipPart: ClipPart,
   steps: number,
@@ -72,7 +75,7 @@ export function clipPartName(clipPart: ClipPart): string {
   return `The box, ${side === "min" ? "lower" : "upper"} end of ${AXIS_NAMES[axis]}`;
 }
 
-/** The announcement of a change of the cuts; a change of one part is announced alone. */
+/** Returns the announcement of a change of the cuts; a change of one part names that part only. */
 export function cutText(before: Clip, after: Clip): string {
   const { box, plane } = after;
   if ((before.box === null) !== (box === null) || (before.plane === null) !== (plane === null)) {
@@ -89,7 +92,7 @@ export function cutText(before: Clip, after: Clip): string {
   const { normal, offset_um } = plane;
   const isTurned = normal.some((v, i) => v !== before.plane?.normal[i]);
   if (!isTurned) return `Plane at ${placeText(offset_um)}`;
-  return `Plane faces ${normal.map((v) => Number(v.toFixed(2)) + 0).join(", ")}`; // no -0
+  return `Plane faces ${normal.map((v) => Number(v.toFixed(2)) + 0).join(", ")}`; // adding 0 turns -0 into 0
 }
 
 function placeText(place_um: number): string {

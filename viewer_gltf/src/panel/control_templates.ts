@@ -1,4 +1,4 @@
-/** Shapes of controls that several sections of the panel have. Pure. */
+/** Controls that several sections of the panel make in the same way. Pure. */
 import { fromHex, toHex } from "../math/color";
 import type { Command } from "../state/commands";
 import {
@@ -12,12 +12,12 @@ import {
 import type { Button, Choice, Colour, Control } from "./controls";
 import { PALETTES } from "./palettes";
 
-/** A button that asks for a command; its id is the command. */
+/** Returns a button that requests a command; its id is the command. */
 export function command(id: Command, label: string): Button {
   return { kind: "button", id, label, to: () => id };
 }
 
-/** One of a few, side by side. */
+/** Returns a choice between a few options, side by side. */
 export function inline<T extends string>(
   id: string,
   label: string,
@@ -37,7 +37,10 @@ export function inline<T extends string>(
   };
 }
 
-/** What of a parameter's row every control has. @param channel the id of the one that it is of */
+/**
+ * Returns the fields that every control takes from its parameter's row. @param channel id of the
+ * parameter's channel
+ */
 function baseOf<On>(row: Parameter<On>, on: On, channel?: string) {
   return {
     id: channel === undefined ? row.id : `${channel}/${row.id}`,
@@ -49,9 +52,9 @@ function baseOf<On>(row: Parameter<On>, on: On, channel?: string) {
 }
 
 /**
- * The control of a parameter: a slider, a toggle, a choice, or a field for any colour.
+ * Returns the control of a parameter: a slider, a toggle, a choice, or a field for any colour.
  *
- * @param channel the id of the one that it is of
+ * @param channel id of the parameter's channel; absent: it belongs to no channel
  */
 export function controlOf<On>(row: Parameter<On>, on: On, channel?: string): Control {
   const base = baseOf(row, on, channel);
@@ -87,7 +90,7 @@ export function controlOf<On>(row: Parameter<On>, on: On, channel?: string): Con
   }
 }
 
-/** A field for any colour. @param shows what it shows instead of its own; none: nothing else */
+/** Returns a field for any colour. @param shows colours that are shown in its place; empty: its own */
 export function colourOf<On>(
   row: ColourParameter<On>,
   on: On,
@@ -105,7 +108,7 @@ export function colourOf<On>(
   };
 }
 
-/** A colour by the palettes: beside the field for any colour, which has another id. */
+/** Returns a choice from the palettes. It has another id than the field for any colour beside it. */
 export function paletteOf<On>(
   row: ColourParameter<On>,
   on: On,

@@ -1,7 +1,7 @@
 /**
- * The panel as plain data: sections of a few kinds of controls. The code that draws it, in HTML or on a
- * plane in the room, shows the values and hands back the wish that a control's `to` makes of what
- * the user did. Pure.
+ * The panel as plain data: sections of a few kinds of controls. The code that draws it, in HTML or
+ * on a canvas in the scene, shows the values. It returns the request that a control's `to` makes
+ * from the user's input. Pure.
  */
 
 import type { Shapes } from "../bundle/transfer_2d";
@@ -10,65 +10,65 @@ import type { Action } from "../state/actions";
 import type { Command } from "../state/commands";
 import type { HistogramPoint } from "../state/transfer_shapes";
 import type { ClipPart } from "./clip_by_key";
-import type { Grasp, Meant } from "./edit_shapes";
+import type { Grab, SelectedShape } from "./edit_shapes";
 
-/** Of the viewer that a phone is put into: Google's of 2014, of 2015, another. */
+/** Lens profile of a Cardboard viewer: Google's of 2014 or of 2015, or another one. */
 export type Lenses = "v1" | "v2" | "own";
 
-/** The panel's own state: it changes what is listed or meant, never the picture. */
+/** Changes of the panel's own state. They change what is listed or chosen in the panel, and not the scene. */
 export type PanelChange =
   | Readonly<{ panel: "find"; text: string }>
   | Readonly<{ panel: "page"; page: number }>
-  /** The channel with the open card, which the channel keys mean; null: none. */
+  /** The channel with the open card, which the keys for channels change; null: none. */
   | Readonly<{ panel: "pick"; channel: string | null }>
   /** The part of the cuts that the keys move. */
   | Readonly<{ panel: "clip-part"; clipPart: ClipPart }>
-  /** The number of the light that the keys turn: see state/parameters/light.ts. */
+  /** The number that the keys for numbers change (see state/parameters/light.ts). */
   | Readonly<{ panel: "parameter"; parameter: string }>
-  /** Open or close the joint histogram in a channel's card, which it opens. */
+  /** Opens or closes the joint histogram in the card of a channel, and opens the card. */
   | Readonly<{ panel: "histogram"; channel: string }>
-  /** The shape that is meant, and what a pointer has hold of. */
-  | Readonly<{ panel: "shape"; shape: Meant | null; grasp: Grasp | null }>
-  /** The number of a shape that the keys change: see edit_shapes.ts. */
+  /** The selected shape, and the part of it that a pointer drags. */
+  | Readonly<{ panel: "shape"; shape: SelectedShape | null; grab: Grab | null }>
+  /** The number of a shape that the keys change (see edit_shapes.ts). */
   | Readonly<{ panel: "shape-number"; id: string }>
   | Readonly<{ panel: "unfold"; section: string }>
   | Readonly<{ panel: "lenses"; lenses: Lenses }>
-  /** Of the phone viewer's lenses, as its QR code has it. */
+  /** Text of the QR code of a Cardboard viewer. */
   | Readonly<{ panel: "code"; text: string }>
-  /** Whether keys that write a character do anything (WCAG 2.1.4). */
+  /** Whether keys that write a character have an effect (WCAG 2.1.4). */
   | Readonly<{ panel: "letters"; areOn: boolean }>
-  /** The keys that differ from the tables: see keys.ts. */
+  /** The keys that the user has changed (see keys.ts). */
   | Readonly<{ panel: "keys"; changes: Readonly<Record<string, string>> }>
-  /** Open a section, and scroll to one of its controls. */
+  /** Opens a section, and scrolls to one of its controls. */
   | Readonly<{ panel: "reveal"; section: string; control: string }>
   | Readonly<{ panel: "hide" }>
   | Readonly<{ panel: "help" }>;
 
 /** The request of a control or a key. */
-export type Wish = Action | PanelChange | Command;
+export type Request = Action | PanelChange | Command;
 
-/** Why a request does nothing now, in a sentence. */
+/** Why a request has no effect now, in a sentence. */
 export type Refusal = Readonly<{ refusal: string }>;
-/** A button beside a refusal, or in an empty picture: one step that leads on. */
+/** A button beside a refusal or in an empty view, with the actions that solve the problem. */
 export type Offer = Readonly<{ label: string; to: readonly (Action | Command)[] }>;
 
 export type PanelView = Readonly<{
   search: string;
-  /** The page of the list of channels that is shown, from 0. */
+  /** The shown page of the list of channels, from 0. */
   page: number;
   /**
-   * The channels with a card above the list, if there are many channels. They were shown when the section was
-   * last opened. null: the channels that are shown now get the cards.
+   * The channels with a card above the list, if there are many. They were shown when the section
+   * was last opened. null: the channels that are shown now get the cards.
    */
   channelsWithCard: readonly string[] | null;
   picked: string | null;
   clipPart: ClipPart | null;
   parameter: string | null;
   isHistogramOpen: boolean;
-  shape: Meant | null;
-  grasp: Grasp | null;
+  shape: SelectedShape | null;
+  grab: Grab | null;
   shapeNumber: string | null;
-  /** Sections that are open. */
+  /** Ids of the open sections. */
   open: readonly string[];
   lenses: Lenses;
   code: string;
@@ -89,7 +89,7 @@ export const START_VIEW: PanelView = {
   parameter: null,
   isHistogramOpen: false,
   shape: null,
-  grasp: null,
+  grab: null,
   shapeNumber: null,
   open: ["channels", "volumes"],
   lenses: "v2",
@@ -102,38 +102,38 @@ export const START_VIEW: PanelView = {
 };
 
 type Base = Readonly<{
-  /** Unique in the panel; of a channel's control: channel/part. */
+  /** Unique in the panel; for a channel's control: channel/part. */
   id: string;
   label: string;
-  /** The label where there is no group around it: for screen readers, and for gaze. */
+  /** Label for places without the group's name around it: for screen readers and gaze. */
   name?: string;
-  /** Why it can't be used; "" or absent: it can. */
+  /** Why the control cannot be used; "" or absent: it can. */
   refusal?: string;
-  /** What it does, in a sentence under it. */
+  /** Explanation of the effect, in a sentence. */
   about?: string;
-  /** Whether the refusal is always in view. */
+  /** Whether the refusal is always visible, and not only after a press. */
   showsReason?: boolean;
 }>;
 
 export type Toggle = Base &
-  Readonly<{ kind: "toggle"; value: boolean; to: (value: boolean) => Wish }>;
-/** `value` 0..1, in so many steps; what it stands for is the text's. */
+  Readonly<{ kind: "toggle"; value: boolean; to: (value: boolean) => Request }>;
+/** `value` is 0..1, in `steps` steps; `text` is the value in its own unit. */
 export type Slider = Base &
   Readonly<{
     kind: "slider";
     value: number;
     steps: number;
     text: string;
-    to: (value: number) => Wish;
+    to: (value: number) => Request;
   }>;
-/** Two ends of a range, each as a slider's value. */
+/** Two ends of a range, each with a value as a slider has it. */
 export type Window = Base &
   Readonly<{
     kind: "window";
     value: readonly [number, number];
     steps: number;
     texts: readonly [string, string];
-    to: (value: readonly [number, number]) => Wish;
+    to: (value: readonly [number, number]) => Request;
   }>;
 type Option = Readonly<{ value: string; label: string }>;
 export type Choice = Base &
@@ -141,9 +141,9 @@ export type Choice = Base &
     kind: "choice";
     value: string;
     options: readonly Option[];
-    /** Few and short: side by side. Otherwise a list to open. */
+    /** Whether the options are few and short, and stand side by side. Otherwise they open as a list. */
     isInline: boolean;
-    to: (value: string) => Wish;
+    to: (value: string) => Request;
   }>;
 export type Palette = Readonly<{
   name: string;
@@ -155,26 +155,26 @@ export type Colour = Base &
     kind: "colour";
     value: string;
     palettes: readonly Palette[];
-    /** Eight colours that no other channel has, where there are other channels. */
+    /** Eight colours that no other channel has, for controls of channels. */
     free?: readonly string[];
-    /** Colours that it shows instead of its own; none or absent: nothing else. */
+    /** Colours that are shown instead of the control's own; empty or absent: its own. */
     shows?: readonly string[];
-    to: (hex: string) => Wish;
+    to: (hex: string) => Request;
   }>;
 export type Button = Base &
   Readonly<{
     kind: "button";
     isPrimary?: boolean;
-    /** Each press moves on by a step, as undoing does, so quick presses all count. */
+    /** Whether each press is a step, as with Undo, so that quick presses all count. */
     isStep?: boolean;
-    /** Goes on with it, little by little, while it is held or gazed at. */
+    /** Command that is repeated while the button is held or gazed at. */
     repeats?: Command;
-    to: () => Wish;
+    to: () => Request;
   }>;
 export type MapTile = Readonly<{
   id: string;
   name: string;
-  /** The tile's name, as it is written where it stands alone. */
+  /** Name of the tile where it stands alone. */
   title: string;
   row: number;
   column: number;
@@ -188,58 +188,58 @@ export type TileMap = Base &
     rows: number;
     columns: number;
     tiles: readonly MapTile[];
-    to: (tile: string) => Wish;
+    to: (tile: string) => Request;
   }>;
-/** The voxels of a channel by value and gradient. */
+/** The joint histogram of a channel: its voxels by intensity and gradient magnitude. */
 export type Histogram = Readonly<{
-  /** 256 x 64 bytes, row 0 is gradient 0: the logarithm of the number of voxels. */
+  /** 256 x 64 bytes; row 0 has gradient 0. A byte is the logarithm of the number of voxels. */
   cells: Uint8Array;
-  /** A panel distinguishes pictures by their text: a name is enough. */
+  /** Panels compare drawings by their JSON text, for which a name is enough. */
   toJSON: () => string;
 }>;
-/** Value to the right, gradient up: a histogram, and shapes that can be taken hold of. */
+/** A joint histogram with shapes that can be dragged: intensity to the right, gradient up. */
 export type HistogramEditor = Base &
   Readonly<{
     kind: "histogram";
-    /** null: it has not come. */
+    /** null: not loaded yet. */
     histogram: Histogram | null;
-    /** The part of the histogram's values that the plane is as wide as. */
+    /** The range of the histogram's values that fills the width. */
     window: readonly [number, number];
     shapes: Shapes;
     selected: number | null;
-    /** The channel's, linear. */
+    /** Linear colour of the channel. */
     color: Rgb;
-    /** The lower and the upper end of the values, and the steepest gradient. */
+    /** Lower and upper end of the values, and the steepest gradient. */
     texts: readonly [string, string, string];
-    /** @param reach how far off a corner or an edge may be */
-    press: (at: HistogramPoint, reach: HistogramPoint) => Wish;
-    /** null: nothing has changed by it. */
-    drag: (at: HistogramPoint) => Wish | null;
+    /** @param reach largest distance to a corner or an edge */
+    press: (at: HistogramPoint, reach: HistogramPoint) => Request;
+    /** null: nothing changes. */
+    drag: (at: HistogramPoint) => Request | null;
   }>;
-/** Whatever is drawn of something that only its owner knows. Places: shares of width and height, from the upper left. */
+/** A drawing that only its owner can make. Places are shares of its width and height, from the upper left. */
 export type Picture = Base &
   Readonly<{
     kind: "picture";
-    /** As a share of its width. */
+    /** Height, as a share of the width. */
     height: number;
-    /** Changes with what is drawn. */
+    /** Changes with the content of the drawing. */
     version: string;
     draw: (context: CanvasRenderingContext2D, width: number, height: number) => void;
-    /** It in words. */
+    /** The content in words. */
     text: string;
-    press: (x: number, y: number) => Wish;
-    /** null: nothing has changed by it; absent: only a press does something. */
-    drag?: (x: number, y: number) => Wish | null;
+    press: (x: number, y: number) => Request;
+    /** null: nothing changes; absent: the picture takes presses only. */
+    drag?: (x: number, y: number) => Request | null;
   }>;
-/** What can only be read. */
+/** A text that can only be read. */
 export type Text = Base & Readonly<{ kind: "text"; value: string }>;
 export type Search = Base &
   Readonly<{
     kind: "search";
     value: string;
-    /** Texts to choose from where nobody can type. */
+    /** Texts to choose from if nobody can type. */
     hints?: readonly string[];
-    to: (text: string) => Wish;
+    to: (text: string) => Request;
   }>;
 /** An address to copy. */
 export type Link = Base & Readonly<{ kind: "link"; value: string }>;
@@ -258,41 +258,41 @@ export type Control =
   | Search
   | Link;
 
-/** A channel: its name and what is always at hand; `more` only while it is open. */
+/** A channel or a lamp: its name and the controls that are always shown; `more` only while it is open. */
 export type Group = Readonly<{
   kind: "group";
   id: string;
   label: string;
   tags: readonly string[];
-  /** What the tags mean, in a sentence; empty: nothing more. */
+  /** Meaning of the tags, in a sentence; "": nothing to add. */
   about: string;
-  /** Its channel is hidden, so its name is drawn dim. */
+  /** Whether the channel is hidden, so that its name is drawn dim. */
   isDimmed: boolean;
-  /** Drawn as a row of a long list, not as a card. */
+  /** Whether the group is drawn as a row of a long list, and not as a card. */
   isCompact?: boolean;
   controls: readonly Control[];
   more: readonly Control[];
   isOpen: boolean;
-  /** Opens and closes it. */
+  /** Opens and closes the group. */
   opener: PanelChange;
 }>;
 
 export type Section = Readonly<{
   id: string;
   label: string;
-  /** On a flat screen it is listed under *More*. */
+  /** Whether a flat screen lists the section under *More*. */
   isDeeper: boolean;
   isOpen: boolean;
   opener: PanelChange;
   items: readonly (Control | Group)[];
 }>;
 
-/** A section as the panel's own lists and the parts have it. */
+/** A section as the panel's own lists and the parts define it. */
 export type PartSection = Pick<Section, "id" | "label" | "items"> &
   Readonly<{
-    /** Place among the others: the panel's own have tens. */
+    /** Place among the sections; the panel's own have multiples of ten. */
     rank: number;
-    /** Absent: it is listed with the first ones. */
+    /** Absent: the section is listed with the first ones. */
     isDeeper?: boolean;
   }>;
 
@@ -302,12 +302,12 @@ export type Layout = Readonly<{
   sections: readonly Section[];
   /** Opens and closes the list of the deeper sections. */
   more: Readonly<{ isOpen: boolean; opener: PanelChange }>;
-  /** This line names the forms that are shown, and whether they are complete. It is always in view. */
+  /** The line that names the shown forms and whether they are complete. It is always visible. */
   status: string;
   isHidden: boolean;
 }>;
 
-/** The next view of the panel. Returns the same object if nothing changes. */
+/** Returns the next view of the panel: the same object if nothing changes. */
 export function changePanel(view: PanelView, change: PanelChange): PanelView {
   switch (change.panel) {
     case "find":
@@ -323,10 +323,10 @@ export function changePanel(view: PanelView, change: PanelChange): PanelView {
     case "histogram": {
       const { channel } = change;
       const isOpen = view.isHistogramOpen && view.picked === channel;
-      return { ...view, picked: channel, isHistogramOpen: !isOpen, shape: null, grasp: null };
+      return { ...view, picked: channel, isHistogramOpen: !isOpen, shape: null, grab: null };
     }
     case "shape":
-      return { ...view, shape: change.shape, grasp: change.grasp };
+      return { ...view, shape: change.shape, grab: change.grab };
     case "shape-number":
       return change.id === view.shapeNumber ? view : { ...view, shapeNumber: change.id };
     case "unfold": {

@@ -1,6 +1,6 @@
 /**
- * Edits of the shapes of a two-dimensional transfer function: the shape that is meant, its hold,
- * and the numbers that describe it. Plain data and pure functions.
+ * Edits of the shapes of a two-dimensional transfer function: the selected shape, the part that is
+ * dragged, and the numbers of a shape. Plain data and pure functions.
  */
 
 import type { Shape, ShapeKind, Shapes } from "../bundle/transfer_2d";
@@ -17,52 +17,58 @@ import {
   resize,
 } from "../state/transfer_shapes";
 
-/** Which shape is meant, of how many: of another number of shapes it means the one on top. */
-export type Meant = Readonly<{ index: number; count: number }>;
+/**
+ * The selected shape, and the number of shapes when it was selected. If the number has changed, the
+ * topmost shape is selected.
+ */
+export type SelectedShape = Readonly<{ index: number; count: number }>;
 
-/** What a pointer has taken hold of, and what it was then. */
-export type Grasp = Readonly<{ index: number; part: Part; from: HistogramPoint; shape: Shape }>;
+/** The part of a shape that a pointer drags, with the place and the shape at the start of the drag. */
+export type Grab = Readonly<{ index: number; part: Part; from: HistogramPoint; shape: Shape }>;
 
-/** Least move of a pointer, in the plane's units: a finger trembles, a press moves nothing. */
+/** Smallest drag, as a share of the histogram. Shorter ones are the trembling of a finger. */
 const STILL: HistogramPoint = { value: 1 / 255, gradient: 1 / 63 };
-/** Places of new shapes, 0..1: beside each other. */
+/** Intensities of new shapes, 0..1, so that they do not cover each other. */
 const PLACES = [0.3, 0.5, 0.7, 0.4, 0.6];
 
-/** null: there is none. */
-export function meantShape(meant: Meant | null, shapes: Shapes): number | null {
+/** Returns the index of the selected shape; null if there are no shapes. */
+export function selectedShapeIndex(meant: SelectedShape | null, shapes: Shapes): number | null {
   if (shapes.length === 0) return null;
   return meant?.count === shapes.length ? meant.index : shapes.length - 1;
 }
 
-/** The shapes that an editor shows: none while a one-dimensional function is chosen. */
+/** Returns the shapes that an editor shows: none while a one-dimensional function is chosen. */
 export function editedShapes(functions: Functions): Shapes {
   return isTwoD(functions) ? shapesOf(functions) : [];
 }
 
-/** The shapes that one more is added to: one's own may be there, though they are not chosen. */
-function growing(functions: Functions): Shapes {
+/**
+ * Returns the shapes to which another one is added: the user's own shapes, even if they are not
+ * chosen now.
+ */
+function editableShapes(functions: Functions): Shapes {
   return shapesOf(functions, editedName(functions));
 }
 
 export function withNewShape(functions: Functions, kind: ShapeKind): Shapes {
-  const shapes = growing(functions);
+  const shapes = editableShapes(functions);
   const value = PLACES[shapes.length % PLACES.length];
   return addShape(shapes, makeShape(kind, { value, gradient: 0.4 }));
 }
 
-export function graspAt(
+export function grabAt(
   shapes: Shapes,
   at: HistogramPoint,
   reach: HistogramPoint,
   meant: number | null,
-): Grasp | null {
+): Grab | null {
   const hit = hitTest(shapes, at, reach, meant);
   return hit === null ? null : { ...hit, from: at, shape: shapes[hit.index] };
 }
 
-/** The shapes after what was taken hold of has been drawn along; null: nothing has changed. */
-export function draggedTo(shapes: Shapes, grasp: Grasp, at: HistogramPoint): Shapes | null {
-  const { index, part, from, shape } = grasp;
+/** Returns the shapes after a drag; null if nothing has changed. */
+export function draggedTo(shapes: Shapes, grab: Grab, at: HistogramPoint): Shapes | null {
+  const { index, part, from, shape } = grab;
   if (!(index in shapes)) return null;
   const by = { value: at.value - from.value, gradient: at.gradient - from.gradient };
   const isStill = Math.abs(by.value) < STILL.value && Math.abs(by.gradient) < STILL.gradient;
@@ -81,7 +87,7 @@ function placeOf({ values, gradients, tip }: Shape, part: Part): HistogramPoint 
   };
 }
 
-/** One number of a shape, which keys make less or more. */
+/** A number of a shape that keys decrease or increase. */
 export type ShapeNumber = Readonly<{
   id: string;
   name: string;
@@ -131,7 +137,7 @@ export const SHAPE_NUMBERS: readonly ShapeNumber[] = [
 
 const ends = ([low, high]: readonly [number, number]) => `${low.toFixed(2)} – ${high.toFixed(2)}`;
 
-/** For a user who can't see it. */
+/** Describes a shape for users who cannot see it. */
 export function shapeText({ kind, values, gradients, opacity, softness, color }: Shape): string {
   const hex = toHex(color);
   return [
@@ -143,7 +149,7 @@ export function shapeText({ kind, values, gradients, opacity, softness, color }:
   ].join(", ");
 }
 
-/** A change of shapes, in words. */
+/** Describes a change of the shapes. */
 export function changeText(before: Shapes, after: Shapes): string {
   if (after.length > before.length) return `Added a ${shapeText(after[after.length - 1])}`;
   if (after.length < before.length) return `Removed a shape: ${after.length} left`;

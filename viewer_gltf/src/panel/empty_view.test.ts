@@ -23,9 +23,9 @@ const each = (state: ViewerState, change: Partial<ViewerState["channels"][number
   channels: state.channels.map((channel) => ({ ...channel, ...change })),
 });
 
-/** The state that the button of an empty picture leads to. */
+/** The state after a press on the button of an empty view. */
 function after(state: ViewerState, empty: EmptyView | null): ViewerState {
-  if (empty === null) throw new Error("the picture is not empty");
+  if (empty === null) throw new Error("the view is not empty");
   expect(empty.text).toMatch(/^[A-Z].*\.$/);
   return empty.offer.to.reduce<ViewerState>((now, each) => {
     if (typeof each === "string") throw new Error("no action");
@@ -33,45 +33,45 @@ function after(state: ViewerState, empty: EmptyView | null): ViewerState {
   }, state);
 }
 
-/** The sentence of a state whose button leads to a picture that shows something. */
+/** The sentence of an empty view; its button must lead to a view that shows something. */
 function explained(state: ViewerState, content: Content = CONTENT): string {
   const empty = emptyViewOf(state, content);
   expect(emptyViewOf(after(state, empty), content)).toBeNull();
   return empty?.text ?? "";
 }
 
-describe("an empty picture", () => {
-  it("is none where something shows", () => {
+describe("an empty view", () => {
+  it("is not reported if something is shown", () => {
     expect(emptyViewOf(start, CONTENT)).toBeNull();
     const alone = reduce(start, { type: "isolate", tile: TILE });
     expect(emptyViewOf(alone, CONTENT)).toBeNull();
   });
 
-  it("says that all channels are hidden, and brings those of the opening back", () => {
+  it("reports that all channels are hidden, and shows those of the opening again", () => {
     const hidden = each(start, { shown: false });
     expect(explained(hidden)).toBe("All channels are hidden.");
     const shown = ({ channels }: ViewerState) => channels.map((channel) => channel.shown);
     expect(shown(after(hidden, emptyViewOf(hidden, CONTENT)))).toEqual(shown(start));
   });
 
-  it("says that what is shown is transparent", () => {
+  it("reports that all shown channels are transparent", () => {
     expect(explained(each(start, { opacity: 0 }))).toContain("opacity of 0 %");
   });
 
-  it("says that a cut leaves nothing, by a box or by a plane", () => {
+  it("reports that a cut by a box or a plane removes everything", () => {
     const { min } = MANIFEST.specimen.bounds_um;
     const beside = { min: [min[0] - 9, min[1], min[2]], max: [min[0] - 8, 0, 9] } as const;
     const byBox = reduce(start, { type: "set-clip", clip: { box: beside, plane: null } });
-    expect(explained(byBox)).toBe("The cut leaves nothing of the specimen.");
+    expect(explained(byBox)).toBe("The cut removes all of the specimen.");
     const plane = { normal: [0, 0, 1], offset_um: min[2] - 1 } as const;
     const byPlane = reduce(start, { type: "set-clip", clip: { box: null, plane } });
-    expect(explained(byPlane)).toBe("The cut leaves nothing of the specimen.");
-    // at the very end of the specimen the cut face still shows
+    expect(explained(byPlane)).toBe("The cut removes all of the specimen.");
+    // at the very end of the specimen, the cut face is still visible
     const atEnd = { box: null, plane: { ...plane, offset_um: min[2] } };
     expect(emptyViewOf(reduce(start, { type: "set-clip", clip: atEnd }), CONTENT)).toBeNull();
   });
 
-  it("sees that a cut leaves only the empty margin of the specimen", () => {
+  it("detects a cut that leaves only the empty margin of the specimen", () => {
     const { min, max } = MANIFEST.specimen.bounds_um;
     const middle = (min[2] + max[2]) / 2;
     const inside = { min: [min[0], min[1], middle], max } as const;
@@ -79,43 +79,43 @@ describe("an empty picture", () => {
     const plane = { normal: [0, 0, 1], offset_um: middle - 1 } as const;
     const cut = reduce(start, { type: "set-clip", clip: { box: null, plane } });
     expect(emptyViewOf(cut, CONTENT)).toBeNull();
-    expect(explained(cut, content)).toContain("The cut leaves nothing");
+    expect(explained(cut, content)).toContain("The cut removes all");
   });
 
-  it("says that the only tile is cut away", () => {
+  it("reports that the isolated tile is cut away", () => {
     const alone = reduce(start, { type: "isolate", tile: TILE });
     const plane = { normal: [0, 0, 1], offset_um: bounds_um.min[2] - 1 } as const;
     const cut = reduce(alone, { type: "set-clip", clip: { box: null, plane } });
-    expect(explained(cut)).toBe("The cut leaves nothing of row 1, column 1.");
+    expect(explained(cut)).toBe("The cut removes all of row 1, column 1.");
   });
 
-  it("says that the only tile, or the one for volumes, holds nothing", () => {
+  it("reports that the isolated tile, or the tile for volumes, is empty", () => {
     const bare = {
       ...CONTENT,
       hasSurface: (_: string, tile: string) => tile !== TILE,
       hasVolume: (_: string, tile: string) => tile !== TILE,
     };
     const alone = reduce(start, { type: "isolate", tile: TILE });
-    expect(explained(alone, bare)).toContain("lies in row 1, column 1.");
+    expect(explained(alone, bare)).toContain("in row 1, column 1.");
     const chosen = reduce({ ...start, mode: "tile" }, { type: "select", tile: TILE });
-    expect(explained(chosen, bare)).toContain("lies in row 1, column 1.");
+    expect(explained(chosen, bare)).toContain("in row 1, column 1.");
     // No message appears as long as it is unknown whether the tile has a volume.
     expect(emptyViewOf(alone, { ...bare, hasVolume: () => null })).toBeNull();
   });
 
-  it("says that the only tile has volumes alone, which show from near", () => {
+  it("reports that the isolated tile has only volumes, which are shown when near", () => {
     const content = { ...CONTENT, hasSurface: () => false };
     const alone = reduce(start, { type: "isolate", tile: TILE });
-    expect(explained(alone, content)).toContain("Volumes show from near.");
+    expect(explained(alone, content)).toContain("Move closer to see its volumes.");
   });
 
-  it("says that channels without surfaces have their volumes off", () => {
+  it("reports that the volumes of channels without surfaces are off", () => {
     const off = { ...each(start, { hasSurface: false }), mode: "off" } as const;
     expect(explained(off)).toContain("have no surface");
     expect(explained(each(start, { hasSurface: false, volume: false }))).toContain("switched off");
   });
 
-  it("says that all objects are left out, and shows them again", () => {
+  it("reports that all objects are hidden, and shows them again", () => {
     const state = reduce(each(start, { hasObjects: true }), {
       ...{ type: "objects", channel: "c0", change: { only: [], hidden: [1] } },
     });

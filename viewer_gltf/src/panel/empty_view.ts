@@ -1,4 +1,4 @@
-/** Why the picture is empty, and the way back: one sentence and one button. Pure. */
+/** Why nothing is visible, and how to change that: one sentence and one button. Pure. */
 import { around } from "../math/box";
 import { type Clip, isCutAway, WHOLE } from "../math/clip";
 import { type BoxedTile, shownTiles } from "../math/pick";
@@ -14,7 +14,7 @@ import type { Offer } from "./controls";
 
 export type EmptyView = Readonly<{ text: string; offer: Offer }>;
 
-/** What is known of the content beside the state. */
+/** Facts about the content that are not in the state. */
 export type Content = Readonly<{
   tiles: readonly BoxedTile[];
   /** The state in which the bundle opened. */
@@ -24,11 +24,11 @@ export type Content = Readonly<{
   hasSurface: (channel: string, tile: string) => boolean;
   /** null: not known yet. */
   hasVolume: (channel: string, tile: string) => boolean | null;
-  /** How many objects of a label map show; null: not known yet. */
+  /** Number of objects of a label map that are shown; null: not known yet. */
   objectsLeft: (channel: string) => number | null;
 }>;
 
-/** null: something shows, or it is not known yet whether anything does. */
+/** Returns null if something is visible, or if that is not known yet. */
 export function emptyViewOf(state: ViewerState, content: Content): EmptyView | null {
   const shown = state.channels.filter((channel) => channel.shown);
   return (
@@ -74,17 +74,17 @@ function cutAway(
     const points = outline(channel);
     return points !== null && isOutside(points, cut);
   };
-  // An outline covers all tiles, so it can't tell whether a single tile is empty.
+  // An outline covers all tiles, so it does not show whether a single tile is empty.
   if (!isGone && !(isolated === null && shown.every(hasNothing))) return null;
   const what = isolated === null ? "the specimen" : tileName(isolated, all);
   const remove: Action = { type: "set-clip", clip: WHOLE };
-  return { text: `The cut leaves nothing of ${what}.`, offer: offerOf("Remove the cut", remove) };
+  return { text: `The cut removes all of ${what}.`, offer: offerOf("Remove the cut", remove) };
 }
 
-/** A plane that leaves less than this share of the specimen's longest edge still shows its cut face. */
+/** Share of the specimen's longest edge. A plane that leaves a thinner slice still shows its cut face. */
 const SLICE_SHARE = 0.01;
 
-/** The same cut with its plane moved back by so much. */
+/** Returns the cut with its plane moved back by a distance. */
 function relaxed(clip: Clip, by_um: number): Clip {
   const { plane } = clip;
   return plane === null
@@ -92,7 +92,7 @@ function relaxed(clip: Clip, by_um: number): Clip {
     : { ...clip, plane: { ...plane, offset_um: plane.offset_um + by_um } };
 }
 
-/** Whether nothing of the hull of some points is kept. */
+/** Returns whether the cut removes the whole hull of some points. */
 function isOutside(points: readonly Vec3[], clip: Clip): boolean {
   const { plane } = clip;
   const isBeyond =
@@ -100,7 +100,7 @@ function isOutside(points: readonly Vec3[], clip: Clip): boolean {
   return isBeyond || (points.length > 0 && isCutAway(around(points), { ...clip, plane: null }));
 }
 
-/** Channels without surfaces whose volumes are switched off. */
+/** Detects channels without surfaces whose volumes are switched off. */
 function noForm(
   state: ViewerState,
   shown: readonly ChannelState[],
@@ -111,7 +111,7 @@ function noForm(
   const mode = opening.mode === "off" ? "all" : opening.mode;
   const volumes = shown.filter(({ volume }) => !volume).map(({ id }) => setTo(VOLUME, true, id));
   return {
-    text: "The channels that are shown have no surface, and their volumes are switched off.",
+    text: "The shown channels have no surface, and their volumes are switched off.",
     offer: offerOf(
       "Show the volumes",
       ...volumes,
@@ -120,7 +120,7 @@ function noForm(
   };
 }
 
-/** The only tile that is shown, or the one that volumes show in. */
+/** Detects that the isolated tile, or the tile that is drawn as a volume, is empty. */
 function emptyTile(
   state: ViewerState,
   shown: readonly ChannelState[],
@@ -135,15 +135,15 @@ function emptyTile(
   if (volumes.includes(true)) {
     if (mode === "all" || mode === "traced" || isolated === null) return null;
     return {
-      text: `No surface of the channels that are shown lies in ${name}. Volumes show from near.`,
+      text: `The shown channels have no surface in ${name}. Move closer to see its volumes.`,
       offer: offerOf("Show volumes everywhere", setTo(MODE, "all")),
     };
   }
   return {
-    text: `Nothing of the channels that are shown lies in ${name}.`,
+    text: `The shown channels have neither a surface nor a volume in ${name}.`,
     offer:
       isolated === null
-        ? offerOf("Choose no tile", { type: "select", tile: null })
+        ? offerOf("Clear the selection", { type: "select", tile: null })
         : offerOf("Show all tiles", { type: "isolate", tile: null }),
   };
 }
@@ -160,7 +160,7 @@ function noObjects(
     .filter(({ id }) => (objects[id] ?? START_OBJECTS) !== START_OBJECTS)
     .map(({ id }): Action => ({ type: "objects", channel: id, change: ALL_OBJECTS }));
   return {
-    text: "All objects are hidden, or the filters leave them out.",
+    text: "All objects are hidden, or removed by filters.",
     offer: offerOf("Show all objects", ...all),
   };
 }

@@ -2,9 +2,9 @@ import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
 import { KEYS } from "../../test/support/panel/all_keys";
-import { layOut } from "../../test/support/panel/whole_panel";
+import { buildPanel } from "../../test/support/panel/whole_panel";
 import { PRESET_TITLES } from "../bundle/generated/preset_titles";
-import { STAYS } from "../state/commands";
+import { UNCHANGED_VIEW } from "../state/commands";
 import { initialState } from "../state/initial_state";
 import { CHANNEL } from "../state/parameters/channel";
 import { allParameters } from "../state/parameters/table";
@@ -19,7 +19,7 @@ const STATES: readonly ViewerState[] = (["disc", "tile", "all", "traced", "off"]
   (mode) => ({ ...start, mode }),
 );
 const CONTROLS: readonly Control[] = STATES.flatMap((state) =>
-  layOut(state, FLAT_FACTS, { ...START_VIEW, picked: "c0" })
+  buildPanel(state, FLAT_FACTS, { ...START_VIEW, picked: "c0" })
     .sections.flatMap(({ items }) => items)
     .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item])),
 );
@@ -31,21 +31,21 @@ describe("the explanations", () => {
     for (const text of sentences) expect(text).toMatch(/^[A-Z0-9].*\.$/);
   });
 
-  it("of choices belong to controls that are explained", () => {
+  it("exist for choices only if their control has an explanation", () => {
     const explained = CONTROLS.filter(({ about }) => about !== undefined);
     const ids = new Set(explained.map(({ id }) => id.slice(id.lastIndexOf("/") + 1)));
     for (const id of Object.keys(CHOICES)) expect(ids, id).toContain(id);
   });
 
-  it("are there for each setting whose name can't say it all", () => {
-    // The effect of these settings is plain from their names; all others need an `about`.
+  it("exist for each setting that needs more than its name", () => {
+    // The effect of these settings is clear from their names; all others need an `about`.
     const plain =
       /^(color|picture-size|slice-.*|trace-room|trace\/(environment|hue|saturation|lightness|sharpness|lamp|post).*|lamp-.*)$/;
     const silent = [...allParameters(), ...CHANNEL].filter(({ about }) => !about);
     expect(silent.map(({ id }) => id).filter((id) => !plain.test(id))).toEqual([]);
   });
 
-  it("say of each mode and each transfer function what one will see", () => {
+  it("describe the result of each mode and each transfer function", () => {
     for (const control of CONTROLS) {
       if (control.kind !== "choice" || !(control.id in CHOICES)) continue;
       for (const { value } of control.options) {
@@ -68,9 +68,9 @@ describe("the explanations", () => {
 });
 
 describe("the words of the panel", () => {
-  /** Terms of the code, and words that the panel replaces by the field's own, as whole words. */
+  /** Terms of the code, and words for which the panel uses those of the field; whole words. */
   const PRIVATE =
-    /\b(switch distance|brick|mip|LOD|march\w*|stand-in|wish|rung|ladder|quad|texel|anew|once more|by turns|spoilt)\b/i;
+    /\b(switch distance|brick|mip|LOD|march\w*|stand-in|request|rung|ladder|quad|texel|anew|once more|by turns|spoilt)\b/i;
 
   it("are those of the field, without terms of the code", () => {
     const ofControls = CONTROLS.flatMap(({ id: _, ...control }) =>
@@ -82,7 +82,7 @@ describe("the words of the panel", () => {
       name,
       ...keys.map(({ label }) => label),
     ]);
-    const others = [...Object.values(CHOICES), REFUSED, STAYS].flatMap((table) =>
+    const others = [...Object.values(CHOICES), REFUSED, UNCHANGED_VIEW].flatMap((table) =>
       Object.values(table),
     );
     const found = [...ofControls, ...ofKeys, ...others].filter((text) => PRIVATE.test(text));

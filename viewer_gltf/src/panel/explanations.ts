@@ -1,33 +1,33 @@
 /**
- * Explanations of choices: what one will see of each. The sentence on a setting as a whole is in its row. This is a part
- * of the code by itself, which is loaded when somebody first asks. Pure.
+ * Explanations of choices: the visible result of each. The explanation of the setting itself is in
+ * its row. This module is a separate bundle, which is loaded when a user first asks. Pure.
  */
 import { PRESET_SENTENCES } from "../bundle/generated/preset_sentences";
 import { OWN } from "../state/transfer_functions_2d";
 
-/** Explanations of each choice, by the last part of the control's ID and the choice. */
+/** Explanations of choices, by the last part of the control's id and the choice. */
 export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   mode: {
     disc: "Surfaces from afar. From near, a round window in the middle shows the volume.",
     tile: "Surfaces from afar. From near, the tile that you chose or look at shows its volume.",
     all: "Translucent volumes in every tile, from any distance.",
-    stage: "Each tile as an artist has set it: surface, volume or both.",
+    stage: "Each tile as the stage specifies: surface, volume or both.",
     traced:
-      "Path tracing: volumes with soft shadows, as in a photograph. The picture clears up at rest.",
-    off: "Surfaces alone, which draw fastest.",
+      "Path tracing: volumes with soft shadows, as in a photograph. The image gets clearer while the view rests.",
+    off: "Only surfaces, which are drawn fastest.",
   },
   compositing: {
-    over: "Things in front veil the things behind them.",
-    maximum: "Only the brightest place behind each point shows, as in a maximum projection.",
-    sum: "The light of all places adds up, as in an X-ray, and nothing veils.",
+    over: "Structures in front partly hide those behind them.",
+    maximum: "The brightest value along each line of sight: a maximum intensity projection.",
+    sum: "The sum of all values along each line of sight, as in an X-ray image.",
   },
   "transfer-function": {
     ...PRESET_SENTENCES,
-    [OWN]: "The shapes that you drew in the plane of value and gradient.",
+    [OWN]: "The shapes that you drew in the joint histogram of value and gradient.",
   },
   tool: {
-    select: "A card names what lies there, and hides, recolours or isolates it.",
-    measure: "Each point adds to a length, an angle or a line.",
+    select: "Opens a card that names the structure, with buttons to hide, recolour or isolate it.",
+    measure: "Adds a point to a length, an angle or a line.",
   },
   "measure-kind": {
     distance: "The length between two points.",
@@ -35,13 +35,13 @@ export const CHOICES: Readonly<Record<string, Readonly<Record<string, string>>>>
     line: "The length of a line through several points.",
   },
   quality: {
-    auto: "As finely as this device can draw in time.",
+    auto: "As fine as this device can draw smoothly.",
     low: "Coarse, for slow devices.",
-    high: "As finely as possible, however slowly.",
+    high: "As fine as possible, even if slow.",
   },
 };
 
-/** Explains a choice that the table lacks: the bundle's author has named it. */
+/** Explanation of a transfer function that the author of the bundle has named. */
 const OF_THE_BUNDLE = "A transfer function that came with this bundle.";
 
 const lastPart = (id: string) => id.slice(id.lastIndexOf("/") + 1);

@@ -1,31 +1,31 @@
-/** A key: its names, the words for it, and its request. Pure. */
+/** A key: its names, its label and its request. Pure. */
 import type { Box } from "../math/box";
 import { optionsOf, type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import { REFUSED } from "../state/refusals";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
-import type { PanelView, Refusal, Wish } from "./controls";
+import type { PanelView, Refusal, Request } from "./controls";
 
 export type KeyContext = Readonly<{
   state: ViewerState;
   view: PanelView;
-  /** The specimen, or the isolated tile; um, world. */
+  /** Bounds of the specimen or the isolated tile, um, world. */
   shown: Box;
   focusTile: string | null;
 }>;
 
 export type Key = Readonly<{
-  /** As `keyName` has them; several mean the same. */
+  /** Names as `keyName` returns them; all have the same effect. */
   keys: readonly string[];
   label: string;
-  /** @param name which of its keys it was */
-  to: (context: KeyContext, name: string) => Wish | Refusal;
+  /** @param name name of the pressed key */
+  to: (context: KeyContext, name: string) => Request | Refusal;
 }>;
 export type KeyGroup = Readonly<{
   name: string;
-  /** Place in the list of keys; groups of one name are joined. */
+  /** Place in the list of keys; groups with the same name are joined. */
   rank: number;
   keys: readonly Key[];
-  /** Whether its keys do nothing for a specimen without volumes; absent: they always do something. */
+  /** Whether the keys have no effect for a specimen without volumes; absent: they always have an effect. */
   needsVolumes?: boolean;
 }>;
 
@@ -33,14 +33,14 @@ export function no(refusal: string): Refusal {
   return { refusal };
 }
 
-export function isRefusal(answer: Wish | Refusal): answer is Refusal {
+export function isRefusal(answer: Request | Refusal): answer is Refusal {
   return typeof answer !== "string" && "refusal" in answer;
 }
 
 const NO_CHANNEL = no(REFUSED.channel);
 const NOTHING = no(REFUSED.key);
 
-/** The item after (or before) the present one, round the end. */
+/** Returns the item after (or before) the present one, cyclically. */
 export function neighbour<T>(items: readonly T[], present: T | undefined, by: number): T | null {
   if (items.length === 0) return null;
   const at = present === undefined ? -1 : items.indexOf(present);
@@ -48,22 +48,22 @@ export function neighbour<T>(items: readonly T[], present: T | undefined, by: nu
   return items[(at + by + items.length) % items.length];
 }
 
-/** The channel that the channel keys mean: the open card's, or the first one shown. */
-function meantChannel({ state, view }: KeyContext): ChannelState | undefined {
+/** Returns the channel that the keys change: that of the open card, or the first shown one. */
+function chosenChannel({ state, view }: KeyContext): ChannelState | undefined {
   const shown = state.channels.filter((channel) => channel.shown);
   return shown.find(({ id }) => id === view.picked) ?? shown[0];
 }
 
-/** The meant channel, or why there is none. */
+/** Applies a function to the chosen channel; returns a refusal if no channel is shown. */
 export function withChannel(
   context: KeyContext,
-  to: (channel: ChannelState) => Wish | Refusal,
-): Wish | Refusal {
-  const channel = meantChannel(context);
+  to: (channel: ChannelState) => Request | Refusal,
+): Request | Refusal {
+  const channel = chosenChannel(context);
   return channel === undefined ? NO_CHANNEL : to(channel);
 }
 
-export function key(keys: string | readonly string[], label: string, to: Wish | Key["to"]): Key {
+export function key(keys: string | readonly string[], label: string, to: Request | Key["to"]): Key {
   return {
     keys: typeof keys === "string" ? [keys] : keys,
     label,
@@ -71,22 +71,25 @@ export function key(keys: string | readonly string[], label: string, to: Wish | 
   };
 }
 
-/** A key of the meant channel. */
+/** Returns a key that changes the chosen channel. */
 export function ofChannel(
   name: string,
   label: string,
-  to: (channel: ChannelState) => Wish | Refusal,
+  to: (channel: ChannelState) => Request | Refusal,
 ): Key {
   return key(name, label, (context) => withChannel(context, to));
 }
 
-/** Why a parameter can't be set now; null: it can. */
+/** Returns why a parameter cannot be set now; null: it can. */
 export function refusalOf<On>(row: Parameter<On>, on: On): Refusal | null {
   const reason = row.refusal?.(on) ?? "";
   return reason === "" ? null : no(reason);
 }
 
-/** What keys do to a parameter; `find` gives what it is of, null: there is no channel now. */
+/**
+ * Returns the keys of a parameter; `find` returns the object that it belongs to, or null if no
+ * channel is shown.
+ */
 function keysFor<On>(
   row: Parameter<On>,
   find: (context: KeyContext) => Readonly<{ on: On; channel?: string }> | null,
@@ -130,15 +133,15 @@ function keysFor<On>(
   }
 }
 
-/** The keys of a parameter that is no channel's. */
+/** Returns the keys of a parameter that does not belong to a channel. */
 export function keysOf(row: Parameter<ViewerState>): readonly Key[] {
   return keysFor(row, ({ state }) => ({ on: state }));
 }
 
-/** The keys of a parameter of the meant channel. */
+/** Returns the keys of a parameter of the chosen channel. */
 export function keysOfChannel(row: Parameter<ChannelState>): readonly Key[] {
   return keysFor(row, (context) => {
-    const channel = meantChannel(context);
+    const channel = chosenChannel(context);
     return channel === undefined ? null : { on: channel, channel: channel.id };
   });
 }

@@ -13,8 +13,8 @@ const refusal = (changes: KeyChanges, name: string, pressed: string) =>
     refusal: expect.stringMatching(/^[A-Z][^.]*\.$/),
   });
 
-describe("a key that a reader changes", () => {
-  it("does what the old one did, which does nothing then", () => {
+describe("a key that a user changes", () => {
+  it("takes over the function of the old key, which has none then", () => {
     const changes = changed({}, "o", "é");
     expect(KEYS.standsFor("é", changes)).toBe("o");
     expect(KEYS.standsFor("o", changes)).toBeNull();
@@ -22,7 +22,7 @@ describe("a key that a reader changes", () => {
     expect(keyNow("m", changes)).toBe("m");
   });
 
-  it("leaves its old key to another action, and gets it back when that one leaves it", () => {
+  it("frees its old key for another action, and can take it back when it is free again", () => {
     const first = changed({}, "o", "é");
     const second = changed(first, "m", "o");
     expect(KEYS.standsFor("o", second)).toBe("m");
@@ -31,13 +31,13 @@ describe("a key that a reader changes", () => {
     expect(changed(third, "o", "o")).toEqual({});
   });
 
-  it("is refused in one sentence where another action has it, or the browser", () => {
+  it("is refused in one sentence if another action or the browser uses it", () => {
     for (const key of ["m", "Tab", "Enter", " ", "Escape", "F5", "Ctrl+t", "?"]) {
       refusal({}, "o", key);
     }
   });
 
-  it("keeps each key of the tables for one action, whatever is swapped", () => {
+  it("has one action for each key of the tables after any swap", () => {
     const names = KEYS.groups.flatMap(({ keys }) => keys.flatMap(({ keys }) => keys));
     let changes: KeyChanges = changed(changed({}, "a", "é"), "b", "a");
     changes = changed(changes, "a", "b");
@@ -45,13 +45,13 @@ describe("a key that a reader changes", () => {
     expect(done).toEqual(names);
   });
 
-  it("is named in sentences by its new key", () => {
-    const text = "Nothing is cut open yet: cut by a box (b) or by a plane (n).";
+  it("is named by its new key in sentences", () => {
+    const text = "Nothing is cut yet: cut with a box (b) or a plane (n).";
     expect(withKeys(text, { b: "é" })).toBe(text.replace("(b)", "(é)"));
     expect(withKeys("two tiles (row 1)", { r: "é" })).toBe("two tiles (row 1)");
   });
 
-  it("does nothing by a name that every object has", () => {
+  it("has no function for names that every JavaScript object has", () => {
     expect(KEYS.standsFor("constructor", {})).toBeNull();
     expect(KEYS.standsFor("toString", {})).toBeNull();
   });

@@ -1,19 +1,19 @@
-/** Changing the keys: which key may do what. Pure; it comes with the list of keys. */
+/** Changes of the keys by the user. Pure; loaded together with the list of keys. */
 import type { Refusal } from "./controls";
 import { no } from "./key";
 import type { KeyChanges, KeyTable } from "./keys";
 
-/** The key of this list stays, so that everybody finds the way back. */
+/** The key of the list of keys cannot change, so that everybody finds the way back. */
 export const FIXED = "?";
-/** Controls are worked by these, or the browser has them. */
+/** Keys that operate controls, or that the browser uses. */
 const TAKEN = /^(Shift\+)?(Tab|Enter|Escape| |F\d+)$|^Ctrl\+/;
 
-/** The key that does what `name` does in the tables. */
+/** Returns the key that has the function of `name` in the tables. */
 export function keyNow(name: string, changes: KeyChanges): string {
   return changes[name] ?? name;
 }
 
-/** Let `pressed` do what `name` does in the tables; a refusal says why it can't. */
+/** Gives `pressed` the function of `name` in the tables. Returns a refusal if that is not possible. */
 export function changeKey(
   table: KeyTable,
   changes: KeyChanges,
@@ -23,13 +23,13 @@ export function changeKey(
   const owner = table.standsFor(pressed, changes);
   if (owner !== null && owner !== name) {
     return no(
-      `That key does “${table.labelOf(owner)}”: press another one, or change that one first.`,
+      `That key is used for “${table.labelOf(owner)}”: press another key, or change that one first.`,
     );
   }
   const { [name]: _, ...others } = changes;
   if (pressed === name) return { changes: others };
   if (pressed === FIXED || TAKEN.test(pressed)) {
-    return no("That key belongs to the browser or to the page: press another one.");
+    return no("That key belongs to the browser or the page: press another key.");
   }
   return { changes: { ...others, [name]: pressed } };
 }

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { type Focus, firesOn, keyName } from "./key_events";
 
 describe("a key with Ctrl or Command", () => {
-  it("is named by it, on a keyboard without Latin letters too", () => {
+  it("is named with Ctrl, also on a keyboard without Latin letters", () => {
     const z = { key: "z", code: "KeyZ", shiftKey: false };
     expect(keyName({ ...z, ctrlKey: true })).toBe("Ctrl+z");
     expect(keyName({ ...z, metaKey: true })).toBe("Ctrl+z");
@@ -14,7 +14,7 @@ describe("a key with Ctrl or Command", () => {
 describe("a key that is pressed", () => {
   it("has a name on every keyboard", () => {
     const named = (key: string, code: string, shiftKey = false) => keyName({ key, code, shiftKey });
-    expect(named("a", "KeyQ")).toBe("a"); // as a French keyboard has it
+    expect(named("a", "KeyQ")).toBe("a"); // as on a French keyboard
     expect(named("ф", "KeyA")).toBe("a");
     expect(named("Ф", "KeyA", true)).toBe("A");
     expect(named("?", "Minus", true)).toBe("?");
@@ -22,7 +22,7 @@ describe("a key that is pressed", () => {
     expect(named("ArrowLeft", "ArrowLeft", true)).toBe("Shift+ArrowLeft");
   });
 
-  it("rests while something is typed, and leaves a control what it is worked by", () => {
+  it("is ignored while the user types, and is left to a control that it operates", () => {
     const press = ["Enter", " ", "Shift+Enter"];
     const goThrough = ["ArrowLeft", "Shift+ArrowUp", "Home", "End", "PageUp", "PageDown"];
     const others = ["o", "?", "+", "-", "=", "Escape", "Delete", "Backspace"];

@@ -1,21 +1,21 @@
-/** Keys as the browser reports them: their names, and the elements that want them too. */
+/** Keys as the browser reports them: their names, and the elements that use them themselves. */
 
 type Pressed = Pick<KeyboardEvent, "key" | "code" | "shiftKey"> &
   Partial<Pick<KeyboardEvent, "ctrlKey" | "metaKey">>;
 
 /**
- * The name of a key that was pressed: as `KeyboardEvent.key` has it, with Shift where that leaves no
- * mark on it, with Ctrl for Ctrl and for a Mac's Command. Where a keyboard writes other letters than
- * Latin ones, their place counts.
+ * Returns the name of a pressed key: `KeyboardEvent.key`, with Shift if the key does not show it,
+ * and with Ctrl for Ctrl and for Command on a Mac. On a keyboard without Latin letters, the place
+ * of the key counts.
  */
 export function keyName(pressed: Pressed): string {
   const name = plainName(pressed);
   if (!pressed.ctrlKey && !pressed.metaKey) return name;
-  // whatever Caps Lock makes of the letter
+  // Caps Lock must not change the letter
   return `Ctrl+${pressed.shiftKey ? name.toUpperCase() : name.toLowerCase()}`;
 }
 
-/** Whether a key writes something: one character, and no space. */
+/** Returns whether a key writes one character that is not a space. */
 export function isWritten(name: string): boolean {
   return [...name].length === 1 && name.trim() !== "";
 }
@@ -28,8 +28,8 @@ function plainName({ key: written, code, shiftKey }: Pressed): string {
 }
 
 /**
- * What has the keyboard. A text field takes every key; a control those that it is worked by: a
- * button is pressed, a list (or a slider, or radio buttons) is gone through as well.
+ * The element with the focus. A text field takes every key. A control takes the keys that operate
+ * it: Enter and space press a button, and the arrows also change a list, a slider or radio buttons.
  */
 export type Focus = "field" | "list" | "button" | "page";
 
@@ -42,13 +42,16 @@ const GO_THROUGH = [
 export function firesOn(name: string, focus: Focus): boolean {
   if (focus === "page") return true;
   if (focus === "field") return false;
-  const plain = name.replace(/^Shift\+/, ""); // which changes nothing to a control
+  const plain = name.replace(/^Shift\+/, ""); // Shift makes no difference to a control
   return !PRESS.includes(plain) && !(focus === "list" && GO_THROUGH.includes(plain));
 }
 
 const TEXT_INPUTS = ["text", "search", "url", "number", "email", "password", "tel"];
 
-/** Groups of buttons with one stop of the Tab key take their arrows themselves: see roving_tabindex.ts. */
+/**
+ * Returns the kind of a focused element. Groups of buttons with one Tab stop handle their arrows
+ * themselves (see roving_tabindex.ts).
+ */
 function focusOf(target: EventTarget | null): Focus {
   if (!(target instanceof HTMLElement)) return "page";
   if (target.isContentEditable || target instanceof HTMLTextAreaElement) return "field";
@@ -60,7 +63,7 @@ function focusOf(target: EventTarget | null): Focus {
   return target instanceof HTMLButtonElement ? "button" : "page";
 }
 
-/** @param onKey returns whether the key did something: then the browser does nothing with it */
+/** @param onKey returns whether the key had an effect, in which case the browser ignores it */
 export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSignal): void {
   addEventListener(
     "keydown",
@@ -74,7 +77,7 @@ export function listenForKeys(onKey: (name: string) => boolean, signal: AbortSig
       if (firesOn(name, focus)) {
         if (onKey(name)) event.preventDefault();
       } else if (focus === "field" && name === "Escape" && target instanceof HTMLElement) {
-        target.blur(); // what was typed stays
+        target.blur(); // the typed text stays
         event.preventDefault();
       }
     },

@@ -19,7 +19,10 @@ import { type PanelChange, START_VIEW } from "./controls";
 import { isRefusal, type KeyContext } from "./key";
 import { spokenFeedback } from "./spoken_feedback";
 
-/** A number without keys of its own: one key chooses among several of them, two turn the chosen one. */
+/**
+ * Whether a parameter is a number without keys of its own. One key chooses such a number, and two
+ * keys change it.
+ */
 const isTurned = (row: Parameter<ViewerState>) => row.kind === "number" && row.keys === undefined;
 
 const ALL = KEYS.groups.flatMap(({ keys }) => keys);
@@ -33,7 +36,7 @@ const CONTEXT: KeyContext = {
       ],
     } as const,
     { type: "keep-views", views: [{ position: [0, 0, 2], target: [0, 0, 0] }] } as const,
-    { type: "notify", text: "a fault", isMendable: true } as const,
+    { type: "notify", text: "a fault", isRetryable: true } as const,
     { type: "set-clip", clip: { box: SPECIMEN_BOX, plane: null } } as const,
     {
       type: "set-shapes",
@@ -54,7 +57,7 @@ const CONTEXT: KeyContext = {
   focusTile: "r0_c2",
 };
 
-/** The same where volumes are marched, slices show and a tap measures. */
+/** The same context, but volumes are marched, slices are shown and a tap measures. */
 const MARCHED: KeyContext = {
   ...CONTEXT,
   state: [
@@ -64,15 +67,15 @@ const MARCHED: KeyContext = {
     { type: "select", tile: "r0_c2" } as const,
   ].reduce<KeyContext["state"]>(reduce, CONTEXT.state),
 };
-/** The same where nothing but volumes shows. */
+/** The same context, but only volumes are shown. */
 const EVERYWHERE: KeyContext = {
   ...MARCHED,
   state: reduce(MARCHED.state, { type: "set", id: "mode", value: "all" } as const),
 };
 const CONTEXTS = [CONTEXT, MARCHED, EVERYWHERE];
 
-/** What every key asks for where it does something. */
-const allWishes = () =>
+/** The requests of all keys that have an effect. */
+const allRequests = () =>
   CONTEXTS.flatMap((context) =>
     ALL.flatMap(({ to, keys }) => keys.map((name) => to(context, name))),
   ).filter((answer) => !isRefusal(answer));
@@ -80,39 +83,39 @@ const allWishes = () =>
 const REFUSED = { refusal: expect.stringMatching(/^[A-Z].*\.$/) };
 
 describe("the keys", () => {
-  it("mean one thing each, and name it", () => {
+  it("have one function each, with a label", () => {
     const names = ALL.flatMap(({ keys }) => keys);
     expect(new Set(names).size).toBe(names.length);
     expect(ALL.filter(({ label }) => label.length < 3)).toEqual([]);
   });
 
   it("reach every action and every command", () => {
-    const wishes = allWishes();
+    const requests = allRequests();
     const actions = new Set(
-      wishes.flatMap((wish) =>
-        wish !== null && typeof wish !== "string" && "type" in wish ? [wish.type] : [],
+      requests.flatMap((request) =>
+        request !== null && typeof request !== "string" && "type" in request ? [request.type] : [],
       ),
     );
     const wanted: Readonly<Record<Exclude<Action, PartAction>["type"], boolean>> = {
       set: true,
-      objects: false, // the panel's, and a tap
+      objects: false, // the panel and taps send it
       show: true,
       window: true,
       "choose-transfer-function": true,
       "set-shapes": true,
-      "learn-transfer-2d": false, // the bundle's
+      "learn-transfer-2d": false, // the loader sends it
       select: true,
       isolate: true,
       "set-clip": true,
       measure: true,
-      "add-point": false, // a tap
+      "add-point": false, // a tap sends it
       "finish-measuring": true,
-      "set-measurements": false, // the panel's list
-      "move-lamp": false, // a drag
+      "set-measurements": false, // the panel's list sends it
+      "move-lamp": false, // a drag sends it
       dismiss: true,
-      "keep-views": false, // by the commands
-      restore: false, // by the commands undo and redo
-      notify: false, // the viewer's own
+      "keep-views": false, // commands send it
+      restore: false, // the commands undo and redo send it
+      notify: false, // the viewer sends it
     };
     for (const [type, isWanted] of Object.entries(wanted)) {
       expect(actions.has(type as Action["type"]), type).toBe(isWanted);
@@ -120,32 +123,34 @@ describe("the keys", () => {
     const ofParts = PARTS.flatMap(({ settings }) => Object.keys(settings?.actions ?? {}));
     expect([...actions]).toEqual(expect.arrayContaining(ofParts));
     const commands = [...OWN_COMMANDS, ...PARTS.flatMap(({ commands: ofPart = [] }) => ofPart)];
-    const asked = wishes.filter((wish) => typeof wish === "string");
+    const asked = requests.filter((request) => typeof request === "string");
     expect(new Set(asked)).toEqual(new Set(commands));
   });
 
-  it("reach every parameter, the light's and stereo's numbers by three keys", () => {
-    const wishes = allWishes();
+  it("reach every parameter; three keys reach the numbers of light and stereo", () => {
+    const requests = allRequests();
     const set = new Set(
-      wishes.flatMap((wish) =>
-        wish !== null && typeof wish !== "string" && "id" in wish ? [wish.id] : [],
+      requests.flatMap((request) =>
+        request !== null && typeof request !== "string" && "id" in request ? [request.id] : [],
       ),
     );
     const turned = new Set<string>(
       [...LIGHT_NUMBERS, ...STEREO_NUMBERS, ...rowsOfParts().filter(isTurned)].map(({ id }) => id),
     );
-    // the choice of a tone map and lamps' colours are the panel's alone
+    // only the panel sets the tone map and the colours of lamps
     const others = allParameters().filter(
       ({ id, kind }) => !turned.has(id) && kind !== "colour" && id !== "trace-tone-map",
     );
     for (const { id } of [...others, ...CHANNEL]) expect(set, id).toContain(id);
   });
 
-  it("reach what the panel keeps for itself, but for what is typed and what is folded", () => {
-    const wishes = allWishes();
+  it("reach the state of the panel, except for typed texts and open sections", () => {
+    const requests = allRequests();
     const changes = new Set(
-      wishes.flatMap((wish) =>
-        wish !== null && typeof wish !== "string" && "panel" in wish ? [wish.panel] : [],
+      requests.flatMap((request) =>
+        request !== null && typeof request !== "string" && "panel" in request
+          ? [request.panel]
+          : [],
       ),
     );
     const wanted: Readonly<Record<PanelChange["panel"], boolean>> = {
@@ -162,8 +167,8 @@ describe("the keys", () => {
       reveal: false,
       find: false,
       code: false,
-      letters: false, // a key could not switch it back on
-      keys: false, // the list of keys has it
+      letters: false, // a key could not switch it on again
+      keys: false, // the list of keys sends it
       unfold: false,
     };
     for (const [panel, isWanted] of Object.entries(wanted)) {
@@ -171,64 +176,64 @@ describe("the keys", () => {
     }
   });
 
-  it("move the part of the cuts that is meant", () => {
-    expect(KEYS.wishOf("N", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "x-min" });
-    expect(KEYS.wishOf("B", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "z-max" });
+  it("move the chosen part of the cuts", () => {
+    expect(KEYS.requestOf("N", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "x-min" });
+    expect(KEYS.requestOf("B", CONTEXT)).toEqual({ panel: "clip-part", clipPart: "z-max" });
     const { min, max } = SPECIMEN_BOX;
     const cut = (box: typeof SPECIMEN_BOX | object) => ({
       type: "set-clip",
       clip: { box, plane: null },
     });
-    expect(KEYS.wishOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
+    expect(KEYS.requestOf(".", CONTEXT)).toEqual(cut({ min: [1, min[1], min[2]], max }));
     const view = { ...START_VIEW, clipPart: "y-max" } as const;
-    const inside = KEYS.wishOf(",", { ...CONTEXT, view });
+    const inside = KEYS.requestOf(",", { ...CONTEXT, view });
     expect(inside).toEqual(cut({ min, max: [max[0], -0.4, max[2]] }));
-    expect(KEYS.wishOf(".", { ...CONTEXT, view })).toEqual(REFUSED); // there the specimen ends
+    expect(KEYS.requestOf(".", { ...CONTEXT, view })).toEqual(REFUSED); // the specimen ends there
     const whole = reduce(CONTEXT.state, { type: "set-clip", clip: { box: null, plane: null } });
-    expect(KEYS.wishOf(".", { ...CONTEXT, state: whole })).toEqual(REFUSED);
-    expect(KEYS.wishOf("N", { ...CONTEXT, state: whole })).toEqual(REFUSED);
+    expect(KEYS.requestOf(".", { ...CONTEXT, state: whole })).toEqual(REFUSED);
+    expect(KEYS.requestOf("N", { ...CONTEXT, state: whole })).toEqual(REFUSED);
   });
 
-  it("mean the channel with the open card, or the first one shown", () => {
-    expect(KEYS.wishOf("o", CONTEXT)).toEqual({
+  it("change the channel with the open card, or the first shown one", () => {
+    expect(KEYS.requestOf("o", CONTEXT)).toEqual({
       type: "set",
       id: "opacity",
       channel: "c0",
       value: 0.95,
     });
     const view = { ...START_VIEW, picked: "c2" };
-    expect(KEYS.wishOf("o", { ...CONTEXT, view })).toEqual({
+    expect(KEYS.requestOf("o", { ...CONTEXT, view })).toEqual({
       type: "set",
       id: "opacity",
       channel: "c2",
       value: 0.95,
     });
-    expect(KEYS.wishOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
-    expect(KEYS.wishOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
+    expect(KEYS.requestOf("c", { ...CONTEXT, view })).toEqual({ panel: "pick", channel: "c3" });
+    expect(KEYS.requestOf("C", { ...CONTEXT, view: { ...view, picked: "c0" } })).toEqual({
       panel: "pick",
       channel: "c3",
     });
   });
 
-  it("show the lamps where they light something", () => {
-    expect(KEYS.wishOf("$", CONTEXT)).toEqual({ type: "set", id: "trace/lamps", value: true });
+  it("show the lamps only if they light something", () => {
+    expect(KEYS.requestOf("$", CONTEXT)).toEqual({ type: "set", id: "trace/lamps", value: true });
     const shown = reduce(CONTEXT.state, { type: "set", id: "trace/lamps", value: true });
-    expect(KEYS.wishOf("$", { ...CONTEXT, state: shown })).toEqual({
+    expect(KEYS.requestOf("$", { ...CONTEXT, state: shown })).toEqual({
       type: "set",
       id: "trace/lamps",
       value: false,
     });
     const marched = reduce(shown, { type: "set", id: "mode", value: "all" });
-    expect(KEYS.wishOf("$", { ...CONTEXT, state: marched })).toEqual(REFUSED);
+    expect(KEYS.requestOf("$", { ...CONTEXT, state: marched })).toEqual(REFUSED);
   });
 
-  it("do nothing where there is nothing to do", () => {
-    expect(KEYS.wishOf("F9", CONTEXT)).toBeNull();
-    expect(KEYS.wishOf("F12", CONTEXT)).toBeNull();
-    expect(KEYS.wishOf("g", { ...CONTEXT, focusTile: null })).toEqual(REFUSED);
+  it("have no effect if there is nothing to change", () => {
+    expect(KEYS.requestOf("F9", CONTEXT)).toBeNull();
+    expect(KEYS.requestOf("F12", CONTEXT)).toBeNull();
+    expect(KEYS.requestOf("g", { ...CONTEXT, focusTile: null })).toEqual(REFUSED);
   });
 
-  it("change the state, or say why they don't", () => {
+  it("change the state, or report why they do not", () => {
     const start = initialState(sampleManifest(1));
     const view = { ...START_VIEW, parameter: "slice-x" };
     const bare: KeyContext = { state: start, view, shown: SPECIMEN_BOX, focusTile: null };
@@ -249,47 +254,48 @@ describe("the keys", () => {
     const silent: string[] = [];
     for (const [where, context] of Object.entries(contexts)) {
       for (const name of ALL.flatMap(({ keys }) => keys)) {
-        const wish = KEYS.wishOf(name, context);
-        if (wish === null) throw new Error(name);
-        if (isRefusal(wish)) {
-          if (!/^[A-Z].*\.$/.test(wish.refusal)) silent.push(`${where} ${name}: ${wish.refusal}`);
+        const request = KEYS.requestOf(name, context);
+        if (request === null) throw new Error(name);
+        if (isRefusal(request)) {
+          if (!/^[A-Z].*\.$/.test(request.refusal))
+            silent.push(`${where} ${name}: ${request.refusal}`);
           continue;
         }
-        if (typeof wish === "string" || "panel" in wish) continue; // the page's: see its test
-        const after = reduce(context.state, wish);
-        const text = spokenFeedback(wish, context.state, after, new Map());
+        if (typeof request === "string" || "panel" in request) continue; // requests of the page have a test of their own
+        const after = reduce(context.state, request);
+        const text = spokenFeedback(request, context.state, after, new Map());
         const isSame = JSON.stringify(after) === JSON.stringify(context.state);
         const isSaid =
-          "value" in wish && typeof wish.value !== "number"
+          "value" in request && typeof request.value !== "number"
             ? text !== ""
-            : /: (it goes no further|the only one)$|^Slices: in the middle/.test(text);
+            : /: (it is at its limit|the only one)$|^Slices: in the middle/.test(text);
         if (isSame && !isSaid) {
           silent.push(`${where} ${name}: ${text}`);
         }
       }
     }
     expect(silent).toEqual([]);
-    expect(KEYS.wishOf("}", contexts.bare)).toEqual({ refusal: NO_SLICES });
+    expect(KEYS.requestOf("}", contexts.bare)).toEqual({ refusal: NO_SLICES });
     const said = (name: string) => {
-      const wish = KEYS.wishOf(name, contexts.atEnd);
-      if (wish === null || isRefusal(wish)) throw new Error(name);
-      return spokenFeedback(wish, atEnd, atEnd, new Map());
+      const request = KEYS.requestOf(name, contexts.atEnd);
+      if (request === null || isRefusal(request)) throw new Error(name);
+      return spokenFeedback(request, atEnd, atEnd, new Map());
     };
-    expect(said("}")).toBe("Slices: x 100.0 %: it goes no further");
-    expect(said("D")).toBe("Focus disc 40°: it goes no further");
+    expect(said("}")).toBe("Slices: x 100.0 %: it is at its limit");
+    expect(said("D")).toBe("Focus disc 40°: it is at its limit");
   });
 
-  it("go to the next tile, also of those that are shown alone", () => {
-    expect(KEYS.wishOf("t", CONTEXT)).toEqual({ type: "select", tile: "r0_c0" });
+  it("go to the next tile, also while one is isolated", () => {
+    expect(KEYS.requestOf("t", CONTEXT)).toEqual({ type: "select", tile: "r0_c0" });
     const state = reduce(CONTEXT.state, { type: "isolate", tile: "r1_c4" });
-    expect(KEYS.wishOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
-    expect(KEYS.wishOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
+    expect(KEYS.requestOf("t", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: "r0_c0" });
+    expect(KEYS.requestOf("i", { ...CONTEXT, state })).toEqual({ type: "isolate", tile: null });
   });
 
-  it("cut what is shown, also of a tile that is shown alone", () => {
+  it("cut the shown box, also that of an isolated tile", () => {
     const shown = { min: [0, -10, 0], max: [10, 0, 8] } as const;
     const state = initialState(sampleManifest(1));
-    const clipOf = (name: string) => KEYS.wishOf(name, { ...CONTEXT, state, shown });
+    const clipOf = (name: string) => KEYS.requestOf(name, { ...CONTEXT, state, shown });
     expect(clipOf("b")).toMatchObject({
       clip: { box: { min: [2.5, -7.5, 2], max: [7.5, -2.5, 6] } },
     });
@@ -299,11 +305,16 @@ describe("the keys", () => {
   it("are announced in words that name the new value", () => {
     const ranges = new Map([["c0", [100, 1120] as const]]);
     const after = (name: string) => {
-      const wish = KEYS.wishOf(name, MARCHED);
-      if (wish === null || typeof wish === "string" || "panel" in wish || isRefusal(wish)) {
+      const request = KEYS.requestOf(name, MARCHED);
+      if (
+        request === null ||
+        typeof request === "string" ||
+        "panel" in request ||
+        isRefusal(request)
+      ) {
         throw new Error(name);
       }
-      return spokenFeedback(wish, MARCHED.state, reduce(MARCHED.state, wish), ranges);
+      return spokenFeedback(request, MARCHED.state, reduce(MARCHED.state, request), ranges);
     };
     expect(after("o")).toBe("Marker 0: opacity 95 %");
     expect(after("e")).toBe("Marker 0: window 100 – 1104");
@@ -314,15 +325,15 @@ describe("the keys", () => {
     expect(after(".")).toBe("Box: x from 1.00 µm");
   });
 
-  it("of volumes say why they do nothing where there are only objects", () => {
+  it("for volumes report why they have no effect on a specimen of objects", () => {
     const channels = MARCHED.state.channels.map((one) => ({ ...one, hasObjects: true }));
     const objects = { ...MARCHED, state: { ...MARCHED.state, channels } };
     for (const name of ["m", "D", "%"]) {
-      expect(KEYS.wishOf(name, objects)).toEqual({
+      expect(KEYS.requestOf(name, objects)).toEqual({
         refusal: REASONS.volumes,
       });
-      expect(KEYS.wishOf(name, MARCHED)).not.toHaveProperty("refusal");
+      expect(KEYS.requestOf(name, MARCHED)).not.toHaveProperty("refusal");
     }
-    expect(KEYS.wishOf("b", objects)).not.toHaveProperty("refusal");
+    expect(KEYS.requestOf("b", objects)).not.toHaveProperty("refusal");
   });
 });

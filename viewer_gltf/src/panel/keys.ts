@@ -1,25 +1,25 @@
-/** Every key: the panel's own groups and those of the parts, in the order of the list that `?` opens. Pure. */
+/** All keys: the groups of the panel and of the parts, in the order of the list that `?` opens. Pure. */
 
 import { QUALITY_PARAMETERS } from "../state/parameters/tools";
 import { REFUSED } from "../state/refusals";
 import { hasVolumes } from "../state/viewer_state";
-import type { Refusal, Wish } from "./controls";
+import type { Refusal, Request } from "./controls";
 import { type Key, type KeyContext, type KeyGroup, keysOf, no } from "./key";
 import { TOOL_KEYS } from "./tool_keys";
 import { VIEW_KEYS } from "./view_keys";
 
-/** The keys of what every viewer has. */
+/** Keys that every viewer has. */
 export const OWN_KEYS: readonly KeyGroup[] = [
   { name: "View", rank: 10, keys: VIEW_KEYS },
-  // how finely volumes are drawn stands after where they show
+  // the quality of volumes follows the keys that decide where they are shown
   { name: "Volumes", rank: 41, keys: QUALITY_PARAMETERS.flatMap(keysOf), needsVolumes: true },
   { name: "Tools", rank: 80, keys: TOOL_KEYS },
 ];
 
-/** Keys that a reader has changed: from a name in these tables to the key that is pressed instead. */
+/** Keys that a user has changed: from a name in these tables to the key that is pressed instead. */
 export type KeyChanges = Readonly<Record<string, string>>;
 
-/** A sentence that names keys in brackets, with the keys that a reader has set instead. */
+/** Replaces the keys in brackets in a sentence by those that the user has set instead. */
 export function withKeys(text: string, changes: KeyChanges): string {
   return text.replace(/\((.)\)/g, (_, name: string) => `(${changes[name] ?? name})`);
 }
@@ -29,7 +29,7 @@ const NO_VOLUMES = no(REFUSED.volumes);
 type Entry = Readonly<{ key: Key; needsVolumes: boolean }>;
 
 export class KeyTable {
-  /** Groups of one name are one group. */
+  /** Groups of keys; groups with the same name are joined. */
   readonly groups: readonly KeyGroup[];
   private readonly byName: ReadonlyMap<string, Entry>;
 
@@ -47,23 +47,23 @@ export class KeyTable {
     );
   }
 
-  /** The name in the table that a pressed key stands for; null: none. */
+  /** Returns the name in the tables of a pressed key; null: it has no function. */
   standsFor(pressed: string, changes: KeyChanges): string | null {
     const changed = Object.keys(changes).find((name) => changes[name] === pressed);
     if (changed !== undefined) return changed;
     return this.byName.has(pressed) && !Object.hasOwn(changes, pressed) ? pressed : null;
   }
 
-  /** The words for a key, as the list of keys has them. */
+  /** Returns the label of a key in the list of keys. */
   labelOf(name: string): string {
     return this.byName.get(name)?.key.label ?? "";
   }
 
-  /** Returns the request of a key, or why it does nothing now; null: there is no such key. */
-  wishOf(name: string, context: KeyContext): Wish | Refusal | null {
+  /** Returns the request of a key, or why it has no effect now; null: there is no such key. */
+  requestOf(name: string, context: KeyContext): Request | Refusal | null {
     const found = this.byName.get(name);
     if (found === undefined) return null;
-    const isVain = found.needsVolumes && !hasVolumes(context.state);
-    return isVain ? NO_VOLUMES : found.key.to(context, name);
+    const isUseless = found.needsVolumes && !hasVolumes(context.state);
+    return isUseless ? NO_VOLUMES : found.key.to(context, name);
   }
 }

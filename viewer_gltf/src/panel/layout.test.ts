@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { FLAT_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { CHANNELS_OF_A_PAGE, type Facts, layOut } from "../../test/support/panel/whole_panel";
+import { buildPanel, CHANNELS_OF_A_PAGE, type Facts } from "../../test/support/panel/whole_panel";
 import type { Action } from "../state/actions";
 import { initialState } from "../state/initial_state";
 import { DISC_RADIUS, SWITCH_DISTANCE } from "../state/parameters/volumes";
@@ -13,8 +13,8 @@ import {
   type Group,
   type Layout,
   type PanelView,
+  type Request,
   START_VIEW,
-  type Wish,
 } from "./controls";
 import { PALETTES } from "./palettes";
 
@@ -33,24 +33,24 @@ function find<K extends Control["kind"]>(layout: Layout, kind: K, id: string) {
   return found as Extract<Control, { kind: K }>;
 }
 
-function granted(state: ViewerState, wish: Wish): ViewerState {
-  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
-  return reduce(state, wish);
+function granted(state: ViewerState, request: Request): ViewerState {
+  if (typeof request === "string" || "panel" in request) throw new Error("no action");
+  return reduce(state, request);
 }
 
 const laid = (state: ViewerState, view: PanelView = START_VIEW, facts = FACTS) =>
-  layOut(state, facts, view);
+  buildPanel(state, facts, view);
 const channelsOf = (layout: Layout) =>
   layout.sections[0].items.filter((item): item is Group => item.kind === "group");
 
-/** Of label maps alone, whose channels have no volume. */
+/** Turns all channels into label maps, which have no volumes. */
 const ofObjects = (state: ViewerState): ViewerState => ({
   ...state,
   channels: state.channels.map((channel) => ({ ...channel, hasObjects: true })),
 });
 
 describe("the panel's layout", () => {
-  it("has no sections of volumes where there are only objects", () => {
+  it("has no sections for volumes if there are only objects", () => {
     const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
     const [all, left] = [names(start()), names(ofObjects(start()))];
     expect(left.filter((id) => id.startsWith("objects"))).toHaveLength(3);
@@ -65,11 +65,11 @@ describe("the panel's layout", () => {
     expect(names(mixed).filter((id) => !id.startsWith("objects"))).toEqual(all);
   });
 
-  it("opens with at most twelve rows, and lists the rest under More", () => {
+  it("opens with at most twelve rows, and lists the other sections under More", () => {
     const layout = laid(start(4));
     const first = layout.sections.filter(({ isDeeper }) => !isDeeper);
     const rows = first.map(({ isOpen, items }) => (isOpen ? items.length : 1));
-    expect(rows.reduce((sum, each) => sum + each, 1)).toBeLessThanOrEqual(12); // and More
+    expect(rows.reduce((sum, each) => sum + each, 1)).toBeLessThanOrEqual(12); // one row for More
     expect(layout.more.isOpen).toBe(false);
     const names = first.map(({ id }) => id);
     expect(names).toEqual(["channels", "volumes", "tiles", "cut", "slices", "save", "stereo"]);
@@ -79,7 +79,7 @@ describe("the panel's layout", () => {
     );
   });
 
-  it("begins with the slices of a patient", () => {
+  it("begins with the slices if the specimen is a patient", () => {
     const names = (facts: Partial<typeof FACTS>) =>
       laid(start(), START_VIEW, { ...FACTS, ...facts }).sections.map(({ id }) => id);
     expect(names({ isPatient: true })[0]).toBe("slices");
@@ -87,16 +87,16 @@ describe("the panel's layout", () => {
     expect(names({ isPatient: true, isStereo: true })[0]).toBe("channels");
   });
 
-  it("reports what is shown, whether it is complete, and that nothing is", () => {
+  it("reports the shown forms, whether they are complete, and that nothing is shown", () => {
     const status = (state: ViewerState, facts: Partial<Facts> = {}) =>
       laid(state, START_VIEW, { ...FACTS, ...facts }).status;
-    expect(status(start())).toBe("Surfaces, volumes from near · complete");
-    expect(status(start(), { isLoading: true })).toBe("Surfaces, volumes from near · loading …");
+    expect(status(start())).toBe("Surfaces, volumes when near · complete");
+    expect(status(start(), { isLoading: true })).toBe("Surfaces, volumes when near · loading …");
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     expect(status(off)).toBe("Surfaces · complete");
     const [tile, ...others] = off.tiles;
     const unfinished = { ...off, tiles: [{ ...tile, isUnfinished: true as const }, ...others] };
-    expect(status(unfinished)).toBe("Volumes, as not all surfaces are built");
+    expect(status(unfinished)).toBe("Volumes until all surfaces are built");
     const without = off.tiles.map((each) => ({ ...each, isUnfinished: true as const }));
     expect(status({ ...off, tiles: without })).toBe("Volumes");
     const all = reduce(unfinished, { type: "set", id: "mode", value: "all" });
@@ -105,17 +105,17 @@ describe("the panel's layout", () => {
     expect(status(none)).toBe("All channels are hidden");
   });
 
-  it("gives every control an id of its own, and a name", () => {
+  it("gives every control a unique id, and a label", () => {
     const controls = controlsOf(laid(start(70)));
     const ids = controls.map(({ id }) => id);
     expect(new Set(ids).size).toBe(ids.length);
     expect(controls.filter(({ label }) => label === "")).toEqual([]);
   });
 
-  it("changes each part of a channel to its control's value", () => {
+  it("sets each part of a channel to the value of its control", () => {
     const state = start();
     const layout = laid(state);
-    const channel = (wish: Wish) => granted(state, wish).channels[0];
+    const channel = (request: Request) => granted(state, request).channels[0];
     expect(channel(find(layout, "toggle", "c0/shown").to(false)).shown).toBe(false);
     expect(channel(find(layout, "toggle", "c0/volume").to(false)).volume).toBe(false);
     expect(channel(find(layout, "slider", "c0/opacity").to(0.25)).opacity).toBe(0.25);
@@ -128,23 +128,23 @@ describe("the panel's layout", () => {
     expect(channel(find(layout, "colour", "c0/color").to("#0000ff")).color).toEqual([0, 0, 1]);
   });
 
-  it("names the window in the source's own values, where they are known", () => {
+  it("shows the window in the values of the source if they are known", () => {
     const state = reduce(start(), { type: "window", channel: "c0", window: [0.25, 0.5] });
     expect(find(laid(state), "window", "c0/window").texts).toEqual(["355", "610"]);
     expect(find(laid(state), "window", "c2/window").texts).toEqual(["0 %", "100 %"]);
   });
 
-  it("offers the field's colours and ones that need no red and green", () => {
+  it("offers the usual colours of dyes, and colours for the colour-blind", () => {
     const { palettes } = find(laid(start()), "colour", "c0/palette");
     expect(palettes).toBe(PALETTES);
     const names = palettes.flatMap(({ colors }) => colors.map(({ name }) => name)).join();
     for (const dye of ["DAPI", "FITC", "TRITC", "Cy3", "Cy5"]) expect(names).toContain(dye);
     for (const { hex } of palettes.flatMap(({ colors }) => colors)) {
-      expect(hex).toMatch(/^#[0-9a-f]{6}$/); // as a state's colour reads, so that it is marked
+      expect(hex).toMatch(/^#[0-9a-f]{6}$/); // as the colour of a state is written, so that the chosen colour is marked
     }
   });
 
-  it("lists of seventy channels those that are shown, and a page of the others", () => {
+  it("lists the shown ones of seventy channels, and one page of the others", () => {
     const layout = laid(start(70));
     const [cards, others] = [channelsOf(layout).slice(0, 4), channelsOf(layout).slice(4)];
     expect(cards.map(({ id }) => id)).toEqual(["c0", "c1", "c2", "c3"]);
@@ -155,10 +155,11 @@ describe("the panel's layout", () => {
     expect(second[0].id).toBe(`c${4 + CHANNELS_OF_A_PAGE}`);
   });
 
-  it("finds a channel by a part of its name", () => {
-    const wish = find(laid(start(70)), "search", "find-channel").to("marker 42");
-    if (typeof wish === "string" || !("panel" in wish)) throw new Error("no change of the panel");
-    const found = channelsOf(laid(start(70), changePanel(START_VIEW, wish)));
+  it("finds a channel by part of its name", () => {
+    const request = find(laid(start(70)), "search", "find-channel").to("marker 42");
+    if (typeof request === "string" || !("panel" in request))
+      throw new Error("no change of the panel");
+    const found = channelsOf(laid(start(70), changePanel(START_VIEW, request)));
     expect(found.map(({ id }) => id)).toEqual(["c0", "c1", "c2", "c3", "c42"]);
     const nothing = laid(start(70), { ...START_VIEW, search: "CD999" });
     expect(find(nothing, "text", "no-channel").value).toContain("CD999");
@@ -171,7 +172,7 @@ describe("the panel's layout", () => {
     expect(opened.map(({ isOpen }) => isOpen)).toEqual([true, false, false]);
   });
 
-  it("brings a slider's ends to the limits, and each step back to itself", () => {
+  it("maps the ends of a slider to the limits, and each step to itself", () => {
     const state = start();
     const layout = laid(state);
     for (const [row, key] of [
@@ -190,7 +191,7 @@ describe("the panel's layout", () => {
     }
   });
 
-  it("maps the tiles by row and column, with the marks of gaze, choice and isolation", () => {
+  it("maps the tiles by row and column, and marks the gazed, selected and isolated ones", () => {
     const actions: Action[] = [
       { type: "select", tile: "r0_c1" },
       { type: "isolate", tile: "r0_c4" },
@@ -215,7 +216,7 @@ describe("the panel's layout", () => {
     expect(choose()).toEqual(["r0_c3", null]);
   });
 
-  it("tells where the limit of tiles ends the focus disc, and only there", () => {
+  it("reports the radius at which the limit of tiles ends the focus disc", () => {
     const now = (state: ViewerState, discLimit_deg: number | null) =>
       find(laid(state, START_VIEW, { ...FACTS, discLimit_deg }), "slider", "disc-radius").text;
     const set = now(start(), null);
@@ -223,7 +224,7 @@ describe("the panel's layout", () => {
     expect(now(reduce(start(), { type: "set", id: "mode", value: "all" }), 3.2)).toBe(set);
   });
 
-  it("has no section of tiles where there is a single one", () => {
+  it("has no section of tiles if there is only one", () => {
     const names = (state: ViewerState) => laid(state).sections.map(({ id }) => id);
     const { tiles, ...rest } = start();
     const all = names({ tiles, ...rest });
@@ -231,7 +232,7 @@ describe("the panel's layout", () => {
     expect(all.filter((id) => !single.includes(id))).toEqual(["tiles"]);
   });
 
-  it("lists the tiles where their names are no rows and columns", () => {
+  it("lists the tiles if their names are not rows and columns", () => {
     const tiles = ["left", "right"].map((id) => ({ id, representation: "mesh" }) as const);
     const state = { ...start(), tiles };
     const list = find(laid(state), "choice", "tile-choice");
@@ -267,7 +268,7 @@ describe("the panel's layout", () => {
     ]);
   });
 
-  it("keeps the place of a label map's section until its table has come", () => {
+  it("keeps the place of a label map's section until its table is loaded", () => {
     const ids = (objects: Facts["objects"]) =>
       laid(ofObjects(start(1)), START_VIEW, { ...FACTS, objects }).sections.map(({ id }) => id);
     const items = [{ kind: "text", id: "objects-count", label: "Objects", value: "3" } as const];
@@ -275,7 +276,7 @@ describe("the panel's layout", () => {
     expect(ids([])).toContain("objects");
   });
 
-  it("shows the objects' own colours beside a label map's name, and one colour where they have that", () => {
+  it("shows the colours of the objects beside a label map's name, or the one colour that all have", () => {
     const state = ofObjects(start());
     const shows = (colors: readonly string[]) => {
       const objectColors = new Map([["c0", colors]]);
@@ -286,10 +287,10 @@ describe("the panel's layout", () => {
     expect(shows([])).toEqual([[], []]);
   });
 
-  it("offers another try in stereo while a notice shows a fault that it may mend", () => {
+  it("offers to try again in stereo while a notice shows a fault that may pass", () => {
     const facts = { ...FACTS, isStereo: true };
-    const withNotice = (isMendable: boolean) =>
-      reduce(start(), { type: "notify", text: "a fault", isMendable });
+    const withNotice = (isRetryable: boolean) =>
+      reduce(start(), { type: "notify", text: "a fault", isRetryable });
     const retry = find(laid(withNotice(true), START_VIEW, facts), "button", "retry");
     expect(retry.to()).toBe("retry");
     const others = controlsOf(laid(withNotice(false), START_VIEW, facts)).map(({ id }) => id);
@@ -297,7 +298,7 @@ describe("the panel's layout", () => {
     expect(others).not.toContain("retry");
   });
 
-  it("cuts a tile that is shown alone at its own middle", () => {
+  it("cuts an isolated tile at its own middle", () => {
     const facts = { ...FACTS, shown: { min: [0, -10, 0], max: [10, 0, 6] } } as const;
     const layout = laid(start(), START_VIEW, facts);
     const clipOf = (id: string) => granted(start(), find(layout, "toggle", id).to(true)).clip;
@@ -323,11 +324,11 @@ describe("the panel's layout", () => {
       "First point: Marker 0 12 · Marker 1 7",
       "Second point: Marker 0 512",
     ]);
-    expect(find(laid(state), "text", "values-0").value).toBe(""); // and so not there to be seen
+    expect(find(laid(state), "text", "values-0").value).toBe(""); // so the row is hidden
     expect(find(laid(state), "button", "clear-measured").refusal).toBe("");
   });
 
-  it("reports why stereo can't be had, and leaves out what the viewer has not", () => {
+  it("reports why stereo is not available, and omits kinds that the viewer lacks", () => {
     const layout = laid(start());
     expect(find(layout, "button", "stereo").refusal).toBe("No headset was found.");
     expect(controlsOf(layout).some(({ id }) => id === "split")).toBe(false);
@@ -337,7 +338,7 @@ describe("the panel's layout", () => {
     expect(find(had, "button", "split").refusal).toBe("");
   });
 
-  it("takes the code of a phone viewer that is not Google's, and reports its fault", () => {
+  it("accepts the code of another Cardboard viewer, and reports its faults", () => {
     const faultOfCode = (code: string) => (code === "" ? "The code is empty." : "");
     const facts = { ...FACTS, split: { isAvailable: true, reason: "" }, faultOfCode };
     const other = changePanel(START_VIEW, { panel: "lenses", lenses: "own" });
@@ -352,7 +353,7 @@ describe("the panel's layout", () => {
     expect([has(true), has(false)]).toEqual([true, false]);
   });
 
-  it("asks for the views by command, and shows the figures", () => {
+  it("requests the views by command, and shows the figures", () => {
     const layout = laid(start());
     for (const id of ["front", "side", "top", "reset", "share"] as const) {
       expect(find(layout, "button", id).to()).toBe(id);
@@ -370,6 +371,6 @@ describe("the panel's layout", () => {
       "none",
       "12 ms",
     ]);
-    expect(find(layout, "text", "settings").value).toBe("64 steps a ray, 50 % resolution");
+    expect(find(layout, "text", "settings").value).toBe("64 steps per ray, 50 % resolution");
   });
 });

@@ -1,4 +1,4 @@
-/** The panel's content for a state: see controls.ts. Pure. */
+/** Builds the content of the panel for a state (see controls.ts). Pure. */
 import type { Box } from "../math/box";
 import type { ClipPlane } from "../math/clip";
 import { groupNotices } from "../state/notice_groups";
@@ -11,31 +11,31 @@ import type { ViewerState } from "../state/viewer_state";
 import { command, controlsOf } from "./control_templates";
 import type { Control, Layout, PanelView, PartSection, Section } from "./controls";
 
-/** Facts outside the state. */
+/** Inputs of the panel that are not in the state. */
 export type Facts = Readonly<{
   title: string;
   subtitle: string;
-  /** The specimen, or the isolated tile; um, world. */
+  /** Bounds of the specimen or the isolated tile, um, world. */
   shown: Box;
   isStereo: boolean;
   /** null: not known yet. */
   frame_ms: number | null;
   settings: QualitySettings | null;
   triangles: number;
-  /** The finest level of the volumes on screen, 0 the finest of all; null: no volume. */
+  /** Finest level of the volumes on screen; 0 is the finest of all. null: no volume. */
   volumeLevel: number | null;
-  /** Of the path-traced picture, for each pixel; null: it is none. */
+  /** Samples per pixel of the path-traced image; null: path tracing is off. */
   samples: number | null;
   isLoading: boolean;
-  /** What undoing and redoing would change, in words; null: there is nothing. */
+  /** Names of the steps that undo and redo would take; null: none. */
   undo: string | null;
   redo: string | null;
 }>;
 
-/** Most notices on the panel: the newest few are enough. */
+/** Largest number of notices on the panel; the newest are enough. */
 const MAX_NOTICES = 3;
 
-/** The middle half of what is shown along each axis: a cut that is seen at once, from every side. */
+/** Returns the middle half of a box along each axis. Such a cut is visible at once from every side. */
 export function middleBox({ min, max }: Box): Box {
   const at = (i: 0 | 1 | 2, share: number) => min[i] + share * (max[i] - min[i]);
   return {
@@ -44,20 +44,21 @@ export function middleBox({ min, max }: Box): Box {
   };
 }
 
-/** Through the middle of what is shown, the half towards the viewer cut away. */
+/** Returns the plane through the middle of a box that cuts away the half towards the viewer. */
 export function middlePlane({ min, max }: Box): ClipPlane {
   return { normal: [0, 0, 1], offset_um: (min[2] + max[2]) / 2 };
 }
 
-/** The section that lists the deeper ones. */
+/** Id of the section that lists the deeper sections. */
 export const MORE = "more";
 
 /**
- * The whole panel. A flat screen lists the sections that most people come for, and the others under *More*.
+ * Builds the whole panel. A flat screen lists the most used sections first, and the others under
+ * *More*.
  *
  * @param contributed the sections of the parts
  */
-export function layOut(
+export function buildPanel(
   state: ViewerState,
   facts: Facts,
   view: PanelView,
@@ -86,7 +87,7 @@ function placeOf({ rank, isDeeper }: PartSection): number {
   return isDeeper ? DEEPER_FROM + rank : rank;
 }
 
-/** The ID of the section of a label map, where so many are shown. */
+/** Returns the id of the section of a label map, if `count` label maps are shown. */
 export function objectsSection(channel: string, count: number): string {
   return count === 1 ? "objects" : `objects/${channel}`;
 }
@@ -94,11 +95,11 @@ export function objectsSection(channel: string, count: number): string {
 export const labelMapsOf = ({ channels }: ViewerState) =>
   channels.filter(({ shown, hasObjects }) => shown && hasObjects);
 
-/** The sections that are no part's. */
+/** Returns the sections that do not belong to a part. */
 function ownSections(state: ViewerState, facts: Facts, view: PanelView): readonly PartSection[] {
   const { isStereo } = facts;
   const about = aboutItems(facts);
-  // in stereo a page of texts alone would lead nowhere
+  // in stereo a page of texts alone would have no target for a gaze
   const quality = [...controlsOf(QUALITY_PARAMETERS, state), ...(isStereo ? about : [])];
   const isDeeper = true;
   return [
@@ -132,13 +133,13 @@ function shareItems({ isStereo }: Facts, view: PanelView): readonly Control[] {
   ];
 }
 
-/** Some people speak to their computer or press keys by accident: they switch the keys of one character off. */
+/** Switches off keys of one character, for users who speak to their computer or press keys by accident. */
 function lettersToggle({ hasLetters: value }: PanelView): Control {
   return {
     kind: "toggle",
     id: "letters",
-    label: "Keys of one character",
-    about: "If this is off, only ?, the arrows, Escape and keys with Ctrl work.",
+    label: "Single-character keys",
+    about: "If this is off, only ?, the arrow keys, Escape and keys with Ctrl work.",
     value,
     to: (areOn) => ({ panel: "letters", areOn }),
   };
@@ -161,8 +162,8 @@ function historyItems({ undo, redo }: Facts): readonly Control[] {
   ];
 }
 
-/** On a flat screen they lie over the picture; in stereo there is the panel alone. */
-function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
+/** Notices lie over the view on a flat screen; in stereo only the panel can show them. */
+function noticeItems({ notices, retryable }: ViewerState): readonly Control[] {
   if (notices.length === 0) return [];
   const groups = groupNotices(notices).slice(-MAX_NOTICES);
   const items = groups.flatMap(({ text, of }, i): Control[] => [
@@ -174,7 +175,7 @@ function noticeItems({ notices, mendable }: ViewerState): readonly Control[] {
       to: () => ({ type: "dismiss", texts: of }),
     },
   ]);
-  return mendable.length > 0 ? [...items, command("retry", "Try again")] : items;
+  return retryable.length > 0 ? [...items, command("retry", "Try again")] : items;
 }
 
 function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
@@ -204,7 +205,7 @@ function cutItems({ clip }: ViewerState, shown: Box): readonly Control[] {
   ];
 }
 
-/** How finely and how fast this device draws. */
+/** Shows how fine and how fast this device draws. */
 function aboutItems(facts: Facts): readonly Control[] {
   const { settings, frame_ms, triangles, volumeLevel } = facts;
   const items: Control[] = [
@@ -224,7 +225,7 @@ function aboutItems(facts: Facts): readonly Control[] {
   ];
   if (settings !== null) {
     const { steps, resolution, errorFactor } = settings;
-    const parts = [`${steps} steps a ray`, `${Math.round(100 * resolution)} % resolution`];
+    const parts = [`${steps} steps per ray`, `${Math.round(100 * resolution)} % resolution`];
     if (errorFactor !== 1) parts.push(`${errorFactor} x coarser surfaces`);
     items.push({ kind: "text", id: "settings", label: "Rays", value: parts.join(", ") });
   }
@@ -235,7 +236,7 @@ function frameText(frame_ms: number | null): string {
   return frame_ms === null ? "" : `${frame_ms.toFixed(frame_ms < 10 ? 1 : 0)} ms`;
 }
 
-/** How far a path-traced picture is, in whole samples. */
+/** Returns the progress of a path-traced image, in whole samples. */
 function samplesText(samples: number): string {
   const whole = Math.floor(samples);
   if (whole < 1) return "gathering light …";
@@ -249,12 +250,12 @@ function trianglesText(triangles: number): string {
   return `${Math.round(triangles / 1000).toLocaleString("en")} k triangles`;
 }
 
-/** Each level has half of the voxels along an edge. */
+/** Each level has half as many voxels along an edge as the one before. */
 function volumesText(level: number): string {
   return level === 0 ? "in full detail" : `at 1/${2 ** level} detail`;
 }
 
-/** Names the forms that are shown, and whether they are complete. */
+/** Names the shown forms, and whether they are complete. */
 function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts): string {
   const { samples, isLoading } = facts;
   const isUnfinished = tiles.some((tile) => tile.isUnfinished);
@@ -269,12 +270,12 @@ function statusOf({ channels, mode, isolated, tiles }: ViewerState, facts: Facts
   return parts.filter((part) => part !== "").join(" · ");
 }
 
-/** A tile without surfaces is shown as a volume, also by the modes that show surfaces. */
-const UNFINISHED = "Volumes, as not all surfaces are built";
+/** A tile whose surfaces are not built yet is shown as a volume, even by the modes that show surfaces. */
+const UNFINISHED = "Volumes until all surfaces are built";
 
 const STATUS: Readonly<Record<ViewerState["mode"], string>> = {
-  disc: "Surfaces, volumes from near",
-  tile: "Surfaces, one tile as volume from near",
+  disc: "Surfaces, volumes when near",
+  tile: "Surfaces, one tile as volume when near",
   all: "Volumes",
   stage: "As set in the stage",
   traced: "Volumes, path tracing",

@@ -1,7 +1,7 @@
 /**
- * Colours to choose from, sRGB. The field's go by the dye that is usually shown so; the others can
- * be distinguished without red or green: Okabe & Ito, "Color Universal Design", 2008 (their black
- * would not show on a dark ground).
+ * Colours to choose from, sRGB. The first palette has the usual colours of dyes. The colours of the
+ * second can be distinguished without red or green: Okabe & Ito, "Color Universal Design", 2008,
+ * without their black, which would be invisible on a dark ground.
  */
 import { fromHex, type Rgb, toHex, toOklab } from "../math/color";
 import type { Palette } from "./controls";
@@ -37,29 +37,29 @@ export const PALETTES: readonly Palette[] = [
 
 const ALL = PALETTES.flatMap(({ colors }) => colors.map(({ hex }) => hex));
 
-/** The name of a palette's colour; of any other, its hexadecimal digits. */
+/** Returns the name of a palette's colour, or the hexadecimal digits of any other colour. */
 export function nameOfColour(hex: string): string {
   const found = PALETTES.flatMap(({ colors }) => colors).find((each) => each.hex === hex);
   return found?.name ?? hex;
 }
 
-/** The palettes' next colour; of any other, the first. */
+/** Returns the next colour of the palettes; for any other colour, the first one. */
 export function nextColour(hex: string): string {
   return ALL[(ALL.lastIndexOf(hex) + 1) % ALL.length];
 }
 
-/** Colours to recolour a channel by: so many are offered. */
+/** Number of colours that are offered for a channel. */
 const OFFERED = 8;
-/** Distance in Oklab at which two colours are told apart at a glance, as signals in one picture are. */
+/** Smallest distance in Oklab at which two signals of an image have clearly different colours. */
 const APART = 0.12;
-/** More colours, where the others of a bundle with many channels take up the palettes. */
+/** Number of further hues, for bundles whose channels already use the colours of the palettes. */
 const HUES = 24;
 
 /**
- * Eight colours that no other channel has: of the palettes first, the colour-blind safe ones before the
- * dyes, then of the circle of hues. With many channels the farthest from all of theirs.
+ * Returns eight colours that no other channel has: the colour-blind safe ones first, then the dyes,
+ * then further hues. With many channels, the colours that are farthest from all others.
  *
- * @param others the other channels' colours, #rrggbb
+ * @param others colours of the other channels, #rrggbb
  */
 export function freeColours(others: readonly string[]): readonly string[] {
   const taken = others.map((hex) => toOklab(fromHex(hex)));
@@ -79,7 +79,7 @@ export function freeColours(others: readonly string[]): readonly string[] {
   return chosen;
 }
 
-/** The next colour that no other channel has. */
+/** Returns the next colour that no other channel has. */
 export function nextFreeColour(hex: string, others: readonly string[]): string {
   const free = freeColours(others);
   return free[(free.indexOf(hex) + 1) % free.length];
@@ -89,7 +89,7 @@ function hexesOf({ colors }: Palette): readonly string[] {
   return colors.map(({ hex }) => hex);
 }
 
-/** A strong, light colour of the circle. @param turn 0..1 */
+/** Returns a strong, light colour of the colour circle. @param turn 0..1 */
 function hueOf(turn: number): string {
   const part = (shift: number) => 0.5 + 0.5 * Math.cos(2 * Math.PI * (turn - shift));
   return toHex([part(0), part(1 / 3), part(2 / 3)]);

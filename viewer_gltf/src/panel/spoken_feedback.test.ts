@@ -6,7 +6,7 @@ import { setTo } from "../state/parameters/kinds";
 import { LAMP, LIGHT_NUMBERS } from "../state/parameters/light";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
-import type { Wish } from "./controls";
+import type { Request } from "./controls";
 import { spokenFeedback } from "./spoken_feedback";
 
 const START = [
@@ -17,20 +17,20 @@ const after = (action: Action, before = START) =>
   spokenFeedback(action, before, reduce(before, action), new Map());
 
 describe("announcements of the light", () => {
-  it("names the part of a lamp that has changed", () => {
+  it("name the part of a lamp that has changed", () => {
     const { isOn, color, place, numbers } = LAMP[0];
     expect(after(setTo(isOn, false))).toBe("Lamp 1: off");
     expect(after(setTo(isOn, true))).toBe("Lamp 1: on");
-    expect(after(setTo(color, [1, 0.5, 0]))).toBe("Lamp 1: another colour");
+    expect(after(setTo(color, [1, 0.5, 0]))).toBe("Lamp 1: new colour");
     expect(after(setTo(place[0], 1.25))).toBe("Lamp 1, left to right: 1.25");
     expect(after(setTo(numbers[3], 2))).toBe("Lamp 1, strength: 2 x");
   });
 
-  it("report of a dragged lamp that it has moved, not where along one axis", () => {
+  it("report only that a dragged lamp has moved", () => {
     expect(after({ type: "move-lamp", lamp: 2, place: [1, 0, -1] })).toBe("Lamp 3: moved");
   });
 
-  it("report whether there are lamps to be dragged", () => {
+  it("report whether there are lamps to drag", () => {
     const show = (areShown: boolean, before = START) =>
       after({ type: "set", id: "trace/lamps", value: areShown }, before);
     expect(show(true)).toBe("Lamps shown: drag them");
@@ -42,30 +42,30 @@ describe("announcements of the light", () => {
     expect(show(true, dark)).toBe("No lamp is on");
   });
 
-  it("names every number of the light, and its value", () => {
+  it("name every number of the light, and its value", () => {
     const names = new Set<string>();
     for (const row of LIGHT_NUMBERS) {
       const [, high] = row.limits;
-      const said = after(setTo(row, high));
-      expect(said).toContain(row.text(high));
-      expect(said.toLowerCase()).toContain(row.label.toLowerCase());
-      names.add(said.slice(0, said.indexOf(":")));
-      const meant: Wish = { panel: "parameter", parameter: row.id };
-      expect(spokenFeedback(meant, START, START, new Map()), row.id).toBe(row.spoken(START));
+      const announced = after(setTo(row, high));
+      expect(announced).toContain(row.text(high));
+      expect(announced.toLowerCase()).toContain(row.label.toLowerCase());
+      names.add(announced.slice(0, announced.indexOf(":")));
+      const choice: Request = { panel: "parameter", parameter: row.id };
+      expect(spokenFeedback(choice, START, START, new Map()), row.id).toBe(row.spoken(START));
     }
     expect(names.size).toBe(LIGHT_NUMBERS.length);
   });
 
-  it("report the room, scatterings and post-processing", () => {
+  it("report the environment, scattering and image adjustments", () => {
     const set = (id: string, value: string | boolean) => after({ type: "set", id, value });
-    expect(set("trace-room", "sky")).toBe("Room: sky");
-    expect(set("trace/multiple", false)).toBe("Scattered once");
-    expect(set("trace/multiple", true)).toBe("Scattered many times");
-    expect(set("trace/post", false)).toBe("Before");
+    expect(set("trace-room", "sky")).toBe("Environment: sky");
+    expect(set("trace/multiple", false)).toBe("Multiple scattering: off");
+    expect(set("trace/multiple", true)).toBe("Multiple scattering: on");
+    expect(set("trace/post", false)).toBe("Image adjustments: off");
     expect(set("trace-tone-map", "none")).toBe("Tone map: none");
   });
 
-  it("names what a parameter of the view or of a channel is now", () => {
+  it("name the new value of a parameter of the view or of a channel", () => {
     const set = (id: string, value: string | number | boolean, channel?: string) =>
       after(
         channel === undefined ? { type: "set", id, value } : { type: "set", id, value, channel },
@@ -82,7 +82,7 @@ describe("announcements of the light", () => {
     expect(set("volume", false, id)).toBe(`${name}: volume off`);
   });
 
-  it("is nothing where the picture says it all", () => {
+  it("are empty if the view shows the change", () => {
     expect(spokenFeedback("zoom-in", START, START, new Map())).toBe("");
   });
 });

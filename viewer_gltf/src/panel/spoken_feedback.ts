@@ -1,4 +1,4 @@
-/** The effect of a key, in words: the user may not see the control that it stands for. Pure. */
+/** Announces the effect of a key, because the user may not see the control that it stands for. Pure. */
 
 import { measurementText } from "../probe/measure";
 import type { Action } from "../state/actions";
@@ -10,65 +10,72 @@ import { tileName } from "../state/tile_name";
 import { shapesOf } from "../state/transfer_functions_2d";
 import type { ViewerState } from "../state/viewer_state";
 import { clipPartName, cutText } from "./clip_by_key";
-import type { Wish } from "./controls";
+import type { Request } from "./controls";
 import { changeText, SHAPE_NUMBERS } from "./edit_shapes";
 import { LENS_NAMES } from "./lenses";
 import { measuredText } from "./measured";
 import { transferTitle } from "./transfer_titles";
 import { type Ranges, windowTexts } from "./window_texts";
 
-/** @param state after the wish was granted; "" where the picture shows it all */
+/** @param state state after the request @returns "" if the view shows the effect */
 export function spokenFeedback(
-  wish: Wish,
+  request: Request,
   before: ViewerState,
   state: ViewerState,
   ranges: Ranges,
 ): string {
-  const text = spokenWish(wish, before, state, ranges);
-  if (typeof wish === "string" || "panel" in wish || !isSame(before, state)) return text;
-  return text === "" ? "That changes nothing." : `${text}${whyUnchanged(wish)}`;
+  const text = spokenRequest(request, before, state, ranges);
+  if (typeof request === "string" || "panel" in request || !isSame(before, state)) return text;
+  return text === "" ? "This changes nothing." : `${text}${whyUnchanged(request)}`;
 }
 
-/** Why an action has left all as it was: a step that has an end, or the next one of several. */
+/** Returns why an action has changed nothing: a value at its limit, or the only choice. */
 function whyUnchanged(action: Action): string {
   switch (action.type) {
     case "set":
-      return typeof action.value === "number" ? ": it goes no further" : "";
+      return typeof action.value === "number" ? ": it is at its limit" : "";
     case "window":
     case "set-shapes":
-      return ": it goes no further";
+      return ": it is at its limit";
     case "choose-transfer-function":
     case "select":
     case "isolate":
-      return ": there is no other";
+      return ": the only one";
     default:
       return "";
   }
 }
 
-/** Tables of shapes are made anew by an edit that changes none of their numbers. */
+/** An edit makes new lists of shapes even if no number changes, so the contents are compared. */
 function isSame(before: ViewerState, after: ViewerState): boolean {
   return before === after || JSON.stringify(before) === JSON.stringify(after);
 }
 
-function spokenWish(wish: Wish, before: ViewerState, state: ViewerState, ranges: Ranges): string {
-  if (typeof wish === "string") return "";
-  if (!("panel" in wish)) {
-    if (wish.type === "set-clip") return cutText(before.clip, state.clip);
-    if (wish.type === "set-shapes") return spokenShapes(wish.channel, before, state);
-    return spokenAction(wish, state, ranges);
+function spokenRequest(
+  request: Request,
+  before: ViewerState,
+  state: ViewerState,
+  ranges: Ranges,
+): string {
+  if (typeof request === "string") return "";
+  if (!("panel" in request)) {
+    if (request.type === "set-clip") return cutText(before.clip, state.clip);
+    if (request.type === "set-shapes") return spokenShapes(request.channel, before, state);
+    return spokenAction(request, state, ranges);
   }
-  if (wish.panel === "clip-part") return clipPartName(wish.clipPart);
-  if (wish.panel === "parameter") return parameterOf(wish.parameter).spoken(state);
-  if (wish.panel === "lenses") return `Phone viewer: ${LENS_NAMES[wish.lenses]}`;
-  if (wish.panel === "shape") {
-    return wish.shape === null ? "" : `Shape ${wish.shape.index + 1} of ${wish.shape.count}`;
+  if (request.panel === "clip-part") return clipPartName(request.clipPart);
+  if (request.panel === "parameter") return parameterOf(request.parameter).spoken(state);
+  if (request.panel === "lenses") return `Cardboard viewer: ${LENS_NAMES[request.lenses]}`;
+  if (request.panel === "shape") {
+    return request.shape === null
+      ? ""
+      : `Shape ${request.shape.index + 1} of ${request.shape.count}`;
   }
-  if (wish.panel === "shape-number") {
-    return `Shapes: ${SHAPE_NUMBERS.find(({ id }) => id === wish.id)?.name ?? wish.id}`;
+  if (request.panel === "shape-number") {
+    return `Shapes: ${SHAPE_NUMBERS.find(({ id }) => id === request.id)?.name ?? request.id}`;
   }
-  if (wish.panel !== "pick" || wish.channel === null) return "";
-  return `Channel ${nameOf(wish.channel, state)}`;
+  if (request.panel !== "pick" || request.channel === null) return "";
+  return `Channel ${nameOf(request.channel, state)}`;
 }
 
 function spokenShapes(id: string, before: ViewerState, state: ViewerState): string {

@@ -3,7 +3,7 @@ import { sampleManifest } from "../../test/support/fixture/manifest";
 import { initialState } from "../state/initial_state";
 import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
-import type { Control, Wish } from "./controls";
+import type { Control, Request } from "./controls";
 import { type TapCardContent, tapCardOf } from "./tap_card";
 
 const start = initialState(sampleManifest(3));
@@ -13,9 +13,9 @@ const labels = ({ controls }: TapCardContent) => controls.map(({ label }) => lab
 
 function pressed(state: ViewerState, control: Control | undefined): ViewerState {
   if (control?.kind !== "button") throw new Error("no button");
-  const wish: Wish = control.to();
-  if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
-  return reduce(state, wish);
+  const request: Request = control.to();
+  if (typeof request === "string" || "panel" in request) throw new Error("no action");
+  return reduce(state, request);
 }
 
 describe("the card of a tapped place", () => {
@@ -39,14 +39,14 @@ describe("the card of a tapped place", () => {
     for (const { name } of colours.palettes[0].colors) expect(name).not.toBe("");
   });
 
-  it("says of a single tile nothing about tiles", () => {
+  it("does not mention tiles if there is only one", () => {
     const alone = { ...start, tiles: start.tiles.slice(0, 1) };
     const { subtitle, controls } = tapCardOf(alone, { tile, channel: "c0" }, null);
     expect(subtitle).toBe("");
     expect(controls.map(({ id }) => id)).not.toContain("tap-isolate");
   });
 
-  it("names an object and its label map, shows it alone, and all again", () => {
+  it("names an object and its label map, isolates it, and shows all objects again", () => {
     const channels = start.channels.map((each) => ({ ...each, hasObjects: true }));
     const state = { ...start, channels };
     const tapped = { tile, channel: "c0", object: { row: 4, name: "Cell 105" } };
@@ -62,14 +62,14 @@ describe("the card of a tapped place", () => {
     expect(only.objects.c0.only).toEqual([4]);
     const back = tapCardOf(only, tapped, null).controls.find(({ id }) => id === "tap-only-object");
     expect(pressed(only, back).objects.c0.only).toBeNull();
-    // its colours are a column's, which a colour of the channel would not change
+    // the colours come from a column, and a colour of the channel would not change them
     expect(content.controls.some(({ kind }) => kind === "colour")).toBe(false);
   });
 
-  it("undoes the last change, and says why it can't", () => {
+  it("undoes the last change, or reports why it cannot", () => {
     const undo = (text: string | null) =>
       tapCardOf(start, { tile, channel: null }, text).controls.find(({ id }) => id === "tap-undo");
-    expect(undo("only tile")?.label).toBe("Undo: only tile");
+    expect(undo("isolated tile")?.label).toBe("Undo: isolated tile");
     expect(undo(null)?.refusal).toMatch(/^[A-Z].*\.$/);
   });
 });

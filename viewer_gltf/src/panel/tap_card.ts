@@ -1,4 +1,4 @@
-/** The card beside a tapped place, as plain data: what lies there, and what can be done with it. Pure. */
+/** The card beside a tapped place, as plain data: the structure there, and what can be done with it. Pure. */
 import { toHex } from "../math/color";
 import { START_OBJECTS } from "../state/objects";
 import { COLOR } from "../state/parameters/channel";
@@ -6,27 +6,27 @@ import { REFUSED } from "../state/refusals";
 import { tileTitle } from "../state/tile_name";
 import type { ChannelState, ViewerState } from "../state/viewer_state";
 import { colourOf } from "./control_templates";
-import type { Button, Control, Wish } from "./controls";
+import type { Button, Control, Request } from "./controls";
 import { labelMapsOf, objectsSection } from "./layout";
 import { freeColours, nameOfColour } from "./palettes";
 
-/** What a ray from a tap meets. */
+/** The tile, channel and object that a ray from a tap meets. */
 export type Tapped = Readonly<{
   tile: string;
-  /** null: the place is inside a tile, but nothing shows there. */
+  /** null: the place is inside a tile, but nothing is shown there. */
   channel: string | null;
-  /** An object of a label map: its row in the table, and its name there. */
+  /** An object of a label map: its row in the table, and its name. */
   object?: Readonly<{ row: number; name: string }>;
 }>;
 
 export type TapCardContent = Readonly<{
   title: string;
-  /** Where the place is; empty: there is nothing to add. */
+  /** Where the place is; "": nothing to add. */
   subtitle: string;
   controls: readonly Control[];
 }>;
 
-/** @param undo the change that undoing takes back, in words; null: there is none */
+/** @param undo the change that undo would take back, in words; null: none */
 export function tapCardOf(
   state: ViewerState,
   { tile, channel: id, object }: Tapped,
@@ -44,11 +44,11 @@ export function tapCardOf(
     ...(channel === undefined ? [] : channelControls(state, channel)),
     undoButton(undo),
   ];
-  return { title: title ?? "Nothing shows here", subtitle: rest.join(" · "), controls };
+  return { title: title ?? "Nothing is shown here", subtitle: rest.join(" · "), controls };
 }
 
-function button(id: string, label: string, wish: Wish): Button {
-  return { kind: "button", id: `tap-${id}`, label, to: () => wish };
+function button(id: string, label: string, request: Request): Button {
+  return { kind: "button", id: `tap-${id}`, label, to: () => request };
 }
 
 function tileControls({ tiles, isolated }: ViewerState, tile: string): readonly Control[] {
@@ -65,12 +65,12 @@ function channelControls(state: ViewerState, channel: ChannelState): readonly Co
     channel: id,
     shown: !shown,
   });
-  // the colours of a column take the place of the channel's
+  // colours by a column replace the colour of the channel
   const isPlain = !channel.hasObjects || state.objects[id]?.colorBy === "";
   return shown && isPlain ? [hide, coloursOf(state, channel)] : [hide];
 }
 
-/** Eight colours that no other channel has. */
+/** Offers eight colours that no other channel has. */
 function coloursOf({ channels }: ViewerState, channel: ChannelState): Control {
   const others = channels.filter(({ id }) => id !== channel.id).map(({ color }) => toHex(color));
   const colors = freeColours(others).map((hex) => ({ hex, name: nameOfColour(hex) }));
@@ -84,7 +84,7 @@ function coloursOf({ channels }: ViewerState, channel: ChannelState): Control {
 
 function objectControls(state: ViewerState, channel: string, row: number): readonly Control[] {
   const { only, hidden } = state.objects[channel] ?? START_OBJECTS;
-  const change = (change: Partial<typeof START_OBJECTS>): Wish => ({
+  const change = (change: Partial<typeof START_OBJECTS>): Request => ({
     ...{ type: "objects", channel, change },
   });
   const section = objectsSection(channel, labelMapsOf(state).length);
@@ -97,7 +97,7 @@ function objectControls(state: ViewerState, channel: string, row: number): reado
     isHidden
       ? button("hide-object", "Show this object", change({ hidden: left }))
       : button("hide-object", "Hide this object", change({ hidden: [...hidden, row] })),
-    button("values", "Its values", {
+    button("values", "Values of this object", {
       ...{ panel: "reveal", section, control: `${channel}/objects-card` },
     }),
   ];

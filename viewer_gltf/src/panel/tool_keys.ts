@@ -1,4 +1,4 @@
-/** The keys of cutting open, sharing and of the panel itself. Pure. */
+/** The keys of cutting, of sharing and of the panel itself. Pure. */
 
 import { groupNotices } from "../state/notice_groups";
 import { REFUSED } from "../state/refusals";
@@ -21,7 +21,7 @@ function push(steps: number): Key["to"] {
     if (clipPart === undefined) return NOT_CUT;
     return (
       moveClipPart(clipPart, steps, clip, shown) ??
-      no(`${clipPartName(clipPart)}: it goes no further.`)
+      no(`${clipPartName(clipPart)}: it is at its limit.`)
     );
   };
 }
@@ -36,18 +36,18 @@ export const TOOL_KEYS: readonly Key[] = [
     type: "set-clip",
     clip: { ...clip, plane: clip.plane === null ? middlePlane(shown) : null },
   })),
-  key("N", "Next part of the cuts: a face, the plane, its turn", nextClipPart(1)),
-  key("B", "The part before", nextClipPart(-1)),
-  key(",", "Move or turn that part back", push(-1)),
-  key(".", "Move or turn that part on", push(1)),
+  key("N", "Next part of the cuts: a face, the plane, its rotation", nextClipPart(1)),
+  key("B", "Previous part of the cuts", nextClipPart(-1)),
+  key(",", "Move or turn that part backwards", push(-1)),
+  key(".", "Move or turn that part forwards", push(1)),
   key("l", "Copy a link to this view", "share"),
   key("Delete", "Dismiss the newest notice", ({ state }) => {
     const newest = groupNotices(state.notices).at(-1);
     return newest === undefined ? no(REFUSED.notice) : { type: "dismiss", texts: newest.of };
   }),
-  key("R", "Try again what the network failed to bring", ({ state }) =>
-    state.mendable.length === 0 ? no(REFUSED.failed) : "retry",
+  key("R", "Load again what failed to load", ({ state }) =>
+    state.retryable.length === 0 ? no(REFUSED.failed) : "retry",
   ),
   key("h", "Hide or show the panel", { panel: "hide" }),
-  key("?", "This list", { panel: "help" }),
+  key("?", "List of all keys", { panel: "help" }),
 ];

@@ -17,6 +17,6 @@ export const VIEW_KEYS: readonly Key[] = [
   key("y", "From the top (along y)", "top"),
   key("r", "Reset the view", "reset"),
   key("Ctrl+z", "Undo the last change of the view", "undo"),
-  key(["Ctrl+Z", "Ctrl+y"], "Redo what was undone", "redo"),
-  key("Shift+Enter", "Full screen, or back in the window", "full-screen"),
+  key(["Ctrl+Z", "Ctrl+y"], "Redo the last undone change", "redo"),
+  key("Shift+Enter", "Full screen, or back to the window", "full-screen"),
 ];

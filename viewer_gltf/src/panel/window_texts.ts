@@ -1,19 +1,19 @@
-/** A channel's window in the values of the source. Pure. */
+/** The window of a channel in the values of the source. Pure. */
 import { valueText } from "../probe/measure";
 
-/** The voxel values of the source that are 0 and 255 in a volume, and their unit, where there is one. */
+/** Voxel values of the source that are 0 and 255 in a volume, and their unit, if any. */
 export type Range = readonly [start: number, end: number, unit?: string];
-/** By channel. */
+/** Ranges by channel. */
 export type Ranges = ReadonlyMap<string, Range>;
 
-/** A share of the intensities as the source counts them. */
+/** Returns a share of the intensities as a value of the source; in percent if the range is unknown. */
 export function intensityText(share: number, range: Range | undefined): string {
   if (range === undefined) return `${Math.round(100 * share)} %`;
   const [start, end] = range;
   return valueText(start + (end - start) * share, [start, end]);
 }
 
-/** Both ends of a window, the unit behind the upper one. */
+/** Returns both ends of a window, with the unit after the upper one. */
 export function windowTexts(
   [low, high]: readonly [number, number],
   range: Range | undefined,

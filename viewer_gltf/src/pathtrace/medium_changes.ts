@@ -1,5 +1,5 @@
 /** Whether another appearance of the medium, or another light on it, makes the gathered light worthless. */
-import { gathersAnew, type TraceSettings } from "../state/path_trace_settings";
+import { needsNewPaths, type TraceSettings } from "../state/path_trace_settings";
 import type { Appearance } from "../voxels/march_tables";
 import type { TransferTable2d } from "../voxels/transfer_table_2d";
 
@@ -29,6 +29,6 @@ export class MediumChanges {
     this.tables2d = tables2d;
     this.settings = settings;
     if (!isSame) return "appearance";
-    return before === null || gathersAnew(before, settings) ? "light" : null;
+    return before === null || needsNewPaths(before, settings) ? "light" : null;
   }
 }

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { type Control, type Group, START_VIEW, type Wish } from "../panel/controls";
+import { type Control, type Group, type Request, START_VIEW } from "../panel/controls";
 import { initialState } from "../state/initial_state";
 import { LIGHT_NUMBERS } from "../state/parameters/light";
 import { LAMPS } from "../state/path_trace_settings";
@@ -22,7 +22,7 @@ function find<K extends Control["kind"]>(state: ViewerState, kind: K, id: string
   if (found?.kind !== kind) throw new Error(`no ${kind} ${id}`);
   return found as Extract<Control, { kind: K }>;
 }
-function granted(state: ViewerState, wish: Wish): ViewerState {
+function granted(state: ViewerState, wish: Request): ViewerState {
   if (typeof wish === "string" || "panel" in wish) throw new Error("no action");
   return reduce(state, wish);
 }

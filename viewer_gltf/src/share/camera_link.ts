@@ -1,7 +1,7 @@
 /** From where the specimen is seen, in an address. Metres of the room. Pure. */
 
 import { LARGEST_SCALE, SMALLEST_SCALE } from "../math/grab";
-import type { CameraView, SpecimenLook } from "../state/camera_view";
+import type { CameraView, SpecimenPlacement } from "../state/camera_view";
 import { readNumbers, written } from "./numbers";
 
 /** Farthest place in the room, m: the user finds nothing beyond it. */
@@ -28,7 +28,7 @@ export function readLook(eye: string, pose: string | null): CameraView | null {
   return { position: [px, py, pz], target: [tx, ty, tz], specimen };
 }
 
-function readSpecimen(pose: string): SpecimenLook | null {
+function readSpecimen(pose: string): SpecimenPlacement | null {
   const values = readNumbers(pose, 8);
   if (values === null) return null;
   const [x, y, z, qx, qy, qz, qw, size] = values;

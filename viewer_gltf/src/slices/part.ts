@@ -123,6 +123,6 @@ export const slices: PartDefinition = {
   id: "slices",
   keys: SLICE_KEYS,
   settings: SLICE_SETTINGS,
-  waysOn: SLICE_WAYS,
+  remedies: SLICE_WAYS,
   create: (host) => new SlicesPart(host),
 };

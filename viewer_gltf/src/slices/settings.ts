@@ -1,7 +1,7 @@
 /** The settings of the three slice planes: whether they show, where they meet, how they are turned. Pure. */
 
 import type { Vec3 } from "../math/vec3";
-import type { WaysOn } from "../panel/ways_on";
+import type { Remedies } from "../panel/remedies";
 import {
   lensesOf,
   type NumberParameter,
@@ -145,6 +145,6 @@ export const SLICE_SETTINGS: PartSettings = {
   },
 };
 
-export const SLICE_WAYS: WaysOn = {
+export const SLICE_WAYS: Remedies = {
   [NO_SLICES]: () => ({ label: "Show slices", to: [setTo(SLICE_PICTURES, true)] }),
 };

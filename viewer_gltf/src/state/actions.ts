@@ -1,4 +1,4 @@
-/** All that can be asked of the state. */
+/** The actions that change the state. */
 
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import type { Clip } from "../math/clip";
@@ -9,39 +9,46 @@ import type { ObjectChange } from "./objects";
 import type { SetAction } from "./parameters/kinds";
 import type { ViewerState } from "./viewer_state";
 
-/** Actions of parts, by their types. A part adds its own by `declare module`, and their rules in its definition. */
-// biome-ignore lint/suspicious/noEmptyInterface: a type could not be extended by parts
+/**
+ * Actions of the parts, by type. A part adds its actions by `declare module`; its definition has
+ * their rules.
+ */
+// biome-ignore lint/suspicious/noEmptyInterface: parts can extend an interface, but not a type
 export interface PartActions {}
 export type PartAction = PartActions[keyof PartActions];
 
 export type Action =
   | PartAction
   | ObjectChange
-  /** The user sets a number, a switch, a choice or a colour: see parameters/. */
+  /** The user sets a number, a switch, a choice or a colour (see parameters/). */
   | SetAction
   | Readonly<{ type: "show"; channel: string; shown: boolean }>
   | Readonly<{ type: "window"; channel: string; window: readonly [number, number] }>
   | Readonly<{ type: "choose-transfer-function"; channel: string; name: string }>
-  /** Other shapes for a transfer function, which is chosen by that; `own` may be a new one. */
+  /**
+   * Gives a transfer function other shapes and chooses it. The name `own` may be a new function.
+   */
   | Readonly<{ type: "set-shapes"; channel: string; name: string; shapes: Shapes }>
-  /** The bundle's two-dimensional functions of a channel have come. */
+  /** The bundle's two-dimensional transfer functions of a channel have been fetched. */
   | Readonly<{ type: "learn-transfer-2d"; channel: string; transfer2d: Transfer2d }>
   | Readonly<{ type: "select"; tile: string | null }>
   | Readonly<{ type: "isolate"; tile: string | null }>
   | Readonly<{ type: "set-clip"; clip: Clip }>
-  /** The points of the newest measurement, of the kind that is chosen. */
+  /** Replaces the points of the measurement in progress, in um; its kind is the chosen one. */
   | Readonly<{ type: "measure"; points: readonly Vec3[] }>
-  /** One more, or the first of another. */
+  /** Adds a point to the measurement in progress, or begins another measurement with it. um. */
   | Readonly<{ type: "add-point"; point: Vec3 }>
-  /** The newest measurement is done. */
+  /** Moves the measurement in progress to the list of finished ones. */
   | Readonly<{ type: "finish-measuring" }>
-  /** Those that are done: named otherwise, fewer, or another's. */
+  /** Replaces the list of finished measurements: after a rename, a deletion, or loading a link. */
   | Readonly<{ type: "set-measurements"; measurements: readonly Measurement[] }>
-  /** Where a lamp is dragged to. */
+  /** Moves a lamp to a place, in lengths of the specimen's longest edge from its middle. */
   | Readonly<{ type: "move-lamp"; lamp: number; place: Vec3 }>
-  /** Back to a state of before, but for what is no user's: see history.ts. */
+  /**
+   * Returns to an earlier state. Values that are not the user's stay as they are (see history.ts).
+   */
   | Readonly<{ type: "restore"; state: ViewerState }>
-  /** The views to go through. */
+  /** Replaces the views that a video goes through. */
   | Readonly<{ type: "keep-views"; views: readonly KeptView[] }>
-  | Readonly<{ type: "notify"; text: string; isMendable?: boolean }>
+  | Readonly<{ type: "notify"; text: string; isRetryable?: boolean }>
   | Readonly<{ type: "dismiss"; texts: readonly string[] }>;

@@ -12,21 +12,23 @@ const START = initialState(MANIFEST);
 const announcement = (state: ViewerState, action: Action) =>
   announcementOf(state, reduce(state, action), MANIFEST.tiles);
 
-describe("a remark", () => {
-  it("names the channel that left for another", () => {
+describe("an announcement", () => {
+  it("names the channel that was hidden to show another", () => {
     const fifth: Action = { type: "show", channel: "c5", shown: true };
-    expect(announcement(START, fifth)).toBe("4 channels show at once: Marker 0 left for Marker 5.");
+    expect(announcement(START, fifth)).toBe(
+      "Only 4 channels can be shown: Marker 0 was hidden to show Marker 5.",
+    );
     const room = reduce(START, { type: "show", channel: "c2", shown: false });
     expect(announcement(START, { type: "show", channel: "c2", shown: false })).toBeNull();
     expect(announcement(room, fifth)).toBeNull();
   });
 
-  it("announces that the cut has taken all of the only tile that is shown", () => {
+  it("reports that the cut removes all of the isolated tile", () => {
     const [{ id: near, bounds_um }] = MANIFEST.tiles;
     const far = MANIFEST.tiles.at(-1)?.id ?? "";
     const cutTo: Action = { type: "set-clip", clip: { box: bounds_um, plane: null } };
     const cut = reduce(START, cutTo);
-    const words = `Only ${tileName(far, START.tiles)}: the cut leaves nothing of it.`;
+    const words = `Only ${tileName(far, START.tiles)} is shown, and the cut removes all of it.`;
     expect(announcement(START, cutTo)).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: near })).toBeNull();
     expect(announcement(cut, { type: "isolate", tile: far })).toBe(words);
@@ -36,7 +38,7 @@ describe("a remark", () => {
     expect(
       announcement(empty, { type: "set", id: "opacity", channel: "c0", value: 0.5 }),
     ).toBeNull();
-    expect(announcement(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // it is known
+    expect(announcement(empty, { type: "set-clip", clip: { ...empty.clip } })).toBeNull(); // this was announced before
     expect(announcement(empty, { type: "isolate", tile: null })).toBeNull();
   });
 });

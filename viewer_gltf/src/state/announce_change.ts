@@ -1,6 +1,6 @@
 /**
- * What a change of the state has brought that nobody asked for and that is no fault, in words that go
- * by themselves. Pure.
+ * Announcements of what a change of the state did beyond the user's request, although nothing
+ * failed. The page shows them for a moment. Pure.
  */
 
 import { isCutAway } from "../math/clip";
@@ -8,26 +8,26 @@ import type { BoxedTile } from "../math/pick";
 import { tileName } from "./tile_name";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
-/** null: nothing. */
+/** Returns the announcement of a change; null if there is none. */
 export function announcementOf(
   before: ViewerState,
   after: ViewerState,
   tiles: readonly BoxedTile[],
 ): string | null {
-  return channelLeft(before, after) ?? nothingLeft(before, after, tiles);
+  return replacedChannel(before, after) ?? emptiedTile(before, after, tiles);
 }
 
-/** One came, and another had to leave for it. */
-function channelLeft(before: ViewerState, after: ViewerState): string | null {
+/** Announces that a channel was hidden to make room for another. */
+function replacedChannel(before: ViewerState, after: ViewerState): string | null {
   if (before.channels === after.channels) return null;
-  const come = after.channels.find(({ shown }, i) => shown && !before.channels[i].shown);
-  const left = after.channels.find(({ shown }, i) => !shown && before.channels[i].shown);
-  if (come === undefined || left === undefined) return null;
-  return `${MAX_CHANNELS} channels show at once: ${left.name} left for ${come.name}.`;
+  const added = after.channels.find(({ shown }, i) => shown && !before.channels[i].shown);
+  const removed = after.channels.find(({ shown }, i) => !shown && before.channels[i].shown);
+  if (added === undefined || removed === undefined) return null;
+  return `Only ${MAX_CHANNELS} channels can be shown: ${removed.name} was hidden to show ${added.name}.`;
 }
 
-/** The picture is empty, since the cuts have taken the only tile that is shown. */
-function nothingLeft(
+/** Announces that nothing is shown because the cuts remove all of the isolated tile. */
+function emptiedTile(
   before: ViewerState,
   after: ViewerState,
   tiles: readonly BoxedTile[],
@@ -39,5 +39,5 @@ function nothingLeft(
     return tile !== undefined && isCutAway(tile.bounds_um, state.clip);
   };
   if (!isEmpty(after) || (isolated === before.isolated && isEmpty(before))) return null;
-  return `Only ${tileName(isolated ?? "", after.tiles)}: the cut leaves nothing of it.`;
+  return `Only ${tileName(isolated ?? "", after.tiles)} is shown, and the cut removes all of it.`;
 }

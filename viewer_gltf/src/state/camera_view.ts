@@ -1,17 +1,20 @@
-/** From where the specimen is seen. Metres of the room. */
+/** The pose of the flat camera and of the specimen, in metres of the scene. */
 import type { Vec3 } from "../math/vec3";
 
-/** The specimen's centre, its turn (a quaternion x, y, z, w), a multiple of its usual size. */
-export type SpecimenLook = Readonly<{
+/**
+ * The specimen's centre, its rotation (quaternion x, y, z, w) and its size, as a multiple of the
+ * usual one.
+ */
+export type SpecimenPlacement = Readonly<{
   position: Vec3;
   orientation: readonly [number, number, number, number];
   scale: number;
 }>;
 
 export type CameraView = Readonly<{
-  /** The camera, and the point that it is turned about. */
+  /** Place of the camera, and the point that it turns around. */
   position: Vec3;
   target: Vec3;
-  /** null: where it opens. */
-  specimen: SpecimenLook | null;
+  /** null: the specimen's opening pose. */
+  specimen: SpecimenPlacement | null;
 }>;

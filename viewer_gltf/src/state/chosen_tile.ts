@@ -1,7 +1,10 @@
 /** The effect of choosing a tile. Pure. */
 import type { ViewerState } from "./viewer_state";
 
-/** Selects a tile; chosen again, isolates it; once more, shows all. */
+/**
+ * Returns the action of choosing a tile: the first choice selects it, the second isolates it, the
+ * third shows all tiles.
+ */
 export function chosenTile({ selected, isolated }: ViewerState, tile: string) {
   if (isolated === tile) return { type: "isolate", tile: null } as const;
   if (isolated !== null || selected === tile) return { type: "isolate", tile } as const;

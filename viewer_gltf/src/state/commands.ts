@@ -1,35 +1,35 @@
 /**
- * The requests of a panel or a key that are no change of the state. A part has a list of its own in its definition, and
- * adds the names by `declare module`.
+ * Requests of a panel or a key that do not change the state. A part lists its own commands in its
+ * definition, and adds their names by `declare module`.
  */
 export const OWN_COMMANDS = [
-  /** The whole specimen from the front again, and no tile isolated. */
+  /** Shows the whole specimen from the front, with no tile isolated. */
   "reset",
-  /** One step out: from an isolated tile to all, from a selected one to none. */
+  /** Goes one step back: from an isolated tile to all tiles, or from a selected tile to none. */
   "back",
-  /** One step of the history back, or on again. */
+  /** Goes one step back or forward in the history. */
   "undo",
   "redo",
-  /** Asks again for all that has failed. */
+  /** Requests all files again that failed to load. */
   "retry",
-  /** A tap in the middle of the view: for hands that have only keys. */
+  /** Taps the middle of the view, for users of the keyboard. */
   "press",
-  /** Stereo in a headset, or back to the page. */
+  /** Enters stereo in a headset, or returns to the page. */
   "stereo",
-  /** Stereo, or one picture on a phone, with the user's own room behind the specimen. */
+  /** Shows the specimen in the user's own room, in a headset or on a phone. */
   "room",
-  /** Split screen for a phone in a viewer without WebXR. */
+  /** Splits the screen of a phone in a Cardboard viewer, without WebXR. */
   "split",
-  /** Reads the phone viewer's code by the camera. */
+  /** Reads the QR code of a Cardboard viewer with the camera. */
   "scan",
-  /** Measures how large the screen is, by a card that is held to it. */
+  /** Measures the size of the screen with a bank card on it. */
   "measure-screen",
-  /** The page on the full screen, or back in its window. */
+  /** Shows the page on the full screen, or returns to its window. */
   "full-screen",
   "share",
-  /** To the panel's search among the channels that are not shown. */
+  /** Moves the focus to the panel's search for channels. */
   "find",
-  /** Lights the traced picture by a .hdr or .exr file. */
+  /** Lights the path-traced image by a .hdr or .exr file of the user. */
   "own-light",
   "front",
   "side",
@@ -46,26 +46,26 @@ export const OWN_COMMANDS = [
   "pan-down",
 ] as const;
 
-/** Names of commands: those above and those of the parts. */
+/** Names of all commands: those above and those of the parts. */
 export interface CommandNames extends Record<(typeof OWN_COMMANDS)[number], true> {}
 
 export type Command = keyof CommandNames;
 
-/** Why a command of the flat view has left it as it was. */
-export const STAYS: Partial<Record<Command, string>> = {
+/** Reasons why a command of the flat view changed nothing. */
+export const UNCHANGED_VIEW: Partial<Record<Command, string>> = {
   front: "The specimen is seen from the front already.",
   side: "The specimen is seen from the side already.",
   top: "The specimen is seen from the top already.",
-  reset: "The view is as it was at the opening already.",
-  "zoom-in": "This is as near as the view goes.",
-  "zoom-out": "This is as far as the view goes.",
-  "turn-up": "The specimen is seen from the top: it turns no further up.",
-  "turn-down": "The specimen is seen from below: it turns no further down.",
-  "pan-left": "The view moves no further: its middle stays in the specimen.",
-  "pan-right": "The view moves no further: its middle stays in the specimen.",
-  "pan-up": "The view moves no further: its middle stays in the specimen.",
-  "pan-down": "The view moves no further: its middle stays in the specimen.",
+  reset: "The view is the opening view already.",
+  "zoom-in": "The view cannot move any closer.",
+  "zoom-out": "The view cannot move any farther away.",
+  "turn-up": "The specimen is seen from the top already.",
+  "turn-down": "The specimen is seen from below already.",
+  "pan-left": "The view cannot move further: its centre stays inside the specimen.",
+  "pan-right": "The view cannot move further: its centre stays inside the specimen.",
+  "pan-up": "The view cannot move further: its centre stays inside the specimen.",
+  "pan-down": "The view cannot move further: its centre stays inside the specimen.",
 };
 
-/** The announcement where the viewer can't do what was asked for. */
-export const CANT = "This viewer can't do that here.";
+/** Announcement when the viewer cannot do what was requested. */
+export const UNAVAILABLE = "This viewer cannot do that here.";

@@ -33,8 +33,8 @@ const input = (x: number, y: number, away: number, dt_s = 1): GazeInput => ({
   dt_s,
 });
 
-describe("what is near", () => {
-  it("comes at the switch distance, and goes at a tenth more", () => {
+describe("the near tiles", () => {
+  it("begin at the switch distance and end at 1.1 times that distance", () => {
     const near = (away: number, before = FAR_AWAY) =>
       advanceFocus(before, input(5, -5, away)).near.has("r0_c0");
     expect(near(20.1)).toBe(false);
@@ -44,7 +44,7 @@ describe("what is near", () => {
     expect(near(20 * HYSTERESIS + 0.1, there)).toBe(false);
   });
 
-  it("does not flicker where the distance trembles", () => {
+  it("do not flicker when the distance varies slightly", () => {
     let state = FAR_AWAY;
     let changes = 0;
     for (let i = 0; i < 100; i++) {
@@ -57,21 +57,21 @@ describe("what is near", () => {
 });
 
 describe("the gazed tile", () => {
-  it("is the first along the view's centre, once it is near", () => {
+  it("is the first near tile along the centre of the view", () => {
     expect(advanceFocus(FAR_AWAY, input(25, -15, 10)).focusTile).toBe("r1_c2");
     expect(advanceFocus(FAR_AWAY, input(25, -15, 30)).focusTile).toBeNull();
     expect(advanceFocus(FAR_AWAY, input(60, -15, 10)).focusTile).toBeNull();
   });
 
-  it("is not one that is cut away where it is looked at", () => {
-    const plane = { normal: [0, 0, 1], offset_um: 0 } as const; // all that lies before z = 0
+  it("is not a tile that is cut away where the gaze meets it", () => {
+    const plane = { normal: [0, 0, 1], offset_um: 0 } as const; // the plane cuts away all that lies in front of z = 0
     const cut = { ...input(25, -15, 10), clip: { box: null, plane } };
     expect(advanceFocus(FAR_AWAY, cut)).toMatchObject({ focusTile: null, disc: [] });
     const left = { ...cut, clip: { box: null, plane: { ...plane, offset_um: 1 } } };
     expect(advanceFocus(FAR_AWAY, left).focusTile).toBe("r1_c2");
   });
 
-  it("changes only once the gaze has rested on another", () => {
+  it("changes only after the gaze has rested on another tile", () => {
     const first = advanceFocus(FAR_AWAY, input(5, -5, 10));
     const glance = advanceFocus(first, input(15, -5, 10, REST_S / 2));
     expect(glance.focusTile).toBe("r0_c0");
@@ -85,7 +85,7 @@ describe("the gazed tile", () => {
 });
 
 describe("the disc", () => {
-  it("wants the tiles that it covers, the gazed one first", () => {
+  it("requests the tiles that it covers, the gazed tile first", () => {
     expect(advanceFocus(FAR_AWAY, input(5, -5, 10)).disc).toEqual(["r0_c0"]);
     const edge = advanceFocus(FAR_AWAY, input(9, -5, 10)).disc;
     expect(edge).toEqual(["r0_c0", "r0_c1"]);
@@ -94,7 +94,7 @@ describe("the disc", () => {
     expect([...corner].sort()).toEqual(["r0_c0", "r0_c1", "r1_c0", "r1_c1"]);
   });
 
-  it("is twelve degrees wide at the opening of two rows of five tiles, wherever one looks", () => {
+  it("has a radius of twelve degrees in the opening view of two rows of five tiles, for any gaze", () => {
     const tiles = TILES.slice(0, 10);
     const radius = (12 * Math.PI) / 180;
     for (const [x, y] of [
@@ -108,29 +108,29 @@ describe("the disc", () => {
     }
   });
 
-  it("wants no more than its limit, and none that is far", () => {
+  it("requests at most the largest number of tiles, and no distant tile", () => {
     const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
     expect(advanceFocus(FAR_AWAY, wide).disc).toHaveLength(MAX_DISC_TILES);
     expect(advanceFocus(FAR_AWAY, input(9, -9, 25)).disc).toEqual([]);
   });
 
-  it("knows where that limit ends it", () => {
+  it("reports the radius at which that limit ends it", () => {
     const wide = { ...input(25, -10.1, 10), discRadius_rad: 1.2 };
     const state = advanceFocus(FAR_AWAY, wide);
     const limit = discLimit(state, 1.2);
     expect(limit).toBe(discReach(state, 1.2, (id) => state.disc.includes(id)));
     expect(limit).toBeLessThan(1.2);
-    expect(discLimit(advanceFocus(FAR_AWAY, input(9, -9, 10)), 0.2)).toBeNull(); // just four
+    expect(discLimit(advanceFocus(FAR_AWAY, input(9, -9, 10)), 0.2)).toBeNull(); // the disc covers four tiles
     expect(discLimit(FAR_AWAY, 1.2)).toBeNull();
   });
 
-  it("ends before the first tile without its volume", () => {
+  it("ends before the first tile whose volume is not loaded", () => {
     const state = advanceFocus(FAR_AWAY, input(8, -5, 10));
     const radius = Math.atan(4 / 10);
     expect(discReach(state, radius, () => true)).toBe(radius);
     expect(discReach(state, radius, (id) => id === "r0_c1")).toBe(0);
     const reach = discReach(state, radius, (id) => id === "r0_c0");
-    expect(reach).toBeLessThanOrEqual(Math.atan(2 / 10)); // the border lies 2 um aside
+    expect(reach).toBeLessThanOrEqual(Math.atan(2 / 10)); // the border of the tile is 2 um from the gaze
     expect(reach).toBeGreaterThan(0.8 * Math.atan(2 / 10));
     expect(discReach(FAR_AWAY, radius, () => true)).toBe(0);
   });

@@ -10,7 +10,7 @@ import {
   PAUSE_S,
   redone,
   undone,
-  withOwn,
+  withoutUserChanges,
   withStep,
 } from "./history";
 import { initialState } from "./initial_state";
@@ -22,7 +22,7 @@ const alone = { key: null, gesture: 0, isHeld: false, time_s: 0 };
 const drag = { key: "set disc", gesture: 1, isHeld: true, time_s: 0 };
 
 describe("a history", () => {
-  it("goes back through every step, and on again", () => {
+  it("goes back through every step and forward again", () => {
     let history = withStep<string>(NO_HISTORY, "a", "to b", alone);
     history = withStep(history, "b", "to c", alone);
     const once = undone(history, "c");
@@ -35,13 +35,13 @@ describe("a history", () => {
     expect(again && redone(again.history, "b")?.moment).toBe("c");
   });
 
-  it("forgets what was undone once another change is made", () => {
+  it("forgets undone steps after another change", () => {
     const back = undone(withStep<string>(NO_HISTORY, "a", "to b", alone), "b");
     if (back === null) throw new Error("nothing to undo");
     expect(redone(withStep(back.history, "a", "to x", alone), "x")).toBeNull();
   });
 
-  it("takes a drag for one step, however long it rests, and the next drag for another", () => {
+  it("counts a drag as one step, however long it pauses, and the next drag as another", () => {
     let history = withStep<number>(NO_HISTORY, 0, "disc", drag);
     history = withStep(history, 1, "disc", { ...drag, time_s: 30 });
     expect(history.past).toHaveLength(1);
@@ -49,7 +49,7 @@ describe("a history", () => {
     expect(history.past.map(({ before }) => before)).toEqual([0, 2]);
   });
 
-  it("takes keys that follow each other for one step, until they pause", () => {
+  it("counts keys in quick succession as one step, until a pause", () => {
     const key = { ...drag, isHeld: false };
     let history = withStep<number>(NO_HISTORY, 0, "disc", key);
     history = withStep(history, 1, "disc", { ...key, time_s: 0.9 * PAUSE_S });
@@ -60,7 +60,7 @@ describe("a history", () => {
     expect(history.past).toHaveLength(3);
   });
 
-  it("does not grow without end", () => {
+  it("is limited to the largest number of steps", () => {
     let history = withStep<number>(NO_HISTORY, 0, "x", alone);
     for (let i = 1; i < MAX_STEPS + 9; i++) history = withStep(history, i, "x", alone);
     expect(history.past).toHaveLength(MAX_STEPS);
@@ -80,7 +80,7 @@ describe("a step", () => {
     { type: "isolate", tile: "r0_c1" },
   ];
 
-  it("is a change that is seen, and has a name", () => {
+  it("is a visible change with a name", () => {
     for (const action of [...drags, ...presses]) {
       expect(isSameView(START, reduce(START, action)), action.type).toBe(false);
       expect(nameOfChange(action, START)).not.toBe("");
@@ -89,17 +89,17 @@ describe("a step", () => {
     expect(new Set(presses.map(keyOfChange))).toEqual(new Set([null]));
   });
 
-  it("is no notice, and nothing that was fetched", () => {
-    const told = reduce(START, { type: "notify", text: "a fault" });
-    expect(isSameView(START, told)).toBe(true);
+  it("is neither a notice nor fetched data", () => {
+    const notified = reduce(START, { type: "notify", text: "a fault" });
+    expect(isSameView(START, notified)).toBe(true);
     const transfer2d = { gradient_max: 0.4, functions: {} };
-    const learnt = reduce(told, { type: "learn-transfer-2d", channel: "c0", transfer2d });
-    expect(isSameView(START, learnt)).toBe(true);
-    const changed = reduce(learnt, { type: "set", id: DISC_RADIUS.id, value: 9 });
-    const back = withOwn(START, changed);
+    const fetched = reduce(notified, { type: "learn-transfer-2d", channel: "c0", transfer2d });
+    expect(isSameView(START, fetched)).toBe(true);
+    const changed = reduce(fetched, { type: "set", id: DISC_RADIUS.id, value: 9 });
+    const back = withoutUserChanges(START, changed);
     expect(back.notices).toEqual(["a fault"]);
     expect(back.channels[0].transfer2d).toBe(transfer2d);
     expect(back.discRadius_deg).toBe(START.discRadius_deg);
-    expect(isSameView(back, learnt)).toBe(true);
+    expect(isSameView(back, fetched)).toBe(true);
   });
 });

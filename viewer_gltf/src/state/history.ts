@@ -1,24 +1,35 @@
 /**
- * Undo and redo: the moments that a user has made, each a state and what else belongs to it. Pure.
+ * Undo and redo. The history holds the moments before each step of the user: the state and all that
+ * belongs to it. Pure.
  *
- * Changes of one kind that follow each other at once, as those of a slider that is dragged, are one
- * step. Notices, what has been loaded since, and what the device can do are no user's: they stay.
+ * Changes of the same kind in quick succession, for example by dragging a slider, are one step.
+ * Notices, loaded data and the abilities of the device are not steps of the user, so undo leaves
+ * them as they are.
  */
 import type { Action } from "./actions";
 import { channelParameterOf, parameterOf } from "./parameters/table";
 import { rulesOf } from "./part_settings";
 import type { ChannelState, ViewerState } from "./viewer_state";
 
-/** Most steps back: so many states share all that they have in common. */
+/**
+ * Largest number of steps that can be undone. States share all values that are equal, so 200 need
+ * little memory.
+ */
 export const MAX_STEPS = 200;
-/** Longest pause within one step, s, where nothing is held down. */
+/**
+ * Seconds without a change after which the next change is a new step, if no button or key is held
+ * down.
+ */
 export const PAUSE_S = 1;
 
-/** When and how a change was made: of the same `key` and `gesture` it may belong to the step before. */
+/**
+ * When and how a change was made. A change with the `key` and `gesture` of the previous one may
+ * join its step.
+ */
 export type Occasion = Readonly<{
-  /** null: a step of its own. */
+  /** null: the change is a step of its own. */
   key: string | null;
-  /** Counts what was pressed and let go. */
+  /** Number of presses and releases so far. */
   gesture: number;
   isHeld: boolean;
   time_s: number;
@@ -27,14 +38,14 @@ export type Occasion = Readonly<{
 type Step<T> = Readonly<{ before: T; name: string }>;
 export type History<T> = Readonly<{
   past: readonly Step<T>[];
-  /** `before` is the moment that redoing leads to. */
+  /** `before` is the moment that redo leads to. */
   future: readonly Step<T>[];
   last: Occasion | null;
 }>;
 
 export const NO_HISTORY: History<never> = { past: [], future: [], last: null };
 
-/** @param before the moment that this change has ended */
+/** @param before the moment before this change */
 export function withStep<T>(
   history: History<T>,
   before: T,
@@ -53,7 +64,10 @@ export function withStep<T>(
   return { past: steps, future: [], last: occasion };
 }
 
-/** The moment before and the history then; null: there is none. */
+/**
+ * Undoes the last step. Returns the moment before it and the history then; null if there is no
+ * step.
+ */
 export function undone<T>(
   { past, future }: History<T>,
   now: T,
@@ -65,7 +79,9 @@ export function undone<T>(
   return { moment: before, history: { past: past.slice(0, -1), future: ahead, last: null }, name };
 }
 
-/** The moment that was undone last and the history then; null: there is none. */
+/**
+ * Redoes the last undone step. Returns its moment and the history then; null if there is no step.
+ */
 export function redone<T>(
   { past, future }: History<T>,
   now: T,
@@ -77,22 +93,24 @@ export function redone<T>(
   return { moment, history: { past: behind, future: ahead, last: null }, name };
 }
 
-/** Whether a user sees no change between two states. */
+/** Returns whether a user sees no difference between two states. */
 export function isSameView(a: ViewerState, b: ViewerState): boolean {
   if (a === b) return true;
-  const { channels: ofA, ...restA } = withOwn(a, b);
+  const { channels: ofA, ...restA } = withoutUserChanges(a, b);
   const { channels: ofB, ...restB } = b;
   return isShallowEqual(restA, restB) && ofA.every((each, i) => isShallowEqual(each, ofB[i]));
 }
 
-/** A state of before, with all of the present one that is no user's. */
-export function withOwn(then: ViewerState, now: ViewerState): ViewerState {
-  const { notices, mendable, canTrace, tiles, middle } = now;
+/**
+ * Returns an earlier state with the notices, loaded data and device abilities of the present one.
+ */
+export function withoutUserChanges(then: ViewerState, now: ViewerState): ViewerState {
+  const { notices, retryable, canTrace, tiles, middle } = now;
   const channels = then.channels.map((channel): ChannelState => {
     const transfer2d = now.channels.find(({ id }) => id === channel.id)?.transfer2d ?? null;
     return channel.transfer2d === transfer2d ? channel : { ...channel, transfer2d };
   });
-  return { ...then, channels, notices, mendable, canTrace, tiles, middle };
+  return { ...then, channels, notices, retryable, canTrace, tiles, middle };
 }
 
 function isShallowEqual(a: object, b: object): boolean {
@@ -100,7 +118,10 @@ function isShallowEqual(a: object, b: object): boolean {
   return ofA.size === ofB.size && [...ofA].every(([key, value]) => ofB.get(key) === value);
 }
 
-/** What changes little by little, and so may be one step; null: each change is one. */
+/**
+ * Returns the key by which gradual changes are joined to one step; null: each change is a step of
+ * its own.
+ */
 export function keyOfChange(action: Action): string | null {
   switch (action.type) {
     case "set": {
@@ -123,7 +144,7 @@ export function keyOfChange(action: Action): string | null {
   }
 }
 
-/** What a step changes, in a few words. */
+/** Returns what a step changes, in a few words. */
 export function nameOfChange(action: Action, { channels }: ViewerState): string {
   const nameOf = (id: string) => channels.find((each) => each.id === id)?.name ?? id;
   switch (action.type) {
@@ -142,16 +163,16 @@ export function nameOfChange(action: Action, { channels }: ViewerState): string 
     case "set-shapes":
       return `${nameOf(action.channel)}: shapes`;
     case "select":
-      return "chosen tile";
+      return "selected tile";
     case "isolate":
-      return "only tile";
+      return "isolated tile";
     case "set-clip":
       return "cut";
     case "measure":
     case "add-point":
     case "finish-measuring":
     case "set-measurements":
-      return "measuring";
+      return "measurement";
     case "move-lamp":
       return "lamp";
     case "keep-views":

@@ -14,21 +14,21 @@ function opening(modality: string, canTrace = true, representation: "mesh" | "vo
   ).mode;
 }
 
-it("opens scans of bodies in natural light, and as volumes on devices that cannot trace paths", () => {
+it("opens CT and MR with path tracing, or as volumes on devices that cannot trace paths", () => {
   for (const modality of ["MR", "CT"]) {
     expect(opening(modality)).toBe("traced");
     expect(opening(modality, false)).toBe("all");
   }
 });
 
-it("opens PET and SPECT as volumes, since a surface of one colour would hide their heat", () => {
+it("opens PET and SPECT as volumes, since a surface of one colour would hide the uptake", () => {
   for (const modality of ["PT", "NM"]) expect(opening(modality)).toBe("all");
 });
 
-it("opens volumes of microscopes with surfaces and the disc", () => {
+it("opens microscopy with surfaces and the focus disc", () => {
   for (const modality of ["", "GM"]) expect(opening(modality)).toBe("disc");
 });
 
-it("opens as the stage draws it, where the stage chooses volumes", () => {
+it("opens as the stage draws it if the stage chooses volumes", () => {
   for (const modality of ["", "PT"]) expect(opening(modality, true, "volume")).toBe("stage");
 });

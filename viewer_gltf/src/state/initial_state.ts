@@ -8,15 +8,20 @@ import { startOfParts } from "./part_settings";
 import { traceLitBy } from "./stage_light";
 import { MAX_CHANNELS, type ViewerState } from "./viewer_state";
 
-/** Most tiles that open as volumes; of a larger specimen the chosen tile does. */
+/**
+ * Largest number of tiles that open as volumes. In a larger specimen, only the selected tile does.
+ */
 export const VOLUME_TILES_AT_START = 16;
-/** DICOM's terms for scans of whole bodies, which are best seen as light passes through them. */
+/** DICOM modalities of scans of the body, which are best seen by path tracing. */
 const TRACED_MODALITIES: readonly string[] = ["MR", "CT"];
-/** Terms for PET and SPECT, whose volume shows heat. A surface has one colour, and would hide it. */
+/**
+ * DICOM modalities of PET and SPECT. Their volumes show uptake; a surface of one colour would hide
+ * it.
+ */
 const TRACER_MODALITIES: readonly string[] = ["PT", "NM"];
 
-/** The tiles, by the distance of their centres from the specimen's, nearest first. */
-function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
+/** Returns the tiles, ordered by the distance of their centres from the specimen's centre. */
+function byDistanceFromCentre({ specimen, tiles }: Manifest): Manifest["tiles"][number][] {
   const centerOf = ({ min, max }: Manifest["specimen"]["bounds_um"]) =>
     min.map((v, i) => (v + max[i]) / 2);
   const center = centerOf(specimen.bounds_um);
@@ -26,11 +31,12 @@ function fromTheMiddle({ specimen, tiles }: Manifest): Manifest["tiles"][number]
 }
 
 /**
- * The state in which a bundle opens: the channels that the stage shows, as surfaces from afar and as volumes in the disc
- * when near; in the tiles that the stage draws as volumes, as those.
+ * Returns the state in which a bundle opens. It shows the channels that the stage shows, as
+ * surfaces from afar and as volumes in the disc when near. Tiles that the stage draws as volumes
+ * open as volumes.
  */
 export function initialState(manifest: Manifest, canTrace = true): ViewerState {
-  const ordered = fromTheMiddle(manifest);
+  const ordered = byDistanceFromCentre(manifest);
   const staged = ordered.filter((tile) => tile.representation !== "mesh");
   const asStaged = new Set(staged.slice(0, VOLUME_TILES_AT_START));
   const opened = manifest.channels.filter(({ opens }) => opens !== false).slice(0, MAX_CHANNELS);
@@ -44,7 +50,7 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
       id: channel.id,
       name: channel.name,
       shown: shown.has(channel.id),
-      turn: index - manifest.channels.length, // before all that is shown later
+      turn: index - manifest.channels.length, // negative: hidden before any channel that the user shows
       ...START_CHANNEL,
       color: channel.color,
       original: channel.color,
@@ -79,24 +85,27 @@ export function initialState(manifest: Manifest, canTrace = true): ViewerState {
     notices:
       staged.length > VOLUME_TILES_AT_START
         ? [
-            `The stage draws ${staged.length} tiles as volumes: ` +
-              `the ${VOLUME_TILES_AT_START} in the middle are, "All" draws the rest.`,
+            `The stage draws ${staged.length} tiles as volumes, but only the ${VOLUME_TILES_AT_START} ` +
+              'nearest the centre open as volumes. Choose "Volumes everywhere" to draw the rest.',
           ]
         : [],
-    mendable: [],
+    retryable: [],
   };
 }
 
-/** The plane that the stage cuts the specimen open by. */
+/** Returns the clip plane of the stage. */
 function openingPlane({ specimen: { cut } }: Manifest): ClipPlane | null {
   if (cut === undefined) return null;
   const [x, y, z] = cut.normal;
   return { normal: [x, y, z], offset_um: cut.offset_um };
 }
 
-/** Scans of bodies open by paths of light, tracers as volumes; an artist's choice goes before the disc. */
-function startMode({ specimen }: Manifest, canTrace: boolean, isStaged: boolean): Mode {
+/**
+ * Returns the opening mode: path tracing for CT and MR, the choice of the stage, volumes for PET
+ * and SPECT, else the disc.
+ */
+function startMode({ specimen }: Manifest, canTrace: boolean, hasStagedVolumes: boolean): Mode {
   if (TRACED_MODALITIES.includes(specimen.modality)) return canTrace ? "traced" : "all";
-  if (isStaged) return "stage";
+  if (hasStagedVolumes) return "stage";
   return TRACER_MODALITIES.includes(specimen.modality) ? "all" : "disc";
 }

@@ -1,11 +1,11 @@
-/** Views that a user keeps, to go through them. Pure. */
+/** Views of the camera that a user keeps. Pure. */
 import type { Vec3 } from "../math/vec3";
 
-/** The flat camera, and the point that it is turned about; metres of the room. */
+/** The flat camera and the point that it turns around, in metres of the scene. */
 export type KeptView = Readonly<{
   position: Vec3;
   target: Vec3;
-  /** The name of the stage's camera whose view this is; absent: the user has kept the view. */
+  /** Name of the camera of the stage that has this view; absent: the user kept the view. */
   name?: string;
 }>;
 

@@ -13,7 +13,7 @@ const kind = (value: MeasureKind): Action => ({ type: "set", id: MEASURE_KIND.id
 const after = (...actions: readonly Action[]) => actions.reduce(reduce, START);
 
 describe("measuring", () => {
-  it("takes two points for a distance, and the third begins another", () => {
+  it("takes two points for a distance; a third point begins another", () => {
     const two = after(point(0, 0, 0), point(3, 4, 0));
     expect(two.measured).toHaveLength(2);
     expect(lengthOf(two.measured)).toBe(5);
@@ -24,7 +24,7 @@ describe("measuring", () => {
     ]);
   });
 
-  it("takes three points for an angle, which is at the second", () => {
+  it("takes three points for an angle, and measures at the second", () => {
     const state = after(kind("angle"), point(1, 0, 0), point(0, 0, 0), point(0, 2, 0));
     expect(angleOf(state.measured)).toBeCloseTo(90, 12);
     expect(
@@ -51,7 +51,7 @@ describe("measuring", () => {
     expect(allOf(state).map(({ name }) => name)).toEqual(["Angle 1"]);
   });
 
-  it("goes on with a line until it is done", () => {
+  it("adds points to a line until it is finished", () => {
     const line = after(
       kind("line"),
       point(0, 0, 0),
@@ -65,7 +65,7 @@ describe("measuring", () => {
     expect(reduce(done, { type: "finish-measuring" })).toBe(done);
   });
 
-  it("drops one point alone, and begins anew where another kind is chosen", () => {
+  it("drops a single point and begins again when another kind is chosen", () => {
     const other = after(point(0, 0, 0), kind("angle"), point(1, 0, 0));
     expect([other.measured, other.measuredAs, other.measurements]).toEqual([
       [[1, 0, 0]],
@@ -74,7 +74,7 @@ describe("measuring", () => {
     ]);
   });
 
-  it("keeps names apart, within limits", () => {
+  it("gives each measurement a name of its own, up to the largest number", () => {
     const many = Array.from({ length: 2 * MAX_MEASUREMENTS + 9 }, (_, i) => [
       point(i, 0, 0),
       point(i, 1, 0),
@@ -85,8 +85,8 @@ describe("measuring", () => {
   });
 });
 
-describe("the measurements' file", () => {
-  it("has a line for each, which spreadsheets read as text and numbers", () => {
+describe("the file of measurements", () => {
+  it("has a line for each measurement that spreadsheets read as text and numbers", () => {
     const csv = measurementsCsv([
       {
         name: 'wall, "left"',

@@ -1,6 +1,6 @@
 /**
- * Measurements: distances, angles and lines through several points, with names. The one that is being made
- * is `measured`; the finished ones are a list. Pure.
+ * Measurements: distances, angles and lines through several points, with names. `measured` holds
+ * the points of the measurement in progress; `measurements` lists the finished ones. Pure.
  */
 import { distanceBetween } from "../math/distance";
 import type { Vec3 } from "../math/vec3";
@@ -9,18 +9,18 @@ import type { MeasureKind } from "./parameters/tools";
 export type Measurement = Readonly<{ name: string; kind: MeasureKind; points: readonly Vec3[] }>;
 
 export type Measuring = Readonly<{
-  /** The points of the newest one, um: none, some, or all that it needs. */
+  /** Points of the measurement in progress, um; it may be complete. */
   measured: readonly Vec3[];
-  /** What the newest one is. */
+  /** Kind of the measurement in progress. */
   measuredAs: MeasureKind;
-  /** What the next one will be. */
+  /** Kind of the next measurement. */
   measureKind: MeasureKind;
-  /** Those before, oldest first. */
+  /** Finished measurements, oldest first. */
   measurements: readonly Measurement[];
 }>;
 
 export const MAX_MEASUREMENTS = 100;
-/** Most points of a line. */
+/** Largest number of points of a line. */
 export const MAX_POINTS = 64;
 const LONGEST_NAME = 60;
 
@@ -29,24 +29,33 @@ export const NAMES: Readonly<Record<MeasureKind, string>> = {
   angle: "Angle",
   line: "Line",
 };
-const WANTED: Readonly<Record<MeasureKind, number>> = { distance: 2, angle: 3, line: MAX_POINTS };
+const MAX_POINTS_OF: Readonly<Record<MeasureKind, number>> = {
+  distance: 2,
+  angle: 3,
+  line: MAX_POINTS,
+};
 const MIN_POINTS: Readonly<Record<MeasureKind, number>> = { distance: 2, angle: 3, line: 2 };
 
-/** How many points are missing at least; 0: it measures something. */
+/** Returns the number of points that are still missing; 0: the measurement has a value. */
 export function missing(kind: MeasureKind, points: readonly Vec3[]): number {
   return Math.max(0, MIN_POINTS[kind] - points.length);
 }
 
-/** With one more point: of the newest one, or, where that is done, of another. */
+/**
+ * Adds a point to the measurement in progress. If that is complete or of another kind, begins
+ * another.
+ */
 export function withPoint<S extends Measuring>(state: S, point: Vec3): S {
   const { measured, measuredAs, measureKind } = state;
   const goesOn =
-    measured.length > 0 && measured.length < WANTED[measuredAs] && measuredAs === measureKind;
+    measured.length > 0 &&
+    measured.length < MAX_POINTS_OF[measuredAs] &&
+    measuredAs === measureKind;
   if (goesOn) return { ...state, measured: [...measured, point] };
   return { ...finished(state), measured: [point], measuredAs: measureKind };
 }
 
-/** The newest one goes to the list, if it measures anything. */
+/** Moves the measurement in progress to the list if it has a value; else drops its points. */
 export function finished<S extends Measuring>(state: S): S {
   const { measured, measuredAs, measurements } = state;
   if (missing(measuredAs, measured) > 0) {
@@ -57,13 +66,13 @@ export function finished<S extends Measuring>(state: S): S {
   return { ...state, measured: [], measurements: kept };
 }
 
-/** The first name of a kind with a number that no other has. */
+/** Returns the first name of a kind with a number that no other measurement has. */
 export function freeName(kind: MeasureKind, others: readonly Measurement[]): string {
   const taken = new Set(others.map(({ name }) => name));
   for (let i = 1; ; i++) if (!taken.has(`${NAMES[kind]} ${i}`)) return `${NAMES[kind]} ${i}`;
 }
 
-/** A list within the limits; what measures nothing is left out. */
+/** Returns the list within the limits, without measurements that lack points. */
 export function withinLimits(list: readonly Measurement[]): readonly Measurement[] {
   return list
     .filter(({ kind, points }) => missing(kind, points) === 0)
@@ -71,21 +80,24 @@ export function withinLimits(list: readonly Measurement[]): readonly Measurement
     .map(({ name, kind, points }) => ({
       name: name.slice(0, LONGEST_NAME),
       kind,
-      points: points.slice(0, WANTED[kind]),
+      points: points.slice(0, MAX_POINTS_OF[kind]),
     }));
 }
 
-/** All that measure something, the newest last. */
+/** Returns all measurements that have a value, newest last. */
 export function allOf(state: Measuring): readonly Measurement[] {
   return finished(state).measurements;
 }
 
-/** The sum of all stretches, um. */
+/** Returns the length of the line through the points, um. */
 export function lengthOf(points: readonly Vec3[]): number {
   return points.slice(1).reduce((sum, point, i) => sum + distanceBetween(points[i], point), 0);
 }
 
-/** At the second of three points, degrees; null: two of them are one. */
+/**
+ * Returns the angle at the second of three points, degrees; null if it coincides with another
+ * point.
+ */
 export function angleOf([a, b, c]: readonly Vec3[]): number | null {
   const [u, v] = [a, c].map((end) => [end[0] - b[0], end[1] - b[1], end[2] - b[2]]);
   const cross = Math.hypot(
@@ -95,10 +107,13 @@ export function angleOf([a, b, c]: readonly Vec3[]): number | null {
   );
   const along = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
   if (cross === 0 && along === 0) return null;
-  return (Math.atan2(cross, along) * 180) / Math.PI; // exact near 0 and 180 too
+  return (Math.atan2(cross, along) * 180) / Math.PI; // atan2 is exact near 0 and 180 degrees, where acos is not
 }
 
-/** RFC 4180: a line for each, points in um of the world. A spreadsheet takes no name for a formula. */
+/**
+ * Returns CSV (RFC 4180) with one line for each measurement and its points in um of the world. A
+ * name that a spreadsheet would read as a formula gets a leading apostrophe.
+ */
 export function measurementsCsv(list: readonly Measurement[]): string {
   const most = Math.max(2, ...list.map(({ points }) => points.length));
   const columns = Array.from({ length: most }, (_, i) =>

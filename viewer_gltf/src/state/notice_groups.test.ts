@@ -4,21 +4,21 @@ import { groupNotices } from "./notice_groups";
 const missing = (n: number) => `volumes/r0_c${n}/CD8.ktx2: the host answers 404`;
 
 describe("notices", () => {
-  it("of many files with one fault are one, which stands for all of them", () => {
+  it("form one group if many files have the same fault", () => {
     const all = [missing(0), missing(1), missing(2)];
     expect(groupNotices(all)).toEqual([
       { text: `${missing(0)} And 2 more files like it.`, of: all },
     ]);
   });
 
-  it("are alike whatever sizes and hashes they tell", () => {
+  it("belong together although their sizes and hashes differ", () => {
     const short = (n: number) =>
       `a/${n}.glb: expected ${n + 100} bytes with the hash ${"abcdef01".repeat(n)}, found ${n}`;
     const [group] = groupNotices([short(1), short(2)]);
     expect(group.text).toBe(`${short(1)} And 1 more file like it.`);
   });
 
-  it("of another fault, another kind of file or of no file stand alone, the newest last", () => {
+  it("stand alone if the fault or the kind of file differs, newest last", () => {
     const texts = [
       missing(0),
       "a.glb: the host answers 404",

@@ -1,44 +1,53 @@
 /**
- * How the objects of a label map are shown: what colours them, which are left out, which are meant. The table
- * itself is not here: it comes with the code that reads it (objects/). Pure.
+ * How the objects of a label map are shown: their colours, and which are hidden or selected. The
+ * table of objects is loaded by the code in objects/. Pure.
  */
 
 export const PALETTES = ["viridis", "cividis", "magma", "diverging"] as const;
 export type PaletteName = (typeof PALETTES)[number];
 
-/** Numbers of rows are rows of the table; a byte is one of a column's file: see schemas/objects.schema.json. */
+/**
+ * Numbers of rows are rows of the table. A byte is a value of a column's file (see
+ * schemas/objects.schema.json).
+ */
 export type ObjectView = Readonly<{
-  /** ID of a column; "": none; null: the table's own choice. */
+  /** ID of the column that colours the objects; "": none; null: the table's own choice. */
   colorBy: string | null;
   palette: PaletteName;
-  /** The bytes at which the palette begins and ends. */
+  /** Bytes at which the palette begins and ends. */
   span: readonly [number, number];
-  /** Evenly in the logarithm; null: as the column's bytes lie. */
+  /**
+   * Whether the palette is spread over the logarithm of the values; null: as the column's bytes
+   * are.
+   */
   isLog: boolean | null;
-  /** By column, the bytes that are left: numbers' lowest and highest. What is missing goes, too. */
+  /**
+   * Lowest and highest byte that are shown, by column of numbers. Objects without a value are
+   * hidden, too.
+   */
   ranges: Readonly<Record<string, readonly [number, number]>>;
-  /** By column, the categories that are left out, by index; -1: those without. */
+  /** Indices of categories that are hidden, by column; -1: objects without a category. */
   without: Readonly<Record<string, readonly number[]>>;
   hidden: readonly number[];
-  /** The only ones that are shown; null: all are. */
+  /** Rows of the only objects that are shown; null: all are shown. */
   only: readonly number[] | null;
   selected: readonly number[];
-  /** Whose card is open. */
+  /** Row of the object whose card is open. */
   picked: number | null;
-  /** To be flown to; anew with each new object. */
+  /** Object that the camera flies to; each request is a new JavaScript object. */
   aim: Readonly<{ row: number }> | null;
-  /** Whether what is painted on them shows, where there is something. */
+  /** Whether the stage's colours of the objects are shown, if it has any. */
   isStained: boolean;
-  /** Space that each leaves along its walls, um. */
+  /** Gap between neighbouring objects, um on each side. */
   gap_um: number;
   search: string;
-  /** Page of the categories' legend. */
+  /** Page of the legend of categories. */
   legend: number;
-  /** Columns of the scatter plot; "": the first that suit. */
+  /** Columns of the scatter plot; "": the first suitable ones. */
   scatter: readonly [string, string];
-  /** In the scatter plot, shares of its width and height. */
+  /** Points of the lasso in the scatter plot, as shares of its width and height. */
   lasso: readonly (readonly [number, number])[];
-  /** As a link has it, until the table has come. */
+  /** The setting as a link has it, until the table is loaded. */
   linked: string;
 }>;
 
@@ -65,10 +74,10 @@ export const START_OBJECTS: ObjectView = {
   linked: "",
 };
 
-/** By channel; absent: as at the start. */
+/** Views by channel; a channel without an entry has START_OBJECTS. */
 export type ObjectViews = Readonly<Record<string, ObjectView>>;
 
-/** Some of it is another from now on. */
+/** Changes some fields of the view of a channel. */
 export type ObjectChange = Readonly<{
   type: "objects";
   channel: string;

@@ -1,14 +1,14 @@
-/** How far the overview has come: the coarsest LOD of every tile of the shown channels. Pure. */
+/** Loading progress of the overview: the coarsest LOD of every tile of the shown channels. Pure. */
 export type TileProgress = Readonly<{
-  /** Coarsest tiles with content; null until the tileset has arrived. */
+  /** Number of coarsest tiles with content; null until the tileset has arrived. */
   total: number | null;
-  /** Of these, loaded or given up. */
+  /** Tiles that are loaded or have failed. */
   done: number;
 }>;
 
 export type Progress = Readonly<{ done: number; total: number; isComplete: boolean }>;
 
-/** The sum over tilesets. A tileset that is not there yet counts as one tile to come. */
+/** Returns the sum over tilesets. A tileset that has not arrived counts as one missing tile. */
 export function overview(tilesets: readonly TileProgress[]): Progress {
   const total = tilesets.reduce((sum, tileset) => sum + (tileset.total ?? 1), 0);
   const done = tilesets.reduce((sum, tileset) => sum + tileset.done, 0);

@@ -1,43 +1,43 @@
 /**
- * Settings and actions that parts of the viewer add to the state. The host adds those of all its parts before it makes
- * the first state, so that a viewer without a part has none of them.
+ * Settings and actions that the parts add to the state. The host adds those of its parts before it
+ * makes the first state. A viewer without a part therefore lacks the part's settings.
  */
 import type { PartAction, PartActions } from "./actions";
 import type { Parameter } from "./parameters/kinds";
 import type { SettingsOfParts } from "./parameters/settings";
 import type { ViewerState } from "./viewer_state";
 
-/** How an action of a part changes the state, and what is said about it. */
+/** How an action of a part changes the state, and its words. */
 export type ActionRules<A> = Readonly<{
   reduce: (state: ViewerState, action: A) => ViewerState;
-  /** What a step of the history changes, in a few words. */
+  /** Name of the step in the history, in a few words. */
   name: string;
-  /** Changes that follow each other at once, as by a drag, are one step of the history. */
+  /** Whether changes in quick succession, for example by a drag, are one step of the history. */
   isGradual?: boolean;
-  /** The announcement once a key has made the change. */
+  /** The announcement after a key has made the change. */
   spoken: (state: ViewerState) => string;
 }>;
 
 export type PartSettings = Readonly<{
   /** The settings in a bundle that has just opened. */
   start: Partial<SettingsOfParts>;
-  /** A row for each setting, in the order that links have. */
+  /** A row for each setting, in the order of links. */
   rows: readonly Parameter<ViewerState>[];
-  /** Those of the rows that the page's address may set before the `#`. */
+  /** Rows that the query of the page's address may set. */
   inAddress?: readonly Parameter<ViewerState>[];
   actions?: Readonly<{ [T in keyof PartActions]?: ActionRules<PartActions[T]> }>;
 }>;
 
 const byPart = new Map<string, PartSettings>();
 
-/** Adds what a part has; the same part may come again, with another view. */
+/** Adds the settings of a part, or replaces those of an earlier view of the same part. */
 export function addSettings(part: string, settings: PartSettings): void {
   byPart.set(part, settings);
 }
 
 const allParts = () => [...byPart.values()];
 
-/** What the parts of the page have, as declared to the compiler by `declare module`. */
+/** Returns the opening values of all settings of parts; `declare module` gives them their types. */
 export const startOfParts = (): SettingsOfParts =>
   Object.assign({}, ...allParts().map(({ start }) => start));
 
@@ -47,17 +47,17 @@ export const rowsOfParts = (): readonly Parameter<ViewerState>[] =>
 export const addressRowsOfParts = (): readonly Parameter<ViewerState>[] =>
   allParts().flatMap(({ inAddress = [] }) => inAddress);
 
-/** The rules of an action; null: it is none of a part. */
+/** Returns the rules of an action; null if it is not an action of a part. */
 export function rulesOf({ type }: Readonly<{ type: string }>): ActionRules<PartAction> | null {
   for (const { actions = {} } of allParts()) {
     const found = new Map<string, unknown>(Object.entries(actions)).get(type);
-    // the table of actions gives each type rules for its own action
+    // the table of actions gives each type the rules of its own action
     if (found !== undefined) return found as ActionRules<PartAction>;
   }
   return null;
 }
 
-/** The state after an action of a part. */
+/** Returns the state after an action of a part. */
 export function withPartAction(state: ViewerState, action: PartAction): ViewerState {
   const rules = rulesOf(action);
   if (rules === null) throw new Error(`no part has the action ${JSON.stringify(action)}`);

@@ -3,11 +3,11 @@ import { sampleManifest } from "../../test/support/fixture/manifest";
 import { initialState } from "./initial_state";
 import { type Value, withValue } from "./parameters/kinds";
 import { AFTER, LAMP, LIGHT, LIGHT_NUMBERS } from "./parameters/light";
-import { gathersAnew, LAMPS, START_TRACE, withLamp } from "./path_trace_settings";
+import { LAMPS, needsNewPaths, START_TRACE, withLamp } from "./path_trace_settings";
 
 const START = initialState(sampleManifest(1));
 
-describe("the light's settings", () => {
+describe("the settings of path tracing", () => {
   it("start within their limits", () => {
     expect(START.trace).toEqual(START_TRACE);
     expect(LAMP).toHaveLength(LAMPS);
@@ -16,15 +16,15 @@ describe("the light's settings", () => {
     }
   });
 
-  it("of a lamp leave the others", () => {
+  it("leave the other lamps unchanged if one lamp changes", () => {
     const { lamps } = withLamp(START_TRACE, 1, { isOn: true });
     expect([lamps[0], lamps[2]]).toEqual([START_TRACE.lamps[0], START_TRACE.lamps[2]]);
     expect(lamps[1]).toEqual({ ...START_TRACE.lamps[1], isOn: true });
     expect(withLamp(START_TRACE, 9, { isOn: true })).toEqual(START_TRACE);
   });
 
-  it("are gathered for anew where paths depend on them, and only there", () => {
-    expect(gathersAnew(START_TRACE, { ...START_TRACE })).toBe(false);
+  it("need new paths only where paths depend on them", () => {
+    expect(needsNewPaths(START_TRACE, { ...START_TRACE })).toBe(false);
     for (const row of LIGHT) {
       const other = (): Value => {
         if (row.kind === "number") return row.limits[row.get(START) === row.limits[0] ? 1 : 0];
@@ -34,7 +34,7 @@ describe("the light's settings", () => {
       };
       const { trace } = withValue(row, START, other());
       expect(trace, row.id).not.toEqual(START_TRACE);
-      expect(gathersAnew(START_TRACE, trace), row.id).toBe(!AFTER.includes(row));
+      expect(needsNewPaths(START_TRACE, trace), row.id).toBe(!AFTER.includes(row));
     }
   });
 });

@@ -1,17 +1,20 @@
 /**
- * What a path-traced picture is made with. Plain data, and pure functions on it. A row of the numbers
- * below is all that a new one takes besides its use: panel, keys and links go by it.
+ * Settings of a path-traced image, as plain data and pure functions. A number needs only its row
+ * below and its use: the panel, the keys and the links are made from the row.
  */
 import type { Rgb } from "../math/color";
 
-/** Linear colour; x, y, z in longest edges of the specimen's box, from its middle, y up. */
+/**
+ * A lamp: linear colour; x, y, z in lengths of the longest edge of the specimen's box, from its
+ * middle, y up.
+ */
 export type Lamp = Readonly<{
   isOn: boolean;
   x: number;
   y: number;
   z: number;
   color: Rgb;
-  /** 1: as much light on the specimen's middle as a white room gives. */
+  /** At 1, the lamp gives the middle of the specimen as much light as a white environment. */
   strength: number;
 }>;
 
@@ -20,18 +23,18 @@ export type EnvironmentName = (typeof ENVIRONMENTS)[number];
 
 export const TONE_MAPS = ["filmic", "none"] as const;
 
-/** Samples of each pixel in a finished picture. */
+/** Samples of each pixel in a finished image. */
 export const ENOUGH_SAMPLES = 1024;
 
 type TraceNumber = Readonly<{
   label: string;
-  /** The value in a bundle that has just opened. */
+  /** Value in a bundle that has just opened. */
   start: number;
   limits: readonly [number, number];
-  /** Equal steps are equal factors. */
+  /** Whether equal steps of the slider are equal factors. */
   isLogarithmic?: boolean;
   text: (value: number) => string;
-  /** What it does, where its name can't say it. */
+  /** Explanation of the effect, where the label does not say it. */
   about?: string;
 }>;
 type TraceNumbers = Readonly<Record<string, TraceNumber>>;
@@ -42,7 +45,7 @@ const percent = (value: number) => `${Math.round(100 * value)} %`;
 const degrees = (value: number) => `${Math.round(value)}°`;
 const stops = (value: number) => `${value >= 0 ? "+" : ""}${value.toFixed(1)} stops`;
 
-/** Numbers of the medium that light goes through. */
+/** Numbers of the medium that the light passes through. */
 export const MEDIUM_NUMBERS = {
   /** Added to the intensities before the transfer function. */
   bias: {
@@ -51,23 +54,24 @@ export const MEDIUM_NUMBERS = {
     limits: [-1, 1],
     text: plain,
     about:
-      "Shifts the transfer function: more shows darker material, too; less only the brightest.",
+      "Shifts the transfer function: a higher value also shows darker material, a lower value only the brightest.",
   },
-  /** Share of the intensities; 0: the transfer function alone decides what is empty. */
+  /** Share of the intensities; 0: only the transfer function decides what is empty. */
   threshold: {
     label: "Threshold",
     start: 0,
     limits: [0, 1],
     text: (value) => (value === 0 ? "auto" : percent(value)),
-    about: "Voxels below it are empty. Auto: as the transfer function has it.",
+    about: "Voxels darker than this are empty. On auto, the transfer function decides.",
   },
-  /** Along the specimen's diagonal; 0: as many as the frame's budget allows. */
+  /** Samples along the diagonal of the specimen; 0: as many as the time of a frame allows. */
   steps: {
     label: "Steps",
     start: 0,
     limits: [0, 500],
     text: (value) => (value === 0 ? "auto" : value.toFixed(0)),
-    about: "Along a ray through the specimen: few are fast, many are exact. Auto: as time allows.",
+    about:
+      "Samples along a ray through the specimen: few are fast, many are exact. Auto takes as many as time allows.",
   },
   /** Factor to the extinction. */
   density: {
@@ -76,72 +80,81 @@ export const MEDIUM_NUMBERS = {
     limits: [0.05, 20],
     isLogarithmic: true,
     text: factor,
-    about: "How much light it stops: less is mist, more is solid.",
+    about: "How much light the material stops: low values look like mist, high values look solid.",
   },
-  /** How readily a gradient makes a surface. */
+  /** How readily a gradient scatters like a surface. */
   surface: {
     label: "Surfaces",
     start: 0.6,
     limits: [0, 1],
     text: percent,
-    about: "How readily an edge in it is lit as a surface; at 0 % all is mist.",
+    about:
+      "How readily an edge in the material is lit as a surface; at 0 % everything looks like mist.",
   },
-  /** A surface's shine. */
   shine: {
     label: "Shine",
     start: 0.5,
     limits: [0, 1],
     text: percent,
-    about: "From dull surfaces to polished ones.",
+    about: "How polished surfaces look.",
   },
-  /** Henyey-Greenstein g. */
+  /** Asymmetry g of Henyey and Greenstein's phase function, -1..1. */
   anisotropy: {
-    label: "Scatters forward",
+    label: "Forward scattering",
     start: 0,
     limits: [-0.95, 0.95],
     text: plain,
-    about: "Where light goes from where it is stopped: above 0 mostly on, below 0 mostly back.",
+    about: "Direction of scattered light: above 0 mostly onwards, below 0 mostly back.",
   },
 } as const satisfies TraceNumbers;
 
-/** Factor to the environment's light, and by how much it is turned. */
+/** Brightness of the environment, and its rotation about the vertical axis. */
 export const ROOM_NUMBERS = {
-  environmentLight: { label: "Light of the room", start: 1, limits: [0, 4], text: factor },
-  environmentTurn_deg: { label: "Room turned", start: 0, limits: [-180, 180], text: degrees },
+  environmentLight: { label: "Environment light", start: 1, limits: [0, 4], text: factor },
+  environmentTurn_deg: {
+    label: "Environment rotation",
+    start: 0,
+    limits: [-180, 180],
+    text: degrees,
+  },
 } as const satisfies TraceNumbers;
 
-/** Numbers of the post-processing. */
+/** Numbers of the image adjustments, which follow path tracing. */
 export const POST_NUMBERS = {
-  /** At the start a specimen is as bright as its surfaces are, whose light has no tone map. */
+  /**
+   * Stops. At the start value, the specimen is as bright as its surfaces, which are drawn without a
+   * tone map.
+   */
   exposure: {
     label: "Exposure",
     start: -0.5,
     limits: [-4, 4],
     text: stops,
-    about: "One stop more is twice as bright.",
+    about: "Brightness of the image: one stop more is twice as bright.",
   },
   hue: { label: "Hue", start: 0, limits: [-180, 180], text: degrees },
-  /** Factor. */
   saturation: { label: "Saturation", start: 1, limits: [0, 3], text: percent },
-  /** Added. */
   lightness: { label: "Luminance", start: 0, limits: [-0.5, 0.5], text: percent },
   occlusion: {
     label: "Ambient occlusion",
     start: 0.3,
     limits: [0, 1],
     text: percent,
-    about: "How dark corners and hollows are.",
+    about: "How dark corners and hollows appear.",
   },
   sharpness: { label: "Sharpness", start: 0.2, limits: [0, 2], text: percent },
 } as const satisfies TraceNumbers;
 
-/** Farthest place of a lamp, in lengths of the specimen: a hand round it reaches the lamp. */
+/**
+ * Largest distance of a lamp along each axis, in lengths of the specimen's longest edge. A hand
+ * beside the specimen can still reach the lamp there.
+ */
 export const LAMP_REACH = 3;
 
-/** Numbers of one lamp: its place, and its strength. */
+/** Numbers of one lamp: its place and its strength. */
 export const LAMP_NUMBERS = {
   x: { label: "Left to right", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
-  y: { label: "Down to up", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
+  y: { label: "Bottom to top", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
   z: { label: "Back to front", limits: [-LAMP_REACH, LAMP_REACH], steps: 120, text: plain },
   strength: { label: "Strength", limits: [0, 10], steps: 100, text: factor },
 } as const;
@@ -152,16 +165,16 @@ export type TraceSettings = NumbersOf<typeof MEDIUM_NUMBERS> &
   NumbersOf<typeof ROOM_NUMBERS> &
   NumbersOf<typeof POST_NUMBERS> &
   Readonly<{
-    /** Paths are scattered once, or until they leave. */
+    /** Whether light is scattered until it leaves the specimen, or once. */
     isMultiple: boolean;
     environment: EnvironmentName;
     lamps: readonly Lamp[];
-    /** The post-processing; off: the picture as it was gathered. */
+    /** Whether the image adjustments are applied. */
     isPostOn: boolean;
     toneMap: (typeof TONE_MAPS)[number];
   }>;
 
-/** From the left above, from the right, from behind: the key, the fill, the rim. */
+/** Key light from the upper left, fill light from the right, rim light from behind. */
 const START_LAMPS: readonly Lamp[] = [
   { isOn: true, x: -0.9, y: 0.9, z: 1.1, color: [1, 0.96, 0.9], strength: 1.6 },
   { isOn: false, x: 1.2, y: 0.3, z: 0.8, color: [0.8, 0.88, 1], strength: 0.6 },
@@ -185,7 +198,7 @@ export const START_TRACE: TraceSettings = {
   toneMap: "filmic",
 };
 
-/** One lamp changed. */
+/** Returns the settings with one lamp changed. */
 export function withLamp(
   trace: TraceSettings,
   index: number,
@@ -195,7 +208,7 @@ export function withLamp(
   return { ...trace, lamps };
 }
 
-const GATHERED: readonly (keyof TraceSettings)[] = [
+const PATH_SETTINGS: readonly (keyof TraceSettings)[] = [
   ...(Object.keys(MEDIUM_NUMBERS) as (keyof typeof MEDIUM_NUMBERS)[]),
   ...(Object.keys(ROOM_NUMBERS) as (keyof typeof ROOM_NUMBERS)[]),
   "isMultiple",
@@ -203,7 +216,7 @@ const GATHERED: readonly (keyof TraceSettings)[] = [
   "lamps",
 ];
 
-/** Whether what paths gather differs between two settings, and not only what is made of it. */
-export function gathersAnew(a: TraceSettings, b: TraceSettings): boolean {
-  return GATHERED.some((name) => a[name] !== b[name]);
+/** Returns whether two settings need different paths, and not only different image adjustments. */
+export function needsNewPaths(a: TraceSettings, b: TraceSettings): boolean {
+  return PATH_SETTINGS.some((name) => a[name] !== b[name]);
 }

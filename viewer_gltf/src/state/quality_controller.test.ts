@@ -5,7 +5,7 @@ import {
   advanceQuality,
   frameBudget_ms,
   initialQuality,
-  LADDER,
+  NOTCHES,
   type Quality,
   type QualitySettings,
   qualitySettings,
@@ -13,7 +13,10 @@ import {
   withLevel,
 } from "./quality_controller";
 
-/** What a device takes for a frame: meshes by their error, the march by rays and steps. */
+/**
+ * Milliseconds that a device needs for the parts of a frame at full quality. Meshes cost by their
+ * error, volumes by rays and steps.
+ */
 type Device = Readonly<{ fixed_ms: number; mesh_ms: number; march_ms: number }>;
 const cost_ms = (device: Device, s: QualitySettings) =>
   device.fixed_ms +
@@ -22,11 +25,11 @@ const cost_ms = (device: Device, s: QualitySettings) =>
 
 const REFRESH_MS = 1000 / 60;
 const BUDGET_MS = frameBudget_ms(60, "work");
-const LAST = LADDER[LADDER.length - 1];
+const LAST = NOTCHES[NOTCHES.length - 1];
 
 type Run = Readonly<{ quality: Quality; changes: readonly number[]; times_ms: readonly number[] }>;
 
-/** So many frames on a device; with "interval", a display of 60 Hz rounds their times up. */
+/** Runs frames on a device. With "interval", a display of 60 Hz rounds the frame times up. */
 function run(quality: Quality, device: Device, frames: number, noise = () => 0): Run {
   let current = quality;
   const changes: number[] = [];
@@ -46,13 +49,13 @@ function run(quality: Quality, device: Device, frames: number, noise = () => 0):
 
 const start = (timing: Timing = "work") => initialQuality(timing);
 
-describe("the frame's budget", () => {
-  it("is the display's", () => {
+describe("the time budget of a frame", () => {
+  it("follows the rate of the display", () => {
     expect(frameBudget_ms(60, "interval")).toBeCloseTo(16.67, 2);
     expect(frameBudget_ms(72, "work")).toBeLessThan(1000 / 72);
   });
 
-  it("is kept on every device that can, and after 10 s nothing changes any more", () => {
+  it("is kept on every device that can keep it, and the quality is steady after 10 s", () => {
     const random = seeded(1);
     for (let i = 0; i < 120; i++) {
       const device = {
@@ -64,33 +67,33 @@ describe("the frame's budget", () => {
       const noise = () => 0.06 * (random() - 0.5);
       const { quality, changes } = run(start(), device, 3600, noise);
       expect(cost_ms(device, qualitySettings(quality))).toBeLessThanOrEqual(BUDGET_MS * 1.03);
-      // Noise may carry a frame just within the budget over it later, once, never back.
-      const better = cost_ms(device, LADDER[Math.max(0, quality.notch - 1)]);
+      // Noise may raise a frame just within the budget above it once, but not below again.
+      const better = cost_ms(device, NOTCHES[Math.max(0, quality.notch - 1)]);
       const isClose = Math.abs(better / BUDGET_MS - 1) < 0.03;
       expect(changes.filter((at) => at > 600).length).toBeLessThanOrEqual(isClose ? 1 : 0);
     }
   });
 
-  it("costs no more quality than it must", () => {
+  it("costs no more quality than necessary", () => {
     const random = seeded(2);
     for (let i = 0; i < 100; i++) {
       const device = { fixed_ms: 2, mesh_ms: 6 * random(), march_ms: 80 * random() };
       const { quality } = run(start(), device, 3000);
       if (quality.notch === 0) continue;
-      // One notch better would not have left the room of a tenth that keeps it steady.
-      const better = cost_ms(device, LADDER[quality.notch - 1]);
+      // One notch better would have used up the margin of a tenth that keeps the quality steady.
+      const better = cost_ms(device, NOTCHES[quality.notch - 1]);
       expect(better).toBeGreaterThan(0.85 * BUDGET_MS);
     }
   });
 
-  it("is left alone where full quality fits", () => {
+  it("leaves the quality unchanged if full quality fits", () => {
     const { changes } = run(start(), { fixed_ms: 2, mesh_ms: 3, march_ms: 8 }, 5000);
     expect(changes).toEqual([]);
   });
 });
 
 describe("quality", () => {
-  it("goes in the order steps, resolution, disc, meshes, and ends at the limits", () => {
+  it("is reduced in the order steps, resolution, disc, meshes, down to the limits", () => {
     const hopeless = { fixed_ms: 100, mesh_ms: 10, march_ms: 100 };
     const { quality } = run(start(), hopeless, 3000);
     expect(qualitySettings(quality)).toEqual({
@@ -100,23 +103,23 @@ describe("quality", () => {
       errorFactor: 4,
     });
     const keys = ["steps", "resolution", "discShare", "errorFactor"] as const;
-    const changed = LADDER.slice(1).map((settings, i) => {
-      const keysChanged = keys.filter((key) => settings[key] !== LADDER[i][key]);
+    const changed = NOTCHES.slice(1).map((settings, i) => {
+      const keysChanged = keys.filter((key) => settings[key] !== NOTCHES[i][key]);
       expect(keysChanged).toHaveLength(1);
       return keys.indexOf(keysChanged[0]);
     });
     expect(changed).toEqual([...changed].sort());
-    expect(LADDER[0]).toEqual({ steps: 100, resolution: 1, discShare: 1, errorFactor: 1 });
+    expect(NOTCHES[0]).toEqual({ steps: 100, resolution: 1, discShare: 1, errorFactor: 1 });
   });
 
-  it("leaves the opening disc at least 12 degrees on the slowest device", () => {
+  it("keeps a radius of at least 12 degrees for the opening disc on the slowest device", () => {
     const low = qualitySettings(withLevel(start(), "low"));
-    for (const { discShare } of [...LADDER, low]) {
+    for (const { discShare } of [...NOTCHES, low]) {
       expect(discShare * START_VOLUMES.discRadius_deg).toBeGreaterThanOrEqual(12);
     }
   });
 
-  it("comes back in full when the load goes, from wherever it was", () => {
+  it("returns to full quality when the load ends, from any notch", () => {
     const random = seeded(3);
     for (let i = 0; i < 60; i++) {
       const heavy = { fixed_ms: 3, mesh_ms: 12 * random(), march_ms: 20 + 200 * random() };
@@ -124,20 +127,20 @@ describe("quality", () => {
       const low = run(start(), heavy, 2000).quality;
       const { quality, changes } = run(low, light, 1200);
       expect(quality.notch).toBe(0);
-      // One way only, up.
+      // The notches change in one direction only.
       expect(changes).toHaveLength(low.notch);
     }
   });
 
-  it("comes back also where the notch was dear when it was given up", () => {
-    // The march made up nearly all of the time; now it is gone and meshes take its place.
+  it("returns although the notch was expensive when the quality was reduced", () => {
+    // The march took nearly all of the time. Now it has ended, and meshes take its place.
     const low = run(start(), { fixed_ms: 1, mesh_ms: 0, march_ms: 30 }, 2000).quality;
     expect(low.notch).toBeGreaterThan(2);
     const { quality } = run(low, { fixed_ms: 9, mesh_ms: 0, march_ms: 0 }, 2000);
     expect(quality.notch).toBe(0);
   });
 
-  it("stays between its limits whatever the times are", () => {
+  it("stays between its limits for any frame times", () => {
     const random = seeded(4);
     let isWithin = true;
     for (let i = 0; i < 20; i++) {
@@ -163,17 +166,17 @@ describe("quality", () => {
     expect(isWithin).toBe(true);
   });
 
-  it("is fixed by the user's choice", () => {
+  it("stays at the level that the user chose", () => {
     const hopeless = { fixed_ms: 100, mesh_ms: 10, march_ms: 100 };
     for (const level of ["low", "high"] as const) {
       const chosen = withLevel(start(), level);
       const { quality } = run(chosen, hopeless, 500);
       expect(quality).toBe(chosen);
     }
-    expect(qualitySettings(withLevel(start(), "high"))).toEqual(LADDER[0]);
+    expect(qualitySettings(withLevel(start(), "high"))).toEqual(NOTCHES[0]);
     expect(qualitySettings(withLevel(start(), "low")).steps).toBeLessThan(100);
     expect(run(withLevel(withLevel(start(), "low"), "auto"), hopeless, 500).quality.notch).toBe(
-      LADDER.length - 1,
+      NOTCHES.length - 1,
     );
   });
 });
@@ -181,7 +184,7 @@ describe("quality", () => {
 describe("slow frames", () => {
   const good = { fixed_ms: 3, mesh_ms: 2, march_ms: 6 };
 
-  it("change nothing if they are single, however slow", () => {
+  it("change nothing if they are single, at any length", () => {
     for (const timing of ["work", "interval"] as const) {
       let quality = run(start(timing), good, 100).quality;
       let changes = 0;
@@ -195,7 +198,7 @@ describe("slow frames", () => {
     }
   });
 
-  it("change nothing while something loads: a few stalls in a row, again and again", () => {
+  it("change nothing during loading, which causes a few stalls in a row again and again", () => {
     const random = seeded(6);
     for (let session = 0; session < 50; session++) {
       let quality = run(start(), good, 60).quality;
@@ -210,7 +213,7 @@ describe("slow frames", () => {
     }
   });
 
-  it("that stay are a load: within 3 s the frame is back in budget", () => {
+  it("that persist count as load: the frame is in budget again within 3 s", () => {
     const quality = run(start(), good, 500).quality;
     const heavy = { fixed_ms: 3, mesh_ms: 3, march_ms: 90 };
     const { times_ms } = run(quality, heavy, 600);
@@ -222,27 +225,27 @@ describe("slow frames", () => {
   });
 });
 
-describe("times that the display rounds up", () => {
-  it("settle in budget; tries at more become rare", () => {
+describe("frame times that the display rounds up", () => {
+  it("settle in the budget, and trials of higher quality become rare", () => {
     const random = seeded(7);
     for (let i = 0; i < 15; i++) {
       const device = { fixed_ms: 2, mesh_ms: 6 * random(), march_ms: 20 + 80 * random() };
       const { times_ms, changes } = run(start("interval"), device, 40_000);
       const late = times_ms.slice(20_000).filter((ms) => ms > 1.5 * REFRESH_MS).length;
       expect(late / 20_000).toBeLessThan(0.01);
-      // A try up and back makes two; at 60 Hz this is at most one try in 90 s.
+      // A trial and its return are two changes. At 60 Hz this allows at most one trial in 90 s.
       expect(changes.filter((at) => at >= 20_000).length).toBeLessThanOrEqual(8);
     }
   });
 
-  it("come back to full quality when the load goes", () => {
+  it("return to full quality when the load ends", () => {
     const low = run(start("interval"), { fixed_ms: 2, mesh_ms: 5, march_ms: 90 }, 10_000).quality;
     expect(low.notch).toBeGreaterThan(3);
     const { quality } = run(low, { fixed_ms: 2, mesh_ms: 2, march_ms: 2 }, 8000);
     expect(quality.notch).toBe(0);
   });
 
-  it("are too long also if only every second frame is late", () => {
+  it("are also too long if only every second frame is late", () => {
     let quality = start("interval");
     for (let i = 0; i < 400; i++) {
       const isLate = i % 2 === 0 && quality.notch < 3;

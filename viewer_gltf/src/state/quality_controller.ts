@@ -1,31 +1,31 @@
 /**
- * Keeps a frame's time in its budget by giving up quality one notch at a time. Pure.
+ * Keeps the time of a frame in its budget by reducing quality one notch at a time. Pure.
  *
- * Down: a window of frames over budget gives up a notch, several if far over. Up: only if the
- * notch's price, which was measured when it was given up, fits with room to spare, so a steady
- * load settles and stays. Prices are forgotten once the load has fallen. A single slow frame moves
- * the interquartile mean of a window not at all; a stall far longer than its window is left out.
+ * Down: a window of frames over budget lowers the quality by a notch, or by several if far over.
+ * Up: a notch is raised only if its price, measured when it was lowered, fits with a margin. A
+ * steady load therefore settles. Prices are forgotten when the load has fallen. A single slow frame
+ * does not change the interquartile mean of a window; a much longer stall is ignored.
  *
- * Where only the time between frames is known, the display rounds it up and room does not show:
- * there the next notch is tried after a while in budget, and a try that fails doubles that while.
+ * If only the time between frames is known, the display rounds it up, which hides the margin. The
+ * next notch is then tried after some time in budget. Each failed trial doubles that time.
  */
 
 export type QualitySettings = Readonly<{
-  /** Most steps along a ray. */
+  /** Largest number of steps along a ray. */
   steps: number;
-  /** Pixels of the march along an edge of the picture, as a share of the picture's. */
+  /** Pixels of the march along an edge of the frame, as a share of the frame's pixels. */
   resolution: number;
-  /** Radius of the gaze's disc, as a share of what the user has set. */
+  /** Radius of the focus disc, as a share of the user's setting. */
   discShare: number;
-  /** Screen-space error of the meshes, as a multiple of the usual. */
+  /** Screen-space error of the meshes, as a multiple of the usual error. */
   errorFactor: number;
 }>;
 
 const HIGH: QualitySettings = { steps: 100, resolution: 1, discShare: 1, errorFactor: 1 };
 const LOW: QualitySettings = { steps: 48, resolution: 0.5, discShare: 0.75, errorFactor: 2 };
 
-/** Each notch's settings, best first: one thing after the other is given up. */
-export const LADDER: readonly QualitySettings[] = [
+/** Settings of each notch, best first. One setting after the other is reduced. */
+export const NOTCHES: readonly QualitySettings[] = [
   HIGH,
   ...([80, 64, 50, 40, 32] as const).map((steps) => ({ ...HIGH, steps })),
   ...([0.75, 0.5, 1 / 3] as const).map((resolution) => ({ ...HIGH, steps: 32, resolution })),
@@ -42,52 +42,61 @@ export const LADDER: readonly QualitySettings[] = [
     errorFactor,
   })),
 ];
-const LAST = LADDER.length - 1;
+const LAST_NOTCH = NOTCHES.length - 1;
 
 export const QUALITY_LEVELS = ["auto", "low", "high"] as const;
 export type QualityLevel = (typeof QUALITY_LEVELS)[number];
-/** Whether frame_ms is what a frame cost (GPU timer) or the time since the frame before. */
+/** Whether frame_ms is the work of a frame (GPU timer) or the time since the previous frame. */
 export type Timing = "work" | "interval";
 
 export type Quality = Readonly<{
   level: QualityLevel;
   timing: Timing;
-  /** Index into LADDER. */
+  /** Index into NOTCHES. */
   notch: number;
-  /** Frames of this notch that have not been judged yet. */
+  /** Times of the frames in this notch that have not been judged yet. */
   window_ms: readonly number[];
-  /** Frames still to pass after a change: the GPU's times come late. */
+  /** Frames to skip after a change, because the GPU's times arrive late. */
   pause: number;
-  /** Stalls in a row that were left out. */
+  /** Number of consecutive stalls that were ignored. */
   stalls: number;
-  /** By how much a frame costs more one notch higher; entry k is from k + 1 to k, 0: unknown. */
+  /** Factor by which a frame gets slower one notch higher. Entry k is from k + 1 to k; 0: unknown. */
   prices: readonly number[];
-  /** The longest window of this notch; much less than it means that the load has fallen. */
+  /** Longest window mean in this notch. A much shorter one means that the load has fallen. */
   usual_ms: number;
-  /** The last judged window, and the notch at which it was; 0: none since the last jump. */
+  /** Mean of the last judged window and its notch; 0: none since the last change. */
   before_ms: number;
   before_notch: number;
-  /** Frames in budget since the last change, and how many make a try ("interval" only). */
+  /**
+   * Frames in budget since the last change, and the number after which a notch is tried ("interval"
+   * only).
+   */
   calm: number;
   patience: number;
 }>;
 
 const WINDOW = 20;
-/** Slow frames are judged sooner: so many of them, if they took so long together. */
+/**
+ * Slow frames are judged sooner: a window of SHORT_WINDOW frames is enough if they took
+ * SHORT_WINDOW_MS together.
+ */
 const SHORT_WINDOW = 8;
 const SHORT_WINDOW_MS = 400;
 const PAUSE = 4;
-/** Length of a stall, in lengths of its window, unless SHORT_WINDOW such frames follow in a row. */
-const STALL = 4;
-/** Frame times above the budget that still keep it, as a factor: displays are unsteady. */
+/**
+ * Factor to the mean of the window above which a frame is a stall. After SHORT_WINDOW stalls in a
+ * row, the next is not one.
+ */
+const STALL_FACTOR = 4;
+/** Factor to the budget that a frame may take and still keep it, because displays are unsteady. */
 const TOLERANCE: Readonly<Record<Timing, number>> = { work: 1, interval: 1.15 };
-/** Share of the budget within which a notch must be expected to stay before it is taken back. */
-const ROOM = 0.9;
-/** Cost of a notch before a measurement, as a factor to the frame's time. */
+/** Share of the budget that a frame must be expected to keep before a notch is raised. */
+const MARGIN = 0.9;
+/** Assumed price of a notch, as a factor to the frame's time, before it is measured. */
 const USUAL_PRICE = 1.15;
 /** Share of the usual time below which the load has fallen. */
-const FALLEN = 0.85;
-/** Factor over budget for which one notch is given up. */
+const FALLEN_SHARE = 0.85;
+/** Factor over budget for which one notch is lowered. */
 const FACTOR_A_NOTCH = 1.25;
 const MAX_NOTCHES = 6;
 const PATIENCE = 90;
@@ -101,7 +110,7 @@ export function initialQuality(timing: Timing, level: QualityLevel = "auto"): Qu
     window_ms: [],
     pause: PAUSE,
     stalls: 0,
-    prices: LADDER.slice(1).map(() => 0),
+    prices: NOTCHES.slice(1).map(() => 0),
     usual_ms: 0,
     before_ms: 0,
     before_notch: 0,
@@ -110,34 +119,34 @@ export function initialQuality(timing: Timing, level: QualityLevel = "auto"): Qu
   };
 }
 
-/** A level fixed by the user holds until "auto" gives the choice back, from full quality on. */
+/** Sets the user's level. "auto" begins again from full quality. */
 export function withLevel(quality: Quality, level: QualityLevel): Quality {
   return level === quality.level ? quality : initialQuality(quality.timing, level);
 }
 
-/** The settings that the viewer draws with; the same object as long as nothing has changed. */
+/** Returns the settings that the viewer draws with: the same object as long as nothing changes. */
 export function qualitySettings({ level, notch }: Quality): QualitySettings {
-  return level === "auto" ? LADDER[notch] : level === "low" ? LOW : HIGH;
+  return level === "auto" ? NOTCHES[notch] : level === "low" ? LOW : HIGH;
 }
 
 /**
- * The budget at a display's rate. Of the work, a part is left to the browser, which puts the
- * picture on the screen.
+ * Returns the budget for a display's rate. If only the work is measured, 15 % is left for the
+ * browser, which puts the frame on the screen.
  */
 export function frameBudget_ms(rate_hz: number, timing: Timing): number {
   return (timing === "work" ? 0.85 : 1) * (1000 / rate_hz);
 }
 
 /**
- * The quality after one more frame. Give it no frame that came after a rest (a picture that did not
- * change is not drawn): such an interval means nothing.
+ * Returns the quality after one more frame. Do not pass a frame that follows a pause: unchanged
+ * scenes are not drawn, so the interval means nothing.
  */
 export function advanceQuality(quality: Quality, frame_ms: number, budget_ms: number): Quality {
   if (quality.level !== "auto" || !(frame_ms > 0) || !Number.isFinite(frame_ms)) return quality;
   if (quality.pause > 0) return { ...quality, pause: quality.pause - 1 };
   if (isStall(quality, frame_ms)) return { ...quality, stalls: quality.stalls + 1 };
 
-  // Stalls that do not end are the load: what was before them counts no more.
+  // Stalls that persist are the load. The window before them no longer counts.
   const isNewLoad = quality.stalls >= SHORT_WINDOW;
   const window_ms = isNewLoad ? [frame_ms] : [...quality.window_ms, frame_ms];
   const usual_ms = isNewLoad ? 0 : quality.usual_ms;
@@ -157,10 +166,10 @@ export function advanceQuality(quality: Quality, frame_ms: number, budget_ms: nu
 
 function isStall({ window_ms, usual_ms, stalls }: Quality, frame_ms: number): boolean {
   const usual = window_ms.length >= 3 ? middleMean(window_ms) : usual_ms;
-  return stalls < SHORT_WINDOW && usual > 0 && frame_ms > STALL * usual;
+  return stalls < SHORT_WINDOW && usual > 0 && frame_ms > STALL_FACTOR * usual;
 }
 
-/** Mean of the middle half: blind to stray frames as a median is, but not to every third one. */
+/** Mean of the middle half. Stray frames do not change it, as with a median, but every third frame does. */
 function middleMean(values: readonly number[]): number {
   const sorted = [...values].sort((a, b) => a - b);
   const cut = Math.floor(sorted.length / 4);
@@ -171,30 +180,33 @@ function middleMean(values: readonly number[]): number {
 function judge(quality: Quality, mean_ms: number, budget_ms: number): Quality {
   const known = withPrice(quality, mean_ms);
   const over = mean_ms / (budget_ms * TOLERANCE[known.timing]);
-  if (over > 1 && isTry(quality)) {
+  if (over > 1 && isTrial(quality)) {
     const patience = Math.min(2 * known.patience, MAX_PATIENCE);
     return moveTo({ ...known, patience }, quality.before_notch, mean_ms);
   }
   if (over > 1)
-    return moveTo(known, Math.min(known.notch + notchesFor(over, known), LAST), mean_ms);
+    return moveTo(known, Math.min(known.notch + notchesFor(over, known), LAST_NOTCH), mean_ms);
   return known.timing === "work"
-    ? judgeRoom(known, mean_ms, budget_ms)
-    : judgeCalm(isTry(quality) ? { ...known, patience: PATIENCE } : known, mean_ms);
+    ? judgeMargin(known, mean_ms, budget_ms)
+    : judgeCalm(isTrial(quality) ? { ...known, patience: PATIENCE } : known, mean_ms);
 }
 
-/** How many notches to give up; of an interval the display may have added nearly one budget. */
+/**
+ * Returns the number of notches to lower. An interval may include nearly one budget that the
+ * display added.
+ */
 function notchesFor(over: number, { timing }: Quality): number {
   const sure = timing === "interval" ? Math.max(1, over - 1) : over;
   const notches = Math.floor(Math.log(sure) / Math.log(FACTOR_A_NOTCH));
   return Math.min(Math.max(notches, 1), MAX_NOTCHES);
 }
 
-/** Whether the window that is judged is the first after a step up, which may fail. */
-function isTry({ before_ms, before_notch, notch }: Quality): boolean {
+/** Returns whether the judged window is the first after a notch was raised, which may fail. */
+function isTrial({ before_ms, before_notch, notch }: Quality): boolean {
   return before_ms > 0 && notch < before_notch;
 }
 
-/** Learn from the first window after a change what the notches in between cost. */
+/** Learns the price of the notches between two levels from the first window after a change. */
 function withPrice(quality: Quality, mean_ms: number): Quality {
   const { before_ms, before_notch, notch } = quality;
   const settled = { ...quality, before_ms: 0, before_notch: notch };
@@ -207,14 +219,14 @@ function withPrice(quality: Quality, mean_ms: number): Quality {
   return { ...settled, prices };
 }
 
-function judgeRoom(quality: Quality, mean_ms: number, budget_ms: number): Quality {
-  const hasFallen = mean_ms < FALLEN * quality.usual_ms;
+function judgeMargin(quality: Quality, mean_ms: number, budget_ms: number): Quality {
+  const hasFallen = mean_ms < FALLEN_SHARE * quality.usual_ms;
   const prices = hasFallen ? quality.prices.map(() => 0) : quality.prices;
   const usual_ms = hasFallen ? mean_ms : Math.max(quality.usual_ms, mean_ms);
   const settled = { ...quality, prices, usual_ms };
   if (settled.notch === 0) return settled;
   const price = prices[settled.notch - 1] || USUAL_PRICE;
-  if (mean_ms * price >= ROOM * budget_ms) return settled;
+  if (mean_ms * price >= MARGIN * budget_ms) return settled;
   return moveTo(settled, settled.notch - 1, mean_ms);
 }
 

@@ -6,10 +6,10 @@ import { DISC_RADIUS, SWITCH_DISTANCE } from "./parameters/volumes";
 import { newNotice, reduce } from "./reduce";
 import {
   type FocusTiles,
+  hiddenShare,
   isInDisc,
   NO_FOCUS,
   representationOf,
-  takenFrom,
   wantedTiles,
   wantsSurface,
 } from "./representation";
@@ -24,7 +24,7 @@ function unclear(given: Manifest, ...indices: number[]): Manifest {
   return { ...given, channels };
 }
 
-/** What the stage draws in the tiles of the row, from the left. */
+/** The manifest with other representations of some tiles. */
 function staged(given: Manifest, representations: Readonly<Record<string, Representation>>) {
   const [first, ...others] = given.tiles.map((each) => ({
     ...each,
@@ -33,7 +33,7 @@ function staged(given: Manifest, representations: Readonly<Record<string, Repres
   return { ...given, tiles: [first, ...others] } satisfies Manifest;
 }
 
-/** The tile in the middle, and a row of so many others beside it. */
+/** The tile in the middle, and a row of `count` other tiles beside it. */
 function withRow(given: Manifest, count: number, representation: Representation = "mesh") {
   const middle = given.tiles[2];
   const row = Array.from({ length: count }, (_, i): typeof middle => {
@@ -44,14 +44,14 @@ function withRow(given: Manifest, count: number, representation: Representation 
   return { ...given, tiles: [middle, ...row] } satisfies Manifest;
 }
 
-/** Within the switch distance, the first of them looked at. */
+/** Tiles within the volume distance; the gaze is on the first of them. */
 const near = (...tiles: readonly string[]): FocusTiles => ({
   focusTile: tiles[0],
   disc: tiles,
   near: new Set(tiles),
 });
 
-/** The tiles in which any channel is a volume. */
+/** The tiles in which any channel is drawn as a volume. */
 function marched(state: ViewerState, focusTiles: FocusTiles = NO_FOCUS): readonly string[] {
   return wantedTiles(state, focusTiles).map(({ tile: id }) => id);
 }
@@ -63,8 +63,8 @@ function find(state: ViewerState, channel: string, id: string) {
   return [c, t] as const;
 }
 
-/** How a channel is drawn in a tile once all has arrived. */
-function looks(state: ViewerState, channel: string, id: string, focusTiles = NO_FOCUS): string {
+/** How a channel is drawn in a tile once all is loaded. */
+function drawnAs(state: ViewerState, channel: string, id: string, focusTiles = NO_FOCUS): string {
   const [c, t] = find(state, channel, id);
   const as = representationOf(state, c, t, focusTiles);
   return as === null ? "" : { mesh: "surface", volume: "volume", both: "surface + volume" }[as];
@@ -75,7 +75,7 @@ function after(state: ViewerState, ...actions: Parameters<typeof reduce>[1][]): 
 }
 
 describe("the viewer's state", () => {
-  it("opens with surfaces of the first channels, and volumes for what comes near", () => {
+  it("opens with surfaces of the first channels, and volumes for near tiles", () => {
     const state = initialState(sampleManifest(70));
     expect(state.channels.filter((c) => c.shown)).toHaveLength(MAX_CHANNELS);
     expect(state.channels[1].hasSurface).toBe(false);
@@ -93,12 +93,12 @@ describe("the viewer's state", () => {
     );
     const state = initialState({ ...plain, channels });
     expect(state.channels.filter((c) => c.shown).map((c) => c.id)).toEqual(["c5"]);
-    // which have no volumes, and stay surfaces however near they come
+    // label maps have no volumes: they stay surfaces at every distance
     expect(state.channels.map((c) => c.volume)).toEqual([true, true, true, true, true, false]);
-    expect(looks(state, "c5", "r0_c2", near("r0_c2"))).toBe("surface");
+    expect(drawnAs(state, "c5", "r0_c2", near("r0_c2"))).toBe("surface");
   });
 
-  it("opens cut where the stage cuts it, and with the channels that the stage opens", () => {
+  it("opens with the clip plane and the channels of the stage", () => {
     const plain = sampleManifest(4);
     expect(initialState(plain).clip.plane).toBeNull();
     const cut = { normal: [1, 0, 0] as [number, number, number], offset_um: 7 };
@@ -111,7 +111,7 @@ describe("the viewer's state", () => {
     expect(none.channels.some((c) => c.shown)).toBe(false);
   });
 
-  it("draws an unsure surface from afar as it does a clear one", () => {
+  it("draws an unsure surface from afar like a clear one", () => {
     const clear = sampleManifest(1);
     const [first] = clear.channels;
     const reason = "unsure surface: at 162 with a confidence of 0.40";
@@ -123,7 +123,7 @@ describe("the viewer's state", () => {
     expect(drawn(unsure)).toEqual(drawn(trusted));
   });
 
-  it("lets the channel that was shown longest leave for a fifth, which is no fault", () => {
+  it("hides the channel that was shown longest for a fifth one, without a notice", () => {
     const state = initialState(sampleManifest(7));
     const five = reduce(state, { type: "show", channel: "c5", shown: true });
     const shown = (each: ViewerState) => each.channels.filter((c) => c.shown).map((c) => c.id);
@@ -145,14 +145,14 @@ describe("the viewer's state", () => {
     expect(marched(state)).toHaveLength(state.tiles.length);
     expect(wantedTiles(state, NO_FOCUS)[0].channels).toEqual(["c0"]);
     expect(wantsSurface(state, state.channels[0])).toBe(false);
-    expect(looks(state, "c0", "r0_c0")).toBe("volume");
+    expect(drawnAs(state, "c0", "r0_c0")).toBe("volume");
     expect(isInDisc(state, state.channels[0])).toBe(false);
     expect(isInDisc(state, state.channels[2])).toBe(true);
     expect(wantsSurface(state, state.channels[2])).toBe(true);
     const asked = reduce(state, { type: "set", id: "volume", channel: "c0", value: false });
-    expect(looks(asked, "c0", "r0_c0")).toBe("surface");
+    expect(drawnAs(asked, "c0", "r0_c0")).toBe("surface");
     const off = reduce(state, { type: "set", id: "mode", value: "off" });
-    expect(looks(off, "c0", "r0_c0")).toBe("surface");
+    expect(drawnAs(off, "c0", "r0_c0")).toBe("surface");
     expect(wantsSurface(off, off.channels[0])).toBe(true);
   });
 
@@ -175,7 +175,7 @@ describe("the viewer's state", () => {
     expect(marched(state, gaze)).toEqual(["r0_c1"]);
     const selected = reduce(state, { type: "select", tile: "r0_c2" });
     expect(marched(selected, gaze)).toEqual(["r0_c2"]);
-    expect(marched(selected, near("r0_c1"))).toEqual([]); // it is too far away
+    expect(marched(selected, near("r0_c1"))).toEqual([]); // the tile is too far away
     expect(marched(reduce(state, { type: "set", id: "mode", value: "all" }))).toHaveLength(
       state.tiles.length,
     );
@@ -190,25 +190,25 @@ describe("the viewer's state", () => {
 
   it("shows nothing but the isolated tile", () => {
     const state = reduce(initialState(sampleManifest(2)), { type: "isolate", tile: "r0_c0" });
-    expect(looks(state, "c0", "r0_c0")).toBe("surface");
-    expect(looks(state, "c0", "r0_c1")).toBe("");
+    expect(drawnAs(state, "c0", "r0_c0")).toBe("surface");
+    expect(drawnAs(state, "c0", "r0_c1")).toBe("");
     const all = reduce(state, { type: "set", id: "mode", value: "all" });
     expect(marched(all)).toEqual(["r0_c0"]);
   });
 
-  it("takes from a surface what its volume shows, once that has come", () => {
+  it("hides a surface as far as its volume has faded in", () => {
     const focusTiles = near("r0_c1");
     const state = initialState(unclear(sampleManifest(3), 2));
     const taken = (channel: string, id: string, presence: number) =>
-      takenFrom(state, ...find(state, channel, id), focusTiles, presence);
+      hiddenShare(state, ...find(state, channel, id), focusTiles, presence);
     expect(taken("c0", "r0_c1", 0)).toBe(0);
     expect(taken("c0", "r0_c1", 0.4)).toBe(0.4);
     expect(taken("c0", "r0_c0", 0)).toBe(0);
-    expect(taken("c0", "r0_c0", 0.7)).toBe(0.7); // it fades out where it is no longer wanted
+    expect(taken("c0", "r0_c0", 0.7)).toBe(0.7); // the volume fades out in a tile that no longer needs it
     expect(taken("c2", "r0_c1", 0)).toBeNull();
   });
 
-  it("keeps what is set within its limits", () => {
+  it("keeps values within their limits", () => {
     const state = initialState(sampleManifest(1));
     const far = reduce(state, { type: "set", id: "switch-distance", value: 1e9 });
     expect(far.switchDistance_m).toBe(SWITCH_DISTANCE.limits[1]);
@@ -236,7 +236,7 @@ describe("the viewer's state", () => {
     expect(chosen.channels[0].transferFunction).toBe("default");
   });
 
-  it("reports each fault once and forgets it when dismissed", () => {
+  it("lists each fault once until it is dismissed", () => {
     const text = "channels/c0/r0_c0/lod0.glb: not found (404)";
     const twice = after(
       initialState(sampleManifest(1)),
@@ -248,21 +248,21 @@ describe("the viewer's state", () => {
     expect(reduce(twice, { type: "dismiss", texts: ["another"] })).toBe(twice);
   });
 
-  it("knows which notices another try may mend, until they are dismissed", () => {
+  it("marks notices that another attempt may solve, until they are dismissed", () => {
     const opened = initialState(sampleManifest(6));
     const faulty = after(
       opened,
-      { type: "notify", text: "a file is spoilt" },
-      { type: "notify", text: "no network", isMendable: true },
+      { type: "notify", text: "a file is damaged" },
+      { type: "notify", text: "no network", isRetryable: true },
     );
-    expect(faulty.mendable).toEqual(["no network"]);
-    expect(reduce(faulty, { type: "dismiss", texts: ["a file is spoilt"] }).mendable).toEqual([
+    expect(faulty.retryable).toEqual(["no network"]);
+    expect(reduce(faulty, { type: "dismiss", texts: ["a file is damaged"] }).retryable).toEqual([
       "no network",
     ]);
-    expect(reduce(faulty, { type: "dismiss", texts: ["no network"] }).mendable).toEqual([]);
+    expect(reduce(faulty, { type: "dismiss", texts: ["no network"] }).retryable).toEqual([]);
   });
 
-  it("returns the notice that a change has brought, also once more", () => {
+  it("returns the notice that a change has added, also a second time", () => {
     const brought = (before: ViewerState, action: Parameters<typeof reduce>[1]) =>
       newNotice(before, reduce(before, action));
     const faulty = after(
@@ -279,27 +279,27 @@ describe("the viewer's state", () => {
   });
 });
 
-describe("what the stage draws in a tile", () => {
+describe("the stage's choice for a tile", () => {
   const MIXED = { r0_c0: "volume", r0_c2: "both" } as const;
 
-  it("is what the viewer opens with, whatever the other tiles are", () => {
+  it("is used at the opening, independently of the other tiles", () => {
     const state = initialState(staged(sampleManifest(3), MIXED));
     expect(state.channels.every((c) => c.shown && c.volume)).toBe(true);
     for (const channel of ["c0", "c2"]) {
-      expect(looks(state, channel, "r0_c0")).toBe("volume");
-      expect(looks(state, channel, "r0_c1")).toBe("surface");
-      expect(looks(state, channel, "r0_c2")).toBe("surface + volume");
+      expect(drawnAs(state, channel, "r0_c0")).toBe("volume");
+      expect(drawnAs(state, channel, "r0_c1")).toBe("surface");
+      expect(drawnAs(state, channel, "r0_c2")).toBe("surface + volume");
       expect(wantsSurface(state, state.channels[0])).toBe(true);
     }
     expect(marched(state)).toEqual(["r0_c0", "r0_c2"]);
   });
 
-  it("leaves channels without a clear surface as volumes, and gives their surface to `both`", () => {
+  it("draws channels without a clear surface as volumes, and with their surfaces for `both`", () => {
     const state = initialState(staged(unclear(sampleManifest(3), 0), MIXED));
-    expect(looks(state, "c0", "r0_c0")).toBe("volume");
-    expect(looks(state, "c0", "r0_c1")).toBe("volume");
-    expect(looks(state, "c0", "r0_c2")).toBe("surface + volume");
-    expect(looks(state, "c2", "r0_c1")).toBe("surface");
+    expect(drawnAs(state, "c0", "r0_c0")).toBe("volume");
+    expect(drawnAs(state, "c0", "r0_c1")).toBe("volume");
+    expect(drawnAs(state, "c0", "r0_c2")).toBe("surface + volume");
+    expect(drawnAs(state, "c2", "r0_c1")).toBe("surface");
     expect(wantsSurface(state, state.channels[0])).toBe(true);
     const without = initialState(staged(unclear(sampleManifest(3), 0), { r0_c0: "volume" }));
     expect(wantsSurface(without, without.channels[0])).toBe(false);
@@ -308,35 +308,35 @@ describe("what the stage draws in a tile", () => {
   it("gives way to what the user chooses", () => {
     const state = initialState(staged(sampleManifest(3), MIXED));
     const off = reduce(state, { type: "set", id: "volume", channel: "c0", value: false });
-    expect(looks(off, "c0", "r0_c0")).toBe("surface");
-    expect(looks(off, "c2", "r0_c0")).toBe("volume");
+    expect(drawnAs(off, "c0", "r0_c0")).toBe("surface");
+    expect(drawnAs(off, "c2", "r0_c0")).toBe("volume");
 
     const all = reduce(state, { type: "set", id: "mode", value: "all" });
-    for (const { id } of state.tiles) expect(looks(all, "c0", id)).toBe("volume");
+    for (const { id } of state.tiles) expect(drawnAs(all, "c0", id)).toBe("volume");
     const back = reduce(all, { type: "set", id: "mode", value: "stage" });
     expect(back).toEqual(state);
   });
 
-  it("opens as volumes only so many tiles, from the middle, and reports it", () => {
+  it("opens only the tiles nearest the centre as volumes, with a notice", () => {
     const many = unclear(sampleManifest(3), 2);
     const state = initialState(withRow(many, VOLUME_TILES_AT_START + 4, "volume"));
     const tilesOf = (channel: string) =>
       wantedTiles(state, NO_FOCUS).filter(({ channels }) => channels.includes(channel));
     expect(tilesOf("c0")).toHaveLength(VOLUME_TILES_AT_START);
     expect(tilesOf("c0").map((each) => each.tile)).not.toContain("r1_c0");
-    expect(looks(state, "c0", "r1_c0")).toBe("surface");
-    // without a clear surface: there and in the middle tile
+    expect(drawnAs(state, "c0", "r1_c0")).toBe("surface");
+    // without a clear surface, the volumes are drawn there and in the middle tile
     expect(new Set(tilesOf("c2").map((each) => each.tile))).toEqual(
       new Set([...tilesOf("c0").map((each) => each.tile), state.middle]),
     );
     expect(state.notices).toEqual([
-      'The stage draws 20 tiles as volumes: the 16 in the middle are, "All" draws the rest.',
+      'The stage draws 20 tiles as volumes, but only the 16 nearest the centre open as volumes. Choose "Volumes everywhere" to draw the rest.',
     ]);
   });
 });
 
 describe("the lamps", () => {
-  it("are shown when they are asked for, whatever becomes of the mode", () => {
+  it("are shown when they are switched on, in every mode", () => {
     const start = initialState(sampleManifest(3));
     expect(start.areLampsShown).toBe(false);
     const shown = reduce(start, { type: "set", id: "trace/lamps", value: true });

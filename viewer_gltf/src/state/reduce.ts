@@ -1,6 +1,6 @@
-/** The state after an action. Pure. */
+/** Returns the state after an action. Pure. */
 import type { Action } from "./actions";
-import { withOwn } from "./history";
+import { withoutUserChanges } from "./history";
 import { MAX_VIEWS } from "./kept_views";
 import { finished, MAX_POINTS, withinLimits, withPoint } from "./measurements";
 import { withObjects } from "./objects";
@@ -24,29 +24,32 @@ function withNotice(state: ViewerState, text: string): ViewerState {
   return { ...state, notices: [...state.notices.filter((n) => n !== text), text] };
 }
 
-function withMendable(state: ViewerState, text: string, isMendable: boolean): ViewerState {
-  const others = state.mendable.filter((n) => n !== text);
-  return { ...state, mendable: isMendable ? [...others, text] : others };
+function withRetryable(state: ViewerState, text: string, isRetryable: boolean): ViewerState {
+  const others = state.retryable.filter((n) => n !== text);
+  return { ...state, retryable: isRetryable ? [...others, text] : others };
 }
 
-/** Show a channel; if there is no room, the one that has been shown longest leaves: see announce_change.ts. */
+/**
+ * Shows a channel. If there are too many, the channel that has been shown longest is hidden (see
+ * announce_change.ts).
+ */
 function withShown(state: ViewerState, id: string): ViewerState {
   const channel = state.channels.find((c) => c.id === id);
   if (channel === undefined || channel.shown) return state;
   const turn = Math.max(0, ...state.channels.map((c) => c.turn + 1));
   const shown = state.channels.filter((c) => c.shown).sort((a, b) => a.turn - b.turn);
   const next = withChannel(state, id, (c) => ({ ...c, shown: true, turn }));
-  const [leaves] = shown;
+  const [oldest] = shown;
   if (shown.length < MAX_CHANNELS) return next;
-  return withChannel(next, leaves.id, (c) => ({ ...c, shown: false }));
+  return withChannel(next, oldest.id, (c) => ({ ...c, shown: false }));
 }
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
 
-/** Least width of a window, 0..1: a narrower one would be one step of the 8 bits. */
+/** Smallest width of a window, 0..1. A narrower window would cover a single step of 8 bits. */
 const NARROWEST_WINDOW = 1 / 128;
 
-/** The next state. Returns the same object if the action changes nothing. */
+/** Returns the next state: the same object if the action changes nothing. */
 export function reduce(state: ViewerState, action: Action): ViewerState {
   switch (action.type) {
     case "set": {
@@ -86,7 +89,7 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "select":
       return withTile(state, "selected", action.tile);
     case "isolate":
-      // the isolated tile is the selected one: `back` leads from one to the other
+      // the isolated tile is also the selected one, so that `back` leads from one to the other
       return withTile(
         action.tile === null ? state : withTile(state, "selected", action.tile),
         "isolated",
@@ -109,14 +112,18 @@ export function reduce(state: ViewerState, action: Action): ViewerState {
     case "keep-views":
       return { ...state, keptViews: action.views.slice(-MAX_VIEWS) };
     case "restore":
-      return withOwn(action.state, state);
+      return withoutUserChanges(action.state, state);
     case "notify":
-      return withMendable(withNotice(state, action.text), action.text, action.isMendable === true);
+      return withRetryable(
+        withNotice(state, action.text),
+        action.text,
+        action.isRetryable === true,
+      );
     case "dismiss": {
       const isLeft = (notice: string) => !action.texts.includes(notice);
       const notices = state.notices.filter(isLeft);
       if (notices.length === state.notices.length) return state;
-      return { ...state, notices, mendable: state.mendable.filter(isLeft) };
+      return { ...state, notices, retryable: state.retryable.filter(isLeft) };
     }
     default:
       return withPartAction(state, action);
@@ -133,7 +140,7 @@ function withTile(
   return { ...state, [key]: tile };
 }
 
-/** The notice that a change has brought, also if it was there before; null: none. */
+/** Returns the notice that a change has added, even if it existed before; null: none. */
 export function newNotice(before: ViewerState, after: ViewerState): string | null {
   const isNew = after.notices !== before.notices && after.notices.length >= before.notices.length;
   return (isNew && after.notices.at(-1)) || null;

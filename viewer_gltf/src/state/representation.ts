@@ -1,4 +1,4 @@
-/** The representation of each channel and tile: surface or volume. Pure. */
+/** Chooses whether each channel is drawn as a surface or as a volume in each tile. Pure. */
 
 import { VOLUME_TILES_AT_START } from "./initial_state";
 import { isTraced } from "./parameters/volumes";
@@ -10,35 +10,35 @@ import {
   volumeChannels,
 } from "./viewer_state";
 
-/** What lies near enough to be drawn as a volume. */
+/** Tiles that are near enough to be drawn as volumes. */
 export type FocusTiles = Readonly<{
-  /** The tile that the view's centre looks at. */
+  /** Tile in the middle of the view. */
   focusTile: string | null;
-  /** The tiles that the disc round the gaze meets first, the gazed one first. */
+  /** First tiles that the rays of the focus disc meet, the gazed tile first. */
   disc: readonly string[];
-  /** All tiles within the switch distance. */
+  /** All tiles within the volume distance. */
   near: ReadonlySet<string>;
 }>;
 
 export const NO_FOCUS: FocusTiles = { focusTile: null, disc: [], near: new Set() };
 
-/** A tile with a wanted volume, and its channels in the bundle's order. */
+/** A tile whose volume is needed, and its channels in the order of the bundle. */
 export type WantedTile = Readonly<{
   tile: string;
   channels: readonly string[];
 }>;
 
-/** The tile that volumes follow: the selected one, or the gazed one. */
+/** The tile that volumes follow: the selected tile, or the gazed one. */
 function focusTileOf(state: ViewerState, focusTiles: FocusTiles): string | null {
   return state.selected ?? focusTiles.focusTile;
 }
 
-/** Whether a channel is drawn as a volume wherever that is possible. */
+/** Returns whether a channel has no clear surface, so that it is drawn as a volume wherever possible. */
 function prefersVolume(channel: ChannelState): boolean {
   return !channel.hasSurface && channel.surfaceReason !== "";
 }
 
-/** How a channel is drawn in a tile, once all has arrived; null: not at all. */
+/** Returns how a channel is drawn in a tile once all is loaded; null: not at all. */
 export function representationOf(
   state: ViewerState,
   channel: ChannelState,
@@ -47,7 +47,7 @@ export function representationOf(
 ): Representation | null {
   if (!channel.shown || (state.isolated !== null && tile.id !== state.isolated)) return null;
   if (!channel.volume || state.mode === "off") return "mesh";
-  if (tile.isUnfinished) return "volume"; // there is nothing else, and its volume is small
+  if (tile.isUnfinished) return "volume"; // its surfaces are not built yet, and its volume is small
   if (state.mode === "stage" && tile.representation !== "mesh") return tile.representation;
   if (isTraced(state) || isMarched(state, tile.id, focusTiles)) return "volume";
   if (!prefersVolume(channel)) return "mesh";
@@ -70,23 +70,29 @@ function isMarched(state: ViewerState, tile: string, focusTiles: FocusTiles): bo
   }
 }
 
-/** The one tile that is a volume among surfaces; null: there is none. */
+/** Returns the only tile that is a volume among surfaces; null: none. */
 export function marchedTile(state: ViewerState, focusTiles: FocusTiles): string | null {
   const tile = focusTileOf(state, focusTiles);
   return state.mode === "tile" && tile !== null && focusTiles.near.has(tile) ? tile : null;
 }
 
-/** Whether a channel's volumes show in the disc alone. */
+/** Returns whether the volumes of a channel are drawn only in the focus disc. */
 export function isInDisc(state: ViewerState, channel: ChannelState): boolean {
   return state.mode === "disc" && !prefersVolume(channel) && !isUnfinished(state);
 }
 
-/** Whether volumes still stand for surfaces that are being built: then nothing else cuts into surfaces. */
+/**
+ * Returns whether volumes still stand for surfaces that are being built. The disc then cuts into no
+ * surface.
+ */
 function isUnfinished({ tiles }: ViewerState): boolean {
   return tiles.some((tile) => tile.isUnfinished);
 }
 
-/** The tiles that are marched, those in the disc first; where light is followed, until that has come. */
+/**
+ * Returns the tiles whose volumes are needed, those in the disc first. Path tracing marches them
+ * until its own volume is loaded.
+ */
 export function wantedTiles(state: ViewerState, focusTiles: FocusTiles): readonly WantedTile[] {
   const channels = volumeChannels(state);
   const wanted = state.tiles.flatMap((tile) => {
@@ -109,7 +115,7 @@ export function wantedTiles(state: ViewerState, focusTiles: FocusTiles): readonl
   return wanted.sort((a, b) => rank(a.tile) - rank(b.tile));
 }
 
-/** Whether a channel's surfaces, if it has any, are drawn anywhere: else they aren't loaded. */
+/** Returns whether surfaces of a channel are drawn anywhere. If not, they are not loaded. */
 export function wantsSurface(state: ViewerState, channel: ChannelState): boolean {
   if (!channel.shown) return false;
   if (channel.volume && isTraced(state)) return false;
@@ -117,8 +123,8 @@ export function wantsSurface(state: ViewerState, channel: ChannelState): boolean
   return state.mode === "stage" && state.tiles.some((tile) => tile.representation === "both");
 }
 
-/** How much of a tile's surface its volume takes away, 0..1; null: the surface is not drawn. */
-export function takenFrom(
+/** Returns the share of a tile's surface that its volume hides, 0..1; null: the surface is not drawn. */
+export function hiddenShare(
   state: ViewerState,
   channel: ChannelState,
   tile: TileState,

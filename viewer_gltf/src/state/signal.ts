@@ -1,4 +1,4 @@
-/** A stream of values to which several listeners subscribe. */
+/** A stream of values with several listeners. */
 export class Signal<T> {
   private readonly listeners = new Set<(value: T) => void>();
 

@@ -18,12 +18,12 @@ const file = { path: "room.exr", bytes: 1, sha256: "0".repeat(64) };
 const lit = (lights: Lights) => ({ ...manifest, lights });
 
 describe("the light of a stage", () => {
-  it("is the viewer's own where no layer gives any", () => {
+  it("is the viewer's own light if no layer has lights", () => {
     expect(roomLightOf(manifest)).toBe(OWN_LIGHT);
     expect(initialState(manifest).trace).toBe(START_TRACE);
   });
 
-  it("stands with the specimen: the strongest lamp is the key, all others are one lamp beside it", () => {
+  it("moves with the specimen: the strongest lamp is the key light, all others are joined to one fill light", () => {
     const light = roomLightOf(
       lit({
         lamps: [
@@ -43,7 +43,7 @@ describe("the light of a stage", () => {
     expect(light.ground).toEqual([0.1, 0, 0]);
   });
 
-  it("puts a lamp of path tracing where it stands, or as far as a lamp can be", () => {
+  it("places a lamp of path tracing where it stands, or at the farthest place of a lamp", () => {
     const at = [middle[0] + edge, middle[1], middle[2]] as [number, number, number];
     const { trace } = initialState(
       lit({
@@ -61,7 +61,7 @@ describe("the light of a stage", () => {
     expect(trace.environmentLight).toBe(0);
   });
 
-  it("has a room to choose where the stage has domes, and none elsewhere", () => {
+  it("offers the stage's environment only if the stage has dome lights", () => {
     const dark = initialState(lit({ lamps: [] }));
     const roomed = initialState(
       lit({ lamps: [], room: { sky: [1, 1, 1], ground: [1, 1, 1], image: file } }),

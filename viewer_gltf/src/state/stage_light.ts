@@ -1,4 +1,7 @@
-/** The light that a layer over the stage gives the specimen, for path tracing and for all other pictures. Pure. */
+/**
+ * The light that a layer of the stage gives the specimen, for path tracing and for all other
+ * frames. Pure.
+ */
 import type { Lights, Manifest, StageLamp } from "../bundle/generated/bundle";
 import { asOneLamp, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
 import type { Vec3 } from "../math/vec3";
@@ -8,12 +11,12 @@ type Bounds = Manifest["specimen"]["bounds_um"];
 
 const DARK = [0, 0, 0] as const;
 
-/** The light of a bundle's pictures, paths of light aside. */
+/** Returns the light of all frames but the path-traced ones. */
 export function roomLightOf({ lights, specimen: { bounds_um } }: Manifest): RoomLight {
   if (lights === undefined) return OWN_LIGHT;
   const [key, ...others] = lights.lamps.map((lamp) => ({
     ...lamp,
-    towards: asideOf(lamp, bounds_um),
+    towards: offsetOf(lamp, bounds_um),
   }));
   return {
     key: asOneLamp(key === undefined ? [] : [key]),
@@ -24,7 +27,10 @@ export function roomLightOf({ lights, specimen: { bounds_um } }: Manifest): Room
   };
 }
 
-/** Returns the settings that path tracing opens with. The light of a stage needs no other exposure than surfaces have. */
+/**
+ * Returns the opening settings of path tracing. Light from a stage is set for surfaces, so it needs
+ * no other exposure.
+ */
 export function traceLitBy(lights: Lights | undefined, bounds: Bounds): TraceSettings {
   if (lights === undefined) return START_TRACE;
   const off = START_TRACE.lamps.map((lamp): Lamp => ({ ...lamp, isOn: false }));
@@ -41,17 +47,23 @@ export function traceLitBy(lights: Lights | undefined, bounds: Bounds): TraceSet
   };
 }
 
-/** A lamp that is farther away than a hand reaches stands nearer, and is as bright in the middle. */
+/**
+ * Converts a lamp of the stage. A lamp beyond the reach of a hand is moved nearer, and stays as
+ * bright in the middle.
+ */
 function lampOf(lamp: StageLamp, bounds: Bounds): Lamp {
-  const aside = asideOf(lamp, bounds);
-  const largest = Math.max(...aside.map(Math.abs));
+  const offset = offsetOf(lamp, bounds);
+  const largest = Math.max(...offset.map(Math.abs));
   const share = lamp.position_um === null || largest > LAMP_REACH ? LAMP_REACH / largest : 1;
-  const [x, y, z] = aside.map((v) => v * share);
+  const [x, y, z] = offset.map((v) => v * share);
   return { isOn: true, x, y, z, color: lamp.color, strength: lamp.strength };
 }
 
-/** Returns the way from the specimen's middle to a lamp in longest edges, or the direction to a far lamp. */
-function asideOf({ towards, position_um }: StageLamp, { min, max }: Bounds): Vec3 {
+/**
+ * Returns the vector from the specimen's middle to a lamp, in lengths of the longest edge, or the
+ * direction of a distant lamp.
+ */
+function offsetOf({ towards, position_um }: StageLamp, { min, max }: Bounds): Vec3 {
   if (position_um === null) return towards ?? [0, 0, 1];
   const edge = Math.max(...max.map((v, k) => v - min[k]));
   const [x, y, z] = position_um.map((v, k) => (v - (min[k] + max[k]) / 2) / edge);

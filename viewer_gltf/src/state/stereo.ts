@@ -1,19 +1,19 @@
-/** The stereo that this browser offers. */
+/** The kinds of stereo that this browser offers. */
 
-/** Whether it can be used, and if not, why, in words. */
+/** Whether a kind of stereo can be used, and the reason if not. */
 export type XrSupport = Readonly<{ isAvailable: boolean; reason: string }>;
 
 export type StereoSupport = Readonly<{
   stereo: XrSupport;
-  /** null: there is none in this viewer. */
+  /** null: this viewer has no split screen. */
   split: XrSupport | null;
-  /** Whether the specimen can stand in the user's own room. */
+  /** Whether the specimen can stand in the user's own room (augmented reality). */
   hasRoom: boolean;
   /** Whether the browser reads QR codes. */
   canScan: boolean;
-  /** The fault of the text of a phone viewer's code, in words; "": none. */
+  /** Returns what is wrong with the text of a Cardboard viewer's QR code; "": nothing. */
   faultOfCode: (code: string) => string;
 }>;
 
-/** CSS pixels in an inch that a screen may have. */
+/** Least and largest number of CSS pixels per inch of a screen. */
 export const PER_INCH = [60, 240] as const;

@@ -1,17 +1,18 @@
-/** A tile's name for people. Pure. */
+/** Names of tiles for users. Pure. */
 
-/** The parts of a tile from which its name for people is made. */
+/** The fields of a tile from which its name is made. */
 export type NamedTile = Readonly<{ id: string; name?: string }>;
 
 /**
- * The name that the stage gives a tile. Without one, `row 1, column 4` of a tile of the grid, counted from 1, with its
- * layer in z if there are several; else its id.
+ * Returns the name that the stage gives a tile. Without one, returns the place in the grid, counted
+ * from 1: `row 1, column 4`, with the layer in z if there are several. Other tiles are named by
+ * their id.
  */
 export function tileName(id: string, tiles: readonly NamedTile[]): string {
   return tiles.find((tile) => tile.id === id)?.name ?? placeInGrid(id);
 }
 
-/** The same name with a capital letter, for places where it stands alone. */
+/** Returns the name with a capital letter, for headings. */
 export function tileTitle(id: string, tiles: readonly NamedTile[]): string {
   return tiles.find((tile) => tile.id === id)?.name ?? `Tile in ${placeInGrid(id)}`;
 }
@@ -23,7 +24,7 @@ function placeInGrid(id: string): string {
   return `row ${row}, column ${column}${found[3] === undefined ? "" : `, layer ${layer}`}`;
 }
 
-/** A tile's place in the grid where there is no room for words. */
+/** Returns the place of a tile in the grid as numbers, where there is no space for words. */
 export function shortTileName(id: string): string {
   return placeInGrid(id)
     .replace("row ", "")

@@ -48,7 +48,7 @@ describe("the two-dimensional functions of a channel", () => {
     expect([isTwoD(emptied), emptied.transferFunction]).toEqual([false, "soft"]);
   });
 
-  it("become one's own where a one-dimensional one is chosen, which stays as it is", () => {
+  it("become the user's own function if the chosen one is one-dimensional, which stays unchanged", () => {
     expect(editedName(channelAfter())).toBe(OWN);
     expect(editedName(channelAfter(choose("soft")))).toBe("soft");
     const own = channelAfter(set(OWN, [SHAPE]));
@@ -60,7 +60,7 @@ describe("the two-dimensional functions of a channel", () => {
     expect(channelAfter(set("none", [SHAPE]))).toEqual(channelAfter());
   });
 
-  it("keep within the limits, for shapes from anywhere", () => {
+  it("stay within the limits, for shapes from any source", () => {
     const wrong = [
       { ...SHAPE, opacity: Number.NaN },
       { ...SHAPE, values: [0.5, 0.4] as const },
@@ -71,7 +71,7 @@ describe("the two-dimensional functions of a channel", () => {
     expect(shapesOf(channelAfter(set(OWN, many)))).toHaveLength(MAX_SHAPES);
   });
 
-  it("lie on a lattice, however thin, and still are shapes", () => {
+  it("lie on a lattice and stay valid shapes, however thin they are", () => {
     const [v, g] = [MIN_WIDTH, MIN_HEIGHT];
     const thin = [0, 0.12345, 1 - v, 0.9999 - v].flatMap((low) =>
       [0, 0.54321, 1 - g].map((bottom) => ({
@@ -92,6 +92,6 @@ describe("the two-dimensional functions of a channel", () => {
         expect(number * STEPS).toBeCloseTo(Math.round(number * STEPS), 9);
       }
     }
-    expect(shapesOf(channelAfter(set(OWN, kept)))).toEqual(kept); // what lies on it stays
+    expect(shapesOf(channelAfter(set(OWN, kept)))).toEqual(kept); // shapes on the lattice stay the same
   });
 });

@@ -1,6 +1,6 @@
 /**
- * A channel's two-dimensional transfer functions as the state has them: what the bundle brought and
- * what a user has made of it. Plain data and pure functions; see docs/transfer-functions.md.
+ * A channel's two-dimensional transfer functions: those of the bundle and the user's edits. Plain
+ * data and pure functions; see docs/transfer-functions.md.
  */
 
 import {
@@ -14,51 +14,56 @@ import {
 import { fromHex, toHex } from "../math/color";
 import { MIN_HEIGHT, MIN_WIDTH } from "./transfer_shapes";
 
-/** The function that a user's shapes make of a channel that is shown by a one-dimensional one. */
+/** Name of the function that a user's shapes make for a channel with a one-dimensional function. */
 export const OWN = "own";
 /**
- * Places in the joint histogram, opacities and softness are whole multiples of one part of so many, so that a
- * link holds them exactly: a quarter of the table's columns, two characters of base 36.
+ * Places in the joint histogram, opacities and softness are whole multiples of 1 / STEPS. A link
+ * then holds them exactly in two characters of base 36. Each column of the table has four steps.
  */
 export const STEPS = 1020;
 
 export type Functions = Readonly<{
   transferFunction: string;
   transferFunctions: readonly string[];
-  /** Of these, the bundle's two-dimensional ones. */
+  /** The two-dimensional functions of the bundle. */
   transferFunctions2d: readonly string[];
-  /** null: it has not come, as it is asked for only when something needs it. */
+  /** null: not fetched yet. It is fetched when something needs it. */
   transfer2d: Transfer2d | null;
   /** The user's own versions of functions, by name. */
   shapes: Readonly<Record<string, Shapes>>;
 }>;
 
-function own<T>(record: Readonly<Record<string, T>>, name: string): T | undefined {
+function ownValue<T>(record: Readonly<Record<string, T>>, name: string): T | undefined {
   return Object.hasOwn(record, name) ? record[name] : undefined;
 }
 
-/** The shapes of a function; none: it is one-dimensional, or the bundle's have not come. */
+/** Returns the shapes of a function; none if it is one-dimensional, or not fetched yet. */
 export function shapesOf(functions: Functions, name = functions.transferFunction): Shapes {
   const { shapes, transfer2d } = functions;
   return (
-    own(shapes, name) ?? (transfer2d === null ? undefined : own(transfer2d.functions, name)) ?? []
+    ownValue(shapes, name) ??
+    (transfer2d === null ? undefined : ownValue(transfer2d.functions, name)) ??
+    []
   );
 }
 
-/** Whether a function has shapes, also such as have not come. */
+/** Returns whether a function has shapes, even if they are not fetched yet. */
 export function isTwoD(functions: Functions, name = functions.transferFunction): boolean {
-  const made = own(functions.shapes, name);
+  const made = ownValue(functions.shapes, name);
   return made === undefined
     ? functions.transferFunctions2d.includes(name)
     : made.length > 0 || name === OWN;
 }
 
-/** The function that an editor changes: the chosen one, if it has shapes, or the user's own. */
+/** Returns the function that an editor changes: the chosen one if it has shapes, else the user's own. */
 export function editedName(functions: Functions): string {
   return isTwoD(functions) ? functions.transferFunction : OWN;
 }
 
-/** The functions with other shapes in one of them, which is chosen; the same if it can't be. */
+/**
+ * Returns the functions with other shapes in one of them, which becomes the chosen one. An unknown
+ * name changes nothing.
+ */
 export function withShapes<F extends Functions>(functions: F, name: string, shapes: Shapes): F {
   const { transferFunctions } = functions;
   const isKnown = transferFunctions.includes(name);
@@ -74,7 +79,7 @@ export function withShapes<F extends Functions>(functions: F, name: string, shap
 
 const rounded = (x: number) => Math.round(x * STEPS) / STEPS;
 
-/** Rounded so that it still has its least size. */
+/** Rounds a range to the lattice, and keeps at least its least size. */
 function roundedRange([low, high]: Range, least: number): Range {
   const steps = Math.ceil(least * STEPS - 1e-9);
   const from = Math.min(Math.round(low * STEPS), STEPS - steps);
@@ -82,7 +87,7 @@ function roundedRange([low, high]: Range, least: number): Range {
   return [from / STEPS, to / STEPS];
 }
 
-/** The shape in such numbers as a link holds; null: it is none. */
+/** Returns the shape with numbers that a link can hold; null if it is invalid. */
 export function onLattice(shape: Shape): Shape | null {
   if (faultOf(shape) !== null) return null;
   return {

@@ -36,16 +36,17 @@ const TRIANGLE: Shape = {
 const REACH = { value: 0.02, gradient: 0.03 };
 const at = (value: number, gradient: number): HistogramPoint => ({ value, gradient });
 
-/** One component of a table of 5 x 5 cells, by rows, gradient 0 first. */
+/** One component of a table of 5 x 5 cells, by rows; the row of gradient 0 is first. */
 function component(table: Uint8Array, i: number): number[][] {
   return Array.from({ length: 5 }, (_, row) =>
     Array.from({ length: 5 }, (_, column) => table[4 * (5 * row + column) + i]),
   );
 }
 
-describe("the table of shapes", () => {
-  // worked out by hand, as in tests/transfer/test_shapes2d.py: values and gradients 0, 1/4, 1/2, 3/4, 1
-  it("of a rectangle fades to its edges, but not to the plane's", () => {
+describe("the table", () => {
+  // computed by hand, as in tests/transfer/test_shapes2d.py; values and gradients are 0, 1/4, 1/2,
+  // 3/4, 1
+  it("fades towards the edges of a rectangle, but not at the ends of the histogram", () => {
     const table = rasterise([RECTANGLE], 5, 5);
     expect(component(table, 3)).toEqual([
       [0, 0, 0, 0, 0],
@@ -57,7 +58,7 @@ describe("the table of shapes", () => {
     expect(component(table, 1)[3]).toEqual([255, 255, 128, 128, 128]);
   });
 
-  it("of a triangle widens from its tip", () => {
+  it("widens from the tip of a triangle", () => {
     expect(component(rasterise([TRIANGLE], 5, 5), 3)).toEqual([
       [0, 0, 255, 0, 0],
       [0, 0, 255, 0, 0],
@@ -67,20 +68,20 @@ describe("the table of shapes", () => {
     ]);
   });
 
-  it("of shapes that overlap shares the colour by their opacities", () => {
+  it("mixes the colours of overlapping shapes by their opacities", () => {
     const cell = 4 * (5 * 4 + 2);
     const table = rasterise([RECTANGLE, TRIANGLE], 5, 5);
     expect([...table.subarray(cell, cell + 4)]).toEqual([64, 32, 191, 255]);
   });
 
-  it("of no shapes is clear and white", () => {
+  it("is transparent and white without shapes", () => {
     const table = rasterise([]);
     expect(table.length).toBe(4 * ROWS * COLUMNS);
     expect([...table.subarray(0, 4)]).toEqual([255, 255, 255, 0]);
     expect(table.every((v, i) => v === (i % 4 === 3 ? 0 : 255))).toBe(true);
   });
 
-  it("with hard edges holds all of a shape or nothing", () => {
+  it("has the full opacity or none at hard edges", () => {
     const hard = { ...RECTANGLE, values: [0.3, 0.6] as const, softness: 0 };
     expect(component(rasterise([hard], 5, 5), 3)).toEqual([
       [0, 0, 0, 0, 0],
@@ -88,7 +89,7 @@ describe("the table of shapes", () => {
     ]);
   });
 
-  it("has a triangle's tip between two cells too", () => {
+  it("includes the tip of a triangle that lies between two cells", () => {
     const thin = { ...TRIANGLE, tip: 0.3737, values: [0.37, 0.378] as const, softness: 0 };
     const table = rasterise([thin]);
     for (let row = 0; row < ROWS; row++) {
@@ -98,7 +99,7 @@ describe("the table of shapes", () => {
   });
 });
 
-describe("what is taken hold of", () => {
+describe("the part under the pointer", () => {
   const box: Shape = { ...RECTANGLE, values: [0.2, 0.6], gradients: [0.3, 0.7] };
   const cone: Shape = { ...TRIANGLE, tip: 0.5, values: [0.3, 0.7], gradients: [0.2, 0.8] };
 
@@ -127,7 +128,7 @@ describe("what is taken hold of", () => {
     expect(hitTest([cone], at(0.71, 0.79), REACH)?.part).toBe("top-right");
     expect(hitTest([cone], at(0.5, 0.2), REACH)?.part).toBe("bottom");
     expect(hitTest([cone], at(0.5, 0.5), REACH)?.part).toBe("body");
-    // half-way up it is half as wide: 0.4 to 0.6 at 0.4
+    // the triangle is half as wide half-way up: 0.4 to 0.6 at a gradient of 0.4
     expect(hitTest([cone], at(0.41, 0.4), REACH)?.part).toBe("body");
     expect(hitTest([cone], at(0.36, 0.4), REACH)).toBeNull();
   });
@@ -140,7 +141,7 @@ describe("what is taken hold of", () => {
 });
 
 describe("an edit", () => {
-  it("moves a shape as far as the plane goes, and keeps its size", () => {
+  it("moves a shape as far as the end of the histogram, and keeps its size", () => {
     const moved = move(RECTANGLE, at(-0.1, 5));
     expect(moved.values).toEqual([0.15, 0.9]);
     expect(moved.gradients).toEqual(RECTANGLE.gradients);
@@ -150,7 +151,7 @@ describe("an edit", () => {
     expect(move(cone, at(-1, 0)).values[1]).toBeCloseTo(0.4);
   });
 
-  it("draws a part to a point, inside the plane, and leaves a least size", () => {
+  it("moves a part to a point inside the histogram, and keeps the smallest size", () => {
     const box: Shape = { ...RECTANGLE, values: [0.2, 0.6], gradients: [0.3, 0.7] };
     expect(resize(box, "top-right", at(0.9, 0.8))).toMatchObject({
       values: [0.2, 0.9],
@@ -166,7 +167,7 @@ describe("an edit", () => {
     expect(resize(box, "body", at(0, 0))).toBe(box);
   });
 
-  it("of any kind, anywhere, leaves a shape without a fault", () => {
+  it("leaves a valid shape, whatever its kind and place", () => {
     const places = [-1, 0, 0.001, 0.4, 0.999, 1, 2];
     const parts = ["tip", "top-left", "bottom-right", "bottom-left", "top", "left"] as const;
     for (const kind of ["rectangle", "triangle"] as const) {
@@ -184,7 +185,7 @@ describe("an edit", () => {
     }
   });
 
-  it("adds, replaces and removes without touching the list that it was given", () => {
+  it("adds, replaces and removes without changing the given list", () => {
     const shapes = Object.freeze([RECTANGLE]);
     expect(addShape(shapes, TRIANGLE)).toEqual([RECTANGLE, TRIANGLE]);
     expect(replaceShape(shapes, 0, TRIANGLE)).toEqual([TRIANGLE]);
@@ -195,7 +196,7 @@ describe("an edit", () => {
 });
 
 describe("a shape from outside", () => {
-  it("is refused with a reason", () => {
+  it("is rejected with a reason", () => {
     expect(faultOf(TRIANGLE)).toBeNull();
     expect(faultOf({ ...TRIANGLE, values: [0.5, 0.5] })).toMatch(/values are \(0.5, 0.5\)/);
     expect(faultOf({ ...TRIANGLE, gradients: [0.5, 1.5] })).toMatch(/gradients/);

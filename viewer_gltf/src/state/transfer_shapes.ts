@@ -1,7 +1,8 @@
 /**
- * Two-dimensional transfer functions: shapes in the joint histogram of value and gradient magnitude, the table
- * that a shader reads, and what an editor does with them. Plain data and pure functions. The table
- * has the bytes that the pipeline's evaluate2d has; docs/transfer-functions.md states the formula.
+ * Two-dimensional transfer functions: shapes in the joint histogram of intensity and gradient
+ * magnitude, the table that a shader reads, and the edits of an editor. Plain data and pure
+ * functions. The table has the same bytes as that of the pipeline's evaluate2d;
+ * docs/transfer-functions.md has the formula.
  */
 import {
   COLUMNS,
@@ -13,14 +14,17 @@ import {
   type Shapes,
 } from "../bundle/transfer_2d";
 
-/** Least size of a shape, as a share of the plane's width and height: a cell of the table. */
+/** Smallest size of a shape, as a share of the histogram's width and height: one cell of the table. */
 export const MIN_WIDTH = 1 / (COLUMNS - 1);
 export const MIN_HEIGHT = 1 / (ROWS - 1);
 
-/** A place in the plane: value in the window, gradient magnitude of gradient_max. */
+/**
+ * A place in the histogram: intensity as a share of the window, gradient magnitude as a share of
+ * gradient_max.
+ */
 export type HistogramPoint = Readonly<{ value: number; gradient: number }>;
 
-/** What of a shape is taken hold of. Corners before edges before the body. */
+/** The part of a shape under the pointer. Corners are found before edges, edges before the body. */
 export type Part =
   | "tip"
   | "top-left"
@@ -37,8 +41,8 @@ export type Hit = Readonly<{ index: number; part: Part }>;
 const clamp = (x: number, low: number, high: number) => Math.min(high, Math.max(low, x));
 
 /**
- * The table of a function: RGBA of `rows` x `columns` cells, row 0 (gradient 0) first. RGB is a
- * factor to the channel's colour, A what one finest voxel spacing absorbs.
+ * Returns the table of a function: RGBA of `rows` x `columns` cells, row 0 (gradient 0) first. RGB
+ * is a factor to the channel's colour; A is the opacity of one finest voxel spacing.
  */
 export function rasterise(shapes: Shapes, rows = ROWS, columns = COLUMNS): Uint8Array<ArrayBuffer> {
   const table = new Uint8Array(rows * columns * 4);
@@ -68,7 +72,7 @@ export function rasterise(shapes: Shapes, rows = ROWS, columns = COLUMNS): Uint8
 
 type Sums = Readonly<Record<"clear" | "weight" | "r" | "g" | "b", Float64Array>>;
 
-/** Add a shape to one row, in the columns that it has a part of. */
+/** Adds a shape to one row of the table. */
 function addRow({ clear, weight, r, g, b }: Sums, shape: Shape, gradient: number, columns: number) {
   const [bottom, top] = shape.gradients;
   const height = (top - bottom) / 2;
@@ -82,7 +86,8 @@ function addRow({ clear, weight, r, g, b }: Sums, shape: Shape, gradient: number
   const middle = (left + right) / 2;
   const first = Math.max(0, Math.floor((middle - half) * (columns - 1)));
   const last = Math.min(columns - 1, Math.ceil((middle + half) * (columns - 1)));
-  // what is beyond an end of the window is clipped to it: no edge there
+  // A rectangle that reaches an end of the window has no soft edge there: intensities beyond it are
+  // clipped to the end.
   const isRectangle = shape.kind === "rectangle";
   const isOpenBelow = isRectangle && shape.values[0] === 0;
   const isOpenAbove = isRectangle && shape.values[1] === 1;
@@ -105,7 +110,7 @@ function soften(depth: number, softness: number): number {
   return clamp(depth / softness, 0, 1);
 }
 
-/** The values between which a shape lies at a gradient magnitude. */
+/** Returns the intensities between which a shape lies at a gradient magnitude. */
 function sidesAt(shape: Shape, gradient: number): Range {
   const [low, high] = shape.values;
   if (shape.kind === "rectangle") return shape.values;
@@ -113,7 +118,10 @@ function sidesAt(shape: Shape, gradient: number): Range {
   return [shape.tip + (low - shape.tip) * share, shape.tip + (high - shape.tip) * share];
 }
 
-/** Corners in order round the shape, to draw it; a triangle is cut off below its lower gradient. */
+/**
+ * Returns the corners in order around the shape, for drawing. A triangle is cut off below its lower
+ * gradient.
+ */
 export function outline(shape: Shape): readonly HistogramPoint[] {
   const [bottom, top] = shape.gradients;
   const [lowLeft, lowRight] = sidesAt(shape, bottom);
@@ -128,10 +136,10 @@ export function outline(shape: Shape): readonly HistogramPoint[] {
 }
 
 /**
- * What lies at a point: the shape on top, which is the last, and the part of it.
+ * Returns the topmost shape at a point, which is the last one, and the part of it that is hit.
  *
- * @param reach how far off a corner or an edge may be, in each direction of the plane
- * @param selected index of a shape: its corners and edges go before those of others
+ * @param reach largest distance to a corner or an edge, in each direction of the histogram
+ * @param selected index of the shape whose corners and edges are found first
  */
 export function hitTest(
   shapes: Shapes,
@@ -166,7 +174,7 @@ function partAt(shape: Shape, point: HistogramPoint, reach: HistogramPoint): Par
   const [left, right] = sidesAt(shape, clamp(point.gradient, bottom, top));
   if (point.value < left - reach.value || point.value > right + reach.value) return null;
   if (Math.abs(point.gradient - top) <= reach.gradient) return "top";
-  // a triangle that goes down to its tip has no lower edge
+  // a triangle that reaches down to its tip has no lower edge
   if (!(isTriangle && bottom === 0) && Math.abs(point.gradient - bottom) <= reach.gradient) {
     return "bottom";
   }
@@ -175,7 +183,7 @@ function partAt(shape: Shape, point: HistogramPoint, reach: HistogramPoint): Par
   return left <= point.value && point.value <= right ? "body" : null;
 }
 
-/** The shape moved as a whole, as far as it stays inside the plane; its size stays. */
+/** Returns the shape moved as a whole, as far as it stays inside the histogram. Its size stays the same. */
 export function move(shape: Shape, by: HistogramPoint): Shape {
   const [v0, v1] = shape.values;
   const [g0, g1] = shape.gradients;
@@ -192,12 +200,15 @@ export function move(shape: Shape, by: HistogramPoint): Shape {
   };
 }
 
-/** Rounding must not leave the plane. */
+/** Keeps both ends in 0..1 despite rounding. */
 function shifted(low: number, high: number, by: number): Range {
   return [clamp(low + by, 0, 1), clamp(high + by, 0, 1)];
 }
 
-/** The shape with one part drawn to a point; it stays inside the plane and keeps a least size. */
+/**
+ * Returns the shape with one part moved to a point. It stays inside the histogram, and at least of
+ * the smallest size.
+ */
 export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   if (part === "body") return shape;
   if (part === "tip") return { ...shape, tip: clamp(to.value, 0, 1) };
@@ -211,7 +222,7 @@ export function resize(shape: Shape, part: Part, to: HistogramPoint): Shape {
   return shape.kind === "rectangle" ? { ...resized, tip: (v0 + v1) / 2 } : resized;
 }
 
-/** A shape of a usual size about a point: a rectangle round it, a triangle's tip below it. */
+/** Makes a shape of the usual size at a point: a rectangle around it, or a triangle with its tip below it. */
 export function makeShape(kind: ShapeKind, at: HistogramPoint): Shape {
   const [width, height] = [0.2, 0.3];
   const tip = clamp(at.value, 0, 1);
@@ -232,7 +243,7 @@ export function makeShape(kind: ShapeKind, at: HistogramPoint): Shape {
   return { ...shape, gradients: [0.5 * shape.gradients[1], shape.gradients[1]] };
 }
 
-/** With one more shape, on top; as they were where there are MAX_SHAPES. */
+/** Adds a shape on top; returns the same list if it already has MAX_SHAPES. */
 export function addShape(shapes: Shapes, shape: Shape): Shapes {
   return shapes.length < MAX_SHAPES ? [...shapes, shape] : shapes;
 }

@@ -1,6 +1,7 @@
 /**
- * What the viewer shows, as plain data. Every change is a pure function; the GPU side reads the
- * state and follows it. What a user sets by a number, a switch or a choice is in parameters/.
+ * The state of the viewer, as plain data. Every change is a pure function; the GPU side reads the
+ * state and follows it. Settings that a user makes by a number, a switch or a choice are in
+ * parameters/.
  */
 import type { Manifest } from "../bundle/generated/bundle";
 import type { Clip } from "../math/clip";
@@ -13,8 +14,8 @@ import type { Settings } from "./parameters/settings";
 import type { Functions } from "./transfer_functions_2d";
 
 /**
- * So many channels show at once: one march samples as many from one texture. Of more, the one that
- * has been shown longest leaves.
+ * Largest number of channels that can be shown: one march samples four channels from one texture.
+ * Another one hides the channel that has been shown longest.
  */
 export const MAX_CHANNELS = 4;
 
@@ -24,28 +25,31 @@ export type ChannelState = Functions &
     id: string;
     name: string;
     shown: boolean;
-    /** When it was shown: the lowest leaves first. */
+    /** Order in which channels were shown; the lowest one is hidden first. */
     turn: number;
-    /** The bundle's colour. */
+    /** Colour in the bundle. */
     original: Rgb;
-    /** Part of the volume's intensities, 0..1, that the transfer function is stretched over. */
+    /** Part of the intensities, 0..1, that the transfer function is stretched over. */
     window: readonly [number, number];
     hasSurface: boolean;
-    /** A label map: closed objects, and no volume. */
+    /** Whether the channel is a label map: objects with closed surfaces, and no volume. */
     hasObjects: boolean;
-    /** Why the build made no surface: its volume is drawn from afar too. Empty: it made one. */
+    /**
+     * Reason why the build made no surface, in which case the volume is drawn from afar too; "": it
+     * made one.
+     */
     surfaceReason: string;
   }>;
 
 export type Representation = Manifest["tiles"][number]["representation"];
 
-/** `representation`: what the stage draws there, as far as VOLUME_TILES_AT_START lets it. */
+/** `representation`: how the stage draws the tile, for at most VOLUME_TILES_AT_START tiles. */
 export type TileState = Readonly<{
   id: string;
-  /** The name that the stage gives the tile; absent: it has none. */
+  /** Name that the stage gives the tile; absent: none. */
   name?: string;
   representation: Representation;
-  /** Its surfaces are not built yet; absent: they are. */
+  /** true: the surfaces of the tile are not built yet. */
   isUnfinished?: true;
 }>;
 
@@ -54,35 +58,35 @@ export type ViewerState = Settings &
   Readonly<{
     channels: readonly ChannelState[];
     tiles: readonly TileState[];
-    /** Of the channels that are label maps. */
+    /** Views of the channels that are label maps. */
     objects: ObjectViews;
-    /** The tile nearest to the specimen's centre. */
+    /** Tile nearest to the specimen's centre. */
     middle: string;
-    /** The tile that was chosen; null: the gaze chooses. */
+    /** Tile that was chosen; null: the gaze chooses. */
     selected: string | null;
-    /** The only tile that is shown; null: all are. */
+    /** The only tile that is shown; null: all tiles are. */
     isolated: string | null;
-    /** The part of the specimen that the cuts leave, um. */
+    /** Part of the specimen that the cuts leave, um. */
     clip: Clip;
     /** Views that a video goes through. */
     keptViews: readonly KeptView[];
-    /** Whether this device can gather light: draw into textures of floats. */
+    /** Whether this device can trace paths, for which it must draw into floating-point textures. */
     canTrace: boolean;
     /** Faults that leave the rest usable, newest last. */
     notices: readonly string[];
-    /** Of these, what another try may mend. */
-    mendable: readonly string[];
+    /** Notices of faults that another attempt may solve. */
+    retryable: readonly string[];
   }>;
 
-/** The channels that may be marched, in the bundle's order. */
+/** Returns the channels that may be drawn as volumes, in the order of the bundle. */
 export function volumeChannels(state: ViewerState): readonly ChannelState[] {
   return state.channels.filter((c) => c.shown && c.volume);
 }
 
-/** Whether there is a volume at all: label maps have none. */
+/** Returns whether the bundle has a volume. Label maps have none. */
 export const hasVolumes = ({ channels }: Pick<ViewerState, "channels">): boolean =>
   channels.some(({ hasObjects }) => !hasObjects);
 
-/** Whether a channel is shown that has one. */
+/** Returns whether a shown channel has a volume. */
 export const showsVolumes = ({ channels }: Pick<ViewerState, "channels">): boolean =>
   channels.some(({ shown, hasObjects }) => shown && !hasObjects);

@@ -11,10 +11,10 @@ import type { ShownSurface } from "../state/on_screen";
 import { overview, type Progress } from "../state/overview_progress";
 import {
   type FocusTiles,
+  hiddenShare,
   isInDisc,
   marchedTile,
   NO_FOCUS,
-  takenFrom,
   wantsSurface,
 } from "../state/representation";
 import { Signal } from "../state/signal";
@@ -219,7 +219,7 @@ export class SurfaceSet implements Surfaces {
     const tile = state?.tiles.find((each) => each.id === surface.tile);
     if (state === null || channel === undefined || tile === undefined) return;
     const presence = this.options.presence(tile.id, id);
-    const taken = takenFrom(state, channel, tile, this.focusTiles, presence);
+    const taken = hiddenShare(state, channel, tile, this.focusTiles, presence);
     surface.blend.set({
       opacity: taken === null ? 0 : channel.opacity,
       taken: taken ?? 0,

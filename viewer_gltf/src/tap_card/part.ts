@@ -1,4 +1,7 @@
-/** A tap on the flat picture opens a card beside the place. The card's code loads with the first tap. */
+/**
+ * A tap on the flat view opens a card beside the place. The code of the card is loaded with the
+ * first tap.
+ */
 
 import { NOT_LOADED } from "../host/later";
 import type { Part, PartDefinition, PartHost, Tap } from "../host/part";
@@ -7,7 +10,7 @@ import type { PlacedCard } from "./placed_card";
 class TapCardPart implements Part {
   readonly id = "tap-card";
   private card: PlacedCard | null = null;
-  /** Number of taps so far. If another tap has come while the code loaded, the first one opens no card. */
+  /** Number of taps so far. If another tap comes while the code is loading, the first one opens no card. */
   private taps = 0;
 
   constructor(private readonly host: PartHost) {
@@ -32,7 +35,7 @@ class TapCardPart implements Part {
       host.announce(NOT_LOADED);
       return;
     }
-    this.card ??= new part.PlacedCard(host, (wish) => host.service("page")?.perform(wish));
+    this.card ??= new part.PlacedCard(host, (request) => host.service("page")?.perform(request));
     await this.card.open(tap);
   }
 

@@ -6,7 +6,7 @@ import { TapCard } from "../panel/html/tap_card";
 import type { Send } from "../panel/html/widget";
 import { type Tapped, tapCardOf } from "../panel/tap_card";
 
-/** Time after a tap in which another one makes a double click of the two, ms: see interaction/rays.ts. */
+/** Milliseconds in which a second tap makes a double click (see interaction/rays.ts). */
 const DOUBLE_MS = 400;
 
 type Place = Tapped & Readonly<{ point: Vec3 }>;
@@ -14,7 +14,7 @@ type Place = Tapped & Readonly<{ point: Vec3 }>;
 export class PlacedCard {
   private readonly card: TapCard;
   private shown: Place | null = null;
-  /** Counts the taps, so that only the newest one opens the card. */
+  /** Number of taps so far; only the newest one opens the card. */
   private taps = 0;
 
   constructor(
@@ -24,12 +24,12 @@ export class PlacedCard {
     this.card = new TapCard(host.view, send, () => this.close());
   }
 
-  /** Opens the card of the place that a tap meets, unless the tap was the first of a double click. */
+  /** Opens the card of the place that a tap hits, unless the tap was the first of a double click. */
   async open({ ray, by, time_ms }: Tap): Promise<void> {
     const number = ++this.taps;
     const isByKey = by === "key";
-    const tapped = await this.meet(ray);
-    // the card of another place goes at once
+    const tapped = await this.find(ray);
+    // the card of another place closes at once
     if (number === this.taps) this.hide();
     const rest_ms = isByKey ? 0 : time_ms + DOUBLE_MS - performance.now();
     await new Promise((resolve) => setTimeout(resolve, Math.max(0, rest_ms)));
@@ -41,7 +41,7 @@ export class PlacedCard {
     else this.card.open(tapCardOf(host.state, tapped, host.undo.undoes), place, isByKey);
   }
 
-  /** Closes the card, and leaves one that is about to open closed. */
+  /** Closes the card, and cancels one that is about to open. */
   close(): void {
     this.taps++;
     this.hide();
@@ -52,7 +52,7 @@ export class PlacedCard {
     this.card.close();
   }
 
-  /** Follows a change of the state. */
+  /** Updates the card to the state. */
   update(): void {
     const { host, shown } = this;
     if (shown === null) return;
@@ -60,7 +60,7 @@ export class PlacedCard {
     else this.card.update(tapCardOf(host.state, shown, host.undo.undoes));
   }
 
-  /** Follows the view, after every frame. */
+  /** Moves the card with the view, after every frame. */
   follow(): void {
     if (this.shown === null) return;
     const place = this.host.isInRoom ? null : this.placeOf(this.shown.point);
@@ -68,32 +68,35 @@ export class PlacedCard {
     else this.card.moveTo(place);
   }
 
-  /** The nearest object, surface, volume or slice along a ray, else the tile; null: the ray meets nothing. */
-  private async meet(ray: Ray): Promise<Place | null> {
+  /**
+   * Returns the nearest object, surface, volume or slice along a ray, else the tile; null: nothing
+   * is hit.
+   */
+  private async find(ray: Ray): Promise<Place | null> {
     const { state, reading } = this.host;
-    const met = await reading.probe(ray);
+    const hit = await reading.probe(ray);
     const object = this.host.objectAlong(ray);
     const isOfObjects = (id: string | null) =>
       state.channels.some((each) => each.id === id && each.hasObjects);
-    // the probe also meets the triangles of objects that are hidden
-    const other = met !== null && isOfObjects(met.channel) ? null : met;
+    // the probe also hits the triangles of hidden objects
+    const other = hit !== null && isOfObjects(hit.channel) ? null : hit;
     if (object !== null && !(other && other.distance_um < object.distance_um)) {
       return placeOfHit(object);
     }
     return other === null ? this.tileAlong(ray) : placeOfHit(other);
   }
 
-  /** The tile along a ray, where there are several; null: there is none. */
+  /** Returns the tile along a ray if there are several tiles; null: none. */
   private tileAlong(ray: Ray): Place | null {
     const { state, bundle } = this.host;
     const { tiles } = bundle.manifest;
-    const met = pickTile(ray, shownTiles(tiles, state.isolated), state.clip);
-    if (met === null || tiles.length < 2) return null;
-    const point = along(ray.origin, ray.direction, met.distance);
-    return { point, tile: met.id, channel: null };
+    const hit = pickTile(ray, shownTiles(tiles, state.isolated), state.clip);
+    if (hit === null || tiles.length < 2) return null;
+    const point = along(ray.origin, ray.direction, hit.distance);
+    return { point, tile: hit.id, channel: null };
   }
 
-  /** px from the upper left of the picture; null: out of the picture. */
+  /** Returns the place in px from the upper left of the view; null: outside the view. */
   private placeOf(point: Vec3): Readonly<{ x: number; y: number }> | null {
     const { canvas, viewpoint } = this.host;
     const { clientWidth, clientHeight } = canvas;

@@ -18,21 +18,25 @@ function nextTile(by: number): Key["to"] {
 const KEYS: readonly Key[] = [
   key("t", "Next tile", nextTile(1)),
   key("T", "Previous tile", nextTile(-1)),
-  key("i", "Show only the tile that is chosen or looked at; again: all", (context) => {
+  key("i", "Show only the selected or gazed tile; again: all tiles", (context) => {
     const { state, focusTile } = context;
     if (state.isolated !== null) return { type: "isolate", tile: null };
     const tile = state.selected ?? focusTile;
     if (tile === null) return no(REFUSED.tile);
     return { type: "isolate", tile };
   }),
-  key("g", "Choose the tile that is looked at", ({ state, focusTile }) =>
+  key("g", "Select the gazed tile; again: isolate it", ({ state, focusTile }) =>
     focusTile === null ? no(REFUSED.tileAhead) : chosenTile(state, focusTile),
   ),
-  key(["Escape", "Backspace"], "Back: out of stereo, all tiles, then none chosen", ({ state }) => {
-    if (state.screenStereo !== "off") return setTo(SCREEN_STEREO, "off");
-    const isChosen = state.isolated !== null || state.selected !== null;
-    return isChosen ? "back" : no(REFUSED.back);
-  }),
+  key(
+    ["Escape", "Backspace"],
+    "Back: end stereo, show all tiles, then clear the selection",
+    ({ state }) => {
+      if (state.screenStereo !== "off") return setTo(SCREEN_STEREO, "off");
+      const isChosen = state.isolated !== null || state.selected !== null;
+      return isChosen ? "back" : no(REFUSED.back);
+    },
+  ),
 ];
 
 export const TILE_KEYS: readonly KeyGroup[] = [{ name: "Tiles", rank: 70, keys: KEYS }];

@@ -1,4 +1,4 @@
-/** The choice of a tile as a part of the viewer. */
+/** The choice of a tile, as a part of the viewer. */
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PartSection } from "../panel/controls";
 import { TILE_KEYS } from "./keys";

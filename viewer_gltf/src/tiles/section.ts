@@ -1,4 +1,4 @@
-/** The panel's section of the tiles: a map by row and column, or a list. Pure. */
+/** The section of the tiles on the panel: a map by row and column, or a list. Pure. */
 
 import { command } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
@@ -22,7 +22,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
         { value: "", label: "by gaze" },
         ...state.tiles.map(({ id }) => ({
           value: id,
-          label: `${tileName(id, state.tiles)}${id === focusTile ? " (gazed at)" : ""}`,
+          label: `${tileName(id, state.tiles)}${id === focusTile ? " (in the gaze)" : ""}`,
         })),
       ],
       isInline: false,
@@ -64,7 +64,7 @@ function tileItems(state: ViewerState, focusTile: string | null): readonly Contr
   return items;
 }
 
-/** A specimen of one tile leaves nothing to choose, and has no such section. */
+/** A specimen of one tile has no such section. */
 export function tileSections(state: ViewerState, focusTile: string | null): readonly PartSection[] {
   if (state.tiles.length < 2) return [];
   return [{ rank: 40, id: "tiles", label: "Tiles", items: tileItems(state, focusTile) }];

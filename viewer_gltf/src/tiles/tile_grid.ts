@@ -1,12 +1,12 @@
-/** Tiles by row and column, where their ids hold them: r<row>_c<column>. Row 0 is on top. Pure. */
+/** Tiles by row and column, if their ids have them: r<row>_c<column>. Row 0 is at the top. Pure. */
 
 type Cell = Readonly<{ id: string; row: number; column: number }>;
 export type Grid = Readonly<{ rows: number; columns: number; cells: readonly Cell[] }>;
 
-/** Most cells of a map: the user could not tap on more. */
+/** Largest number of cells of a map; more would be too small to tap. */
 const MAX_CELLS = 400;
 
-/** null: the ids are of another kind (or of several layers), or the map would be too large. */
+/** Returns null if the ids have another form (or several layers), or if the map would be too large. */
 export function tileGrid(ids: readonly string[]): Grid | null {
   const cells: Cell[] = [];
   for (const id of ids) {

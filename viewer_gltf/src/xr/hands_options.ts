@@ -15,7 +15,7 @@ export type HandsOptions = Readonly<{
   tiles: readonly BoxedTile[];
   /** Targets between the panel and the tiles that can be dragged, such as a cut's handles. */
   handles?: () => readonly Target[];
-  layOut: (view: PanelView) => Layout;
+  buildPanel: (view: PanelView) => Layout;
   onAction: (action: Action) => void;
   onCommand: (command: Command) => void;
   /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */

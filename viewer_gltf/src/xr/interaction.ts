@@ -67,12 +67,12 @@ export class Hands {
   private state: ViewerState | null = null;
 
   constructor(private readonly options: HandsOptions) {
-    const { scene, specimen, handles = () => [], layOut, onLeave } = options;
+    const { scene, specimen, handles = () => [], buildPanel, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
     this.mover = new SpecimenMover(specimen, options.tiles);
     this.notice = new RoomNotice(isPainted);
     this.panel = new RoomPanel({
-      layOut,
+      buildPanel,
       onLeave,
       onLenses,
       isPainted,

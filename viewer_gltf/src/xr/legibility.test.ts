@@ -5,7 +5,7 @@
 import { afterAll, describe, expect, it } from "vitest";
 import { STEREO_FACTS } from "../../test/support/fixture/facts";
 import { sampleManifest } from "../../test/support/fixture/manifest";
-import { layOut } from "../../test/support/panel/whole_panel";
+import { buildPanel } from "../../test/support/panel/whole_panel";
 import { writeTable } from "../../test/support/table";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../panel/canvas/bar";
 import type { Mark, Rect } from "../panel/canvas/draw_list";
@@ -68,13 +68,13 @@ type Surface = Readonly<{ name: string; size: readonly [number, number] }> &
 /** Every page of the menu, and the bar in each of its states. */
 function surfaces(): readonly Surface[] {
   const lit = [
-    { type: "notify", text: "a fault", isMendable: true } as const,
+    { type: "notify", text: "a fault", isRetryable: true } as const,
     { type: "set", id: "mode", value: "traced" } as const,
   ].reduce(reduce, initialState(sampleManifest(12)));
   const found: Surface[] = [];
   for (const state of [initialState(sampleManifest(12)), lit]) {
     const facts = { ...STEREO_FACTS, split: { isAvailable: true, reason: "" } };
-    const layout = layOut(state, facts, { ...START_VIEW, picked: "c2", isHistogramOpen: true });
+    const layout = buildPanel(state, facts, { ...START_VIEW, picked: "c2", isHistogramOpen: true });
     const opened = layout.sections.flatMap(({ id: tab, items }) => [
       { tab, group: null },
       ...items.flatMap(({ kind, id }) => (kind === "group" ? [{ tab, group: id }] : [])),

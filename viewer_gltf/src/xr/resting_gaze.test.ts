@@ -13,7 +13,7 @@ function busy(state: ViewerState): ViewerState {
     [3, 4, 0],
   ] as const;
   return [
-    { type: "notify", text: "a fault", isMendable: true } as const,
+    { type: "notify", text: "a fault", isRetryable: true } as const,
     { type: "measure", points } as const,
     { type: "finish-measuring" } as const,
     { type: "measure", points } as const,

@@ -1,4 +1,4 @@
-/** A part is one folder and one line: without both, the rest of the viewer type-checks, builds and opens. */
+/** A part is one folder and one line. Without both, the rest of the viewer type-checks, builds and opens. */
 import { execFile } from "node:child_process";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -12,7 +12,7 @@ import { openBrowser } from "../support/browser/shared_browser";
 import { describeInChromium } from "../support/browser/skip";
 import { buildPage, copyWithout, registeredParts } from "../support/without_parts";
 
-/** The parts whose copies are built and opened, by folder, and the section of the panel that each has. */
+/** Parts whose copies are built and opened, by folder, with the panel section of each. */
 const OPENED: Readonly<Record<string, string>> = {
   annotations: "measure",
   capture: "save",
@@ -21,7 +21,7 @@ const OPENED: Readonly<Record<string, string>> = {
   slices: "slices",
 };
 const FOLDERS = Object.keys(OPENED);
-/** The page's entry reads its address with files of this folder, which stays without the part's line. */
+/** The folder with which the page's entry reads its address. It stays when the part's line is removed. */
 const READS_ADDRESS = "share";
 
 const PARTS = await registeredParts();
@@ -35,7 +35,7 @@ beforeAll(async () => {
 
 afterAll(() => rm(folder, { recursive: true }));
 
-/** The copy of the viewer without a part, made when it is first asked for. */
+/** Returns the copy of the viewer without a part, made at the first request. */
 function without(part: string): Promise<string> {
   const kept = part === READS_ADDRESS ? [part] : [];
   const copy = copies.get(part) ?? copyWithout([part], join(folder, part), kept);
@@ -43,7 +43,7 @@ function without(part: string): Promise<string> {
   return copy;
 }
 
-/** The faults that the compiler finds in a copy; "": none. */
+/** Returns the faults that the compiler finds in a copy; "": none. */
 async function faultsOf(copy: string): Promise<string> {
   const compiler = join(copy, "node_modules/.bin/tsc");
   const done = await promisify(execFile)(compiler, ["--noEmit", "-p", "tsconfig.page.json"], {
@@ -53,7 +53,7 @@ async function faultsOf(copy: string): Promise<string> {
 }
 
 describe("the viewer", () => {
-  it("is opened without parts that are registered", () => {
+  it("is tested without parts that are registered", () => {
     expect(PARTS).toEqual(expect.arrayContaining(FOLDERS));
   });
 
@@ -72,7 +72,7 @@ describeInChromium("the page", () => {
   afterAll(() => browser?.close());
 
   it.each(FOLDERS)(
-    "without %s draws the specimen, and has the others' sections",
+    "without %s draws the specimen, and has the sections of the other parts",
     async (removed) => {
       const built = await buildPage(await without(removed));
       const host = await Host.start({ "/app/": built, "/bundle/": inject("fixture") });

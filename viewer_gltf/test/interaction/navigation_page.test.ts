@@ -77,7 +77,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     await page().mouse.dblclick(stage.x + 2, stage.y + stage.height / 2);
     await stand.viewer.still();
     expect(await look()).toEqual(whole);
-    expect(await page().locator("[data-said]").textContent()).toBe("Nothing lies there to fly to.");
+    expect(await page().locator("[data-said]").textContent()).toBe("There is nothing to fly to.");
   });
 
   it("flies to what is tapped twice by a finger that rolls a little", async () => {

@@ -1,10 +1,12 @@
 /**
- * Careless use: rests, double clicks, turns of the phone while it loads, sliders while the picture moves, gazes in the
- * split screen. Nothing changes that was not asked for, nothing fails, and the page holds on to nothing.
+ * Careless use of the page: rests, double clicks, rotations of the phone during loading, sliders
+ * during motion, gazes in the split screen. No act changes more than it may, no act fails, and
+ * nothing leaks.
  *
- *   STEREOCELL_CARELESS_S      how long a reader is careless, s; 8 without it, `make careless` takes ten minutes
- *   STEREOCELL_CARELESS_SEED   another reader
- *   STEREOCELL_CARELESS_REPORT a file for the figures
+ * STEREOCELL_CARELESS_S      duration of the careless use, s; default 8, ten minutes in `make
+ * careless`
+ * STEREOCELL_CARELESS_SEED   seed of another user
+ * STEREOCELL_CARELESS_REPORT file for the figures
  */
 import { writeFile } from "node:fs/promises";
 import { expect, it } from "vitest";
@@ -18,7 +20,7 @@ import {
   chooseAct,
   comeToRest,
   type Reader,
-  unasked,
+  unexpected,
 } from "../support/careless/walk";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { seeded } from "../support/seeded";
@@ -27,33 +29,33 @@ const WALK_S = Number(process.env.STEREOCELL_CARELESS_S ?? 8);
 const SEED = Number(process.env.STEREOCELL_CARELESS_SEED ?? 1);
 const REPORT = process.env.STEREOCELL_CARELESS_REPORT;
 const IS_LONG = process.env.STEREOCELL_CARELESS_S !== undefined;
-/** Between two visits to the split screen, and acts in it. */
+/** Number of acts between two visits to the split screen, and in the split screen. */
 const ACTS_ON_SCREEN = 12;
 const ACTS_IN_STEREO = 3;
 
 const ROUNDS = IS_EXHAUSTIVE ? 200 : 6;
-/** After so many rounds each part has come, and is kept; after the more ones all steps are there that can be undone. */
+/** Rounds after which every part is loaded, and the history of undo is full. */
 const WARM_ROUNDS = IS_EXHAUSTIVE ? 20 : 3;
 /**
- * Objects of each kind that may be there later than at first: on a busy machine a part of the picture comes in a later
- * round. A leak takes one in each round, or in each of a few.
+ * Objects of each kind that may appear after the first rounds. On a busy machine, a part of the
+ * view is loaded in a later round. A leak adds an object in each round, or in each of a few.
  */
 const LATE_OBJECTS = Math.max(2, Math.floor((ROUNDS - WARM_ROUNDS) / 10));
-/** Of the JavaScript heap: the steps that can be undone, and compiled code. */
+/** Bytes by which the JavaScript heap may grow: steps that can be undone, and compiled code. */
 const HEAP_SLACK_BYTES = 3 * 1024 * 1024;
 const PATIENT = { timeout: 30_000, interval: 1000 };
 
-/** The figures that have grown by more than their bounds, each with both values. */
+/** Returns the figures that have grown by more than their bounds, each with both values. */
 function growth(before: Figures, after: Figures): readonly string[] {
   const names = Object.keys(before) as (keyof Figures)[];
   return names.flatMap((name) => {
     const slack = name === "heap_bytes" ? HEAP_SLACK_BYTES : LATE_OBJECTS;
-    const isHeld = after[name] > before[name] + slack;
-    return isHeld ? [`${name}: ${before[name]} before, ${after[name]} after`] : [];
+    const hasGrown = after[name] > before[name] + slack;
+    return hasGrown ? [`${name}: ${before[name]} before, ${after[name]} after`] : [];
   });
 }
 
-/** Words of notices about faults; a careless reader meets none. */
+/** Words in notices of faults, which a careless user must not cause. */
 const FAULT = /failed|expected|can't|damaged|broke|answered|dropped/;
 
 describeInChromium("careless use", () => {
@@ -62,7 +64,7 @@ describeInChromium("careless use", () => {
     viewport: { width: 640, height: 480 },
     isBlind: !IS_LONG,
   });
-  /** The page's own faults, and changes that nobody asked for. */
+  /** Faults of the page, and changes that no act may make. */
   const faults: string[] = [];
 
   function listenForFaults(): void {
@@ -74,14 +76,14 @@ describeInChromium("careless use", () => {
     });
   }
 
-  /** Act once, at random; compare what has changed with what was asked for. */
+  /** Acts once, at random, and compares the changes with those that the act may make. */
   async function act(reader: Reader, acts: readonly Act[], done: string[]): Promise<void> {
     const before = await comeToRest(reader);
     const one = chooseAct(reader.random, acts);
     done.push(one.name);
     const detail = await one.run(reader);
     const after = await comeToRest(reader);
-    const changed = unasked(one, changesBetween(before, after));
+    const changed = unexpected(one, changesBetween(before, after));
     const control = typeof detail === "string" ? ` (${detail})` : "";
     const which = `act ${done.length}, ${one.name}${control}`;
     if (changed.length > 0) faults.push(`${which}: changed ${changed.join(", ")}`);
@@ -89,21 +91,21 @@ describeInChromium("careless use", () => {
     faults.push(...fresh.filter((text) => FAULT.test(text)).map((text) => `${which}: ${text}`));
   }
 
-  /** `points`: those that the reader has measured; each has a mark and a label. */
-  type Held = Figures & { at_s: number; acts: number; points: number };
+  /** `points` is the number of points that the user has measured. Each has a mark and a label. */
+  type Sample = Figures & { at_s: number; acts: number; points: number };
 
   async function countPoints({ viewer }: Reader): Promise<number> {
     const { measured, measurements } = (await viewer.snapshot()).state;
     return measurements.reduce((sum, { points }) => sum + points.length, measured.length);
   }
 
-  /** Remove all that the reader has measured: marks of it are no leak. */
+  /** Removes all measurements, because their marks are not a leak. */
   async function clearMeasurements(reader: Reader): Promise<void> {
     await reader.page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     while ((await countPoints(reader)) > 0) await reader.page.keyboard.press("u");
   }
 
-  async function walk(reader: Reader, done: string[], figures: Held[]): Promise<void> {
+  async function walk(reader: Reader, done: string[], figures: Sample[]): Promise<void> {
     const figured = await Figured.of(reader.page);
     const start_ms = Date.now();
     const passed_s = () => (Date.now() - start_ms) / 1000;
@@ -122,14 +124,14 @@ describeInChromium("careless use", () => {
     await figure();
   }
 
-  it(`changes nothing that was not asked for in ${WALK_S} s`, {
+  it(`changes only what each act may change in ${WALK_S} s`, {
     timeout: 1000 * (WALK_S + 180),
   }, async () => {
     await stand.open("&quality=auto");
     listenForFaults();
     const { viewer } = stand;
     const done: string[] = [];
-    const figures: Held[] = [];
+    const figures: Sample[] = [];
     try {
       await walk({ viewer, page: viewer.page, random: seeded(SEED) }, done, figures);
     } finally {
@@ -139,8 +141,8 @@ describeInChromium("careless use", () => {
     expect(faults).toEqual([]);
     expect(done.length).toBeGreaterThan(3);
     if (figures.length < 9) return;
-    // In the first third parts of the page and shaders come that stay. What is open and shown differs from time to
-    // time: a leak would show in the least figures, too.
+    // In the first third, parts of the page and shaders are loaded, and stay. The content of the
+    // page varies with time, but a leak would also show in the smallest figures.
     const third = Math.floor(figures.length / 3);
     const [middle, last] = [figures.slice(third, -third), figures.slice(-third)];
     for (const name of [
@@ -157,7 +159,7 @@ describeInChromium("careless use", () => {
     }
   });
 
-  it(`holds on to nothing after ${ROUNDS} rounds of all actions`, {
+  it(`leaks nothing in ${ROUNDS} rounds of all actions`, {
     timeout: IS_EXHAUSTIVE ? 3_600_000 : 180_000,
   }, async () => {
     const { viewer } = stand;
@@ -170,7 +172,7 @@ describeInChromium("careless use", () => {
     const press = async (...keys: readonly string[]) => {
       for (const key of keys) await page.keyboard.press(key);
     };
-    /** @param isFirst waits in each mode until all of it has come, so that nothing comes later */
+    /** @param isFirst waits in each mode until everything is loaded, so that nothing is loaded later */
     const round = async (isFirst: boolean) => {
       for (const mode of ["disc", "tile", "all", "traced", "off"]) {
         await page.locator("select[data-mode]").selectOption(mode);
@@ -200,7 +202,7 @@ describeInChromium("careless use", () => {
     const shown = (await viewer.snapshot()).state;
     for (let i = WARM_ROUNDS; i < ROUNDS; i++) await round(false);
     let after = await figured.now();
-    // On a busy machine the page lets go of some objects only a while after the last act.
+    // On a busy machine the page releases some objects only some time after the last act.
     await expect
       .poll(async () => {
         after = await figured.now();
@@ -217,7 +219,7 @@ describeInChromium("careless use", () => {
         { state, look: { position: [0, 0, 0], target: [0, 0, 0] } },
       ),
     ).toEqual([]);
-    // A leak of listeners would be seen, also where the page has let go of some others by now.
+    // A leak of listeners is detected, even if the page has released some others by now.
     await page.evaluate(() => {
       for (let i = 0; i < 200; i++) addEventListener("leak", () => undefined);
     });

@@ -1,4 +1,7 @@
-/** The page's Content-Security-Policy: nothing that the viewer does breaks it, and it forbids the rest. */
+/**
+ * The page's Content-Security-Policy: nothing that the viewer does violates it, and it forbids
+ * everything else.
+ */
 import { createHash } from "node:crypto";
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
@@ -21,7 +24,7 @@ describe("the policy", () => {
     const named = (directive: string) =>
       (new RegExp(`${directive} ([^;]*);`).exec(policy)?.[1] ?? "").split(" ").sort();
     expect(hashesOf("script")).toHaveLength(2);
-    // code and style are blobs: the page unpacks them
+    // the page unpacks code and style, which are blobs
     const run = ["'self'", "blob:", "'wasm-unsafe-eval'", ...hashesOf("script")];
     expect(named("script-src")).toEqual(run.sort());
     expect(named("style-src")).toEqual(["'self'", "blob:", ...hashesOf("style")].sort());
@@ -38,11 +41,11 @@ describe.skipIf(!MAPS_BUNDLE)("surfaces with baked maps", () => {
       pixelRatio: 1,
     });
 
-    it("are drawn, their images transcoded", async () => {
-      const told: string[] = [];
+    it("are drawn, with their images transcoded", async () => {
+      const reported: string[] = [];
       const fetched: string[] = [];
       stand.viewer.page.on("console", (message) => {
-        if (VIOLATION.test(message.text())) told.push(message.text());
+        if (VIOLATION.test(message.text())) reported.push(message.text());
       });
       stand.viewer.page.on("request", (request) => fetched.push(request.url()));
       await stand.open("&mode=off");
@@ -50,7 +53,7 @@ describe.skipIf(!MAPS_BUNDLE)("surfaces with baked maps", () => {
       expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
       expect((await stand.viewer.snapshot()).state.notices).toEqual([]);
       expect(fetched.some((url) => /basis|transcod/i.test(url))).toBe(true);
-      expect(told).toEqual([]);
+      expect(reported).toEqual([]);
     });
   });
 });
@@ -69,15 +72,15 @@ describeInChromium("the page's policy", () => {
 
   /** The browser's reports of violations of the policy. */
   function watch(): string[] {
-    const told: string[] = [];
+    const reported: string[] = [];
     stand.viewer.page.on("console", (message) => {
-      if (VIOLATION.test(message.text())) told.push(message.text());
+      if (VIOLATION.test(message.text())) reported.push(message.text());
     });
-    return told;
+    return reported;
   }
 
-  it("lets surfaces, volumes and stereo be drawn", async () => {
-    const told = watch();
+  it("allows surfaces, volumes and stereo", async () => {
+    const reported = watch();
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=tile&switch=9");
     await stand.viewer.settled();
@@ -89,11 +92,11 @@ describeInChromium("the page's policy", () => {
     await stand.viewer.chooseMode("off"); // software draws volumes for two eyes slowly
     await stand.viewer.enterStereo();
     expect((await stand.viewer.snapshot()).state.notices).toEqual([]);
-    expect(told).toEqual([]);
+    expect(reported).toEqual([]);
   });
 
   it("forbids scripts, styles and frames that are put into the page", async () => {
-    const told = watch();
+    const reported = watch();
     await stand.open("&mode=off");
     const ran = await stand.viewer.page.evaluate(async (host) => {
       const script = document.createElement("script");
@@ -111,7 +114,7 @@ describeInChromium("the page's policy", () => {
     }, other.address);
     expect(ran).toBeNull();
     expect(other.requests).toEqual([]);
-    expect(told.length).toBeGreaterThanOrEqual(4);
+    expect(reported.length).toBeGreaterThanOrEqual(4);
   });
 
   const reach = (address: string) =>
@@ -124,14 +127,14 @@ describeInChromium("the page's policy", () => {
       }
     }, address);
 
-  it("reaches no host but its own", async () => {
+  it("allows only its own host", async () => {
     await stand.open("&mode=off");
     expect(await reach(`${other.address}/manifest.json`)).toBe(false);
     expect(await reach(`${stand.host.address}/bundle/manifest.json`)).toBe(true);
     expect(other.requests).toEqual([]);
   });
 
-  it("reaches the host that the address names for the bundle, and no third one", async () => {
+  it("allows the host that the address names for the bundle, and no third one", async () => {
     const third = await Host.start({ "/": stand.bundle });
     await stand.viewer.page.goto(`${stand.host.address}/app/?bundle=${other.address}/`);
     expect(await reach(`${other.address}/manifest.json`)).toBe(true);

@@ -1,6 +1,6 @@
 /**
- * What the viewer weighs: its code, and what a bundle sends until the first picture, which is the
- * overview of all tiles. The bundle is the one in STEREOCELL_TEST_BUNDLE, or the fixture.
+ * Size of the viewer: its code, and the bytes of a bundle until the overview of all tiles is shown.
+ * The bundle is the one in STEREOCELL_TEST_BUNDLE, or the fixture.
  */
 import { readdir, readFile } from "node:fs/promises";
 import { basename, join } from "node:path";
@@ -11,13 +11,13 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const CODE_GZIP_BYTES = 380_000;
-const TOLD_IN = ["docs/viewer.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
-/** Page, code, style and bundle, from a host that compresses nothing. */
+const DOCS_WITH_SIZE = ["docs/viewer.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
+/** Bytes of page, code, style and bundle from a host without compression. */
 const ON_THE_WIRE_BYTES = 430_000;
-/** Of ten tiles, as the demo has. */
+/** Bytes for ten tiles, as in the demo. */
 const FIRST_PICTURE_BYTES = 300_000;
 const DEMO_TILES = 10;
-/** Parts of names of files that are fetched when they are first wanted, after the first picture. */
+/** Parts of the names of files that are fetched only when needed, after the overview. */
 const OPTIONAL = new RegExp(
   [
     "assemble_worker",
@@ -70,8 +70,8 @@ async function gzipBytes(): Promise<Map<string, number>> {
 type Sent = Readonly<{ path: string; bytes: number }>;
 
 /**
- * What had come when all tiles stood on screen: in the first channel (`first`), or in all that are
- * shown at the start.
+ * Returns the files that had been sent when all tiles were on screen: in the first channel
+ * (`first`), or in all channels of the opening view (`whole`).
  */
 async function sentBefore(
   picture: "first" | "whole",
@@ -105,7 +105,7 @@ async function sentBefore(
 
 const sum = (list: readonly Sent[]) => list.reduce((all, { bytes }) => all + bytes, 0);
 
-/** Bytes by kind of file, for people. */
+/** Returns the bytes by kind of file, for readers of the log. */
 function table(list: readonly Sent[]): string {
   const kinds = new Map<string, [number, number]>();
   for (const { path, bytes } of list) {
@@ -121,10 +121,13 @@ function table(list: readonly Sent[]): string {
 
 describe("the viewer's code", () => {
   it("is as large as the docs say", async () => {
-    for (const name of TOLD_IN) {
+    for (const name of DOCS_WITH_SIZE) {
       const text = await readFile(new URL(`../../../${name}`, import.meta.url), "utf8");
-      const told = [...text.matchAll(/(.*) (\d+) kB gzip/g)].map(([, before, kB]) => [before, kB]);
-      const [[before, kB], ...others] = told;
+      const stated = [...text.matchAll(/(.*) (\d+) kB gzip/g)].map(([, before, kB]) => [
+        before,
+        kB,
+      ]);
+      const [[before, kB], ...others] = stated;
       expect(before, name).toMatch(/page.* at most$/);
       expect([1000 * Number(kB), others], name).toEqual([CODE_GZIP_BYTES, []]);
     }
@@ -142,7 +145,13 @@ describe("the viewer's code", () => {
     );
     expect(total).toBeLessThanOrEqual(CODE_GZIP_BYTES);
     const main = [...sizes.keys()].find((name) => /viewer-[^/]*\.js$/.test(name)) ?? "";
-    expect(await readFile(join(DIST, main), "utf8")).not.toContain("What the stage draws there");
+    // descriptions of the schemas are for readers, and must not be part of the code
+    const schema = new URL("../../../schemas/bundle.schema.json", import.meta.url);
+    const found = (await readFile(schema, "utf8")).matchAll(/"description": "([^"\\]{40})/g);
+    const descriptions = [...found].map(([, description]) => description);
+    expect(descriptions.length).toBeGreaterThan(10);
+    const code = await readFile(join(DIST, main), "utf8");
+    expect(descriptions.filter((description) => code.includes(description))).toEqual([]);
   });
 });
 
@@ -168,7 +177,7 @@ describeInChromium("the first picture", () => {
     return false;
   }
 
-  it("needs no decoder that it doesn't use", async () => {
+  it("loads no decoder that it does not use", async () => {
     const sent = await sentBefore("whole", stand, "&mode=off");
     const code = sent.map(({ path }) => path).filter((path) => path.startsWith("/app/assets/"));
     expect(code.some((path) => /\/viewer-.*\.js\.gz$/.test(path))).toBe(true);
@@ -189,19 +198,19 @@ describeInChromium("the first picture", () => {
     expect(sum(whole)).toBeLessThanOrEqual(share * FIRST_PICTURE_BYTES);
   });
 
-  it("comes after at most 430 kB in all, of a host that compresses nothing", async () => {
+  it("comes after at most 430 kB in all, from a host without compression", async () => {
     const sent = await sentBefore("first", stand);
     const report = `${sum(sent)} bytes: ${table(sent)}`;
     process.stdout.write(`on the wire until the first picture: ${report}\n`);
     expect(sent.some(({ path }) => path === "/app/")).toBe(true);
-    // as much of the bundle for each tile, had it as many as the demo
+    // scaled to the number of tiles of the demo
     const share = Math.min(1, stand.manifest.tiles.length / DEMO_TILES);
     const ofBundle = sum(sent.filter(({ path }) => path.startsWith("/bundle/")));
     const whole = sum(sent) + (1 / share - 1) * ofBundle;
     expect(whole, report).toBeLessThanOrEqual(ON_THE_WIRE_BYTES);
   });
 
-  it("asks for no volume where none is drawn", async () => {
+  it("requests no volume if none is drawn", async () => {
     const sent = await sentBefore("whole", stand, "&mode=off");
     expect(sent.filter(({ path }) => path.includes("/volumes/"))).toEqual([]);
   });

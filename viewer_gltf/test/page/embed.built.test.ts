@@ -1,4 +1,4 @@
-/** The viewer in a frame of another origin, by the example of docs/embed.md. */
+/** The viewer in a frame of another origin, with the example of docs/embed.md. */
 import { readFile } from "node:fs/promises";
 import { createServer, type Server } from "node:http";
 import type { AddressInfo } from "node:net";
@@ -18,7 +18,7 @@ describeInChromium("the viewer in another page", () => {
     const [, found] = /```html\n([\s\S]*?)```/.exec(await readFile(DOCS, "utf8")) ?? [];
     if (found === undefined) throw new Error("no example in docs/embed.md");
     expect(found.split("\n").length).toBeLessThanOrEqual(32);
-    // the bundle's address is the only thing that a reader puts in
+    // a reader of the docs replaces only the address of the bundle
     example = found
       .replace("https://host.example/specimen/", `${stand.host.address}/app/`)
       .replace("?panel=off", "?bundle=/bundle/&panel=off");
@@ -42,7 +42,7 @@ describeInChromium("the viewer in another page", () => {
     return { page, told, frame: page.frameLocator("#viewer") };
   }
 
-  it("hears of what changes and changes what it is asked to, with no panel", async () => {
+  it("is notified of changes and makes changes, without a panel", async () => {
     const { page, told, frame } = await open();
     expect(await frame.locator(".panel").isVisible()).toBe(false);
     expect(await frame.locator(".stage canvas").isVisible()).toBe(true);
@@ -52,7 +52,7 @@ describeInChromium("the viewer in another page", () => {
     await expect.poll(() => told.textContent()).toMatch(/F_x20_body/);
   });
 
-  it("refuses what does not fit, and hears no other page", async () => {
+  it("rejects invalid requests, and ignores other pages", async () => {
     const { page, told } = await open();
     const send = (state: unknown) =>
       page.evaluate((asked) => {
@@ -63,7 +63,7 @@ describeInChromium("the viewer in another page", () => {
     await expect
       .poll(() => told.textContent())
       .toBe("channels.Balls.opacity: expected 0 to 1, found 7");
-    // the frame itself is of another origin than the one that may send
+    // the frame itself has another origin than the page that may send requests
     const inner = page.frames().find((each) => each.url().includes("embed="));
     await inner?.evaluate(() =>
       postMessage(
@@ -78,12 +78,12 @@ describeInChromium("the viewer in another page", () => {
     expect(shown).toBe(true);
   });
 
-  it("leaves the wheel to the page until somebody has clicked into it", async () => {
+  it("leaves the wheel to the page until the user has clicked into the frame", async () => {
     const { page } = await open();
     const inner = page.frames().find((each) => each.url().includes("embed="));
     const distance = () =>
       inner?.evaluate(() => Math.hypot(...(window.stereocell?.snapshot().look.position ?? [])));
-    await page.locator("#toggle").click(); // the keyboard is the page's
+    await page.locator("#toggle").click(); // the page keeps the keyboard focus
     await page.evaluate(() => {
       document.body.style.minHeight = "3000px";
     });
@@ -94,7 +94,8 @@ describeInChromium("the viewer in another page", () => {
     await page.mouse.wheel(0, 30);
     await expect.poll(scrolled).toBe(30);
     expect(await distance()).toBe(before);
-    // a pinch on a trackpad comes as a wheel with Ctrl: it zooms the specimen, and neither page
+    // a pinch on a trackpad is sent as a wheel event with Ctrl: it zooms the specimen, and not the
+    // page
     await page.keyboard.down("Control");
     await page.mouse.wheel(0, -300);
     await page.keyboard.up("Control");
@@ -102,7 +103,7 @@ describeInChromium("the viewer in another page", () => {
     const pinched = await distance();
     expect(await scrolled()).toBe(30);
     expect(await page.evaluate(() => visualViewport?.scale)).toBe(1);
-    await page.mouse.click(20, 400); // a corner of the frame, beside the specimen
+    await page.mouse.click(20, 400); // a corner of the frame beside the specimen
     await page.mouse.move(300, 300);
     await page.mouse.wheel(0, -300);
     await expect.poll(distance).not.toBe(pinched);

@@ -1,4 +1,4 @@
-/** Files that are broken, missing or slow: the rest stays on screen, and the page reports it. */
+/** Files that are damaged, missing or slow: the rest stays on screen, and the page reports the fault. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
@@ -20,7 +20,7 @@ describeInChromium("a faulty bundle", () => {
     return (await stand.viewer.snapshot()).triangles;
   }
 
-  it("keeps the coarser surface where a finer one fails, and tries again when shown anew", async () => {
+  it("keeps the coarser surface where a finer one fails, and tries again when shown again", async () => {
     for (const tile of ["r0_c0", "r0_c1"]) {
       const body = "gone";
       stand.host.overrides.set(`/bundle/${BALLS}/${tile}/lod0.glb`, { status: 404, body });
@@ -38,7 +38,7 @@ describeInChromium("a faulty bundle", () => {
     expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(4 * coarse);
   });
 
-  it("asks a busy host again", async () => {
+  it("requests a file of a busy host again", async () => {
     const path = `/bundle/${BALLS}/r0_c1/lod2.glb`;
     stand.host.overrides.set(path, { status: 503, body: "busy", times: 2 });
     expect(await onlyBalls()).toBeGreaterThan(0);
@@ -57,7 +57,7 @@ describeInChromium("a faulty bundle", () => {
     ]);
   });
 
-  it("reports that a tileset is not the one of the manifest", async () => {
+  it("reports that a tileset differs from the one in the manifest", async () => {
     const path = `${BALLS}/tileset.json`;
     const text = await readFile(join(stand.bundle, path), "utf8");
     const body = text.replace('"1.1"', '"1.0"');
@@ -82,7 +82,7 @@ describeInChromium("a faulty bundle", () => {
     expect((await stand.viewer.snapshot()).triangles).toBeGreaterThan(0);
   });
 
-  it("is reported where the address is none", async () => {
+  it("is reported if its address is invalid", async () => {
     await stand.viewer.page.goto(
       `${stand.host.address}/app/?bundle=${encodeURIComponent("http://")}`,
     );
@@ -90,7 +90,7 @@ describeInChromium("a faulty bundle", () => {
     expect(await fatal.textContent()).toContain("expected a folder's address on the web");
   });
 
-  it("shows how far the overview has come", async () => {
+  it("shows the progress of the overview", async () => {
     stand.host.delay_ms = 300;
     await stand.viewer.page.goto(`${stand.host.address}/app/?bundle=../bundle/`);
     const bar = stand.viewer.page.locator("[data-progress]");

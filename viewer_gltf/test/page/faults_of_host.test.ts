@@ -1,4 +1,4 @@
-/** Faults on the way to the page: a network that goes and comes, files cut short, nothing to show. */
+/** Faults between the host and the page: a network that fails and returns, damaged files, empty bundles. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { afterEach, beforeEach, expect, it } from "vitest";
@@ -10,7 +10,7 @@ import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { swapSurface } from "../support/fixture/swap";
 import { Gate } from "../support/offline/gate";
 
-describeInChromium("a fault on the way", () => {
+describeInChromium("a fault between host and page", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 360 } });
   let gate: Gate;
 
@@ -25,7 +25,7 @@ describeInChromium("a fault on the way", () => {
   const through = (query = "") => `${gate.address}/app/?bundle=../bundle/${query}`;
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
-  /** The file with one byte changed; 40 before the end of a glb lie the bytes of its mesh. */
+  /** Returns a file with one byte changed; 40 bytes before the end of a glb lies its mesh. */
   async function changed(path: string): Promise<Buffer> {
     const body = Buffer.from(await readFile(join(stand.bundle, path)));
     body[body.length - 40] ^= 1;
@@ -42,7 +42,7 @@ describeInChromium("a fault on the way", () => {
     return (await stand.viewer.page.locator("[data-fatal]").textContent()) ?? "";
   }
 
-  it("a decoder that can't be had is reported for every surface, and nothing hangs", async () => {
+  it("a decoder that cannot be loaded is reported for every surface, and nothing hangs", async () => {
     await stand.viewer.page.route("**/meshopt_worker*", (route) => route.abort());
     await stand.open("&mode=off");
     await stand.viewer.settled();
@@ -91,12 +91,13 @@ describeInChromium("a fault on the way", () => {
     expect((await notices()).join()).toContain(
       `${path}: expected ${whole.length} bytes, found 100 (a broken upload?)`,
     );
-    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    // the volume of the other tile
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
     const picture = await takePicture(stand.viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
   });
 
-  it.runIf(IS_EXHAUSTIVE)("a volume with other bytes than it should have is named", async () => {
+  it.runIf(IS_EXHAUSTIVE)("a volume with wrong bytes is named", async () => {
     const path = "volumes/r0_c0/Block.ktx2";
     const body = Buffer.from(await readFile(join(stand.bundle, path)));
     body[body.length - 1] ^= 1;
@@ -108,7 +109,7 @@ describeInChromium("a fault on the way", () => {
     expect((await notices()).join()).toMatch(new RegExp(`${path}: expected SHA-256 .*, found`));
   });
 
-  it("a level with other bytes than it should have is named once, and the surfaces stay", async () => {
+  it("a level with wrong bytes is named once, and the surfaces stay", async () => {
     const path = "volumes/r0_c0/Block.ktx2";
     const statuses: number[] = [];
     await stand.viewer.page.route(`**/${path}`, async (route) => {
@@ -124,20 +125,21 @@ describeInChromium("a fault on the way", () => {
     expect(triangles).toBeGreaterThan(0);
     await stand.viewer.drawVolume("Block", true);
     await stand.viewer.chooseMode("all");
-    expect(statuses).toEqual([206, 206]); // a range, asked for once more past all caches
+    expect(statuses).toEqual([206, 206]); // a range, requested a second time without caches
     expect(await notices()).toEqual([
       expect.stringMatching(
         new RegExp(`^${path}: level \\d+: expected SHA-256 [0-9a-f]{64}, found [0-9a-f]{64}$`),
       ),
     ]);
-    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0); // the other tile's
+    // the volume of the other tile
+    expect((await stand.viewer.snapshot()).volumes.length).toBeGreaterThan(0);
     const picture = await takePicture(stand.viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     await stand.viewer.chooseMode("off");
     expect((await stand.viewer.snapshot()).triangles).toBe(triangles);
   });
 
-  it("a surface with another byte than it should have is named, and the others stay", async () => {
+  it("a surface with a wrong byte is named, and the others stay", async () => {
     const path = "channels/Balls/r0_c1/lod2.glb";
     answer(path, await changed(path));
     await stand.open("&mode=off");
@@ -151,7 +153,7 @@ describeInChromium("a fault on the way", () => {
   });
 
   it.runIf(IS_EXHAUSTIVE)(
-    "a finer surface with another byte is named, and the coarser one stays",
+    "a finer surface with a wrong byte is named, and the coarser one stays",
     async () => {
       await stand.open("&mode=off");
       await stand.viewer.show("F_x20_body", false);
@@ -168,10 +170,10 @@ describeInChromium("a fault on the way", () => {
     },
   );
 
-  it("a surface that is no glTF inside is named, and the others stay", async () => {
+  it("a surface that is not a valid glTF is named, and the others stay", async () => {
     const path = "channels/Balls/r0_c1/lod2.glb";
     const body = Buffer.from(await readFile(join(stand.bundle, path)));
-    body.fill(0x7b, 20, 40); // the JSON chunk's start
+    body.fill(0x7b, 20, 40); // the start of the JSON chunk
     const files = await swapSurface(stand.bundle, "Balls", "r0_c1/lod2.glb", body);
     for (const [file, content] of files) answer(file, content);
     await stand.open();
@@ -181,14 +183,14 @@ describeInChromium("a fault on the way", () => {
   });
 
   it.runIf(IS_EXHAUSTIVE)(
-    "a network that is lost in the middle, and comes back, leaves no trace",
+    "a network that fails during loading and returns leaves no trace",
     async () => {
       const viewer = new ViewerPage(stand.viewer.page);
       await viewer.open(through("&mode=off"));
       await viewer.settled();
       gate.shut();
       const shown = viewer.drawVolume("Block", true).then(() => viewer.chooseMode("all"));
-      await new Promise((resolve) => setTimeout(resolve, 700)); // a first try has failed
+      await new Promise((resolve) => setTimeout(resolve, 700)); // a first attempt has failed
       gate.open();
       await shown;
       await viewer.settled();
@@ -214,17 +216,17 @@ describeInChromium("a fault on the way", () => {
   });
 
   it("a bundle without faults leaves no warning in the console", async () => {
-    const said: string[] = [];
+    const warnings: string[] = [];
     stand.viewer.page.on("console", (message) => {
-      if (["warning", "error"].includes(message.type())) said.push(message.text());
+      if (["warning", "error"].includes(message.type())) warnings.push(message.text());
     });
     await stand.open("&mode=all");
     await stand.viewer.settled();
-    // the driver allows none, and software draws slowly
-    expect(said.filter((text) => !/Service Worker|GL Driver/.test(text))).toEqual([]);
+    // the driver forbids warnings, and software draws slowly
+    expect(warnings.filter((text) => !/Service Worker|GL Driver/.test(text))).toEqual([]);
   });
 
-  /** Turn volumes on and come near, without a network, until all tries are used up. */
+  /** Switches volumes on and moves closer, without a network, until all attempts have failed. */
   async function starve(viewer: ViewerPage, notice: RegExp): Promise<number> {
     for (let i = 0; i < 10; i++) await viewer.page.keyboard.press("+");
     await viewer.settled();
@@ -247,7 +249,7 @@ describeInChromium("a fault on the way", () => {
     expect(await notices()).toEqual([]);
   }
 
-  /** The pauses between tries are over at once. */
+  /** Shortens the pauses between attempts. */
   const hurry = () =>
     stand.viewer.page.addInitScript(() => {
       const real = window.setTimeout.bind(window);
@@ -257,7 +259,7 @@ describeInChromium("a fault on the way", () => {
     });
 
   it.runIf(IS_EXHAUSTIVE)(
-    "an outage that outlasts all tries leaves no trace, once the device has a network",
+    "an outage longer than all attempts leaves no trace once the device has a network",
     async () => {
       await hurry();
       const viewer = new ViewerPage(stand.viewer.page);
@@ -271,7 +273,7 @@ describeInChromium("a fault on the way", () => {
     },
   );
 
-  it("a host that was away for long brings all once it is asked to try again", async () => {
+  it("a host that was unreachable for long sends everything after another attempt", async () => {
     await hurry();
     const viewer = new ViewerPage(stand.viewer.page);
     await viewer.page.route("**/Balls/tileset.json", (route) => route.abort());

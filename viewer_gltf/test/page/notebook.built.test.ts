@@ -7,9 +7,9 @@ import { hasPython } from "../support/python";
 
 type View = Readonly<{ eye_um: number[]; target_um: number[] }>;
 type Picked = Readonly<{ point_um: number[]; tile: string; channel: string; object: null }>;
-type Look = Readonly<{ visible: boolean; color: string; opacity: number; window: number[] }>;
+type Appearance = Readonly<{ visible: boolean; color: string; opacity: number; window: number[] }>;
 
-/** As VS Code sends it with its outputs where it is told to: no code comes from blob:. */
+/** Policy that VS Code sends with its outputs if configured: code from blob: is forbidden. */
 const STRICT =
   "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; " +
   "img-src https: http: data:; connect-src https:; child-src https: data:";
@@ -33,26 +33,26 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
 
   const open = async (surroundings = {}) =>
     FrontEnd.open(await browser.context.newPage(), kernel, surroundings);
-  const channels = () => kernel.ask<Record<string, Look>>("viewer.channels");
+  const channels = () => kernel.ask<Record<string, Appearance>>("viewer.channels");
   const inPython = (expression: string) => expect.poll(() => kernel.ask(expression));
 
-  /** How many messages pass in a while, both ways. */
+  /** Returns the number of messages in a time, in both directions. */
   const heardIn = (duration_ms: number) => async () => {
     const before = kernel.heard;
     await new Promise((resolve) => setTimeout(resolve, duration_ms));
     return kernel.heard - before;
   };
-  /** Moves the eye, and waits until the page has moved it and both sides have told each other all of it. */
+  /** Moves the eye, and waits until the page has moved it and no more messages pass. */
   const moveTo = async (eye_um: string, target_um: string) => {
     kernel.run(`viewer.view = {'eye_um': ${eye_um}, 'target_um': ${target_um}}`);
     await inPython("'eye=' in viewer.link").toBe(true);
     await expect.poll(heardIn(1000)).toBe(0);
   };
 
-  test("the page shows without a server, and both sides have its state", async () => {
+  test("the page opens without a server, and both sides have its state", async () => {
     const front = await open();
     const frame = await front.viewer();
-    // but for the page of the test itself nothing was asked of any host
+    // no request went to any host, except for the page of the test itself
     const own = ["/cell.html", "/cell.css", "/listen.js", "/widget.js", "/favicon.ico"];
     expect(front.requests.filter((path) => !own.includes(path))).toEqual([]);
     await inPython("len(viewer.channels) > 0 and viewer.link.startswith('#v=1')").toBe(true);
@@ -62,7 +62,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await frame.locator(`[data-channel="${first}"] [data-part="shown"]`).setChecked(false);
     await inPython(`viewer.channels["${first}"]["visible"]`).toBe(false);
 
-    // from Python to the page, which tells what it has come to
+    // from Python to the page, which reports the resulting values
     kernel.run(`viewer.set_channel("${first}", visible=True, color="#00ff00", opacity=0.25)`);
     kernel.run(`viewer.set_channel("${second}", window=(-1e9, 1e9))`);
     const state = () => frame.evaluate(() => window.stereocell?.snapshot().state.channels ?? []);
@@ -75,25 +75,25 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await inPython("viewer.view['eye_um']").toEqual([30, 40, 50]);
     const link = await kernel.ask<string>("viewer.link");
 
-    // a link is the whole view
+    // a link contains the whole view
     kernel.run("viewer.link = '#v=1&quality=low'");
-    const told = (name: string) => `viewer.channels.get("${first}", {}).get("${name}")`;
-    await inPython(told("opacity")).toBe(1);
+    const value = (name: string) => `viewer.channels.get("${first}", {}).get("${name}")`;
+    await inPython(value("opacity")).toBe(1);
     await inPython("viewer.view.get('eye_um', [30, 40, 50]) == [30, 40, 50]").toBe(false);
     kernel.run(`viewer.link = "${link}"`);
     await inPython("viewer.view.get('eye_um')").toEqual([30, 40, 50]);
-    await inPython(told("color")).toBe("#00ff00");
+    await inPython(value("color")).toBe("#00ff00");
 
-    // at rest nobody says anything
+    // at rest no messages pass
     await inPython("len(viewer._picture) > 100").toBe(true);
     await expect.poll(heardIn(2000)).toBe(0);
     await front.stop();
   });
 
-  test("in the frame of another host, as in Colab and VS Code, a tap is told and a pick is marked", async () => {
+  test("in the frame of another host, as in Colab and VS Code, a tap is reported and a pick is marked", async () => {
     const front = await open({ isForeign: true });
     const frame = await front.viewer();
-    // straight on to the large ball, of radius 9
+    // straight towards the large ball, of radius 9
     await inPython("len(viewer.channels) > 0").toBe(true);
     await moveTo("(48, -24, 70)", "(48, -24, 12)");
     const canvas = frame.locator(".stage canvas").first();
@@ -121,14 +121,14 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await front.stop();
   });
 
-  test("a view that comes again is as it was left, and asks for no file twice", async () => {
+  test("a view that is shown again is unchanged, and requests no file twice", async () => {
     const front = await open();
     await front.viewer();
     await moveTo("(30, 40, 50)", "(4, -4, 2)");
     const asked = () => kernel.told.filter((text) => text.includes('"ask":"')).length;
     await inPython("len(viewer._picture) > 100").toBe(true);
     const before = asked();
-    // the output with the picture shows where the viewer does not
+    // the output with the image is shown while the viewer is not
     const below = front.cell.locator("#below");
     expect(await below.isVisible()).toBe(false);
     await front.leave();
@@ -139,7 +139,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     expect(view.eye_um).toEqual([30, 40, 50]);
     const look = await frame.evaluate(() => window.stereocell?.snapshot().look);
     expect(look).toBeDefined();
-    // pictures may come, files not
+    // images may be sent, but no files
     const files = kernel.told.slice(before).filter((text) => /"ask":"(file|page)"/.test(text));
     expect(new Set(files).size).toBe(files.length);
     await front.stop();
@@ -147,7 +147,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
 
   const REAL = process.env.STEREOCELL_REAL_BUNDLE;
   test.skipIf(REAL === undefined)(
-    "textures, and light from files of the page, come too",
+    "textures, and light from files of the page, are loaded too",
     async () => {
       kernel.stop();
       kernel = new Kernel(REAL ?? "");
@@ -168,7 +168,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     },
   );
 
-  test("where the page may not run its picture stands, with the reason", async () => {
+  test("if the page may not run, its image is shown with the reason", async () => {
     const front = await open({ headers: { "Content-Security-Policy": STRICT } });
     await front.cell.waitForFunction(() =>
       document.querySelector(".stereocell p")?.textContent?.startsWith("The viewer can't run here"),
@@ -176,7 +176,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await front.stop();
   });
 
-  test("until the kernel answers its picture stands", async () => {
+  test("the image is shown until the kernel answers", async () => {
     const png =
       "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==";
     kernel.run(`import base64, time; viewer._picture = base64.b64decode("${png}")`);
@@ -185,7 +185,8 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     const front = await open();
     const picture = front.cell.locator(".stereocell img");
     expect(await picture.getAttribute("src")).toBe(`data:image/png;base64,${png}`);
-    // what is covered wholly is hardly drawn: the viewer took ten seconds longer to come
+    // the browser hardly draws a page that is fully covered: the viewer took ten seconds longer to
+    // load
     const opacity = await picture.evaluate((each) => Number(getComputedStyle(each).opacity));
     expect(opacity).toBeLessThan(1);
     expect(await front.cell.locator(".stereocell p").textContent()).toContain("until the kernel");

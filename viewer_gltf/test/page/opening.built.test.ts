@@ -1,4 +1,4 @@
-/** The first half minute: the page before its code has come, the view that opens, its turn, its hint. */
+/** The first half minute: the page before its code is loaded, the opening view, its rotation, its hint. */
 import { expect, it } from "vitest";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { difference, isBackground, takePicture } from "../support/browser/picture";
@@ -11,7 +11,7 @@ describeInChromium("the opening", () => {
   const page = () => stand.viewer.page;
   const address = (query = "") => `${stand.host.address}/app/?bundle=../bundle/${query}`;
 
-  /** Share of the picture's height over which no words or buttons lie. */
+  /** Share of the view's height without texts and buttons over it. */
   const freeShare = () =>
     page()
       .locator(".stage")
@@ -23,7 +23,7 @@ describeInChromium("the opening", () => {
         return 1 - (over[0] + over[1]) / stage.clientHeight;
       });
 
-  it("counts the code's bytes while they come, says what has failed, and tries again", async () => {
+  it("counts the bytes of the code while it loads, reports a failure, and tries again", async () => {
     const devtools = await page().context().newCDPSession(page());
     await devtools.send("Network.enable");
     const slow = { offline: false, latency: 0, uploadThroughput: -1 };
@@ -49,7 +49,7 @@ describeInChromium("the opening", () => {
     await page().evaluate(() => window.stereocell?.ready);
   });
 
-  it("fills the picture, volumes in sight, and turns until the first touch", async () => {
+  it("fills the view, shows volumes, and turns until the first touch", async () => {
     await page().emulateMedia({ reducedMotion: "no-preference" });
     await stand.viewer.open(address("&quality=low"));
     const volumes = async () => (await stand.viewer.snapshot()).volumes.length;
@@ -58,27 +58,28 @@ describeInChromium("the opening", () => {
       .poll(async () => (await stand.viewer.snapshot()).discRadius_deg)
       .toBeGreaterThan(1);
     const hint = page().locator('[data-overlay="hint"]');
-    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom, go near for volumes");
+    expect(await hint.textContent()).toBe("drag to turn, wheel to zoom, move closer for volumes");
     const frames = () => page().evaluate(() => window.stereocell?.frames ?? 0);
     const before = await frames();
     await expect.poll(frames).toBeGreaterThan(before + 3);
 
     const stage = await page().locator(".stage").boundingBox();
     if (stage === null) throw new Error("no stage");
-    await page().mouse.click(stage.x + 4, stage.y + 4); // where nothing is to be chosen
+    await page().mouse.click(stage.x + 4, stage.y + 4); // a place without any structure
     await stand.viewer.still();
     await expect.poll(() => hint.evaluate((found) => getComputedStyle(found).opacity)).toBe("0");
     await page().emulateMedia({ reducedMotion: "reduce" });
   });
 
-  it("is framed on what shows, as surfaces and as volumes", async () => {
-    // a channel without a surface may show anywhere: with one, all of the specimen is framed
+  it("is framed on the visible structures, as surfaces and as volumes", async () => {
+    // a channel without a surface may fill the specimen, so the whole specimen is framed then
     const withSurface = stand.manifest.channels.filter(({ tileset }) => tileset !== null);
     const isWhole = withSurface.length === stand.manifest.channels.length;
     const link = isWhole ? "" : `#v=1&c=${withSurface.map(({ id }) => id)}`;
-    // volumes are framed by bricks of 8 voxels, of which the fixture's tiles have too few to be near what shows
+    // volumes are framed by bricks of 8 voxels; the tiles of the fixture are too small for a tight
+    // frame
     const modes = DEMO_BUNDLE === undefined ? ["disc"] : ["disc", "traced"];
-    // how much of the picture it fills depends on how far it has turned: as it opens
+    // the filled part of the view depends on the rotation, so the opening view is measured
     for (const mode of modes) {
       await stand.viewer.open(address(`&quality=low&mode=${mode}${link}`));
       await stand.viewer.settled();
@@ -100,7 +101,7 @@ describeInChromium("the opening", () => {
     }
   });
 
-  it("has its words beside the picture's other marks, in small windows too", async () => {
+  it("has its hint beside the other marks, also in small windows", async () => {
     const usual = page().viewportSize() ?? { width: 560, height: 360 };
     const sizes = [
       [320, 240],
@@ -129,13 +130,13 @@ describeInChromium("the opening", () => {
     await page().setViewportSize(usual);
   });
 
-  it("stops turning before volumes are blocks, where frames are late", async () => {
+  it("stops turning before volumes look like blocks, if frames are late", async () => {
     await page().emulateMedia({ reducedMotion: "no-preference" });
     await addClock(page());
     await stand.viewer.open(address("&quality=auto"));
     await holdFrames(page());
     const isLoading = async () => {
-      await tick(page(), 0); // what comes from the host comes when it comes, and no time passes here
+      await tick(page(), 0); // files arrive in real time, while the clock of the test stands still
       return (await stand.viewer.snapshot()).isLoading;
     };
     await expect.poll(isLoading).toBe(false);
@@ -145,27 +146,27 @@ describeInChromium("the opening", () => {
     turned.push(await takePicture(page()));
     expect(difference(turned[0], turned[1])).toBeGreaterThan(0.01);
     await tick(page(), 400, 40);
-    // it would turn for ever; a picture at rest comes once those before it are drawn, and clears up
+    // a turn would go on for ever; the frame at rest follows those before it, and gets clearer
     const best = { steps: 100, resolution: 1, discShare: 1, errorFactor: 1 };
     const atRest = async () => {
       const before = await takePicture(page());
       await tick(page(), 400, 3);
-      const stands = difference(before, await takePicture(page())) < 0.01;
-      return { stands, ...(await settings()) };
+      const isStill = difference(before, await takePicture(page())) < 0.01;
+      return { isStill, ...(await settings()) };
     };
-    await expect.poll(atRest).toEqual({ stands: true, ...best });
+    await expect.poll(atRest).toEqual({ isStill: true, ...best });
     await page().emulateMedia({ reducedMotion: "reduce" });
   });
 
-  it("stands still where less motion is asked for, and where the address says from where", async () => {
+  it("does not turn if the user prefers less motion, or if the address names the view", async () => {
     for (const query of ["&quality=low", "&quality=low&view=top"]) {
       await page().emulateMedia({
         reducedMotion: query.includes("view") ? "no-preference" : "reduce",
       });
       await stand.viewer.open(address(query));
-      await stand.viewer.still(); // which a turn would never be
+      await stand.viewer.still(); // never resolves while the view turns
     }
-    // the way to volumes is told only where there is one
+    // the hint mentions volumes only in modes that show them when near
     const hint = page().locator('[data-overlay="hint"]');
     await stand.viewer.chooseMode("off");
     expect(await hint.textContent()).toBe("drag to turn, wheel to zoom");

@@ -1,4 +1,7 @@
-/** The viewer and a bundle in one file, opened from a disk: it shows what the served page shows, and asks no host. */
+/**
+ * The viewer and a bundle in one file, opened from a disk: it shows the same as the served page,
+ * and contacts no host.
+ */
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -14,7 +17,7 @@ import { prepareStand } from "../support/browser/stand";
 import { askPython, hasPython } from "../support/python";
 
 const VIEWPORT = { width: 480, height: 300 };
-/** Share of pixels that may differ: what is gathered at rest is noise, averaged. */
+/** Share of pixels that may differ, because of the averaged noise of a view at rest. */
 const SAME = 0.01;
 const VIEW = "#v=1&eye=0.5,0.4,1.2,0,0,0";
 
@@ -23,8 +26,8 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
   let folder: string;
   let browser: Browser;
   let viewer: ViewerPage;
-  /** Addresses that the page has asked for, without those that lie in itself. */
-  let asked: string[];
+  /** Addresses that the page has requested, except blobs and data URLs of its own. */
+  let requested: string[];
 
   const fileOf = (name: string) => join(folder, `${name}.html`);
   const write = (name: string, ...more: readonly string[]) =>
@@ -46,13 +49,13 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     await viewer?.page.close();
     viewer = new ViewerPage(await browser.context.newPage());
     await viewer.page.context().setOffline(true);
-    asked = [];
+    requested = [];
     viewer.page.on("request", (request) => {
-      if (!/^(blob|data):/.test(request.url())) asked.push(request.url());
+      if (!/^(blob|data):/.test(request.url())) requested.push(request.url());
     });
   });
 
-  it("shows the served page's picture without a network, and asks for nothing but itself", async () => {
+  it("shows the same as the served page without a network, and requests only itself", async () => {
     await stand.open(`&mode=all${VIEW}`);
     await stand.viewer.settled();
     const served = await takePicture(stand.viewer.page);
@@ -64,12 +67,12 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     const picture = await takePicture(viewer.page);
     expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(500);
     expect(difference(picture, served)).toBeLessThan(SAME);
-    expect(asked.map((address) => new URL(address).pathname)).toEqual([
+    expect(requested.map((address) => new URL(address).pathname)).toEqual([
       pathToFileURL(fileOf("whole")).pathname,
     ]);
   });
 
-  it("has a policy by which no host can be reached, also by code of its own", async () => {
+  it("has a policy that forbids its own code to contact a host", async () => {
     await open("whole");
     const tries = await viewer.page.evaluate(async () => {
       const fails = (job: () => Promise<unknown>) =>
@@ -98,7 +101,7 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     });
   });
 
-  it("opens with the view of a link, keeps a view in its address, and reloads it", async () => {
+  it("opens with the view of a link, and keeps a view in its address through a reload", async () => {
     await write("view", "25", `https://host.example/page${VIEW}`);
     await open("view");
     const eye = async () => (await viewer.snapshot()).look.position.map((v) => v.toFixed(2));
@@ -114,15 +117,15 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     expect(await eye()).toEqual(["0.50", "0.40", "1.20"]);
   });
 
-  it("dresses the parts that come later as the served page does, without an error", async () => {
+  it("styles parts that are loaded later like the served page, without an error", async () => {
     const errors: string[] = [];
     viewer.page.on("console", (message) => {
       if (message.type() === "error") errors.push(message.text());
     });
     await open("whole", `?view=front${VIEW}`);
     await stand.open(VIEW);
-    const looks = async (page: ViewerPage["page"]) => {
-      await page.keyboard.press("Enter"); // the card of the middle
+    const stylesOf = async (page: ViewerPage["page"]) => {
+      await page.keyboard.press("Enter"); // opens the card of the middle of the view
       const card = page.locator(".tap-card");
       await card.waitFor();
       const ofCard = await card.evaluate((each) => {
@@ -134,14 +137,14 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
       await keys.waitFor();
       return [...ofCard, await keys.evaluate((each) => getComputedStyle(each).borderWidth)];
     };
-    const served = await looks(stand.viewer.page);
-    expect(await looks(viewer.page)).toEqual(served);
+    const served = await stylesOf(stand.viewer.page);
+    expect(await stylesOf(viewer.page)).toEqual(served);
     expect(served[0]).toBe("absolute");
     expect(errors).toEqual([]);
   });
 
-  it("is path-traced in its room, whose light lies in the file", async () => {
-    const errors: string[] = []; // the policy refuses a light that is sought elsewhere
+  it("is path-traced with the environment light in the file", async () => {
+    const errors: string[] = []; // the policy forbids to fetch a light from elsewhere
     viewer.page.on("console", (message) => {
       if (message.type() === "error") errors.push(message.text());
     });
@@ -152,7 +155,7 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     expect(errors).toEqual([]);
   });
 
-  it("draws the coarse levels alone that fit, without a notice", async () => {
+  it("draws only the coarse levels that fit, without a notice", async () => {
     const refusal = await write("none", "0.1").catch((error: Error) => error.message);
     const [, least] = /takes ([\d.]+) MB: expected as much/.exec(refusal) ?? [];
     expect(Number(least)).toBeGreaterThan(0.5);
@@ -174,8 +177,8 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
     const firefox = await Firefox.start();
     try {
       await firefox.open(`${pathToFileURL(fileOf("whole")).href}?mode=all&quality=low`);
-      const told = await firefox.run(IN_FIREFOX);
-      expect(told).toEqual({ notices: [], hasVolumes: true, hosts: [] });
+      const result = await firefox.run(IN_FIREFOX);
+      expect(result).toEqual({ notices: [], hasVolumes: true, hosts: [] });
       const { width, height, rgba } = decodePng(await firefox.screenshot());
       const picture = new Picture(width, height, rgba);
       expect(picture.count((pixel) => !isBackground(pixel))).toBeGreaterThan(5000);
@@ -189,7 +192,7 @@ describe.skipIf(!hasChromium() || !hasPython)("a scene in one file", () => {
   });
 });
 
-/** Runs in the page: what it shows, and the addresses of hosts that it has asked. */
+/** Runs in the page: its state, and the addresses of hosts that it has contacted. */
 const IN_FIREFOX = `
   const resolve = arguments[arguments.length - 1];
   const wait = (time_ms) => new Promise((then) => setTimeout(then, time_ms));

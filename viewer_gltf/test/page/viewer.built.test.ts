@@ -1,4 +1,4 @@
-/** The built viewer in headless Chromium, on the synthetic fixture and on the demo's bundle. */
+/** The built viewer in headless Chromium, with the synthetic fixture and with the bundle of the demo. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { beforeAll, expect, it } from "vitest";
@@ -8,7 +8,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const VIEWPORT = { width: 480, height: 270 };
-/** A tile of the demo beside which two rests of cells are thinner than 1 um. */
+/** A tile of the demo beside which two remaining slices of cells are thinner than 1 um. */
 const OPEN_TILE = "r0_c2";
 
 const withSurface = ({ manifest }: Stand) =>
@@ -16,7 +16,7 @@ const withSurface = ({ manifest }: Stand) =>
 
 describeInChromium("the demo", () => {
   const stand = prepareStand({ bundle: DEMO_BUNDLE, viewport: VIEWPORT, sharesPage: true });
-  /** Of the requests that the page made until it had all: levels of surfaces, in their order. */
+  /** Levels of the surfaces that the page requested until everything was loaded, in their order. */
   let lods: readonly number[];
 
   beforeAll(async () => {
@@ -49,7 +49,7 @@ describeInChromium("the demo", () => {
     }
   });
 
-  it("draws no thin rests beside the tile that is a volume", async () => {
+  it("draws no thin remaining slices beside the tile that is a volume", async () => {
     const triangles = async () => (await stand.viewer.snapshot()).triangles;
     await stand.open(`#v=1&mode=off&tile=${OPEN_TILE}`);
     await stand.viewer.settled();
@@ -76,7 +76,7 @@ describeInChromium("the viewer", () => {
 
   const picture = () => takePicture(stand.viewer.page);
 
-  it("opens the bundle beside it, in any folder of a host", async () => {
+  it("opens the bundle beside the page, in any folder of a host", async () => {
     const body = await readFile(join(DIST, "index.html"));
     stand.host.overrides.set("/some/folder/index.html", { status: 200, body });
     await stand.viewer.open(`${stand.host.address}/some/folder/index.html`);
@@ -86,7 +86,7 @@ describeInChromium("the viewer", () => {
     expect(outside).toEqual([]);
   });
 
-  it("asks for nothing that lies outside the page and the bundle", async () => {
+  it("requests nothing outside the page and the bundle", async () => {
     const addresses: string[] = [];
     stand.viewer.page.on("request", (request) => addresses.push(request.url()));
     await stand.open();
@@ -95,7 +95,7 @@ describeInChromium("the viewer", () => {
     expect(addresses.filter((url) => !local(url))).toEqual([]);
   });
 
-  it("takes a channel's colour away when the channel is turned off", async () => {
+  it("removes a channel's colour when the channel is hidden", async () => {
     const { id, color } = withSurface(stand)[0];
     await stand.open();
     await stand.viewer.settled();
@@ -105,7 +105,7 @@ describeInChromium("the viewer", () => {
     expect((await picture()).count((pixel) => !isBackground(pixel))).toBe(0);
   });
 
-  it("recolours the surface and the volume, with no volume fetched again", async () => {
+  it("recolours the surface and the volume without fetching the volume again", async () => {
     const { id, color } = withSurface(stand)[0];
     const chosen: Pixel = [1, 0, 1];
     await stand.open();
@@ -120,7 +120,7 @@ describeInChromium("the viewer", () => {
     await stand.viewer.chooseMode("all");
     const volumes = await stand.viewer.snapshot();
     expect(volumes.volumes).toHaveLength(stand.manifest.tiles.length);
-    expect(volumes.triangles).toBe(0); // the volumes stand in place of the surfaces
+    expect(volumes.triangles).toBe(0); // volumes replace the surfaces
     expect((await picture()).count(hasColor(chosen))).toBeGreaterThan(100);
 
     const before = stand.host.requests.length;
@@ -128,14 +128,15 @@ describeInChromium("the viewer", () => {
     const recoloured = await picture();
     expect(recoloured.count(hasColor([0, 1, 0]))).toBeGreaterThan(100);
     expect(recoloured.count(hasColor(chosen))).toBe(0);
-    // the browser asks for the page's icon when it likes
-    const asked = stand.host.requests.slice(before).map(({ path }) => path);
-    expect(asked.filter((path) => path !== "/app/icon.svg")).toEqual([]);
+    // the browser requests the icon of the page at any time
+    const requested = stand.host.requests.slice(before).map(({ path }) => path);
+    expect(requested.filter((path) => path !== "/app/icon.svg")).toEqual([]);
   });
 
-  /** One channel, as a volume in one tile alone. */
+  /** Shows one channel, as a volume in one tile. */
   async function openTileOf(id: string): Promise<string> {
-    await stand.open("&mode=off&switch=9"); // else it may have begun to load others, and this one
+    // otherwise the page may have begun to load this and other tiles
+    await stand.open("&mode=off&switch=9");
     await stand.viewer.showOnly(id);
     const [{ id: tile }] = stand.manifest.tiles;
     await stand.viewer.chooseTile(tile);
@@ -158,7 +159,7 @@ describeInChromium("the viewer", () => {
     expect(volumes).toEqual([{ tile, channel: id, level: 0 }]);
   });
 
-  it("takes the whole file from a host without ranges", async () => {
+  it("fetches the whole file from a host without ranges", async () => {
     stand.host.hasRanges = false;
     const { id } = stand.manifest.channels[0];
     const tile = await openTileOf(id);
@@ -169,7 +170,7 @@ describeInChromium("the viewer", () => {
     expect(state.notices).toEqual([]);
   });
 
-  it("draws another picture for each eye", async () => {
+  it("draws a different image for each eye", async () => {
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=off");
     await stand.viewer.settled();
@@ -186,7 +187,7 @@ describeInChromium("the viewer", () => {
     expect(a - b).toBeLessThan(half / 4);
   });
 
-  it("reports why stereo can't start where there is no headset", async () => {
+  it("reports why stereo cannot start without a headset", async () => {
     await stand.open();
     const reason = stand.viewer.page.locator("[data-stereo-reason]");
     await expect.poll(() => reason.textContent()).toContain("headset");
@@ -246,24 +247,24 @@ describeInChromium("the viewer", () => {
     expect(await notices.textContent()).not.toContain("not found (404)");
   });
 
-  it("draws no frames while nothing changes, and hardly asks for any", async () => {
+  it("draws no frames while nothing changes, and requests hardly any", async () => {
     await stand.open();
     await stand.viewer.settled();
     const frames = () => stand.viewer.page.evaluate(() => window.stereocell?.frames);
     const before = await frames();
-    await stand.viewer.page.waitForTimeout(700); // it looks on for half a second
-    const asked = await stand.viewer.page.evaluate(async () => {
-      const ask = window.requestAnimationFrame;
+    await stand.viewer.page.waitForTimeout(700); // frames go on for half a second after a change
+    const requested = await stand.viewer.page.evaluate(async () => {
+      const original = window.requestAnimationFrame;
       let count = 0;
       window.requestAnimationFrame = (draw) => {
         count++;
-        return ask(draw);
+        return original(draw);
       };
       await new Promise((resolve) => setTimeout(resolve, 1000));
-      window.requestAnimationFrame = ask;
+      window.requestAnimationFrame = original;
       return count;
     });
-    expect(asked).toBeLessThanOrEqual(10);
+    expect(requested).toBeLessThanOrEqual(10);
     expect(await frames()).toBe(before);
   });
 });

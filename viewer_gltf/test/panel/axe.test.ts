@@ -1,4 +1,4 @@
-/** What axe-core finds on the page, by the rules of WCAG 2.2 at levels A and AA: nothing. */
+/** axe-core finds no violation on the page, by the rules of WCAG 2.2 at levels A and AA. */
 import axe from "axe-core";
 import { describe, expect, it } from "vitest";
 import { openAllSections } from "../support/browser/open_sections";
@@ -13,12 +13,12 @@ declare global {
 }
 
 const RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"];
-/** The query and the scheme that the system prefers, by the name of the theme. */
+/** Query and preferred colour scheme, by the name of the theme. */
 const THEMES = {
   dark: { query: "", colorScheme: "dark" },
   light: { query: "&theme=light", colorScheme: "light" },
 } as const;
-/** Two sliders share a track, and only their thumbs take the pointer: sizes.test.ts measures those. */
+/** Two sliders share a track, and only their thumbs take the pointer. sizes.test.ts measures those. */
 const TWO_ON_A_TRACK = /window-(low|high)"/;
 const DESK = { width: 900, height: 600 };
 const PHONE = { width: 390, height: 844 };
@@ -27,10 +27,10 @@ describeInChromium("axe-core", () => {
   const stand = prepareStand({ viewport: DESK, isBlind: true });
   const page = () => stand.viewer.page;
 
-  /** Each finding as one line: the rule, the element and the reason. */
+  /** Returns each finding as one line: rule, element and reason. */
   async function findings(): Promise<readonly string[]> {
     const isThere = await page().evaluate(() => "axe" in window);
-    if (!isThere) await page().evaluate(axe.source); // the page's policy allows no script of another's
+    if (!isThere) await page().evaluate(axe.source); // the page's policy allows no foreign scripts
     const { violations } = await page().evaluate(
       (values) => window.axe.run({ runOnly: { type: "tag", values }, resultTypes: ["violations"] }),
       RULES,
@@ -48,7 +48,7 @@ describeInChromium("axe-core", () => {
       await stand.open(`&mode=off${query}`);
     };
 
-    /** Sizes depend on the window and colours on the theme, so that one theme does on a phone. */
+    /** Sizes depend on the window and colours on the theme, so one theme is enough on a phone. */
     const hasPhone = IS_EXHAUSTIVE || theme === Object.keys(THEMES)[0];
     async function findingsOnPhone(): Promise<readonly string[]> {
       if (!hasPhone) return [];
@@ -58,7 +58,7 @@ describeInChromium("axe-core", () => {
       return found;
     }
 
-    it("finds nothing on the page as it opens, and with all sections open, a link and a chosen tile", async () => {
+    it("finds nothing on the opening page, nor with all sections open, a link and a selected tile", async () => {
       await open();
       expect(await findings()).toEqual([]);
       expect(await findingsOnPhone()).toEqual([]);
@@ -71,7 +71,7 @@ describeInChromium("axe-core", () => {
       expect(await findingsOnPhone()).toEqual([]);
     });
 
-    it("finds nothing in the dialogs: the keys, the screen's measure", async () => {
+    it("finds nothing in the dialogs of the keys and of measuring the screen", async () => {
       await open();
       await page().keyboard.press("?");
       await page().locator("dialog[data-help]").waitFor();
@@ -84,7 +84,7 @@ describeInChromium("axe-core", () => {
       expect(await findingsOnPhone()).toEqual([]);
     });
 
-    it("finds nothing in slices as pictures, in what a key did, and in a notice", async () => {
+    it("finds nothing in slice images, in the announcement of a key, and in a notice", async () => {
       const { pathname } = new URL(
         "channels/Balls/r0_c0/lod2.glb",
         `${stand.host.address}/bundle/`,
@@ -99,7 +99,7 @@ describeInChromium("axe-core", () => {
     });
   });
 
-  it("finds nothing in the card of a tapped place, and in an empty picture", async () => {
+  it("finds nothing in the card of a tapped place, and in an empty view", async () => {
     await stand.open("&mode=off");
     await stand.viewer.settled();
     await page().keyboard.press("Enter"); // a tap in the middle of the view
@@ -111,7 +111,7 @@ describeInChromium("axe-core", () => {
     expect(await findings()).toEqual([]);
   });
 
-  it("finds nothing in the ways into stereo of an upright phone", async () => {
+  it("finds nothing in the section of stereo on an upright phone", async () => {
     await page().setViewportSize(PHONE);
     await stand.open("&mode=off");
     await stand.viewer.unfold("stereo");
@@ -123,7 +123,7 @@ describeInChromium("axe-core", () => {
     expect(await findings()).toEqual([]);
   });
 
-  it("finds nothing on the page of a bundle that is not there", async () => {
+  it("finds nothing on the page of a missing bundle", async () => {
     stand.host.overrides.set("/bundle/manifest.json", { status: 404, body: "gone" });
     await page().goto(`${stand.host.address}/app/?bundle=../bundle/`);
     await page().locator("[data-fatal]").waitFor();

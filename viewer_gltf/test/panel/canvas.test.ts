@@ -1,4 +1,4 @@
-/** The panel on a canvas in the room: what it shows, what rays do to it, and when it is painted. */
+/** The panel on a canvas in the scene: its content, the effect of rays on it, and when it is painted. */
 import { mkdir } from "node:fs/promises";
 import { expect, it } from "vitest";
 import { REFUSED } from "../../src/state/refusals";
@@ -7,10 +7,10 @@ import { type At, prepareHands } from "../support/xr/stand";
 
 const RIGHT: At = [0.25, -0.3, -0.3];
 const AWAY: At = [0, 5, -1];
-/** Where pictures to look at are kept, if they are wanted. */
+/** Folder for screenshots, if they are wanted. */
 const PICTURES = process.env.STEREO_PICTURES;
 
-describeInChromium("the panel in the room", () => {
+describeInChromium("the panel in the scene", () => {
   const hands = prepareHands(PICTURES === undefined ? undefined : { width: 1800, height: 900 });
 
   async function picture(name: string): Promise<void> {
@@ -20,13 +20,13 @@ describeInChromium("the panel in the room", () => {
     await hands().page.screenshot({ path: `${PICTURES}/${name}.png` });
   }
 
-  /** Point the right controller at a control, and press its trigger. */
+  /** Points the right controller at a control, and presses its trigger. */
   async function choose(id: string): Promise<void> {
     await hands().point("right", RIGHT, await hands().controlAt(id));
     await hands().press("right");
   }
 
-  /** Go on to the page that has a control, by the trigger. */
+  /** Turns to the page that has a control, with the trigger. */
   async function reach(id: string): Promise<void> {
     for (let page = 0; page < 12; page++) {
       if ((await hands().status()).regions.includes(id)) return;
@@ -39,7 +39,7 @@ describeInChromium("the panel in the room", () => {
     await hands().lookAt(await hands().controlAt(id, across));
   }
 
-  it("opens over the bar, below where the head faces, also of one who has turned round", async () => {
+  it("opens over the bar, below the direction of the head, also after a turn", async () => {
     await hands().gazeOnly();
     for (const [x, z] of [
       [0, -1],
@@ -47,13 +47,13 @@ describeInChromium("the panel in the room", () => {
       [-0.3, 0.95],
     ]) {
       await hands().lookAt([x, 0, z]);
-      await hands().wait(3); // the button follows
+      await hands().wait(3); // the bar follows the head
       await hands().openPanel();
       const [, up] = await hands().page.evaluate(() => window.hands.panelAt());
       expect(up).toBeCloseTo(-27.5, 1);
       await hands().lookAt([x, 0, z]);
       const [aside] = await hands().page.evaluate(() => window.hands.panelAt());
-      expect(Math.abs(aside)).toBeLessThan(16); // as far as the bar lags behind
+      expect(Math.abs(aside)).toBeLessThan(16); // the bar lags behind by this much
       await gazeAt("close");
       await hands().tap();
     }
@@ -106,7 +106,7 @@ describeInChromium("the panel in the room", () => {
     await picture("tiles");
   });
 
-  it("sets a slider where it is pointed at, and drags it while the trigger is held", async () => {
+  it("sets a slider to the pointed place, and drags it while the trigger is held", async () => {
     await hands().connect("left", false);
     await hands().point("right", RIGHT, AWAY);
     await hands().openPanel();
@@ -124,7 +124,7 @@ describeInChromium("the panel in the room", () => {
     expect(new Set(opacities)).toEqual(new Set([0.5, 1]));
     expect(opacities.length).toBeLessThan(5); // not one for each frame
     await picture("card");
-    // the second of two quick presses does nothing
+    // the second of two quick presses has no effect
     while ((await hands().status()).regions.includes("up")) {
       await choose("up");
       await hands().page.waitForTimeout(450);
@@ -138,7 +138,7 @@ describeInChromium("the panel in the room", () => {
     expect(await hands().page.evaluate(() => window.hands.leaves)).toBe(1);
   });
 
-  it("places shapes by value and gradient, and draws them by their corners", async () => {
+  it("adds shapes to the joint histogram, and drags them by their corners", async () => {
     await hands().connect("left", false);
     await hands().point("right", RIGHT, AWAY);
     await hands().openPanel();
@@ -166,10 +166,10 @@ describeInChromium("the panel in the room", () => {
     ) => {
       if (by === "gaze") {
         await hands().lookAt(await at(...from));
-        await hands().tap(); // takes it up
+        await hands().tap(); // begins the drag
         await hands().lookAt(await at(...to));
         await hands().wait(0.2);
-        await hands().tap(); // puts it down
+        await hands().tap(); // ends the drag
         return;
       }
       await hands().point("right", RIGHT, await at(...from));
@@ -192,7 +192,7 @@ describeInChromium("the panel in the room", () => {
     expect(moved?.gradients[1]).toBeCloseTo(0.8, 2);
   });
 
-  it("reports why a control refuses, under the gaze, for a while", async () => {
+  it("reports for a while, under the gaze, why a control refuses", async () => {
     await hands().gazeOnly();
     await hands().openPanel();
     await hands().openSection("tiles");
@@ -203,7 +203,8 @@ describeInChromium("the panel in the room", () => {
     expect([(await hands().status()).told, commands]).toEqual([[why], []]);
     const [aside, up] = await hands().page.evaluate(() => window.hands.noticeAt());
     expect(aside).toBeCloseTo(0);
-    expect(up).toBeLessThan(-10); // on the lower part of the panel no lower than a head can see
+    // notices on the lower part of the panel must not be too low for a head
+    expect(up).toBeLessThan(-10);
     expect(up).toBeGreaterThan(-20.1);
     await picture("refusal");
     await hands().wait(5);
@@ -212,7 +213,7 @@ describeInChromium("the panel in the room", () => {
     expect((await hands().status()).told).toEqual([]);
   });
 
-  it("leaves a notice where the head looked when it came", async () => {
+  it("leaves a notice in the direction of the head at its appearance", async () => {
     const fault = "channels/c0/r0_c0/lod0.glb: not found (404). The other tiles go on.";
     const tell = (text: string) => hands().page.evaluate((t) => window.hands.tell(t), text);
     const noticeAt = () => hands().page.evaluate(() => window.hands.noticeAt());
@@ -231,7 +232,7 @@ describeInChromium("the panel in the room", () => {
     expect((await hands().status()).told).toEqual([]);
   });
 
-  it("is painted only when what it shows changes", async () => {
+  it("is painted only when its content changes", async () => {
     await hands().gazeOnly();
     await hands().openPanel();
     const paints = async () => (await hands().status()).paints;
@@ -249,7 +250,7 @@ describeInChromium("the panel in the room", () => {
       window.hands.dispatch({ type: "set", id: "opacity", channel: "c0", value: 0.5 }),
     );
     await hands().step([0.05]);
-    expect(await paints()).toBe(before); // the page that is open shows neither
+    expect(await paints()).toBe(before); // the open page shows neither value
     await hands().page.evaluate(() => {
       for (const channel of ["c0", "c1"]) {
         window.hands.dispatch({ type: "show", channel, shown: false });
@@ -259,7 +260,7 @@ describeInChromium("the panel in the room", () => {
     expect(await paints()).toBe(before + 1);
   });
 
-  it("stays whole for the march where the specimen is cut away", async () => {
+  it("remains complete for the march where the specimen is cut away", async () => {
     const left = await hands().page.evaluate(() => window.leftOfTheUncut());
     expect(left).toEqual([
       [1, 0],

@@ -1,4 +1,4 @@
-/** Each double click on the flat panel counts once. STEREOCELL_SHOTS names a folder for a picture. */
+/** Each double click on the flat panel counts once. STEREOCELL_SHOTS names a folder for a screenshot. */
 import { join } from "node:path";
 import { beforeAll, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
@@ -32,7 +32,7 @@ describeInChromium("a double click on the panel", () => {
     for (const id of ids) {
       const control = page().locator(`[data-control="${id}"]`);
       const [was, rows] = [await control.isChecked(), await places()];
-      // the checkbox lies invisible under its label's text, which is what a person clicks
+      // the checkbox is invisible under the text of its label, which users click
       await control.dblclick({ force: true });
       expect(await control.isChecked(), id).toBe(!was);
       if (!id.endsWith("/plane")) expect(await places(), id).toEqual(rows);

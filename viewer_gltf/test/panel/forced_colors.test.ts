@@ -1,4 +1,7 @@
-/** High contrast: with the system's own few colours, states, colours, sliders and the focus can still be seen. */
+/**
+ * High contrast: with the few colours of the system, states, colours, sliders and the focus remain
+ * visible.
+ */
 import type { Locator } from "playwright-core";
 import { beforeAll, expect, it } from "vitest";
 import { openAllSections } from "../support/browser/open_sections";
@@ -25,7 +28,7 @@ describeInChromium("high contrast", () => {
     return decodePng(await found.screenshot());
   }
 
-  /** An element's pixels, as red, green, blue, opacity. */
+  /** Pixels of an element: red, green, blue, opacity. */
   const pixelsOf = async (found: Locator) => [...(await pictureOf(found)).rgba];
 
   /** Share of the pixels that differ clearly. */
@@ -36,7 +39,7 @@ describeInChromium("high contrast", () => {
     return Array.from({ length: count }, (_, i) => i).filter(isOther).length / count;
   }
 
-  /** Share of the light pixels: the scheme is dark. */
+  /** Share of light pixels; the colour scheme is dark. */
   const lightShare = (pixels: readonly number[]) =>
     (4 * pixels.filter((value, i) => i % 4 === 1 && value > 128).length) / pixels.length;
 
@@ -44,7 +47,7 @@ describeInChromium("high contrast", () => {
     const share = lightShare(await pixelsOf(page().locator('[data-overlay="full-screen"]')));
     const empty = lightShare(await pixelsOf(page().locator(".fold")));
     expect(empty).toBeGreaterThan(0.01); // a chevron
-    expect(share).toBeGreaterThan(0.08); // more than the ring round it
+    expect(share).toBeGreaterThan(0.08); // more than the ring around it
   });
 
   it("shows whether a switch is on", async () => {
@@ -55,11 +58,11 @@ describeInChromium("high contrast", () => {
     const on = await pixelsOf(control);
     await control.uncheck();
     expect(difference(off, on)).toBeGreaterThan(0.3);
-    expect(lightShare(off)).toBeGreaterThan(0.2); // its edge and its dot
+    expect(lightShare(off)).toBeGreaterThan(0.2); // the edge and the dot of the switch
     expect(lightShare(off)).toBeLessThan(0.6);
   });
 
-  it("shows which of several is chosen", async () => {
+  it("shows which of several options is chosen", async () => {
     const span = (value: string) => page().locator(`[data-picture-size="${value}"] + span`);
     const before = await pixelsOf(span("1"));
     await page().locator('[data-picture-size="1"]').check({ force: true });
@@ -87,7 +90,7 @@ describeInChromium("high contrast", () => {
     expect(outline).toBe("solid");
   });
 
-  it("shows a slider's track, its thumbs and how much of it is taken", async () => {
+  it("shows the track, the thumbs and the filled part of a slider", async () => {
     const track = page().locator(".ends").first();
     const whole = await pixelsOf(track);
     await page().locator('[data-part="window-low"]').first().fill("200");
@@ -95,7 +98,7 @@ describeInChromium("high contrast", () => {
     expect(difference(whole, part)).toBeGreaterThan(0.1);
   });
 
-  it("draws a ring round what has the keyboard", async () => {
+  it("draws a ring around the focused element", async () => {
     const button = page().locator('[data-action="share"]');
     await button.scrollIntoViewIfNeeded();
     const box = await button.boundingBox();
@@ -104,7 +107,7 @@ describeInChromium("high contrast", () => {
     const shot = async () => [...decodePng(await page().screenshot({ clip })).rgba];
     await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     const before = await shot();
-    await page().keyboard.press("Tab"); // so that the page is worked by keys
+    await page().keyboard.press("Tab"); // switches the page to keyboard mode
     await button.focus();
     expect(difference(before, await shot())).toBeGreaterThan(0.04);
   });

@@ -1,4 +1,7 @@
-/** The full screen of the flat page: by its button and by its key, and no button where a browser can't. */
+/**
+ * The full screen of the flat page: by its button and its key, and no button if the browser does
+ * not support it.
+ */
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -9,7 +12,7 @@ describeInChromium("the full screen", () => {
   const button = () => page().locator('[data-overlay="full-screen"]');
   const isFull = () => page().evaluate(() => document.fullscreenElement !== null);
 
-  it("shows panel and picture, and is left again, by button and by key", async () => {
+  it("shows the panel and the view, and ends again, by button and by key", async () => {
     await stand.open();
     await button().click();
     await expect.poll(isFull).toBe(true);
@@ -27,14 +30,14 @@ describeInChromium("the full screen", () => {
     await expect.poll(isFull).toBe(false);
   });
 
-  it("has no button where the browser has none, and its key says so", async () => {
+  it("has no button if the browser does not support it, which its key reports", async () => {
     await page().addInitScript(() => {
       Object.defineProperty(document, "fullscreenEnabled", { value: false });
     });
     await stand.open();
     expect(await button().isVisible()).toBe(false);
     await page().keyboard.press("Shift+Enter");
-    const said = () => page().locator("[data-said]").textContent();
-    await expect.poll(said).toMatch(/full screen/);
+    const announced = () => page().locator("[data-said]").textContent();
+    await expect.poll(announced).toMatch(/full screen/);
   });
 });

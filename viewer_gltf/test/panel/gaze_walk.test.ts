@@ -1,14 +1,14 @@
-/** A walk through all of the panel in stereo by gaze alone: no button, no controller, no key. */
+/** A walk through the whole panel in stereo by gaze alone: no button, no controller, no key. */
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 import { prepareHands } from "../support/xr/stand";
 
 describeInChromium("by gaze alone", () => {
-  const hands = prepareHands({ width: 64, height: 32 }); // nobody looks at it
+  const hands = prepareHands({ width: 64, height: 32 }); // no test looks at the pixels
 
   it.runIf(IS_EXHAUSTIVE)(
-    "the panel is opened, every control of every page answers, and stereo is left",
+    "the panel is opened, every control of every page responds, and stereo is ended",
     async () => {
       await hands().gazeOnly();
       const { walked, silent, commands, kinds, isClosed, leaves } = await hands().page.evaluate(
@@ -18,13 +18,15 @@ describeInChromium("by gaze alone", () => {
           const gaze = (id: string) => {
             hands.gazeFor(id, DWELL_S);
             const after = seen();
-            hands.gazeFor(null, 6); // away: the same may be chosen again, and what was told has gone
+            // away from the panel: the control can be chosen again, and its notice has gone
+            hands.gazeFor(null, 6);
             return after;
           };
-          /** Everything that a person can see of an answer. */
+          /** All visible effects of a response. */
           const seen = () => {
             const { told, position, scale, ...status } = hands.status();
-            // Undo goes by itself; the button for the next page counts the pages
+            // Undo disappears by itself, and the button for the next page has the number of the
+            // page in its label
             const regions = status.labels.filter((label) => !label.startsWith("Undo the last"));
             const asked = [hands.actions.length, hands.commands.length, hands.leaves];
             return JSON.stringify([regions, told, position, scale, asked]);
@@ -40,7 +42,7 @@ describeInChromium("by gaze alone", () => {
               !id.startsWith("tab=") && !ofBar.has(id) && !done.has(id) && !id.endsWith("/open");
             const swatches = new Set<string>();
             for (let pages = 0; pages < 20; pages++) {
-              // what is chosen may bring others, or take some away
+              // a choice may add or remove controls
               for (let id = regions().find(isNew); id !== undefined; id = regions().find(isNew)) {
                 done.add(id);
                 const before = seen();
@@ -57,7 +59,7 @@ describeInChromium("by gaze alone", () => {
               if (!regions().some(isNew) && pages > 3) break;
             }
           };
-          /** The page of a channel or lamp, by the colours that a look at its swatch lays out. */
+          /** The page of a channel or lamp, opened from the colours that a glance at its swatch shows. */
           const walkGroup = (swatch: string) => {
             const more = swatch.replace("/open", "/more");
             hands.gazeFor(swatch, 0.6);

@@ -1,4 +1,7 @@
-/** All of the panel by gaze alone in the page itself: a split screen, and a phone's reports of its turn. */
+/**
+ * A walk through the whole panel by gaze alone in the page itself: a split screen, and a phone's
+ * reports of its rotation.
+ */
 import { expect, it } from "vitest";
 import { addClock, holdFrames } from "../support/browser/clock";
 import { describeInChromium } from "../support/browser/skip";
@@ -8,7 +11,10 @@ import { hasPython } from "../support/python";
 
 const SMALL = { viewport: { width: 96, height: 48 }, isBlind: true };
 
-/** Open the panel by gaze, try out each control of each page, or of one tab's, close it, and leave stereo. */
+/**
+ * Opens the panel by gaze, tries each control of each page, or of one section's pages, closes it,
+ * and ends stereo.
+ */
 async function walk(stand: Stand, only = "") {
   const { page } = stand.viewer;
   await page.keyboard.press("P");
@@ -19,7 +25,7 @@ async function walk(stand: Stand, only = "") {
     if (api === undefined || clock === undefined) throw new Error("no viewer, or no clock");
     const DWELL_S = 1.5;
     const UNDO = "undo-choice";
-    /** The head rests there by the second report: where it will be is told from the last two. */
+    /** Two reports bring the head to rest, because its motion is predicted from the last two. */
     const turn = (alpha: number, beta: number) => {
       for (let k = 0; k < 2; k++) {
         dispatchEvent(new DeviceOrientationEvent("deviceorientation", { alpha, beta, gamma: 0 }));
@@ -31,7 +37,7 @@ async function walk(stand: Stand, only = "") {
     const menu = () => api.snapshot().menu;
     const ids = () => menu().map(({ id }) => id);
     let [alpha, beta] = [0, 90];
-    /** The phone turns until it looks there; the eyes lie before the neck, and move on the way. */
+    /** Turns the phone towards a control. The eyes are in front of the neck, and move on the way. */
     const lookAt = (id: string) => {
       for (let k = 0; k < 2; k++) {
         const entry = menu().find((each) => each.id === id);
@@ -45,7 +51,7 @@ async function walk(stand: Stand, only = "") {
       turn(alpha, 150);
       pass(0.1);
     };
-    /** Everything that a person can see of an answer. *Undo* goes by itself, so it is none. */
+    /** All visible effects of a response. *Undo* disappears by itself, so it does not count. */
     const seen = () => {
       const { state, told, specimenAt, specimenTurn, isStereo } = api.snapshot();
       const onPage = [...document.querySelectorAll("input")].map((each) => each.checked);
@@ -68,38 +74,43 @@ async function walk(stand: Stand, only = "") {
     const ofBar = new Set([UNDO, "up", "more", "leave", "close", "opener"]);
     const ofPage = () => ids().filter((id) => !ofBar.has(id) && !id.startsWith("tab="));
 
-    /** Each control of each page of a section, of a group of it, or of the closed panel's bar. */
+    /** Tries each control of each page of a section, of a group, or of the bar of the closed panel. */
     const walkPages = async (name: string) => {
       const done = new Set<string>();
       const pages = new Set<string>();
       const next = () => ofPage().find((id) => !done.has(id));
-      // what is chosen may move others to an earlier page: once round again
+      // a choice may move controls to an earlier page, so all pages are visited again
       for (let stale = 0; stale <= pages.size; stale = next() === undefined ? stale + 1 : 0) {
         pages.add(ofPage().join());
         const again: string[] = [];
-        // what is chosen may bring others, or take some away
+        // a choice may add or remove controls
         for (let id = next(); id !== undefined; id = next()) {
           done.add(id);
           if (id.endsWith("/open")) await walkGroup(name, id);
           else if (!tryOut(id)) again.push(id);
           walked.push(id);
-          await new Promise((resolve) => setTimeout(resolve)); // what loads may come
+          // lets code load that a control needs
+          await new Promise((resolve) => setTimeout(resolve));
         }
-        // what was chosen already, or told for another control, comes after another
+        // a control without a response is tried again after another one, because its value or
+        // notice may have been there before
         for (const id of again) {
-          // code that is loaded when it is first wanted has come by then
+          // code that is loaded on demand is loaded by then
           await new Promise((resolve) => setTimeout(resolve, 500));
           const following = walked[walked.lastIndexOf(id) + 1];
           if (ids().includes(following)) gaze(following);
-          pass(6); // what was told has gone
+          pass(6); // the notice has gone
           if (ids().includes(id) && !tryOut(id)) silent.push(`${name} ${id}`);
         }
-        pass(3); // what the gaze carries is put down
+        pass(3); // the specimen is no longer carried by the gaze
         if (!ids().includes("more")) break;
         gaze("more");
       }
     };
-    /** The colours that a look at a swatch lays over the name, and the page of the channel or lamp. */
+    /**
+     * Tries the colours that a glance at a swatch shows over the name, and the page of the channel
+     * or lamp.
+     */
     const walkGroup = async (name: string, swatch: string) => {
       const group = swatch.slice(0, -"/open".length);
       const look = () => {
@@ -109,7 +120,7 @@ async function walk(stand: Stand, only = "") {
       look();
       const colours = ids().filter((id) => id.startsWith(`${group}/color=`));
       const answered = new Set<string>();
-      // the first once more, since a channel may have had that colour
+      // the first colour is tried again, because a channel may have had it
       for (const id of [...colours, ...colours.slice(0, 1)]) {
         look();
         if (!ids().includes(id)) continue;
@@ -142,7 +153,8 @@ async function walk(stand: Stand, only = "") {
 
     turn(0, 90);
     pass(0.1);
-    await new Promise((resolve) => setTimeout(resolve, 600)); // it has come to rest: that is ahead
+    // the head has come to rest, which defines straight ahead
+    await new Promise((resolve) => setTimeout(resolve, 600));
     pass(0.1);
     const before = ids();
     if (only === "") await walkPages("bar");
@@ -162,7 +174,7 @@ async function walk(stand: Stand, only = "") {
   }, only);
 }
 
-/** The bar while the panel is closed. */
+/** Buttons of the bar while the panel is closed. */
 const BAR = ["nearer", "farther", "roll-left", "roll-right", "move"]
   .map((id) => `bar-${id}`)
   .concat("opener");
@@ -170,7 +182,7 @@ const BAR = ["nearer", "farther", "roll-left", "roll-right", "move"]
 describeInChromium("in a Cardboard, by gaze alone", () => {
   const stand = prepareStand(SMALL);
 
-  it("the panel is opened, each control of each page acts, and stereo is left", async () => {
+  it("the panel is opened, each control of each page responds, and stereo is ended", async () => {
     await addClock(stand.viewer.page);
     await stand.open("&mode=off#v=1&gaze=on");
     const found = await walk(stand);
@@ -205,7 +217,7 @@ describeInChromium("in a Cardboard, the objects of a label map", () => {
   }
   const stand = prepareStand({ ...SMALL, bundle: prepareObjects("--organs") });
 
-  it("are coloured, left out, found, hidden and selected by gaze, of 117 kinds, too", async () => {
+  it("are coloured, filtered, found, hidden and selected by gaze, also with 117 kinds", async () => {
     await addClock(stand.viewer.page);
     const linked = JSON.stringify({ picked: String(labelOf(7)), ranges: { CD8: [null, 1000] } });
     await stand.open(`#v=1&gaze=on&objects=${CHANNEL}:${encodeURIComponent(linked)}`);

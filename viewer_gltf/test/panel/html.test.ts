@@ -1,6 +1,6 @@
 /**
- * The panel in headless Chromium: every control by pointer and by keyboard, names, contrast, narrow
- * windows. STEREOCELL_SHOTS names a folder to leave pictures of it in.
+ * The panel in headless Chromium: every control by pointer and by keyboard, labels, contrast,
+ * narrow windows. STEREOCELL_SHOTS names a folder for screenshots.
  */
 import { join } from "node:path";
 import { beforeAll, beforeEach, describe, expect, it } from "vitest";
@@ -14,7 +14,7 @@ const SHOTS = process.env.STEREOCELL_SHOTS;
 const SCREEN = { viewport: { width: 640, height: 480 }, isBlind: SHOTS === undefined };
 const [FIRST, SECOND] = ["F_x20_body", "Balls"];
 
-/** The panel of a page that is open or will be. */
+/** The panel of a page that is open or will be opened. */
 function panelOf(stand: Stand) {
   const page = () => stand.viewer.page;
   const control = (id: string) => page().locator(`[data-control="${id}"]`);
@@ -94,16 +94,16 @@ describeInChromium("the panel", () => {
     expect((await state()).isDwellOn).toBe(false);
   });
 
-  it("is worked by the keyboard alone, which keeps its place", async () => {
+  it("is operated by the keyboard alone, which keeps its focus", async () => {
     await openAll();
-    /** Go to a control by Tab, from the start of the panel. */
+    /** Moves the focus to a control by Tab, from the start of the panel. */
     async function tabTo(id: string): Promise<void> {
       await page().locator(".fold").focus();
       for (let i = 0; i < 80 && (await focused()) !== id; i++) await page().keyboard.press("Tab");
       expect(await focused()).toBe(id);
     }
     await tabTo(`${FIRST}/shown`);
-    await page().keyboard.press("Space"); // its card goes to the end of the list
+    await page().keyboard.press("Space"); // its card moves to the end of the list
     expect((await first()).shown).toBe(false);
     expect(await focused()).toBe(`${FIRST}/shown`);
     await page().keyboard.press("Space");
@@ -131,10 +131,10 @@ describeInChromium("the panel", () => {
     await tabTo("back");
     await page().keyboard.press("Enter");
     expect((await state()).selected).toBeNull();
-    expect(await focused()).toBe("back"); // it has nothing to do now, and yet is not lost
+    expect(await focused()).toBe("back"); // the button has no effect now, but keeps the focus
   });
 
-  it("has a key for all else", async () => {
+  it("has keys for everything else", async () => {
     const press = (key: string) => page().keyboard.press(key);
     await press("o");
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
@@ -144,7 +144,7 @@ describeInChromium("the panel", () => {
     await press("b");
     const box = async () => (await state()).clip.box;
     const before = await box();
-    await press("B"); // the last of its faces
+    await press("B"); // the last face of the box
     await press(".");
     expect((await box())?.min).toEqual(before?.min);
     expect((await box())?.max[2]).toBeGreaterThan(before?.max[2] ?? Number.NaN);
@@ -158,7 +158,7 @@ describeInChromium("the panel", () => {
     expect((await first()).opacity).toBeCloseTo(0.9, 5);
   });
 
-  it("switches the keys of one character off, also for the next visit, and on again", async () => {
+  it("switches single-character keys off, also for the next visit, and on again", async () => {
     const { channels } = await state();
     await stand.viewer.unfold("share");
     await control("letters").uncheck();
@@ -168,8 +168,8 @@ describeInChromium("the panel", () => {
     await stand.open();
     await press("1");
     expect((await state()).channels).toEqual(channels);
-    await press("?"); // the list of keys names the switch's place
-    await page().getByRole("dialog").waitFor(); // its code comes when it is first asked for
+    await press("?"); // the list of keys says where the switch is
+    await page().getByRole("dialog").waitFor(); // its code is loaded on demand
     await press("Escape");
     await control("letters").check();
     await page()
@@ -179,16 +179,16 @@ describeInChromium("the panel", () => {
     expect((await state()).channels[0].shown).toBe(!channels[0].shown);
   });
 
-  it("leaves the keys alive whatever was clicked", async () => {
+  it("keeps the keys working after any click", async () => {
     const press = (key: string) => page().keyboard.press(key);
     const axes = () => page().locator(".orientation-mark").getAttribute("aria-label");
     await control("top").click();
     await stand.viewer.still();
     const above = await axes();
-    for (let i = 0; i < 6; i++) await press("ArrowRight"); // a quarter
+    for (let i = 0; i < 6; i++) await press("ArrowRight"); // a quarter turn
     await stand.viewer.still();
     expect(await axes()).not.toBe(above);
-    await press("Enter"); // is the button's still
+    await press("Enter"); // the focused button takes this key
     await stand.viewer.still();
     expect(await axes()).toBe(above);
 
@@ -201,7 +201,7 @@ describeInChromium("the panel", () => {
 
     await control("disc-radius").click();
     const { discRadius_deg } = await state();
-    await press("ArrowRight"); // is the slider's still
+    await press("ArrowRight"); // the focused slider takes this key
     expect((await state()).discRadius_deg).toBeCloseTo(discRadius_deg + 0.5, 5);
     const from = await axes();
     await press("z");
@@ -209,9 +209,9 @@ describeInChromium("the panel", () => {
     expect(await axes()).not.toBe(from);
   });
 
-  it("cuts the only tile that is shown at its own middle, and reports an empty cut", async () => {
+  it("cuts an isolated tile at its own middle, and reports an empty cut", async () => {
     await stand.viewer.unfold("cut");
-    const said = () => page().locator("[data-said]").textContent();
+    const announced = () => page().locator("[data-said]").textContent();
     const { tiles } = stand.manifest;
     const [one, other] = [tiles[0], tiles[tiles.length - 1]];
     const alone = (tile: string) => page().locator(`[data-tile-choice="${tile}"]`).click();
@@ -226,7 +226,9 @@ describeInChromium("the panel", () => {
     }
     await alone(other.id);
     expect((await state()).isolated).toBe(other.id);
-    expect(await said()).toBe(`Only ${tileName(other.id, [])}: the cut leaves nothing of it.`);
+    expect(await announced()).toBe(
+      `Only ${tileName(other.id, [])} is shown, and the cut removes all of it.`,
+    );
   });
 
   it("lists all keys in a dialog that keeps the focus until Escape", async () => {
@@ -244,7 +246,7 @@ describeInChromium("the panel", () => {
       });
       expect(isOut).toBe(false);
     }
-    await page().keyboard.press("o"); // no key works behind it
+    await page().keyboard.press("o"); // no key has an effect behind the dialog
     expect((await first()).opacity).toBe(1);
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "keys.png") });
     const find = dialog.locator('[data-control="find-key"]');
@@ -254,22 +256,22 @@ describeInChromium("the panel", () => {
     expect(await labels()).toEqual(["Cut by a box: on or off"]);
     await find.fill("no such key");
     expect(await labels()).toEqual([]);
-    expect(await dialog.textContent()).toContain("No key fits these words.");
+    expect(await dialog.textContent()).toContain("No key matches this text.");
     await page().keyboard.press("Escape");
     expect(await dialog.isVisible()).toBe(false);
     for (const isOpen of [true, false]) {
       await page().keyboard.press("?");
       expect(await dialog.isVisible()).toBe(isOpen);
-      if (isOpen) expect((await labels()).length).toBe(all); // what was sought is forgotten
+      if (isOpen) expect((await labels()).length).toBe(all); // the search text is cleared
     }
   });
 });
 
-describeInChromium("the panel of a page that opens in its own way", () => {
+describeInChromium("the panel of a page with other conditions", () => {
   const stand = prepareStand(SCREEN);
   const { page, control, state, first, focused } = panelOf(stand);
 
-  it("leaves a field at Escape, also that of the link", async () => {
+  it("leaves a field with Escape, also that of the link", async () => {
     await page().addInitScript(() => {
       Object.defineProperty(navigator, "clipboard", { value: undefined });
     });
@@ -277,7 +279,7 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     const press = (key: string) => page().keyboard.press(key);
     await press("l");
     await expect.poll(focused).toBe("link");
-    await press("o"); // is the field's
+    await press("o"); // the field takes this key
     expect((await first()).opacity).toBe(1);
     await press("Escape");
     expect(await focused()).toBeNull();
@@ -285,18 +287,21 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     expect((await first()).opacity).toBeCloseTo(0.95, 5);
   });
 
-  it("announces the same before the eyes in stereo", async () => {
+  it("makes the same announcement in stereo", async () => {
     await addHeadset(page());
     await stand.open("&mode=off");
     await stand.viewer.enterStereo();
-    for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key); // the next tile alone
+    // isolates the next tile
+    for (const key of ["t", "i", "b", "t"]) await page().keyboard.press(key);
     const { isolated } = await state();
     const { told } = await stand.viewer.snapshot();
-    expect(told.at(-1)).toBe(`Only ${tileName(isolated ?? "", [])}: the cut leaves nothing of it.`);
+    expect(told.at(-1)).toBe(
+      `Only ${tileName(isolated ?? "", [])} is shown, and the cut removes all of it.`,
+    );
     expect((await state()).notices).toEqual([]);
   });
 
-  it("finds one of seventy channels, and names the one that leaves for a fifth", async () => {
+  it("finds one of seventy channels, and names the one that is hidden for a fifth", async () => {
     const { manifest, host } = stand;
     const [, , block] = manifest.channels;
     const more = Array.from({ length: 67 }, (_, i) => ({
@@ -314,22 +319,23 @@ describeInChromium("the panel of a page that opens in its own way", () => {
     await page().keyboard.press("/");
     expect(await focused()).toBe("find-channel");
     await control("find-channel").fill("marker 42");
-    await page().keyboard.press("Tab"); // its swatch
+    await page().keyboard.press("Tab"); // the swatch
     await page().keyboard.press("Tab");
     await page().keyboard.press("Space");
     const shown = (await state()).channels.filter((channel) => channel.shown);
     expect(shown.map(({ id }) => id)).toEqual(["Balls", "Block", "marker_0", "marker_42"]);
     expect(await focused()).toBe("marker_42/shown");
     expect(await page().locator("[data-said]").textContent()).toBe(
-      "4 channels show at once: F body left for Marker 42.",
+      "Only 4 channels can be shown: F body was hidden to show Marker 42.",
     );
-    expect((await state()).notices).toEqual([]); // it is no fault, and goes by itself
+    // the announcement is not a notice, and disappears by itself
+    expect((await state()).notices).toEqual([]);
     await expect.poll(() => page().locator("[data-said]").textContent()).toBe("");
     if (SHOTS !== undefined) await page().screenshot({ path: join(SHOTS, "channels-70.png") });
   });
 });
 
-describeInChromium("the panel as it lies there", () => {
+describeInChromium("the layout of the panel", () => {
   const stand = prepareStand({ ...SCREEN, sharesPage: true });
   const { page, control, openAll } = panelOf(stand);
 
@@ -353,12 +359,12 @@ describeInChromium("the panel as it lies there", () => {
     expect(await control(`${FIRST}/shown`).getAttribute("aria-label")).toBe("Show F body");
     const [tile] = await page().locator('[data-tile-choice="r0_c0"]').all();
     await tile.click();
-    expect(await tile.getAttribute("aria-label")).toMatch(/^Tile in row 1, column 1, chosen/);
+    expect(await tile.getAttribute("aria-label")).toMatch(/^Tile in row 1, column 1, selected/);
     expect(await tile.getAttribute("aria-pressed")).toBe("true");
     expect(await page().locator("[data-notices]").getAttribute("role")).toBe("status");
   });
 
-  it("has text of at least 4.5 : 1 on what is behind it", async () => {
+  it("has text with a contrast of at least 4.5 : 1", async () => {
     await openAll();
     await stand.viewer.chooseTile("r0_c0");
     await control("isolate").click();
@@ -370,11 +376,11 @@ describeInChromium("the panel as it lies there", () => {
     [320, 640],
     [1280, 720],
   ])("at %i x %i", (width, height) => {
-    it("fits, and leaves the picture its room", async () => {
+    it("fits, and leaves enough space for the view", async () => {
       await page().setViewportSize({ width, height });
       await stand.viewer.openCard(FIRST);
       await stand.viewer.settled();
-      await page().waitForTimeout(400); // figures follow a little later
+      await page().waitForTimeout(400); // the figures are updated slightly later
       const sizes = await page().evaluate(() => {
         const box = (selector: string) =>
           document.querySelector(selector)?.getBoundingClientRect() ?? new DOMRect();
@@ -407,7 +413,7 @@ describeInChromium("the panel as it lies there", () => {
   });
 });
 
-/** Runs in the page: texts with too low a contrast (WCAG 2.2, 1.4.3), but for disabled ones. */
+/** Runs in the page: texts with too low a contrast (WCAG 2.2, 1.4.3), except disabled ones. */
 function lowContrasts(): string[] {
   type Rgba = [number, number, number, number];
   const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });

@@ -5,7 +5,10 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { KEYS } from "../support/panel/all_keys";
 
-/** They open a dialog, a file chooser or stereo, write a file or the clipboard: each is its own answer. */
+/**
+ * Keys that open a dialog, a file chooser or stereo, or write a file or the clipboard. They need no
+ * announcement.
+ */
 const OWN_ANSWER = ["?", "V", "P", "K", ":", "U", "l", "(", ")", '"', "R"];
 const WRITTEN = KEYS.groups
   .flatMap(({ keys }) => keys.flatMap(({ keys }) => keys))
@@ -18,22 +21,22 @@ const STATES: Readonly<Record<string, readonly string[]>> = {
   ],
 };
 
-type Tried = Readonly<{ name: string; said: string; changes: boolean; fault: string }>;
+type Tried = Readonly<{ name: string; announced: string; changes: boolean; fault: string }>;
 
 describeInChromium("a key that is pressed by accident", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 480 }, isBlind: true });
 
-  /** Press each key once and take it back. `changes`: the key has changed something. */
+  /** Presses each key once and takes it back. `changes`: the key has changed something. */
   const tryAll = (names: readonly string[]) =>
     stand.viewer.page.evaluate(async (names): Promise<Tried[]> => {
       const line = document.querySelector<HTMLElement>("[data-said]");
       if (line === null) throw new Error("the page has no line");
-      /** What has been loaded since is no reader's change. */
-      const own = (key: string, value: unknown) => {
+      /** Loaded data is not a change by the user. */
+      const comparable = (key: string, value: unknown) => {
         if (key === "transfer2d") return undefined;
         return typeof value === "number" ? value.toFixed(5) : value;
       };
-      /** The state, the place of the eye, and the panel. */
+      /** The state, the camera and the panel. */
       const now = () => {
         const { state, look } = window.stereocell?.snapshot() ?? {};
         const panel = document.querySelector(".panel");
@@ -43,7 +46,7 @@ describeInChromium("a key that is pressed by accident", () => {
             ...{ state, look, isFolded: panel?.classList.contains("folded") },
             marks: marks.map((each) => `${each.ariaExpanded} ${each.ariaPressed}`),
           },
-          own,
+          comparable,
         );
       };
       const tried: Tried[] = [];
@@ -52,10 +55,10 @@ describeInChromium("a key that is pressed by accident", () => {
         const before = now();
         dispatchEvent(new KeyboardEvent("keydown", { key: name, cancelable: true }));
         await new Promise(requestAnimationFrame);
-        const said = line.textContent ?? "";
+        const announced = line.textContent ?? "";
         const changes = now() !== before;
         const offer = document.querySelector<HTMLButtonElement>('[data-action="offer"]');
-        const isOffered = offer?.textContent === "Undo"; // others lead on
+        const isOffered = offer?.textContent === "Undo"; // other offers are buttons of refusals
         if (isOffered) offer.click();
         await new Promise(requestAnimationFrame);
         const after = now();
@@ -64,7 +67,7 @@ describeInChromium("a key that is pressed by accident", () => {
           after === before
             ? ""
             : `${isOffered ? "not exact" : "no offer"}: ${before.slice(at - 60, at + 60)} -> ${after.slice(at - 60, at + 60)}`;
-        tried.push({ name, said, changes, fault });
+        tried.push({ name, announced, changes, fault });
       }
       return tried;
     }, names);
@@ -74,11 +77,12 @@ describeInChromium("a key that is pressed by accident", () => {
     await stand.viewer.settled();
     const { page } = stand.viewer;
     for (const key of keys) await page.keyboard.press(key);
-    await page.waitForTimeout(1100); // what follows is no part of the last step
+    await page.waitForTimeout(1100); // later changes are a step of their own
     const tried = await tryAll(WRITTEN);
     expect(tried.filter(({ fault }) => fault !== "")).toEqual([]);
-    expect(tried.filter(({ said }) => said === "").map(({ name }) => name)).toEqual([]);
-    const few = where === "as it opens" ? 35 : 40; // of some ninety: the others say why they do nothing
+    expect(tried.filter(({ announced }) => announced === "").map(({ name }) => name)).toEqual([]);
+    // there are about ninety keys; the others report why they have no effect
+    const few = where === "as it opens" ? 35 : 40;
     expect(tried.filter(({ changes }) => changes).length).toBeGreaterThan(few);
   });
 
@@ -106,12 +110,12 @@ describeInChromium("a key that is pressed by accident", () => {
   });
 });
 
-describeInChromium("a key that a reader changes", () => {
+describeInChromium("a key that a user changes", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 480 }, isBlind: true });
   const page = () => stand.viewer.page;
   const opacity = async () => (await stand.viewer.snapshot()).state.channels[0].opacity;
   const line = () => page().locator("[data-key-line]").textContent();
-  /** A key that no keyboard of the test's has. */
+  /** Presses a key that is on no keyboard of the test. */
   const pressOther = () =>
     page().evaluate(() =>
       (document.activeElement ?? document.body).dispatchEvent(
@@ -120,15 +124,15 @@ describeInChromium("a key that a reader changes", () => {
     );
   const cap = (name: string) => page().locator(`[data-key="${name}"]`);
 
-  it("is set in the list, kept for the next visit, refused where it is taken, and reset", async () => {
+  it("is set in the list, kept for the next visit, refused if it is taken, and reset", async () => {
     await stand.open("&mode=off");
     const press = (key: string) => page().keyboard.press(key);
     await press("?");
     await cap("o").click();
-    expect(await line()).toMatch(/^Press the new key for “.+”; Esc leaves it\.$/);
+    expect(await line()).toMatch(/^Press the new key for “.+”, or Esc to cancel\.$/);
     await press("x");
     expect(await line()).toBe(
-      "That key does “Hide the channel”: press another one, or change that one first.",
+      "That key is used for “Hide the channel”: press another key, or change that one first.",
     );
     await press("F5");
     expect(await line()).toMatch(/^That key belongs to the browser/);

@@ -1,4 +1,4 @@
-/** Phones: nothing lies under a notch, and the way back from a tile is in reach of the thumb. */
+/** On phones, nothing lies under a notch, and the button back from a tile is within reach of the thumb. */
 import { expect, it } from "vitest";
 import { project } from "../support/browser/camera";
 import { openAllSections } from "../support/browser/open_sections";
@@ -8,9 +8,9 @@ import { prepareStand } from "../support/browser/stand";
 const UPRIGHT = { width: 390, height: 844 };
 const LYING = { width: 844, height: 390 };
 const DESK = { width: 900, height: 600 };
-/** As a phone with a notch has them, but on all sides at once, px. */
+/** Safe-area insets of a phone with a notch, but on all sides at once, px. */
 const INSETS = { top: 47, right: 44, bottom: 34, left: 44 };
-/** What must not lie under a notch: controls, and texts over the picture. */
+/** Elements that must not lie under a notch: controls, and texts over the view. */
 const PARTS =
   "button, select, input, canvas[role=application], .said, .first-hint, .notices p, .scale-bar, " +
   ".name-mark, .orientation-mark, .status, .panel h1, .way, dialog, .help header";
@@ -27,7 +27,7 @@ describeInChromium("a phone", () => {
     );
   }
 
-  /** Parts that reach under the covered edges, as far as what scrolls lets them be seen. */
+  /** Elements that reach under the covered edges, within the visible part of their scroll containers. */
   const covered = () =>
     page().evaluate(
       ([parts, { top, right, bottom, left }]) =>
@@ -96,7 +96,7 @@ describeInChromium("a phone", () => {
   it.each([
     ["lying", LYING],
     ["upright", UPRIGHT],
-  ])("marks the tapped place itself, however far the covered edges reach: %s", async (_, size) => {
+  ])("marks the tapped place exactly for any covered edges: %s", async (_, size) => {
     await page().setViewportSize(size);
     await coverEdges();
     await stand.open("&mode=off");
@@ -122,7 +122,7 @@ describeInChromium("a phone", () => {
     ["upright, the panel hidden", UPRIGHT, "h"],
     ["lying", LYING, ""],
     ["lying, the panel hidden", LYING, "h"],
-  ])("leads back from a tile in reach of a thumb: %s", async (_, size, key) => {
+  ])("has a button back from a tile within reach of a thumb: %s", async (_, size, key) => {
     await page().setViewportSize(size);
     await stand.open("&mode=off");
     const back = page().locator('[data-overlay="back"]');

@@ -1,4 +1,4 @@
-/** The code of a phone viewer, read by the camera. */
+/** Reading the QR code of a Cardboard viewer with the camera. */
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -8,18 +8,18 @@ const CODE = "https://g.co/cardboard";
 describeInChromium("the scanner", () => {
   const stand = prepareStand({ viewport: { width: 640, height: 480 }, isBlind: true });
 
-  /** A camera that shows nothing, and a detector that finds the code in it at its third look. */
+  /** Adds a camera that shows nothing, and a detector that finds the code at its third attempt. */
   async function addCamera(isAllowed: boolean): Promise<void> {
     await stand.viewer.page.addInitScript(
       ([code, isAllowed]) => {
-        let looks = 0;
+        let attempts = 0;
         Object.assign(window, {
           BarcodeDetector: class {
             static getSupportedFormats(): Promise<string[]> {
               return Promise.resolve(["qr_code"]);
             }
 
-            detect = async () => (++looks < 3 ? [] : [{ rawValue: code }]);
+            detect = async () => (++attempts < 3 ? [] : [{ rawValue: code }]);
           },
         });
         navigator.mediaDevices.getUserMedia = async () => {
@@ -37,7 +37,7 @@ describeInChromium("the scanner", () => {
     await stand.open("&mode=off");
   }
 
-  it("takes the code, lets go of the camera, and remembers the lenses", async () => {
+  it("reads the code, stops the camera, and keeps the lens profile", async () => {
     const { page } = stand.viewer;
     await addCamera(true);
     await stand.viewer.unfold("stereo");
@@ -52,7 +52,7 @@ describeInChromium("the scanner", () => {
     expect(tracks).toEqual(["ended"]);
   });
 
-  it("reports it where the camera is refused", async () => {
+  it("reports that the camera is refused", async () => {
     await addCamera(false);
     await stand.viewer.page.keyboard.press("K");
     await expect

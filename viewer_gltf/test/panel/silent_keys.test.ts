@@ -1,6 +1,6 @@
-/** Every key in headless Chromium, in several states: something is seen to change, or is said. */
+/** Every key in headless Chromium, in several states: each has a visible effect or an announcement. */
 import { expect, it } from "vitest";
-import { STAYS } from "../../src/state/commands";
+import { UNCHANGED_VIEW } from "../../src/state/commands";
 import { REFUSED } from "../../src/state/refusals";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -8,7 +8,10 @@ import { sweep } from "../support/exhaustive";
 import { KEYS, NO_SLICES } from "../support/panel/all_keys";
 
 const SCREEN = { viewport: { width: 320, height: 240 }, isBlind: true };
-/** They open a dialog of the browser's own, fill the screen, save a file or take long: tests of their own have them. */
+/**
+ * Keys that open a dialog of the browser, fill the screen, save a file or take long. They have
+ * tests of their own.
+ */
 const LEFT_OUT: readonly string[] = ["Shift+Enter", "U", "K", "(", "Insert", '"', ")", "l", "P"];
 const NAMES = KEYS.groups
   .flatMap(({ keys }) => keys.flatMap(({ keys }) => keys))
@@ -27,8 +30,10 @@ describeInChromium("every key", () => {
   const stand = prepareStand(SCREEN);
 
   /**
-   * All that a person can perceive of the page, but for what changes by itself, and what is said. `isBefore`: of a
-   * key, with nothing said or open; else a frame after it.
+   * Everything that a user can perceive of the page, except what changes by itself, and the
+   * announcement.
+   *
+   * @param isBefore clears announcements and dialogs before a key; otherwise waits for a frame after it
    */
   const perceived = (isBefore: boolean) =>
     stand.viewer.page.evaluate(async (isBefore) => {
@@ -48,10 +53,10 @@ describeInChromium("every key", () => {
       const focused = (document.activeElement as HTMLElement | null)?.dataset.control;
       const isFull = document.fullscreenElement !== null;
       const seen = JSON.stringify({ state, look, dialogs, isBodyShown, marks, focused, isFull });
-      return { seen, said: line?.textContent ?? "" };
+      return { seen, announced: line?.textContent ?? "" };
     }, isBefore);
 
-  it.each(SWEPT)("says or shows something: %s", async (where, before) => {
+  it.each(SWEPT)("announces or shows an effect: %s", async (where, before) => {
     const { viewer } = stand;
     await stand.open();
     const { page } = viewer;
@@ -64,32 +69,34 @@ describeInChromium("every key", () => {
       const was = await perceived(true);
       await page.keyboard.press(name.replace("Ctrl", "Control"));
       const isSilent = async () => {
-        const { seen, said } = await perceived(false);
-        return said === "" && seen === was.seen;
+        const { seen, announced } = await perceived(false);
+        return announced === "" && seen === was.seen;
       };
-      // what asks a worker, or for a part of the page, is answered a little later
+      // a response of a worker, or of code that is loaded, may come later
       for (let left = 20; left > 0 && (await isSilent()); left--) await page.waitForTimeout(100);
       if (await isSilent()) silent.push(name);
     }
     expect(silent).toEqual([]);
   });
 
-  it("says of a key that there is none, and how to find all", async () => {
+  it("reports that a key does not exist, and how to find all keys", async () => {
     await stand.open();
     const { page } = stand.viewer;
-    const said = () => page.locator("[data-said]").textContent();
+    const announced = () => page.locator("[data-said]").textContent();
     await page.evaluate(() => dispatchEvent(new KeyboardEvent("keydown", { key: "§" })));
-    expect(await said()).toBe("No key §: ? lists the keys.");
+    expect(await announced()).toBe("§ is not a key of the viewer: ? lists the keys.");
     await page.keyboard.press("}");
-    expect(await said()).toBe(NO_SLICES);
+    expect(await announced()).toBe(NO_SLICES);
     await page.keyboard.press("]");
-    expect(await said()).toBe("Only path tracing has this setting: switch path tracing on first.");
+    expect(await announced()).toBe(
+      "Only path tracing has this setting: switch path tracing on first.",
+    );
     await page.keyboard.press("u");
-    expect(await said()).toBe(REFUSED.measured);
+    expect(await announced()).toBe(REFUSED.measured);
     await page.keyboard.press("z");
     await page.keyboard.press("z");
-    expect(await said()).toBe(STAYS.front);
+    expect(await announced()).toBe(UNCHANGED_VIEW.front);
     for (let i = 0; i < 30; i++) await page.keyboard.press("+");
-    expect(await said()).toBe(STAYS["zoom-in"]);
+    expect(await announced()).toBe(UNCHANGED_VIEW["zoom-in"]);
   });
 });

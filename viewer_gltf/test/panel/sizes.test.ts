@@ -1,4 +1,4 @@
-/** Sizes for fingers and eyes: targets of at least 24 px, and text that grows with the reader's font size. */
+/** Sizes for fingers and eyes: targets of at least 24 px, and text that grows with the user's font size. */
 import { describe, expect, it } from "vitest";
 import { openAllSections } from "../support/browser/open_sections";
 import { describeInChromium } from "../support/browser/skip";
@@ -11,7 +11,7 @@ const SIZES = [
   [900, 600],
 ] as const;
 
-/** Runs in the page: all that can be pressed and is smaller. Two sliders on a track are measured apart. */
+/** Runs in the page: targets that are smaller. Two sliders on one track are measured separately. */
 function smallTargets(least_px: number): string[] {
   const all = document.querySelectorAll<HTMLElement>(
     "button, select, input:not(.ends input), a[href], summary, [role=application], [role=slider]",
@@ -25,7 +25,7 @@ function smallTargets(least_px: number): string[] {
     });
 }
 
-/** Runs in the page: places of the thumb at the lower end that are not the thumb's. */
+/** Runs in the page: places around the thumb at the lower end that do not hit the thumb. */
 function missedThumb(size_px: number): string[] {
   const track = document.querySelector<HTMLElement>(".ends");
   track?.scrollIntoView({ block: "center" });
@@ -59,7 +59,10 @@ function narrowLists(): string[] {
 type Text = Readonly<{ text: string; font_px: number; isCut: boolean }>;
 type Texts = Readonly<{ texts: readonly Text[]; overlaps: readonly string[] }>;
 
-/** Runs in the page: the texts in view of the panel and over the picture, by size, cut and overlap. */
+/**
+ * Runs in the page: the visible texts of the panel and over the view, with their sizes, cuts and
+ * overlaps.
+ */
 function textsOf(root: string): Texts {
   const walker = document.createTreeWalker(
     document.querySelector(root) ?? document.body,
@@ -83,7 +86,7 @@ function textsOf(root: string): Texts {
     for (let each: HTMLElement | null = parent; each; each = each.parentElement)
       ancestors.push(each);
     const clips = ancestors.filter((each) => getComputedStyle(each).overflowX !== "visible");
-    // a name that is too long ends with dots, and is whole in its title
+    // a name that is too long ends with dots, and is complete in its title
     const isTitled = parent.title === text;
     const isCut = clips.some((each) => {
       const { left, right } = each.getBoundingClientRect();
@@ -114,7 +117,7 @@ describeInChromium("sizes", () => {
   const page = () => stand.viewer.page;
 
   describe.each(SIZES)("at %i x %i", (width, height) => {
-    it("of all targets are at least 24 px, also in dialogs, and lists leave room for their longest choice", async () => {
+    it("are at least 24 px for all targets, also in dialogs, and suit the longest choice of lists", async () => {
       await page().setViewportSize({ width, height });
       await stand.open("&mode=disc");
       expect(await page().evaluate(smallTargets, TARGET_PX)).toEqual([]);
@@ -138,7 +141,7 @@ describeInChromium("sizes", () => {
       }
     });
 
-    it("of texts grow with the reader's font size, and no text is cut or covered", async () => {
+    it("grow with the user's font size for texts, of which none is cut or covered", async () => {
       await page().setViewportSize({ width, height });
       await stand.open("&mode=off");
       await openAllSections(stand.viewer);

@@ -1,4 +1,7 @@
-/** No row of the flat panel moves by itself: while a bundle loads, while modes change, while notices come. */
+/**
+ * No row of the flat panel moves by itself: during loading, after a change of mode, or when notices
+ * appear.
+ */
 import { describe, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand, type Stand } from "../support/browser/stand";
@@ -8,14 +11,14 @@ import { hasPython } from "../support/python";
 
 type Move = Readonly<{ row: string; from: number; to: number }>;
 
-/** Runs in the page before its own scripts: notes each row that is seen at another height than before. */
+/** Runs in the page before its own scripts: records each row whose height on the page changes. */
 function watchRows(): void {
   const moves: Move[] = [];
   const places = new Map<string, number>();
-  const look = () => {
+  const check = () => {
     const body = document.querySelector(".panel .body");
     if (body !== null) {
-      // where the reader has scrolled to is no move
+      // scrolling by the user is not a move
       const offset = body.scrollTop;
       const rows = document.querySelectorAll<HTMLElement>(
         ".panel [data-opener], .panel [data-control], .panel [data-channel]",
@@ -35,13 +38,13 @@ function watchRows(): void {
         places.set(row, at);
       }
     }
-    requestAnimationFrame(look);
+    requestAnimationFrame(check);
   };
-  requestAnimationFrame(look);
+  requestAnimationFrame(check);
   Object.assign(window, { moves });
 }
 
-/** What has moved since the last look. */
+/** Returns the rows that have moved since the last call. */
 async function movedIn({ viewer: { page } }: Stand): Promise<readonly Move[]> {
   await page.evaluate(async () => {
     for (let i = 0; i < 3; i++) await new Promise(requestAnimationFrame);
@@ -49,12 +52,12 @@ async function movedIn({ viewer: { page } }: Stand): Promise<readonly Move[]> {
   return page.evaluate(() => (window as never as { moves: Move[] }).moves.splice(0));
 }
 
-/** Without Light, whose settings come with the mode that has them. */
+/** The section *Light* is left out, because its settings appear with path tracing. */
 const SECTIONS = [
   ...["tiles", "cut", "slices", "save", "stereo"],
   ...["view", "volume-settings", "quality", "about"],
 ];
-/** Longer than the figures of the panel take to follow, ms. */
+/** Milliseconds after which the figures of the panel are updated. */
 const FIGURES_MS = 400;
 
 describe.each([
@@ -63,10 +66,10 @@ describe.each([
 ])("the rows of the panel at %i x %i", (width, height) => {
   const viewport = { width, height };
 
-  describeInChromium("of a first visit", () => {
+  describeInChromium("on a first visit", () => {
     const stand = prepareStand({ viewport, isBlind: true, isFirstVisit: true });
 
-    it("stay while the bundle loads, and when a tile, an error and an object come", async () => {
+    it("stay while the bundle loads, and when a tile is selected or a notice appears", async () => {
       await stand.viewer.page.addInitScript(watchRows);
       await stand.open();
       await stand.viewer.settled();
@@ -89,7 +92,7 @@ describe.each([
   describeInChromium("with sections open", () => {
     const stand = prepareStand({ viewport, isBlind: true, isFirstVisit: true });
 
-    // The rows are the same at both sizes, and the narrow panel is the one that has less room for them.
+    // The rows are the same at both sizes; the narrow panel has less space for them.
     const isKept = IS_EXHAUSTIVE || width === 390;
     it.runIf(isKept)(
       "stay while modes, slices and channels change, and the swatch of a hidden channel works",

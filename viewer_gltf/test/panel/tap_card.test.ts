@@ -1,4 +1,7 @@
-/** The card beside a tapped place: by mouse, finger and keyboard. STEREOCELL_SHOTS names a folder for pictures. */
+/**
+ * The card beside a tapped place: by mouse, finger and keyboard. STEREOCELL_SHOTS names a folder
+ * for screenshots.
+ */
 import { join } from "node:path";
 import { beforeEach, expect, it } from "vitest";
 import { project } from "../support/browser/camera";
@@ -20,7 +23,7 @@ describeInChromium("the card beside a tapped place", () => {
   const control = (id: string) => page().locator(`[data-control="tap-${id}"]`);
   const state = async () => (await stand.viewer.snapshot()).state;
 
-  /** The middle of a tile's front face on the page, px. */
+  /** Middle of a tile's front face on the page, px. */
   async function placeOf(index: number) {
     const box = await page().locator(".stage").boundingBox();
     if (box === null) throw new Error("no stage");
@@ -41,7 +44,7 @@ describeInChromium("the card beside a tapped place", () => {
     await stand.viewer.settled();
   });
 
-  it("names the place, and hides, recolours, isolates and undoes there", async () => {
+  it("names the structure, and hides, recolours, isolates and undoes", async () => {
     await click(0);
     const [tile] = stand.manifest.tiles;
     expect((await state()).selected).toBe(tile.id);
@@ -79,7 +82,7 @@ describeInChromium("the card beside a tapped place", () => {
     expect(await card().isVisible()).toBe(false);
   });
 
-  it("goes to the next place, and closes by a tap beside the specimen", async () => {
+  it("moves to the next place, and closes after a tap beside the specimen", async () => {
     await click(0);
     const last = stand.manifest.tiles.length - 1;
     await click(last);
@@ -89,7 +92,7 @@ describeInChromium("the card beside a tapped place", () => {
     await expect.poll(() => card().isVisible()).toBe(false);
   });
 
-  it("takes the keyboard where a key opened it, and gives it back at Escape", async () => {
+  it("takes the focus if a key opened it, and returns it at Escape", async () => {
     await page().keyboard.press("Enter");
     await card().waitFor({ state: "visible" });
     const { selected } = await state();
@@ -97,16 +100,16 @@ describeInChromium("the card beside a tapped place", () => {
     const isInside = () =>
       page().evaluate(() => document.activeElement?.closest("[data-tap-card]") !== null);
     await expect.poll(isInside).toBe(true);
-    await page().keyboard.press("Enter"); // is the first button's: only this tile
+    await page().keyboard.press("Enter"); // the first button takes this key: Only this tile
     expect((await state()).isolated).toBe(selected);
     await page().keyboard.press("Escape");
     expect(await card().isVisible()).toBe(false);
-    expect((await state()).isolated).toBe(selected); // the first Escape closes the card alone
+    expect((await state()).isolated).toBe(selected); // the first Escape only closes the card
     await page().keyboard.press("Escape");
     expect((await state()).isolated).toBeNull();
   });
 
-  it("follows its place as the view turns, and closes once that is out of the picture", async () => {
+  it("follows its place as the view turns, and closes once the place is outside the view", async () => {
     await click(0);
     const mark = () => page().locator(".tap-mark").boundingBox();
     const before = await mark();

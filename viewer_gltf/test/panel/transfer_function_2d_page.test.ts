@@ -1,4 +1,4 @@
-/** The editor of value and gradient in headless Chromium: by mouse, by finger, and in a link. */
+/** The editor of the joint histogram in headless Chromium: by mouse, by finger, and in a link. */
 import { expect, it } from "vitest";
 import { shapesOf } from "../../src/state/transfer_functions_2d";
 import { difference, type Picture, takePicture } from "../support/browser/picture";
@@ -6,22 +6,22 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
 const BALLS = "Balls";
-/** Of the picture's pixels, beside those that blend differently from one drawing to the next. */
+/** Share of pixels that may differ, because some blend differently from frame to frame. */
 const SAME = 0.002;
-/** Of the canvas, left around the plane: see html/transfer_function_2d.ts. */
+/** Space around the histogram, as a share of the canvas (see html/transfer_function_2d.ts). */
 const PAD = { x: 14 / 640, y: 14 / 320 };
 
-describeInChromium("the editor of value and gradient", () => {
+describeInChromium("the editor of the joint histogram", () => {
   const stand = prepareStand({ viewport: { width: 484, height: 260 }, hasTouch: true });
   const page = () => stand.viewer.page;
   const control = (part: string) => page().locator(`[data-control="${BALLS}/${part}"]`);
-  const asked = (name: string) =>
+  const requestsOf = (name: string) =>
     stand.host.requests.filter(({ path }) => path.endsWith(`${BALLS}/${name}`)).length;
   const picture = async (): Promise<Picture> => {
     await stand.viewer.still();
     return takePicture(page());
   };
-  const said = () => page().locator("[data-said]").textContent();
+  const announced = () => page().locator("[data-said]").textContent();
 
   async function shapes() {
     const { state } = await stand.viewer.snapshot();
@@ -29,7 +29,7 @@ describeInChromium("the editor of value and gradient", () => {
     return channel === undefined ? [] : shapesOf(channel);
   }
 
-  /** Where a place of the plane is on the page. */
+  /** Returns the place of a point of the histogram on the page. */
   async function at(value: number, gradient: number): Promise<{ x: number; y: number }> {
     await control("shapes").scrollIntoViewIfNeeded();
     const box = await control("shapes").boundingBox();
@@ -41,19 +41,19 @@ describeInChromium("the editor of value and gradient", () => {
     };
   }
 
-  it("shows boundaries by the bundle's shapes, which mouse and finger draw, and a link brings back", async () => {
+  it("shows boundaries by the bundle's shapes, which mouse and finger edit, and a link restores", async () => {
     await stand.open("&mode=all#v=1&c=Balls&depth=0");
     await stand.viewer.still();
     const flat = await picture();
-    expect([asked("transfer2d.json"), asked("histogram2d.ktx2")]).toEqual([0, 0]);
+    expect([requestsOf("transfer2d.json"), requestsOf("histogram2d.ktx2")]).toEqual([0, 0]);
     await stand.viewer.chooseTransferFunction(BALLS, "arcs");
-    expect([asked("transfer2d.json"), asked("histogram2d.ktx2")]).toEqual([1, 0]);
+    expect([requestsOf("transfer2d.json"), requestsOf("histogram2d.ktx2")]).toEqual([1, 0]);
     const boundary = await picture();
     expect(difference(flat, boundary)).toBeGreaterThan(4 * SAME);
 
     await stand.viewer.openCard(BALLS);
     await control("plane").check();
-    await expect.poll(() => asked("histogram2d.ktx2")).toBe(1);
+    await expect.poll(() => requestsOf("histogram2d.ktx2")).toBe(1);
     const [start] = await shapes();
     const [from, to] = [await at(start.values[1], 1), await at(0.6, 0.75)];
     await page().mouse.move(from.x, from.y);
@@ -67,7 +67,7 @@ describeInChromium("the editor of value and gradient", () => {
     const byMouse = await picture();
     expect(difference(boundary, byMouse)).toBeGreaterThan(SAME);
 
-    // a finger is less exact: it takes a corner from further off
+    // a finger is less exact: it hits a corner from a larger distance
     const finger = await page().context().newCDPSession(page());
     const touch = async (type: "touchStart" | "touchMove" | "touchEnd", ...to: object[]) =>
       finger.send("Input.dispatchTouchEvent", {
@@ -86,12 +86,12 @@ describeInChromium("the editor of value and gradient", () => {
 
     await control("add-rectangle").click();
     await control("shapes").focus();
-    await page().keyboard.press("ArrowRight"); // moves the shape, not the specimen
+    await page().keyboard.press("ArrowRight"); // moves the shape, and not the specimen
     const [kept, added] = await shapes();
     expect(added.values[0]).toBeCloseTo(0.4 + 2 / 255, 3);
     const address = await stand.viewer.writeLink();
-    await expect.poll(said).not.toBe("");
-    await expect.poll(said).toBe(""); // it lies over the picture
+    await expect.poll(announced).not.toBe("");
+    await expect.poll(announced).toBe(""); // the announcement lies over the view
     const own = await picture();
     await page().goto("about:blank");
     await stand.viewer.open(address);

@@ -1,4 +1,4 @@
-/** Undo and redo in the page: by key, by the panel, of settings and of where the specimen is seen from. */
+/** Undo and redo in the page, by key and by the panel, of settings and of the camera. */
 import { beforeAll, expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
@@ -19,9 +19,9 @@ describeInChromium("undo and redo", () => {
     await stand.viewer.settled();
   });
 
-  it("go back through a drag, a press and a turn, one step each, and on again", async () => {
+  it("undo a drag, a press and a turn, one step each, and redo them", async () => {
     const control = (id: string) => page().locator(`[data-control="${id}"]`);
-    expect(await control("undo").isDisabled()).toBe(true); // the address's settings are no step
+    expect(await control("undo").isDisabled()).toBe(true); // settings of the address are not steps
     const before = await state();
     const slider = control("disc-radius");
     await slider.scrollIntoViewIfNeeded();

@@ -1,4 +1,7 @@
-/** The viewer's parts. Importing this adds their settings to the state, as the host does before it makes a state. */
+/**
+ * The parts of the viewer. Importing this module adds their settings to the state, as the host does
+ * before it makes a state.
+ */
 import * as parts from "../../src/app/parts";
 import type { PartDefinition } from "../../src/host/part";
 import { addSettings } from "../../src/state/part_settings";

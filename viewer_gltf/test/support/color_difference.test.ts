@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { colorDifference, type Lab, toLab } from "./color_difference";
 
-/** L*, a*, b* of two colours and how far they are apart: table 1 of Sharma, Wu & Dalal (2005). */
+/** L*, a*, b* of two colours and their difference, from table 1 of Sharma, Wu & Dalal (2005). */
 const PUBLISHED: readonly (readonly [...Lab, ...Lab, number])[] = [
   [50, 2.6772, -79.7751, 50, 0, -82.7485, 2.0425],
   [50, 3.1571, -77.2803, 50, 0, -82.7485, 2.8615],
@@ -40,7 +40,7 @@ const PUBLISHED: readonly (readonly [...Lab, ...Lab, number])[] = [
 ];
 
 describe("the difference of two colours", () => {
-  it("is as published, to the last digit, and the same either way", () => {
+  it("has the published values, to the last digit, in both directions", () => {
     for (const [L1, a1, b1, L2, a2, b2, expected] of PUBLISHED) {
       const [one, other]: Lab[] = [
         [L1, a1, b1],
@@ -51,7 +51,7 @@ describe("the difference of two colours", () => {
     }
   });
 
-  it("is of L*a*b*, where white has a lightness of 100 and red its published place", () => {
+  it("uses L*a*b*, in which white has a lightness of 100 and red its published place", () => {
     toLab([255, 255, 255]).forEach((v, i) => {
       expect(v).toBeCloseTo([100, 0, 0][i], 1);
     });

@@ -1,4 +1,7 @@
-/** How different two colours look: CIEDE2000, of Sharma, Wu & Dalal, Color Research & Application 30 (2005). */
+/**
+ * Visible difference of two colours: CIEDE2000 (Sharma, Wu & Dalal, Color Research & Application
+ * 30, 2005).
+ */
 import type { Pixel } from "./browser/picture";
 
 export type Lab = readonly [number, number, number];
@@ -10,7 +13,7 @@ const XYZ = [
   [0.0193339, 0.119192, 0.9503041],
 ];
 
-/** CIE L*a*b* of a pixel, sRGB of 0..255. */
+/** Returns CIE L*a*b* of a pixel, sRGB 0..255. */
 export function toLab(pixel: Pixel): Lab {
   const linear = pixel.map((v) => {
     const s = v / 255;
@@ -25,17 +28,17 @@ export function toLab(pixel: Pixel): Lab {
 
 const rad = (deg: number) => (deg * Math.PI) / 180;
 const cos = (deg: number) => Math.cos(rad(deg));
-/** Of chroma: it sets greys apart, and is felt less where colours are strong. */
+/** Weight of a chroma: small for greys, near 1 for strong colours. */
 const strong = (chroma: number) => Math.sqrt(chroma ** 7 / (chroma ** 7 + 25 ** 7));
 const hueOf = (a: number, b: number) => ((((Math.atan2(b, a) * 180) / Math.PI) % 360) + 360) % 360;
 
-/** 1 is just seen, side by side. */
+/** Returns the difference; 1 is just visible, side by side. */
 export function colorDifference([L1, a1, b1]: Lab, [L2, a2, b2]: Lab): number {
   const stretch = 1 + 0.5 * (1 - strong((Math.hypot(a1, b1) + Math.hypot(a2, b2)) / 2));
   const [C1, C2] = [Math.hypot(stretch * a1, b1), Math.hypot(stretch * a2, b2)];
   const [h1, h2] = [hueOf(stretch * a1, b1), hueOf(stretch * a2, b2)];
   const isGrey = C1 * C2 === 0;
-  const isAcross = Math.abs(h2 - h1) > 180; // the short way is through 0 degrees
+  const isAcross = Math.abs(h2 - h1) > 180; // the shorter way leads through 0 degrees
   const turn = h2 - h1 - (isAcross ? 360 * Math.sign(h2 - h1) : 0);
   const dH = isGrey ? 0 : 2 * Math.sqrt(C1 * C2) * Math.sin(rad(turn / 2));
   const sum = h1 + h2;

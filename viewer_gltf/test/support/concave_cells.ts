@@ -11,9 +11,9 @@ const OUTLINE: readonly Vec2[] = [
   [0, 3],
 ];
 export const CELLS = [0, 2].map((by) => OUTLINE.map(([x, y]): Vec2 => [x + by, y + by]));
-/** Least x, y, z and largest: they stand from z = 0 as high as they are wide. */
+/** Minima x, y, z, then maxima. The cells stand on z = 0 and are as high as they are wide. */
 export const BOXES = Float32Array.from([0, 2].flatMap((v) => [v, v, 0, v + 3, v + 3, WIDTH_UM]));
-/** On the wall between both. */
+/** Points on the interface between both cells. */
 export const WALL: readonly Vec2[] = [
   [2, 2.1],
   [2, 2.5],
@@ -23,7 +23,7 @@ export const WALL: readonly Vec2[] = [
   [2.9, 2],
 ];
 
-/** Places along an outline, its corners among them. */
+/** Returns points along an outline, including its corners. */
 export function along(outline: readonly Vec2[]): Vec2[] {
   return outline.flatMap(([x, y], i) => {
     const [nextX, nextY] = outline[(i + 1) % outline.length];
@@ -31,7 +31,7 @@ export function along(outline: readonly Vec2[]): Vec2[] {
   });
 }
 
-/** By the edges that a line to the right crosses. */
+/** Counts the edges that a line to the right crosses. */
 export function isWithin(outline: readonly Vec2[], [x, y]: Vec2): boolean {
   const crossed = outline.filter(([x0, y0], i) => {
     const [x1, y1] = outline[(i + 1) % outline.length];

@@ -1,4 +1,4 @@
-/** Numbers out of the picture, on bodies with a known look. */
+/** Checks pixels of bodies whose appearance is known. */
 import { beforeEach, expect, it } from "vitest";
 import { project } from "./browser/camera";
 import { lightOf } from "./browser/light";
@@ -13,11 +13,11 @@ import { expectLetter } from "./letter";
 
 const F = "F_x20_body";
 
-describeInChromium("the picture of the fixture", () => {
+describeInChromium("the view of the fixture", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 272 }, pixelRatio: 1 });
 
   beforeEach(async () => {
-    await stand.open("#v=1&depth=0"); // depth shading is measured elsewhere
+    await stand.open("#v=1&depth=0"); // depth shading is measured in other tests
     await stand.viewer.showOnly();
   });
 
@@ -33,12 +33,12 @@ describeInChromium("the picture of the fixture", () => {
   const showAsVolume = (id: string) => stand.viewer.showAs(id, "volume");
 
   for (const as of ["surface", "volume"] as const) {
-    it(`shows the F as a ${as} neither mirrored nor turned`, () =>
+    it(`shows the F as a ${as} neither mirrored nor rotated`, () =>
       expectLetter(stand.viewer, stand.manifest, F, as, FIXTURE_LETTER));
   }
 
-  it("draws a uniform block as opaque as its length makes it", async () => {
-    // by how much blue of a ball behind is left, whatever light falls on a block that has none
+  it("draws a uniform block with the opacity of its length", async () => {
+    // measured by the blue light of a ball behind the block, because no light on the block is blue
     const { center, radius } = BALLS[3];
     await stand.viewer.showAs("Balls", "surface");
     await stand.viewer.recolor("Balls", "#0000ff");
@@ -47,7 +47,7 @@ describeInChromium("the picture of the fixture", () => {
     await stand.viewer.recolor("Block", "#ff0000");
     const veiled = await takePicture(stand.viewer.page);
     const { cosine } = spotOf(veiled, center);
-    // to where the ray that leads to the ball's middle meets the ball
+    // length to the place where the ray towards the ball's middle hits the ball
     const length = (BLOCK.max[2] - center[2]) / cosine - radius;
     const voxels = length / Math.min(...SPACING);
     const expected = 1 - (1 - BLOCK_OPACITY / 255) ** voxels;
@@ -56,7 +56,7 @@ describeInChromium("the picture of the fixture", () => {
     expect(1 - after / before).toBeCloseTo(expected, 1.5);
   });
 
-  it("lets surfaces hide volumes behind them, and volumes veil surfaces", async () => {
+  it("lets surfaces hide volumes behind them, and volumes partly hide surfaces", async () => {
     await stand.viewer.showAs("Balls", "surface");
     const inFront = at(await takePicture(stand.viewer.page), BALLS[2].center);
     const behind = at(await takePicture(stand.viewer.page), BALLS[3].center);
@@ -64,11 +64,12 @@ describeInChromium("the picture of the fixture", () => {
     const veiled = await takePicture(stand.viewer.page);
     expect(at(veiled, BALLS[2].center)).toEqual(inFront);
     const [, green, blue] = at(veiled, BALLS[3].center);
-    expect(green).toBeGreaterThan(behind[1] + 20); // the block's green over the ball's blue
+    // the green of the block over the blue of the ball
+    expect(green).toBeGreaterThan(behind[1] + 20);
     expect(blue).toBeLessThan(behind[2] - 20);
   });
 
-  it("keeps the order where a surface is a little translucent", async () => {
+  it("keeps the order if a surface is slightly translucent", async () => {
     await stand.viewer.showAs("Balls", "surface");
     await showAsVolume("Block");
     const opaque = await takePicture(stand.viewer.page);

@@ -1,4 +1,4 @@
-/** The orientation check: the letter F from the front and from its left side. */
+/** The orientation check: the letter F seen from the front and from its left side. */
 import { expect } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { project } from "./browser/camera";
@@ -6,7 +6,7 @@ import type { ViewerPage } from "./browser/page";
 import { isBackground, takePicture } from "./browser/picture";
 import type { LetterPoints } from "./fixture/letter";
 
-/** Show the channel alone (all others are hidden) and look at it from two sides. */
+/** Shows only this channel, and looks at it from two sides. */
 export async function expectLetter(
   viewer: ViewerPage,
   manifest: Manifest,

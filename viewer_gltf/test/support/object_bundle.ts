@@ -1,4 +1,4 @@
-/** The bundle of a label map that tests/support/object_bundle.py writes, and where its cells are. */
+/** The bundle of a label map that tests/support/object_bundle.py writes, and the places of its cells. */
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -7,7 +7,7 @@ import { askPython } from "./python";
 
 type Vec3 = readonly [number, number, number];
 
-// as in tests/support/object_bundle.py
+// the same values as in tests/support/object_bundle.py
 export const CHANNEL = "cells";
 export const COLORS: readonly Vec3[] = [
   [0.9, 0.2, 0.1],
@@ -23,7 +23,7 @@ export const RADIUS_UM = 4;
 
 export const labelOf = (row: number) => row + 101;
 
-/** The middle of a ball, um. */
+/** Returns the middle of a ball, um. */
 export function centerOf(row: number): Vec3 {
   const [tile, rest] = [Math.floor(row / PER_TILE), row % PER_TILE];
   const [x, y, z] = [
@@ -34,16 +34,19 @@ export function centerOf(row: number): Vec3 {
   return [60 * tile + 6 + 12 * x, -6 - 12 * y, 6 + 12 * z];
 }
 
-/** The row of a place in the grid. */
+/** Returns the row of a place in the grid. */
 export const rowAt = (tile: number, x: number, y: number, z: number) =>
   PER_TILE * tile + x + GRID[0] * (y + GRID[1] * z);
 
 type Written = Readonly<{ folder: string; write: () => Promise<unknown> }>;
 
-/** Bundles by their flags. All files of tests that one process runs share them, and no test changes them. */
+/** Bundles by their flags. All test files of a process share them, and no test changes them. */
 const bundles = new Map<string, Written>();
 
-/** The bundle's folder. It is written before the tests of a `describe`; to be used inside it, before the stand. */
+/**
+ * Returns the folder of the bundle, which is written before the tests of a `describe`. Must be
+ * called inside it, before the stand is prepared.
+ */
 export function prepareObjects(...flags: readonly string[]): string {
   const key = flags.join(" ");
   const { folder, write } = bundles.get(key) ?? writtenOnce(flags);

@@ -1,4 +1,4 @@
-/** Python's answers: the float64 references, which lie in the repository's tests/support. */
+/** Runs modules of the repository's tests/support in Python, for float64 references. */
 import { execFile } from "node:child_process";
 import { existsSync } from "node:fs";
 import { join } from "node:path";
@@ -8,7 +8,7 @@ const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/pyth
 
 export const hasPython = existsSync(PYTHON);
 
-/** What a module of tests/support prints, which is given `input`. */
+/** Returns the output of a module of tests/support that reads `input`. */
 export function askPython(
   module: string,
   given: readonly string[],

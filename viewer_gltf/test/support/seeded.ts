@@ -1,4 +1,4 @@
-/** Numbers 0..1 that are the same in every run: a linear congruential generator. */
+/** Returns a generator of reproducible numbers 0..1: a linear congruential generator. */
 export function seeded(seed: number): () => number {
   let state = seed >>> 0;
   return () => {

@@ -1,14 +1,14 @@
-/** Where a picture shows an object, and how much two such places have in common. Pure. */
+/** Finds the pixels of an object, and the overlap of two such sets. Pure. */
 import type { Picture } from "./browser/picture";
 
-/** Row by row, whether a pixel shows the object. */
+/** Whether each pixel shows the object, row by row. */
 export type Silhouette = readonly boolean[];
 
-/** The largest part of the colour of the scene's background, of 255. */
+/** Largest component of the background colour, 0..255. */
 const BACKGROUND = 18;
-/** Least brightness, of 255, of anything that is no background. */
+/** Smallest brightness, 0..255, of pixels that are not background. */
 const LIT = 48;
-/** Pixels around one in which the brightest is looked for. */
+/** Radius of the neighbourhood in which the brightest pixel is found, pixels. */
 const AROUND = 3;
 
 function toLight(value: number): number {
@@ -17,8 +17,9 @@ function toLight(value: number): number {
 }
 
 /**
- * Pixels of which the object covers at least half: half of the light of the brightest pixel nearby.
- * The object's own shading, which darkens its limb, thus moves no edge.
+ * Returns the pixels of which the object covers at least half, by half the light of the brightest
+ * pixel nearby. The shading of the object, which darkens its limb, therefore does not move the
+ * edges.
  */
 export function silhouetteOf(picture: Picture): Silhouette {
   const { width, height } = picture;
@@ -31,7 +32,8 @@ export function silhouetteOf(picture: Picture): Silhouette {
 }
 
 /**
- * The largest of each value and its neighbours along a row (stride 1) or a column (stride of a row).
+ * Returns the largest value among each value and its neighbours along a row (stride 1) or a column
+ * (stride of a row).
  */
 function largestAround(values: readonly number[], width: number, stride: number): number[] {
   return values.map((_, i) => {
@@ -44,7 +46,7 @@ function largestAround(values: readonly number[], width: number, stride: number)
   });
 }
 
-/** Intersection over union. */
+/** Returns intersection over union. */
 export function overlap(a: Silhouette, b: Silhouette): number {
   const both = a.filter((inside, i) => inside && b[i]).length;
   const either = a.filter((inside, i) => inside || b[i]).length;

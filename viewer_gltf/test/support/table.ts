@@ -1,7 +1,10 @@
-/** Tables of figures that a test has found, for people. A test writes one where an environment variable names a file. */
+/**
+ * Tables of figures that a test has measured, for readers. A test writes one if an environment
+ * variable names a file.
+ */
 import { writeFile } from "node:fs/promises";
 
-/** Write a table in Markdown into the file that the environment variable names, if it names one. */
+/** Writes a table in Markdown into the file that the environment variable names, if any. */
 export async function writeTable(
   variable: string,
   head: readonly string[],

@@ -9,7 +9,7 @@ export function randomShapes(random: () => number): readonly Shape[] {
   }));
 }
 
-/** As the GPU samples it, linear between cells. */
+/** Samples a table like the GPU, linearly between cells. */
 export function sampled(
   cells: ArrayLike<number>,
   value: number,

@@ -1,4 +1,7 @@
-/** A copy of the viewer's sources from which parts were removed: each part's folder, and its line of registration. */
+/**
+ * Copies the sources of the viewer without some parts: without their folders and their lines of
+ * registration.
+ */
 import { cp, mkdir, readFile, rm, symlink, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -7,11 +10,11 @@ import { build } from "vite";
 const VIEWER = fileURLToPath(new URL("../..", import.meta.url));
 const COPIED = ["src", "index.html", "public", "package.json", "tsconfig.json"];
 
-/** A line of src/app/parts.ts, and in it the folder of the part. */
+/** Matches a line of src/app/parts.ts, with the folder of the part. */
 const REGISTERED = /^export .* from "\.\.\/(\w+)\/part";$/gm;
 const REGISTRATION = "src/app/parts.ts";
 
-/** The folders of all parts that are registered, in the order of their lines. */
+/** Returns the folders of all registered parts, in the order of their lines. */
 export async function registeredParts(): Promise<readonly string[]> {
   const text = await readFile(join(VIEWER, REGISTRATION), "utf8");
   return [...text.matchAll(REGISTERED)].map(([, part]) => part);
@@ -20,7 +23,7 @@ export async function registeredParts(): Promise<readonly string[]> {
 /**
  * Writes the copy to a folder, beside a link to the schemas. Returns the path of the copied viewer.
  *
- * @param kept those of the parts whose folders stay, without their lines
+ * @param kept parts whose folders stay, without their lines
  */
 export async function copyWithout(
   parts: readonly string[],
@@ -51,7 +54,7 @@ export async function copyWithout(
   return copy;
 }
 
-/** Builds the page of a copy. Returns the folder that a host serves. */
+/** Builds the page of a copy. Returns the folder for a host. */
 export async function buildPage(copy: string): Promise<string> {
   const outDir = join(copy, "dist");
   await build({

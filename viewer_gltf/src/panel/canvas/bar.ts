@@ -1,12 +1,13 @@
 /**
- * The bar below the specimen in stereo: what is done most, one gaze each. While the menu is open, the bar
- * holds the ways between the menu's pages. *Undo* and *Menu* keep their places. Pure.
+ * The bar below the specimen in stereo: the most frequent actions, each a target for one gaze.
+ * While the menu is open, the bar has the buttons that lead between the menu's pages. *Undo* and
+ * *Menu* keep their places. Pure.
  */
 import { setTo } from "../../state/parameters/kinds";
 import { MODE, type Mode } from "../../state/parameters/volumes";
 import { hasVolumes, type ViewerState } from "../../state/viewer_state";
 import { MOVES } from "../moves";
-import { box, type CanvasWish, type Mark, type Rect, type Region, text } from "./draw_list";
+import { box, type CanvasRequest, type Mark, type Rect, type Region, text } from "./draw_list";
 import type { Page } from "./page";
 
 const SLOT: Rect = { x: 0, y: 0, width: 184, height: 92 };
@@ -16,7 +17,7 @@ const ROWS = 2;
 export const BAR_WIDTH = COLUMNS * SLOT.width;
 export const BAR_HEIGHT = ROWS * SLOT.height;
 
-export type BarFacts = Readonly<{
+export type BarInputs = Readonly<{
   state: ViewerState;
   /** The open page of the menu; null: the menu is closed. */
   page: Page | null;
@@ -29,17 +30,17 @@ export type BarFacts = Readonly<{
 type Slot = Readonly<{
   id: string;
   label: string;
-  /** The label where it stands alone. */
+  /** Label for use outside the bar, for example by a screen reader. */
   name?: string;
   isOn?: boolean;
-  /** Drawn dim, and chosen in vain. */
+  /** Drawn dim; choosing it has no effect. */
   isIdle?: boolean;
-  to: CanvasWish;
+  to: CanvasRequest;
   more?: Partial<Region>;
 }>;
 
-/** The buttons of both rows; null: an empty place. */
-export function barOf(facts: BarFacts): Pick<Page, "marks" | "regions"> {
+/** Returns the buttons of both rows. null: an empty place. */
+export function barOf(facts: BarInputs): Pick<Page, "marks" | "regions"> {
   const { page } = facts;
   const slots = page === null ? whileClosed(facts) : whileOpen(page);
   const marks: Mark[] = [];
@@ -63,7 +64,7 @@ export function barOf(facts: BarFacts): Pick<Page, "marks" | "regions"> {
   return { marks, regions: [...regions, ...undo] };
 }
 
-/** The lower left place is free but for the seconds after a choice. */
+/** Draws Undo in the lower left place, which is empty except for some seconds after a choice. */
 function undoAt(marks: Mark[]): readonly Region[] {
   const rect: Rect = { ...SLOT, y: SLOT.height };
   marks.push(box(rect, "back", "accent"), text(rect, "Undo", { align: "center" }));
@@ -85,7 +86,7 @@ function move(id: string, label: string): Slot {
   return { id: `bar-${id}`, label, name, to: repeats, more: { repeats, isStep: true } };
 }
 
-function whileClosed({ state, lastMode }: BarFacts): readonly (Slot | null)[] {
+function whileClosed({ state, lastMode }: BarInputs): readonly (Slot | null)[] {
   const isOff = state.mode === "off";
   const volumes: Slot = {
     id: "bar-volumes",
@@ -105,7 +106,7 @@ function whileClosed({ state, lastMode }: BarFacts): readonly (Slot | null)[] {
     {
       id: "bar-move",
       label: "Move",
-      name: "Move it with the gaze",
+      name: "Move the specimen with the gaze",
       to: { canvas: "carry" },
       more: { isCarry: true },
     },

@@ -1,4 +1,4 @@
-/** What the panel on a canvas lets choose from: options, colours, tiles. Pure. */
+/** Options, colours and tiles to choose from, on the panel's canvas. Pure. */
 import { shortTileName } from "../../state/tile_name";
 import type { Choice, Colour, TileMap } from "../controls";
 import { nextColour } from "../palettes";
@@ -16,15 +16,15 @@ import {
 } from "./draw_list";
 import { captioned, LABEL, one, region, toneOf, unlessRefused } from "./parts";
 
-/** Largest cell, px: a map of few tiles need not fill the panel. */
+/** Largest cell, px. A map of few tiles does not fill the panel. */
 const LARGEST_CELL = 160;
 const MAP_HEIGHT = 5 * ROW;
-/** Smallest cell, px: 4.5 degrees at 1.2 m, so that a gaze finds it. */
+/** Smallest cell, px: 4.5 degrees at 1.2 m, so that a gaze can hit it. */
 const SMALLEST_CELL = 78;
-/** Targets that a map counts for on a page: two switches have room beside it. */
+/** Targets that a map counts for on a page; two switches have room beside it. */
 const MAP_TARGETS = 4;
 
-/** Options side by side. */
+/** Draws options side by side. */
 export function chips(choice: Choice, width: number): Block {
   const rects = split({ x: 0, y: 0, width, height: ROW }, choice.options.length);
   const marks: Mark[] = [];
@@ -40,7 +40,7 @@ export function chips(choice: Choice, width: number): Block {
   return captioned(choice.label, width, one(marks, unlessRefused(choice, regions)));
 }
 
-/** A few options with long names: a row for each. */
+/** Draws a row for each of a few options with long names. */
 export function optionRows(choice: Choice, width: number): readonly Block[] {
   return choice.options.map(({ value, label }) => {
     const row: Rect = { x: 0, y: 0, width, height: ROW };
@@ -55,7 +55,7 @@ export function optionRows(choice: Choice, width: number): readonly Block[] {
   });
 }
 
-/** Many options: the one before and the one after. */
+/** Draws the present one of many options between two arrows. */
 export function stepper(choice: Choice, row: Rect): Block {
   const { options, value, id } = choice;
   const at = options.findIndex((each) => each.value === value);
@@ -83,13 +83,13 @@ export function stepper(choice: Choice, row: Rect): Block {
     isAlone
       ? []
       : unlessRefused(choice, [
-          region(`${id}=before`, `${choice.label}: before`, before, step(-1)),
-          region(`${id}=after`, `${choice.label}: after`, after, step(1)),
+          region(`${id}=before`, `${choice.label}: previous`, before, step(-1)),
+          region(`${id}=after`, `${choice.label}: next`, after, step(1)),
         ]).map((each) => ({ ...each, isStep: true })),
   );
 }
 
-/** A colour, or the colours that show in its place. */
+/** Draws a colour, or the colours that are shown in its place. */
 export function swatchMarks({ value, shows = [] }: Colour, rect: Rect): readonly Mark[] {
   const width = rect.width / shows.length;
   const stripes = shows.map((hex, i): Mark => {
@@ -99,14 +99,14 @@ export function swatchMarks({ value, shows = [] }: Colour, rect: Rect): readonly
   return [box(rect, toneOfHex(value), "line"), ...stripes];
 }
 
-/** Any colour: the palettes' next one. */
+/** Draws a swatch; choosing it takes the next colour of the palettes. */
 export function nextSwatch(colour: Colour, rect: Rect): Block {
   const to = () => colour.to(nextColour(colour.value));
   const place = region(colour.id, colour.name ?? colour.label, rect, to);
   return one(swatchMarks(colour, rect), unlessRefused(colour, [place]));
 }
 
-/** Colours side by side. */
+/** Draws colours side by side. */
 export function swatches(colour: Colour, hexes: readonly string[], row: Rect): Block {
   const rects = split(row, hexes.length);
   const marks = hexes.map((hex, i) =>
@@ -162,7 +162,7 @@ export function mapBlock(map: TileMap, width: number): Block {
   return captioned(map.label, width, block);
 }
 
-/** One tile after the other, from the one that is chosen or gazed at. */
+/** Returns the tiles as a choice, which starts from the isolated, selected or gazed tile. */
 function asChoice({ id, tiles, refusal, to }: TileMap): Choice {
   const now =
     tiles.find(({ isIsolated }) => isIsolated) ??

@@ -1,5 +1,6 @@
 /**
- * The controls of a layout as rows of the panel on a canvas, each tall enough to be gazed at. Pure.
+ * Draws the controls of a layout as rows of the panel on a canvas, each tall enough to be hit by a
+ * gaze. Pure.
  */
 import type { Button, Choice, Colour, Control, Group, Search, Toggle } from "../controls";
 import {
@@ -31,33 +32,37 @@ import { sliderRow, windowRow } from "./sliders";
 import { histogramBlock } from "./transfer_function_2d";
 
 /**
- * Controls without use before the eyes: the way into stereo, from which *Leave* leads back, the code of a
- * phone viewer, which is read with the phone out of it, the screen's size, which is measured by a
- * card held to it, files of the user's, the list of a keyboard's keys, and pictures beside the specimen.
+ * Controls that are of no use in stereo. They enter stereo (*Leave* ends it), read the QR code of a
+ * Cardboard viewer, which needs the phone out of the viewer, or measure the screen with a bank
+ * card. They choose or save files, list the keys of a keyboard, or show slice images beside the
+ * specimen.
  */
-const ELSEWHERE: ReadonlySet<string> = new Set([
+const NOT_IN_STEREO: ReadonlySet<string> = new Set([
   ...["stereo", "split"],
   ...["scan", "lens-code", "measure-screen"],
   ...["own-light", "save-csv", "save-objects"],
-  "slice-pictures", // the planes in the specimen are what a headset shows
-  // of the screen's camera, as files
+  "slice-pictures", // a headset shows the slice planes in the specimen instead
+  // images and views of the screen's camera, as files
   ...["picture-size", "save-picture", "save-video", "keep-view", "next-view", "forget-views"],
   "help",
 ]);
-/** Width of a swatch in a channel's row: 6 degrees at 1.2 m. */
+/** Width of a swatch in a channel's row, px: 6 degrees at 1.2 m. */
 const SWATCH = 110;
-/** Options with a name of more letters than fit between two arrows are listed, if there are so few. */
+/**
+ * Largest number of letters that fit between two arrows. Up to MAX_LISTED options with longer names
+ * get a row each.
+ */
 const LONG = 16;
 const MAX_LISTED = 6;
 
-/** @param fanned the group whose colours lie over its name; null: none */
+/** @param fanned the group whose colours are drawn over its name; null: none */
 export function blocksOf(
   item: Control | Group,
   width: number,
   fanned: string | null = null,
 ): readonly Block[] {
   if (item.kind === "group") return [groupRow(item, width, item.id === fanned)];
-  if (ELSEWHERE.has(item.id)) return [];
+  if (NOT_IN_STEREO.has(item.id)) return [];
   const row: Rect = { x: 0, y: 0, width, height: ROW };
   switch (item.kind) {
     case "toggle":
@@ -84,22 +89,24 @@ export function blocksOf(
     case "search":
       return item.hints === undefined ? [] : [stepper(asChoice(item, item.hints), row)];
     case "link":
-      return [textBlock(item.label, "It is in the page's address: take it from there.", width)];
+      return [
+        textBlock(item.label, "The link is the address of this page: copy it from there.", width),
+      ];
   }
 }
 
-/** Whether its options are few, and too long for the space between two arrows. */
+/** Returns whether the options are few, and too long for the space between two arrows. */
 function isWordy({ options }: Choice): boolean {
   return options.length <= MAX_LISTED && options.some(({ label }) => label.length > LONG);
 }
 
-/** Nobody types by gaze: one hint after the other. */
+/** Returns a search as a choice of its hints, because nobody can type by gaze. */
 function asChoice({ id, value, to }: Search, hints: readonly string[]): Choice {
   const options = ["", ...hints].map((hint) => ({ value: hint, label: hint || "all" }));
   return { kind: "choice", id, label: "Begins with", value, options, isInline: false, to };
 }
 
-/** The blocks of a section; buttons that go on while they are held share a row with their opposite. */
+/** Returns the blocks of a section. A button that repeats while it is held shares a row with its opposite. */
 export function blocksOfAll(
   items: readonly (Control | Group)[],
   width: number,
@@ -142,10 +149,10 @@ function toggleRow(toggle: Toggle, row: Rect, isDimmed = false): Block {
     text(label, toggle.label, { tone: isDimmed ? "dim" : toneOf(toggle), lines: 2 }),
   ];
   if (toggle.value) marks.push({ kind: "tick", rect: inner(mark), tone: "ink" });
-  const label_ = toggle.name ?? toggle.label;
+  const name = toggle.name ?? toggle.label;
   return one(
     marks,
-    unlessRefused(toggle, [region(toggle.id, label_, row, () => toggle.to(!toggle.value))]),
+    unlessRefused(toggle, [region(toggle.id, name, row, () => toggle.to(!toggle.value))]),
   );
 }
 
@@ -167,7 +174,7 @@ function textBlock(label: string, value: string, width: number): Block {
   );
 }
 
-/** The group's colour, which knows the colours that no other channel has; null: it has none, or knows none. */
+/** Returns the group's colour control that offers colours no other channel has; null if there is none. */
 function offered({ controls, more }: Group): Colour | null {
   const colours = [...controls, ...more].filter((each): each is Colour => each.kind === "colour");
   return colours.find(({ free }) => free !== undefined) ?? null;
@@ -178,8 +185,9 @@ function shownToggle({ controls }: Group): Toggle | null {
 }
 
 /**
- * A channel or a lamp: its name, which shows and hides it, and its swatch: a look at it lays the colours that the
- * channel can have over the name, and the way to all that is set of it.
+ * Draws a channel or a lamp: its swatch, and its name, which shows and hides it. A glance at the
+ * swatch replaces the name by the colours that the channel can have and a button that opens the
+ * group's page.
  */
 function groupRow(group: Group, width: number, isFanned: boolean): Block {
   const { id, label, isDimmed, tags, controls, more } = group;
@@ -191,17 +199,17 @@ function groupRow(group: Group, width: number, isFanned: boolean): Block {
   const fan = offered(group);
   const beside =
     fan !== null && isFanned ? fanned(group, fan, rest) : nameRow(group, rest, isDimmed, tags);
-  const wish = fan === null ? ({ canvas: "group", group: id } as const) : fanOf(id);
-  const place = region(`${id}/open`, `${label}: colour and more`, swatch, () => wish);
-  const look = { ...place, isGlance: fan !== null };
-  return { ...one([...marks, ...beside.marks], [look, ...beside.regions]), targets: 1 };
+  const request = fan === null ? ({ canvas: "group", group: id } as const) : fanOf(id);
+  const place = region(`${id}/open`, `${label}: colour and more`, swatch, () => request);
+  const glance = { ...place, isGlance: fan !== null };
+  return { ...one([...marks, ...beside.marks], [glance, ...beside.regions]), targets: 1 };
 }
 
 function fanOf(group: string): CanvasChange {
   return { canvas: "fan", group };
 }
 
-/** The colours, and the way to the page of the group. */
+/** Draws the colours, and the button that opens the page of the group. */
 function fanned({ id, label }: Group, colour: Colour, row: Rect): Block {
   const more: Rect = { ...row, x: row.x + row.width - SWATCH, width: SWATCH };
   const colours = swatches(colour, colour.free ?? [], { ...row, width: row.width - SWATCH });
@@ -227,7 +235,7 @@ function nameRow(group: Group, row: Rect, isDimmed: boolean, tags: readonly stri
   return toggleRow({ ...toggle, label: [label, ...tags].join(" · ") }, row, isDimmed);
 }
 
-/** The page of a channel or a lamp: its colours first, then all that is set of it. */
+/** Returns the page of a channel or a lamp: its colours first, then all its other controls. */
 export function blocksOfGroup(group: Group, width: number): readonly Block[] {
   const colour = offered(group);
   const fan = colour === null ? [] : [freeColours(colour, width)];
@@ -237,7 +245,7 @@ export function blocksOfGroup(group: Group, width: number): readonly Block[] {
   return [...fan, ...others.flatMap((control) => blocksOf(control, width))];
 }
 
-/** Two rows of four. */
+/** Draws two rows of four colours. */
 function freeColours(colour: Colour, width: number): Block {
   const free = colour.free ?? [];
   const half = Math.ceil(free.length / 2);

@@ -1,12 +1,12 @@
-/** What the panel on a canvas is made of: marks to paint and regions to point at. Pixels. Pure. */
+/** Marks to paint and regions to point at, of which the panel on a canvas consists. Pixels. Pure. */
 
 import type { Command } from "../../state/commands";
-import type { Histogram, Wish } from "../controls";
+import type { Histogram, Request } from "../controls";
 
-/** From the upper left corner. */
+/** x and y are from the upper left corner of the canvas. */
 export type Rect = Readonly<{ x: number; y: number; width: number; height: number }>;
 
-/** Colours by their part in the panel, or `#rrggbb`. */
+/** Colours by their role in the panel, or `#rrggbb`. */
 export type Tone = "back" | "raised" | "line" | "text" | "dim" | "accent" | "ink" | `#${string}`;
 
 export type Mark =
@@ -18,7 +18,7 @@ export type Mark =
       tone: Tone;
       align: "left" | "center" | "right";
       size: number;
-      /** As many lines as may be broken into; the last one ends with an ellipsis. */
+      /** Largest number of lines; the last one ends with an ellipsis if text is left. */
       lines: number;
     }>
   | Readonly<{ kind: "tick"; rect: Rect; tone: Tone }>
@@ -31,14 +31,14 @@ export type Mark =
       opacity: number;
       stroke: Tone;
     }>
-  /** `window`: the part of its values that the rect is as wide as. */
+  /** `window`: the range of the histogram's values that fills the width of the rect. */
   | Readonly<{
       kind: "histogram";
       rect: Rect;
       histogram: Histogram;
       window: readonly [number, number];
     }>
-  /** Another's; `version` changes with what it is. */
+  /** A picture that its owner draws; `version` changes with its content. */
   | Readonly<{
       kind: "picture";
       rect: Rect;
@@ -46,72 +46,75 @@ export type Mark =
       draw: (context: CanvasRenderingContext2D, width: number, height: number) => void;
     }>;
 
-/** The changes of the panel in the scene that are its own: it shows one page at a time. */
+/** Changes of the panel in the scene only, which shows one page at a time. */
 export type CanvasChange =
   | Readonly<{ canvas: "open" }>
-  /** Open a section; null: the list of all sections. */
+  /** Opens a section; null: the list of all sections. */
   | Readonly<{ canvas: "tab"; section: string | null }>
-  /** Lay the colours that a channel can have beside its swatch. */
+  /** Shows the colours that a channel can have beside its swatch. */
   | Readonly<{ canvas: "fan"; group: string }>
-  /** Open the page of one group of the section: of a channel or a lamp. */
+  /** Opens the page of a channel or a lamp of the section. */
   | Readonly<{ canvas: "group"; group: string }>
   | Readonly<{ canvas: "page"; page: number }>
-  /** One level up: from a group to its section, from a section to the list. */
+  /** Goes one level up: from a group to its section, or from a section to the list. */
   | Readonly<{ canvas: "back" }>
-  /** Undo the last choice. */
+  /** Undoes the last choice. */
   | Readonly<{ canvas: "undo" }>
-  /** The specimen follows the gaze until the gaze rests. */
+  /** Lets the specimen follow the gaze until the gaze rests. */
   | Readonly<{ canvas: "carry" }>
-  /** Report why a request is refused. */
+  /** Reports why a request is refused. */
   | Readonly<{ canvas: "announce"; text: string }>
   | Readonly<{ canvas: "close" }>
   | Readonly<{ canvas: "leave" }>;
 
-export type CanvasWish = Wish | CanvasChange;
+export type CanvasRequest = Request | CanvasChange;
 
 /**
- * Where a ray does something. `to` gets where in the region it is, 0..1 from its left edge and from
- * its upper one; null: nothing changes by it.
+ * A target for a ray. `to` gets the place in the region, 0..1 from the left and from the upper
+ * edge, and returns a request; null: nothing changes.
  */
 export type Region = Readonly<{
   id: string;
-  /** For tests and for programs that read the panel aloud. */
+  /** Label for tests, and for programs that read the panel aloud. */
   label: string;
   rect: Rect;
   isSlide: boolean;
-  to: (across: number, down?: number) => CanvasWish | null;
-  /** What taking hold of it does, where that is something else than to drag it. */
-  press?: (across: number, down: number) => CanvasWish;
-  /** Goes on, little by little, while it is held or gazed at. */
+  to: (across: number, down?: number) => CanvasRequest | null;
+  /** Request at the start of a drag, if that does not yet move anything. */
+  press?: (across: number, down: number) => CanvasRequest;
+  /** Command that is repeated while the region is held or gazed at. */
   repeats?: Command;
-  /** Each press moves on by a step, for example to the next option, so quick presses all count. */
+  /**
+   * Whether each press moves on by a step, for example to the next option, so that quick presses
+   * all count.
+   */
   isStep?: boolean;
-  /** The specimen is carried by it: see `carry` above. */
+  /** Whether the region carries the specimen (see `carry` above). */
   isCarry?: boolean;
-  /** A short look at it is enough, since it changes nothing but the panel; so it has no dwell. */
+  /** Whether a short look is enough, because only the panel changes. There is no dwell then. */
   isGlance?: boolean;
 }>;
 
-/** A row, or what must not be broken; its upper left corner is 0, 0. */
+/** A row, or a larger piece that is not split between pages. Its upper left corner is 0, 0. */
 export type Block = Readonly<{
   height: number;
   marks: readonly Mark[];
   regions: readonly Region[];
-  /** The targets that count on a page; absent: its regions. */
+  /** Number of targets that count on a page; absent: the number of regions. */
   targets?: number;
 }>;
 
-/** Height of a row: six fill a page. */
+/** Height of a row, px; six rows fill a page. */
 export const ROW = 100;
 export const GAP = 12;
 /**
- * Sizes of letters. The smaller one is 35 mm at 1 m: its x-height takes 6 pixels of a phone of 1600 x 720
- * in either Cardboard (xr/legibility.test.ts).
+ * Font sizes, px. The smaller one is 35 mm at 1 m: the height of its x takes 6 pixels of a phone of
+ * 1600 x 720 in either Cardboard (xr/legibility.test.ts).
  */
 const TEXT = 38;
 export const SMALL = 34;
 
-/** The part of a row that is painted. */
+/** Returns the part of a row that is painted. */
 export function inset({ x, y, width, height }: Rect, by = GAP / 2): Rect {
   return { x: x + by, y: y + by, width: width - 2 * by, height: height - 2 * by };
 }
@@ -123,13 +126,13 @@ export function box(rect: Rect, fill: Tone | null, stroke: Tone | null = null): 
 export function text(
   rect: Rect,
   words: string,
-  { tone = "text", align = "left", size = TEXT, lines = 1 }: Partial<TextLook> = {},
+  { tone = "text", align = "left", size = TEXT, lines = 1 }: Partial<TextStyle> = {},
 ): Mark {
   return { kind: "text", rect: inset(rect, GAP), text: words, tone, align, size, lines };
 }
-type TextLook = Omit<Extract<Mark, { kind: "text" }>, "kind" | "rect" | "text">;
+type TextStyle = Omit<Extract<Mark, { kind: "text" }>, "kind" | "rect" | "text">;
 
-/** Parts of a row, side by side. */
+/** Splits a row into equal parts side by side. */
 export function split(rect: Rect, count: number): readonly Rect[] {
   const width = rect.width / count;
   return Array.from({ length: count }, (_, i) => ({ ...rect, x: rect.x + i * width, width }));

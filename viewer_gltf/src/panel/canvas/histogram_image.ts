@@ -1,14 +1,14 @@
-/** Histograms as pictures, each made once. */
+/** Histograms as images, each made once. */
 
 import { COLUMNS, ROWS } from "../../bundle/transfer_2d";
 import type { Histogram } from "../controls";
 
-/** Colour of the most voxels, sRGB, 0..255: the page's accent. */
+/** Colour of the largest number of voxels, sRGB, 0..255: the accent colour of the page. */
 const COLOR = [150, 190, 240] as const;
 
 const made = new WeakMap<Histogram, HTMLCanvasElement>();
 
-/** COLUMNS x ROWS pixels, the steepest gradient on top. */
+/** Returns a canvas of COLUMNS x ROWS pixels, with the steepest gradient on top. */
 export function histogramPicture(histogram: Histogram): HTMLCanvasElement {
   const before = made.get(histogram);
   if (before !== undefined) return before;

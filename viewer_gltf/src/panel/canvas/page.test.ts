@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { STEREO_FACTS } from "../../../test/support/fixture/facts";
 import { sampleManifest } from "../../../test/support/fixture/manifest";
-import { layOut } from "../../../test/support/panel/whole_panel";
+import { buildPanel } from "../../../test/support/panel/whole_panel";
 import { initialState } from "../../state/initial_state";
 import { reduce } from "../../state/reduce";
 import { REFUSED } from "../../state/refusals";
@@ -11,8 +11,8 @@ import { blocksOf } from "./controls";
 import { type Region, ROW } from "./draw_list";
 import { type CanvasView, MAX_TARGETS, type Page, pageOf, paginate, START_CANVAS } from "./page";
 
-/** By the camera of the flat screen, into files. */
-const OF_THE_SCREEN = [
+/** Controls that use the camera of the flat screen, and save files. */
+const SCREEN_CONTROLS = [
   "picture-size",
   "save-picture",
   "save-video",
@@ -23,9 +23,9 @@ const OF_THE_SCREEN = [
 const start = (channels = 12) => initialState(sampleManifest(channels));
 const SPLIT = { isAvailable: true, reason: "" };
 const laidOut = (state: ViewerState, view: Partial<PanelView> = {}) =>
-  layOut(state, { ...STEREO_FACTS, split: SPLIT }, { ...START_VIEW, ...view });
+  buildPanel(state, { ...STEREO_FACTS, split: SPLIT }, { ...START_VIEW, ...view });
 
-/** Every page of every section, and of every group in it. */
+/** Every page of every section, and of every group. */
 function allPages(state: ViewerState, view: Partial<PanelView> = {}): readonly Page[] {
   const layout = laidOut(state, view);
   return layout.sections.flatMap(({ id: tab, items }) => {
@@ -39,7 +39,7 @@ function pagesOf(layout: Layout, view: CanvasView): readonly Page[] {
   return Array.from({ length: count }, (_, page) => pageOf(layout, { ...view, page }));
 }
 
-/** All regions of a section's pages, or of a group's. */
+/** All regions of the pages of a section or a group. */
 function regionsOf(layout: Layout, tab: string, group: string | null = null): Page {
   const pages = pagesOf(layout, { ...START_CANVAS, tab, group });
   return { ...pages[0], regions: pages.flatMap(({ regions }) => regions) };
@@ -51,10 +51,10 @@ function find(page: Page, id: string): Region {
   return found;
 }
 
-describe("the panel on a plane", () => {
+describe("the panel on a canvas", () => {
   const pages = allPages(start(), { picked: "c2", isHistogramOpen: true });
 
-  it("names every control once", () => {
+  it("has every control once", () => {
     for (const { regions } of pages) {
       const ids = regions.map(({ id }) => id);
       expect(new Set(ids).size).toBe(ids.length);
@@ -76,10 +76,10 @@ describe("the panel on a plane", () => {
               "measure-screen",
               "help",
               "slice-pictures",
-              ...OF_THE_SCREEN,
+              ...SCREEN_CONTROLS,
             ].includes(id) || kind === "link";
           const isClosed = item.kind === "group" && !isOpen && kind === "choice";
-          const isColour = kind === "colour"; // its free colours are there in its place
+          const isColour = kind === "colour"; // the free colours take its place
           if (isElsewhere || isClosed || isColour || refusal || kind === "text") continue;
           expect(ids, id).toContain(id);
         }
@@ -87,14 +87,14 @@ describe("the panel on a plane", () => {
     }
   });
 
-  it("has a way for every control of the flat panel, but for what is done with the phone in a hand", () => {
+  it("has every control of the flat panel except those that need the phone in the hand", () => {
     const view = { ...START_VIEW, picked: "c2", isHistogramOpen: true, lenses: "own" } as const;
     const traced = reduce(start(), { type: "set", id: "mode", value: "traced" });
     const offered = new Set<string>();
     const inStereo = new Set<string>();
     for (const state of [start(), traced]) {
       const onPage = { ...STEREO_FACTS, isStereo: false, split: SPLIT, canScan: true };
-      const flat = layOut(state, onPage, view);
+      const flat = buildPanel(state, onPage, view);
       for (const item of flat.sections.flatMap(({ items }) => items)) {
         const all = item.kind === "group" ? [...item.controls, ...item.more] : [item];
         for (const { id, kind, refusal } of item.kind !== "group" || item.isOpen ? all : []) {
@@ -105,13 +105,13 @@ describe("the panel on a plane", () => {
         for (const { id } of regions) inStereo.add(id.split("=")[0]);
       }
     }
-    // any colour: the free ones are there in its place, and the palettes'
+    // the free colours and those of the palettes take the place of any colour
     const isColour = (id: string) => /\/(color|palette)$|^lamp-\d-color$/.test(id);
     const missing = [...offered].filter((id) => !inStereo.has(id) && !isColour(id)).sort();
-    // what is done with the phone out of its viewer: its code, its screen; files, of the screen's own
-    // camera too; a keyboard's list; pictures beside the specimen, which stands alone before the eyes
+    // The missing controls need the phone out of its viewer, save files, list keys, or show slices beside the
+    // specimen.
     const phone = ["lens-code", "scan", "measure-screen"];
-    const files = OF_THE_SCREEN.filter((id) => !["next-view", "forget-views"].includes(id));
+    const files = SCREEN_CONTROLS.filter((id) => !["next-view", "forget-views"].includes(id));
     expect(missing).toEqual(
       [
         "stereo",
@@ -127,7 +127,7 @@ describe("the panel on a plane", () => {
     );
   });
 
-  it("has all ten moves, each going on while it is held", () => {
+  it("has all ten moves, each repeated while it is held", () => {
     const { regions } = regionsOf(laidOut(start()), "move");
     const moves = regions.filter(({ repeats }) => repeats !== undefined);
     expect(new Set(moves.map((move) => move.repeats))).toEqual(
@@ -139,7 +139,7 @@ describe("the panel on a plane", () => {
     for (const move of moves) expect(move.to(0.5)).toBe(move.repeats);
   });
 
-  it("reports why something is refused", () => {
+  it("reports why a control is refused", () => {
     const off = reduce(start(), { type: "set", id: "mode", value: "off" });
     const page = regionsOf(laidOut(off), "volumes");
     const radius = find(regionsOf(laidOut(off), "volume-settings"), "disc-radius");
@@ -149,8 +149,8 @@ describe("the panel on a plane", () => {
   });
 });
 
-describe("its controls", () => {
-  it("do what the layout's do", () => {
+describe("controls on a canvas", () => {
+  it("make the same requests as those of the layout", () => {
     const channels = pageOf(laidOut(start()), { ...START_CANVAS, tab: "channels" });
     expect(find(channels, "c0/shown").to(0)).toEqual({ type: "show", channel: "c0", shown: false });
     expect(find(channels, "c3/open").to(0)).toEqual({ canvas: "fan", group: "c3" });
@@ -160,13 +160,13 @@ describe("its controls", () => {
     expect(find(view, "reset").to(0)).toBe("reset");
   });
 
-  it("slide from end to end, in the control's steps, a little before the region's ends", () => {
+  it("slide from end to end in the control's steps, and reach the ends slightly inside the region", () => {
     const page = regionsOf(laidOut(start(), { picked: "c0" }), "channels", "c0");
     const opacity = find(page, "c0/opacity");
     const at = (across: number) => {
-      const wish = opacity.to(across);
-      return typeof wish === "object" && wish !== null && "value" in wish
-        ? Number(wish.value)
+      const request = opacity.to(across);
+      return typeof request === "object" && request !== null && "value" in request
+        ? Number(request.value)
         : null;
     };
     expect([at(0), at(0.5), at(1)]).toEqual([0, 0.5, 1]);
@@ -174,7 +174,7 @@ describe("its controls", () => {
     expect(100 * (at(0.337) ?? 0)).toBeCloseTo(Math.round(100 * (at(0.337) ?? 0)), 9);
   });
 
-  it("bring a window's ends together but not past each other", () => {
+  it("move the ends of a window together but not past each other", () => {
     const shown = reduce(start(), { type: "window", channel: "c0", window: [0.25, 0.5] });
     const all = allPages(shown, { picked: "c0" }).flatMap(({ regions }) => regions);
     const [low] = all.filter(({ id }) => id === "c0/window=low");
@@ -184,10 +184,10 @@ describe("its controls", () => {
   });
 });
 
-describe("its pages", () => {
+describe("pages on a canvas", () => {
   const block = { height: ROW, marks: [], regions: [] };
 
-  it("hold all blocks in order, as many as there is room for", () => {
+  it("hold all blocks in order, as many as fit", () => {
     const blocks = Array.from({ length: 20 }, (_, i) => ({ ...block, height: ROW + i }));
     const pages = paginate(blocks, 9 * ROW);
     expect(pages.flat()).toEqual(blocks);
@@ -196,20 +196,20 @@ describe("its pages", () => {
     }
   });
 
-  it("hold at most six targets, but for a block that has more", () => {
+  it("hold at most six targets, except for a block with more", () => {
     const blocks = [2, 2, 2, 2, 8, 1].map((targets) => ({ ...block, targets }));
     const counts = paginate(blocks, 99 * ROW).map((page) => page.map(({ targets }) => targets));
     expect(counts).toEqual([[2, 2, 2], [2], [8], [1]]);
     expect(MAX_TARGETS).toBe(6);
   });
 
-  it("never grow with the bundle: of 70 channels, each is reached by name", () => {
+  it("do not grow with the bundle: each of 70 channels is found by name", () => {
     const channels = regionsOf(laidOut(start(70)), "channels");
     expect(find(channels, "next-channels").isStep).toBe(true);
     expect(channels.count).toBeLessThan(4);
   });
 
-  it("step from tile to tile where a map would be too fine for the gaze", () => {
+  it("step from tile to tile if a map would be too fine for the gaze", () => {
     const tiles = Array.from({ length: 400 }, (_, i) => ({
       id: `r${Math.floor(i / 20)}_c${i % 20}`,
       name: `${i}`,

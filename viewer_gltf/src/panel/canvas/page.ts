@@ -1,6 +1,7 @@
 /**
- * The panel on a canvas: the same layout as in HTML, one page at a time, in one column of rows that a gaze
- * finds and a phone's few pixels can show. The ways between the pages are in the bar: see bar.ts. Pure.
+ * The panel on a canvas: the layout of the HTML panel, one page at a time, in one column of rows.
+ * The rows are large enough for a gaze and for a phone's few pixels. The buttons between the pages
+ * are in the bar (see bar.ts). Pure.
  */
 import type { Control, Group, Layout, Section } from "../controls";
 import { blocksOfAll, blocksOfGroup } from "./controls";
@@ -17,16 +18,16 @@ import {
 } from "./draw_list";
 import { one, region } from "./parts";
 
-/** Size of the texture, px: it never grows. It is seen at 1.2 m as 55 x 40 degrees. */
+/** Size of the texture, px; it does not grow. At 1.2 m it is 55 x 40 degrees wide. */
 export const WIDTH = 1024;
 export const HEIGHT = 716;
 export const PX_PER_M = 820;
-/** Most targets of a page. A palette, a map or a histogram has more, and a page for itself. */
+/** Largest number of targets on a page. A palette, a map or a histogram has more, and a page of its own. */
 export const MAX_TARGETS = 6;
 
 const MARGIN = 16;
 const HEADER = 92;
-/** The place of the rows, below the title. */
+/** Place of the rows, below the title. */
 export const CONTENT: Rect = {
   x: MARGIN,
   y: HEADER,
@@ -34,14 +35,14 @@ export const CONTENT: Rect = {
   height: HEIGHT - HEADER - MARGIN,
 };
 
-/** The memory of the panel in the scene. */
+/** State of the panel in the scene. */
 export type CanvasView = Readonly<{
   /** The open section; null: the list of sections. */
   tab: string | null;
   /** The open group of the section; null: the section itself. */
   group: string | null;
   page: number;
-  /** The channel whose colours lie over its name, because its swatch was looked at. */
+  /** The channel whose colours are drawn over its name, after a glance at its swatch; null: none. */
   fanned: string | null;
 }>;
 export const START_CANVAS: CanvasView = { tab: "channels", group: null, page: 0, fanned: null };
@@ -50,25 +51,26 @@ export type Page = Readonly<{
   title: string;
   marks: readonly Mark[];
   regions: readonly Region[];
-  /** Its number, from 0, and how many there are. */
+  /** Number of the page, from 0, and of all pages. */
   page: number;
   count: number;
-  /** The change that leads one level up; null: this is the list of sections. */
+  /** Where *Back* leads, one level up; null: this is the list of sections. */
   up: "section" | "list" | null;
 }>;
 
 type Item = Control | Group;
 type Opened = Readonly<{ title: string; blocks: readonly Block[]; up: Page["up"] }>;
 
-/** A section with nothing for a headset is left out. */
+/** Returns the sections that have a control for a headset. */
 function shownSections({ sections }: Layout): readonly Section[] {
   return sections.filter(({ items }) => blocksOfAll(items, CONTENT.width).length > 0);
 }
 
 /**
- * Blocks by page; none is broken. A page holds at most six targets, unless one block has more.
+ * Distributes blocks to pages without splitting a block. A page has at most six targets, unless one
+ * block has more.
  *
- * @param height of a page, px
+ * @param height height of a page, px
  */
 export function paginate(blocks: readonly Block[], height: number): readonly (readonly Block[])[] {
   const pages: Block[][] = [[]];
@@ -109,7 +111,7 @@ export function pageOf(layout: Layout, view: CanvasView): Page {
   return { title, marks, regions, page, count: pages.length, up };
 }
 
-/** The open list, section or group. */
+/** Returns the open list, section or group. */
 function opened(layout: Layout, { tab, group, fanned }: CanvasView): Opened {
   const sections = shownSections(layout);
   const section = tab === null ? undefined : (sections.find(({ id }) => id === tab) ?? sections[0]);

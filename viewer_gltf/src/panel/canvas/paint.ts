@@ -1,9 +1,9 @@
-/** Marks on a 2D canvas. */
+/** Paints marks on a 2D canvas. */
 
 import type { Mark, Rect, Tone } from "./draw_list";
 import { histogramPicture } from "./histogram_image";
 
-/** The page's own colours: see html/colors.css. */
+/** Colours of the page (see html/colors.css). */
 const COLORS: Readonly<Record<string, string>> = {
   back: "#12151d",
   raised: "#242b39",
@@ -73,7 +73,7 @@ function paintPicture(context: Context, mark: Extract<Mark, { kind: "picture" }>
   context.restore();
 }
 
-/** A window cuts a part out of the plane: of the values as much as of the gradients. */
+/** Draws the part of the histogram inside a window: the same share of the values and of the gradients. */
 function paintHistogram(context: Context, mark: Extract<Mark, { kind: "histogram" }>): void {
   const picture = histogramPicture(mark.histogram);
   const { x, y, width, height } = mark.rect;
@@ -92,7 +92,7 @@ function paintHistogram(context: Context, mark: Extract<Mark, { kind: "histogram
 
 function paintText(context: Context, mark: Extract<Mark, { kind: "text" }>): void {
   const { rect, size, align } = mark;
-  // Dark on light looks thinner than light on dark.
+  // dark text on light ground looks thinner than light text on dark ground
   context.font = `${mark.tone === "ink" ? 700 : 500} ${size}px ${FONT}`;
   context.fillStyle = colorOf(mark.tone);
   context.textAlign = align;
@@ -106,7 +106,10 @@ function paintText(context: Context, mark: Extract<Mark, { kind: "text" }>): voi
   });
 }
 
-/** Lines that fit the width, and end at each \n; the last of so many ends with an ellipsis where it must. */
+/**
+ * Breaks a text into lines that fit the width, also at each \n. The last of `most` lines ends with
+ * an ellipsis if needed.
+ */
 export function breakLines(
   words: string,
   width: number,

@@ -1,10 +1,10 @@
-/** What the panel's blocks have in common. Pixels. Pure. */
+/** Pieces that all blocks of the panel share. Pixels. Pure. */
 import type { Control } from "../controls";
 import { type Block, type Mark, type Rect, type Region, ROW, SMALL, text } from "./draw_list";
 
-/** A control's label, as a share of the row that it shares with the control. */
+/** Width of a control's label, as a share of their row. */
 export const LABEL = 0.27;
-/** Height of a caption over a row, px. */
+/** Height of a caption above a row, px. */
 const CAPTION = 52;
 
 export function one(marks: readonly Mark[], regions: readonly Region[], height = ROW): Block {
@@ -21,7 +21,7 @@ export function region(
   return { id, label, rect, to, isSlide };
 }
 
-/** A refused control reports the reason when the user chooses any part of it. */
+/** Returns regions that report the refusal of a control instead of what they do otherwise. */
 export function unlessRefused(
   { refusal }: Pick<Control, "refusal">,
   regions: readonly Region[],

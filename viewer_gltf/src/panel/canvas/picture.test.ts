@@ -1,9 +1,9 @@
 import { describe, expect, it, vi } from "vitest";
-import type { Picture, Wish } from "../controls";
+import type { Picture, Request } from "../controls";
 import { paint } from "./paint";
 import { pictureBlock } from "./picture";
 
-const wish = (x: number, y: number): Wish => ({ panel: "find", text: `${x} ${y}` });
+const request = (x: number, y: number): Request => ({ panel: "find", text: `${x} ${y}` });
 const PICTURE: Picture = {
   kind: "picture",
   id: "cells/histogram",
@@ -12,29 +12,29 @@ const PICTURE: Picture = {
   version: "1",
   text: "all",
   draw: () => undefined,
-  press: wish,
+  press: request,
 };
 
-describe("a picture on the panel's plane", () => {
-  it("is as high as its share of the width, but no higher than a page", () => {
+describe("a picture on the panel's canvas", () => {
+  it("has its share of the width as its height, up to the height of a page", () => {
     const rectOf = (height: number) => pictureBlock({ ...PICTURE, height }, 832).marks[1].rect;
     expect(rectOf(0.25)).toMatchObject({ x: 16, width: 800, height: 200 });
     expect(rectOf(3).height).toBe(480);
   });
 
-  it("is pressed where a ray meets it, and dragged if it can be", () => {
+  it("is pressed at the place that a ray meets, and dragged if it can be", () => {
     const [pressed] = pictureBlock(PICTURE, 832).regions;
     expect(pressed.isSlide).toBe(false);
-    expect(pressed.to(0.25, 0.5)).toEqual(wish(0.25, 0.5));
+    expect(pressed.to(0.25, 0.5)).toEqual(request(0.25, 0.5));
     const drag = vi.fn(() => null);
     const [dragged] = pictureBlock({ ...PICTURE, drag }, 832).regions;
     expect(dragged.isSlide).toBe(true);
-    expect(dragged.press?.(0.1, 0.2)).toEqual(wish(0.1, 0.2));
+    expect(dragged.press?.(0.1, 0.2)).toEqual(request(0.1, 0.2));
     expect(dragged.to(0.3, 0.4)).toBeNull();
     expect(drag).toHaveBeenCalledWith(0.3, 0.4);
   });
 
-  it("is drawn in its place by its owner, who leaves the rest as it was", () => {
+  it("is drawn in its place by its owner, with the canvas state restored", () => {
     const draw = vi.fn();
     const context = { save: vi.fn(), translate: vi.fn(), restore: vi.fn() };
     const { marks } = pictureBlock({ ...PICTURE, draw }, 832);

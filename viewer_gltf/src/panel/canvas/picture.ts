@@ -1,11 +1,11 @@
-/** A picture that only its owner can draw, on the panel's plane. Pure. */
+/** A picture that its owner draws, on the panel's canvas. Pure. */
 import type { Picture } from "../controls";
 import type { Block, Rect } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
-/** Highest, px: a page has room for it. */
+/** Largest height, px, which fits on a page. */
 const TALLEST = 480;
-/** Space at its sides, px. */
+/** Space at both sides, px. */
 const PAD = 16;
 
 export function pictureBlock(picture: Picture, width: number): Block {

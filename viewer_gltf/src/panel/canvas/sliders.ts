@@ -1,9 +1,9 @@
 /** Sliders of the panel on a canvas. Pure. */
-import type { Slider, Window, Wish } from "../controls";
+import type { Request, Slider, Window } from "../controls";
 import { type Block, GAP, type Mark, type Rect, ROW, SMALL, type Tone, text } from "./draw_list";
 import { one, region, toneOf, unlessRefused } from "./parts";
 
-/** Height of the words above a track, px. */
+/** Height of the text above a track, px. */
 const WORDS = 50;
 const KNOB = 44;
 const LINE = 16;
@@ -15,13 +15,13 @@ type Track = Readonly<{
   text: string;
   steps: number;
   refusal?: string;
-  to: (value: number) => Wish;
+  to: (value: number) => Request;
 }>;
 
-/** The words in the upper half, the track in the lower one; all of the row takes hold of it. */
+/** Draws the text in the upper half and the track in the lower half. The whole row takes a drag. */
 function track(slider: Track, row: Rect): Block {
   const words: Rect = { ...row, height: WORDS };
-  const end = ROW / 2; // a knob at either end stays in the region
+  const end = ROW / 2; // a knob at either end then stays in the region
   const length = row.width - 2 * end;
   const at = row.x + end + slider.value * length;
   const middle = row.y + (WORDS + ROW - GAP) / 2;
@@ -49,7 +49,7 @@ export function sliderRow(slider: Slider, row: Rect): Block {
   return track(slider, row);
 }
 
-/** One end of a window: it never passes the other. */
+/** Draws one end of a window, which cannot pass the other end. */
 export function windowRow(window: Window, end: 0 | 1, row: Rect): Block {
   const { id, label, value, texts, steps, refusal } = window;
   const other = value[1 - end];

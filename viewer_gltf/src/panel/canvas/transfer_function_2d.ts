@@ -1,4 +1,4 @@
-/** The joint histogram with its shapes, on a page's canvas and on the panel's plane. Pure. */
+/** The joint histogram with its shapes, on the page's canvas and on the panel's canvas. Pure. */
 
 import type { Shape } from "../../bundle/transfer_2d";
 import { type Rgb, toHex } from "../../math/color";
@@ -7,15 +7,15 @@ import type { HistogramEditor } from "../controls";
 import { type Block, type Mark, type Rect, SMALL, text } from "./draw_list";
 import { captioned, one, region, unlessRefused } from "./parts";
 
-/** Height of the plane on the panel, px. */
+/** Height of the histogram on the panel, px. */
 const HEIGHT = 440;
-/** Space for the axes' texts, px. */
+/** Space for the texts of the axes, px. */
 const AXIS = 52;
-/** Reach of a corner, px: a ray trembles. */
+/** Reach of a corner, px; large because a ray trembles. */
 const REACH = 36;
 const HANDLE = 32;
 
-/** The corners that are drawn to be taken hold of. */
+/** Returns the corners that are drawn as handles. */
 function handlesOf(shape: Shape): readonly HistogramPoint[] {
   const corners = outline(shape);
   if (shape.kind === "rectangle") return corners;
@@ -25,18 +25,18 @@ function handlesOf(shape: Shape): readonly HistogramPoint[] {
   return [...upper, tip, ...(bottom > 0 ? [{ value: middleAt(shape), gradient: bottom }] : [])];
 }
 
-/** Where a triangle is cut off. */
+/** Returns the middle of the edge where a triangle is cut off. */
 function middleAt({ values: [low, high], gradients: [bottom, top], tip }: Shape): number {
   return tip + (((low + high) / 2 - tip) * bottom) / top;
 }
 
-/** A shape's colour as it shows: the channel's times its own. */
+/** Returns the displayed colour of a shape: the channel's colour times its own. */
 function toneOf(shape: Shape, color: Rgb): `#${string}` {
   const [r, g, b] = color;
   return `#${toHex([r * shape.color[0], g * shape.color[1], b * shape.color[2]]).slice(1)}`;
 }
 
-/** @param handle the edge of a handle */
+/** @param handle width of a handle, px */
 export function histogramMarks(
   editor: HistogramEditor,
   rect: Rect,
@@ -72,12 +72,12 @@ export function histogramBlock(editor: HistogramEditor, width: number): Block {
   const rect: Rect = { x: REACH, y: 0, width: width - 2 * REACH, height: HEIGHT };
   const below: Rect = { ...rect, y: HEIGHT, height: AXIS };
   const [low, high, steepest] = editor.texts;
-  const look = { size: SMALL, tone: "dim" } as const;
+  const style = { size: SMALL, tone: "dim" } as const;
   const marks = [
     ...histogramMarks(editor, rect, HANDLE),
-    text(below, low, look),
-    text(below, high, { ...look, align: "right" }),
-    text({ ...rect, height: AXIS }, steepest, look),
+    text(below, low, style),
+    text(below, high, { ...style, align: "right" }),
+    text({ ...rect, height: AXIS }, steepest, style),
   ];
   const pointAt = (across: number, down = 0): HistogramPoint => ({
     value: across,

@@ -1,16 +1,16 @@
 /**
- * How large this screen is, by a bank card that is held to it: no browser says it, and all such cards are
- * as large (ISO/IEC 7810 ID-1). Its short edge fits an upright phone.
+ * Measures the size of this screen with a bank card on it, because no browser reports the size. All
+ * such cards are equally large (ISO/IEC 7810 ID-1), and their short edge fits an upright phone.
  */
 import { element } from "../../dom/element";
 import { PER_INCH } from "../../state/stereo";
 
 /** Short edge of a card, inches: 53.98 mm. */
 const CARD_IN = 53.98 / 25.4;
-/** Its long edge as a multiple. */
+/** Ratio of the long to the short edge. */
 const LONG = 85.6 / 53.98;
 
-/** CSS pixels in an inch of a screen on which a card's short edge is so wide. */
+/** Returns the CSS pixels per inch of a screen on which the short edge of a card has a width. */
 export function perInchOf(card_px: number): number {
   return Number((card_px / CARD_IN).toFixed(1));
 }
@@ -44,7 +44,7 @@ export class CardMeasure {
     { card: "" },
     element("p", {
       textContent:
-        "Hold a bank card upright to the screen, and slide until the frame is as wide as the card.",
+        "Hold a bank card upright against the screen, and move the slider until the frame is as wide as the card.",
     }),
     this.frame,
     this.slider,
@@ -58,7 +58,7 @@ export class CardMeasure {
     parent.append(this.root);
   }
 
-  /** @param perInch what is known or guessed, to begin with */
+  /** @param perInch first guess of the pixels per inch */
   open(perInch: number): void {
     this.slider.value = String(cardWidth(perInch));
     this.fit();

@@ -1,4 +1,4 @@
-/** The pages' colours in both themes, against the contrasts of WCAG 2.1 (1.4.3 and 1.4.11), level AA. */
+/** The colours of both themes have the contrasts of WCAG 2.1 (1.4.3 and 1.4.11), level AA. */
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
 
@@ -6,7 +6,7 @@ const STYLE = readFileSync(new URL("./colors.css", import.meta.url), "utf8");
 
 type Colors = Readonly<Record<string, string>>;
 
-/** The colours that a rule of the page's style sets, by name. */
+/** Returns the colours that a rule of the style sheet sets, by name. */
 function colorsOf(selector: string): Colors {
   const start = STYLE.indexOf(`${selector} {`);
   expect(start, selector).toBeGreaterThanOrEqual(0);
@@ -40,20 +40,20 @@ const TEXTS = ["text", "dim", "accent"];
 const GROUNDS = ["back", "panel", "raised"];
 
 describe.each(Object.entries(THEMES))("the %s page", (_, colors) => {
-  it("has text of 4.5 to 1 on all that it lies on", () => {
+  it("has text with a contrast of 4.5 to 1 on every ground", () => {
     const pairs = TEXTS.flatMap((text) => GROUNDS.map((ground) => [text, ground]));
     for (const [text, ground] of [...pairs, ["on-accent", "accent"], ["text", "alarm"]]) {
       expect(contrast(colors[text], colors[ground]), `${text} on ${ground}`).toBeGreaterThan(4.5);
     }
   });
 
-  it("has edges of controls of 3 to 1", () => {
+  it("has edges of controls with a contrast of 3 to 1", () => {
     for (const ground of GROUNDS) {
       expect(contrast(colors.edge, colors[ground]), `edge on ${ground}`).toBeGreaterThan(3);
     }
   });
 });
 
-it("sets every colour in the light page that the dark one has", () => {
+it("sets every colour of the dark theme in the light theme", () => {
   expect(Object.keys(colorsOf('[data-theme="light"]'))).toEqual(Object.keys(DARK));
 });

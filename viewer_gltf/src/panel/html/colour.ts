@@ -1,4 +1,4 @@
-/** A colour: any (the browser's own picker), or one of the palettes. */
+/** A control of a colour: any colour (the browser's picker), or one of the palettes. */
 
 import { element } from "../../dom/element";
 import { RovingTabindex } from "../../dom/roving_tabindex";
@@ -27,14 +27,15 @@ function makePicker(first: Colour, send: Send): Widget<Colour> {
     update(control) {
       now = control;
       if (input.value !== control.value) input.value = control.value;
-      // Firefox leaves the colour itself out where a style has any image: one colour is a stripe, too
+      // Firefox does not draw the colour itself if a style sets an image, so a single colour is
+      // drawn as a stripe, too
       const { shows = [], value } = control;
       input.style.setProperty("--shows", stripes(shows.length === 0 ? [value] : shows));
     },
   };
 }
 
-/** Colours side by side. */
+/** Returns a gradient with the colours side by side. */
 function stripes(colors: readonly string[]): string {
   const share = 100 / colors.length;
   const stops = colors.map((color, i) => `${color} ${i * share}% ${(i + 1) * share}%`);

@@ -1,10 +1,10 @@
 /**
- * The second click of a double click is not a second request: it would switch a control back, or choose a
- * control that the first click has moved under the pointer. Controls that move on by a step, `data-step`,
- * take each click.
+ * Ignores the second click of a double click. It is not a second request: it would switch a control
+ * back, or press a control that the first click has moved under the pointer. Controls with
+ * `data-step` move on by a step and take every click.
  */
 
-/** Stop the second click of a double click, as the browser counts clicks, on all children of an element. */
+/** Stops the second click of a double click, as the browser counts clicks, on all children of an element. */
 export function ignoreSecondClicks(root: HTMLElement): void {
   let stepped: Element | null = null;
   const onClick = (event: MouseEvent) => {

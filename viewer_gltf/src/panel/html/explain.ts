@@ -6,7 +6,7 @@ const load = () => import("../explanations");
 
 export type Explainer = Readonly<{ button: HTMLElement; note: HTMLElement }>;
 
-/** null: the control needs no explanation. */
+/** Returns the question mark and the note of a control; null: it needs no explanation. */
 export function explainerOf(control: Control): Explainer | null {
   const { id, label, name = label, about } = control;
   if (about === undefined) return null;
@@ -18,7 +18,7 @@ export function explainerOf(control: Control): Explainer | null {
   );
   button.ariaExpanded = "false";
   button.addEventListener("click", async (event) => {
-    event.preventDefault(); // the label around it would work the control
+    event.preventDefault(); // otherwise the label around the button would also operate the control
     const isOpen = button.ariaExpanded === "true";
     button.ariaExpanded = String(!isOpen);
     if (note.childElementCount === 0) note.replaceChildren(...(await linesOf(control, about)));
@@ -39,7 +39,7 @@ async function linesOf(control: Control, about: string): Promise<readonly HTMLEl
   return lines;
 }
 
-/** Give each option of a list a tooltip, as soon as somebody comes near the list. */
+/** Gives each option of a list a tooltip once the pointer or the focus reaches the list. */
 export function explainOptions(select: HTMLSelectElement, { id, about }: Control): void {
   if (about === undefined) return;
   const explain = async () => {
@@ -49,14 +49,17 @@ export function explainOptions(select: HTMLSelectElement, { id, about }: Control
   for (const kind of ["pointerenter", "focus"]) select.addEventListener(kind, () => void explain());
 }
 
-/** A control with its question mark in the same row, and the note below; the control alone where there is none. */
+/**
+ * Returns a control with its question mark in the same row and the note below; the control alone if
+ * it has no explanation.
+ */
 export function withExplainer(control: Control, root: HTMLElement): HTMLElement {
   const explainer = explainerOf(control);
   if (explainer === null) return root;
   return element("div", { className: "explained" }, {}, root, explainer.button, explainer.note);
 }
 
-/** A control whose label has the question mark, with the note below. */
+/** Returns a control with the note below; its label already has the question mark. */
 export function withNote(root: HTMLElement, explainer: Explainer | null): HTMLElement {
   if (explainer === null) return root;
   return element("div", { className: "explained" }, {}, root, explainer.note);

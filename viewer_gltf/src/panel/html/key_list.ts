@@ -1,6 +1,6 @@
 /**
- * The list of all keys, in a dialog that keeps the focus until it is closed. Each key is a button:
- * after a press on it the next key that is pressed does what it did.
+ * The list of all keys, in a dialog that keeps the focus until it is closed. Each key is a button.
+ * After a click on it, the next key that is pressed takes over its function.
  */
 import "./key_list.css";
 import { element, setText } from "../../dom/element";
@@ -20,7 +20,7 @@ const NAMES: Readonly<Record<string, string>> = {
   Backspace: "⌫",
 };
 
-/** With Shift where it belongs to the key. */
+/** Returns the text of a key, with Shift if it belongs to the key. */
 function textOf(key: string): string {
   const [, control, letter] = /^(Ctrl\+)(.)$/.exec(key) ?? [];
   if (control !== undefined) {
@@ -31,23 +31,26 @@ function textOf(key: string): string {
   return `${shift && "⇧ "}${NAMES[name] ?? name}`;
 }
 
-/** The rows that a few letters leave, each a key's and its label's; all of them where nothing is sought. */
-export function sought<T extends Readonly<{ text: string }>>(rows: readonly T[], words: string) {
+/** Returns the rows that contain all words of a text; an empty text keeps all rows. */
+export function filterRows<T extends Readonly<{ text: string }>>(
+  rows: readonly T[],
+  words: string,
+) {
   const parts = words.toLowerCase().split(/\s+/);
   return rows.filter(({ text }) => parts.every((part) => text.toLowerCase().includes(part)));
 }
 
 const HOW = "Press a key of this list to change it.";
 const WAITING = "press …";
-/** Keys that do nothing alone; they are held while another key is pressed. */
-const HELD = ["Shift", "Control", "Alt", "AltGraph", "Meta", "CapsLock", "Dead", "Process"];
+/** Modifier keys, which are held while another key is pressed. */
+const MODIFIERS = ["Shift", "Control", "Alt", "AltGraph", "Meta", "CapsLock", "Dead", "Process"];
 
 /** One key of the list, by its name in the tables. */
-type Cap = Readonly<{ name: string; root: HTMLElement }>;
+type KeyCap = Readonly<{ name: string; root: HTMLElement }>;
 type Row = Readonly<{
   group: string;
   label: string;
-  caps: readonly Cap[];
+  caps: readonly KeyCap[];
   elements: readonly HTMLElement[];
   section: HTMLElement;
 }>;
@@ -60,7 +63,7 @@ export class Help {
     { type: "text", placeholder: "Find a key", ariaLabel: "Find a key", autocomplete: "off" },
     { control: "find-key" },
   );
-  private readonly none = element("p", { textContent: "No key fits these words.", hidden: true });
+  private readonly none = element("p", { textContent: "No key matches this text.", hidden: true });
   private readonly line = element("p", { className: "hint", role: "status" }, { keyLine: "" });
   private readonly reset = element(
     "button",
@@ -68,12 +71,12 @@ export class Help {
     { action: "reset-keys" },
   );
   private changes: KeyChanges = {};
-  /** All keys are one stop of the Tab key, or a hundred presses would lead through them. */
+  /** All keys are one stop of the Tab key. Otherwise it would take a hundred presses to pass them. */
   private readonly tabindex: RovingTabindex;
-  /** The key that the next press changes, by its name in the tables. */
+  /** The key that the next press changes, by its name in the tables; null: none. */
   private asked: string | null = null;
 
-  /** @param onClose called when the user wants it closed, at times once more than needed */
+  /** @param onClose called when the user closes the dialog, sometimes twice */
   constructor(
     parent: HTMLElement,
     private readonly table: KeyTable,
@@ -106,19 +109,20 @@ export class Help {
   }
 
   private listen(): void {
-    // The state goes first and the dialog follows: its own events come a little late.
+    // The state changes first and the dialog follows it, because the dialog's events come slightly
+    // late.
     this.dialog.addEventListener("cancel", (event) => {
       event.preventDefault();
       if (this.asked === null) this.onClose();
       else this.ask(null);
     });
     this.dialog.addEventListener("close", () => {
-      if (!this.dialog.open) this.onClose(); // the browser may close it in spite of `cancel`
+      if (!this.dialog.open) this.onClose(); // the browser may close the dialog in spite of `cancel`
     });
     const onKey = (event: KeyboardEvent) => {
       if (this.asked !== null) this.take(event, this.asked);
       else if (event.key === FIXED && this.find.value === "") {
-        event.preventDefault(); // or it would open again by the same key
+        event.preventDefault(); // otherwise the same key would open the list again
         this.onClose();
       }
     };
@@ -148,17 +152,19 @@ export class Help {
     );
   }
 
-  /** Let the next key that is pressed take the place of this one; null: none. */
+  /** Lets the next key that is pressed replace this one; null: none. */
   private ask(name: string | null, words = ""): void {
     this.asked = name;
     const press =
-      name === null ? HOW : `Press the new key for “${this.table.labelOf(name)}”; Esc leaves it.`;
+      name === null
+        ? HOW
+        : `Press the new key for “${this.table.labelOf(name)}”, or Esc to cancel.`;
     this.write();
     setText(this.line, words || press);
   }
 
   private take(event: KeyboardEvent, asked: string): void {
-    if (HELD.includes(event.key) || event.isComposing) return;
+    if (MODIFIERS.includes(event.key) || event.isComposing) return;
     event.preventDefault();
     event.stopPropagation();
     if (event.key === "Escape") {
@@ -173,18 +179,18 @@ export class Help {
     this.changes = answer.changes;
     this.ask(
       null,
-      `${textOf(keyNow(asked, this.changes))} does “${this.table.labelOf(asked)}” now.`,
+      `${textOf(keyNow(asked, this.changes))} now does “${this.table.labelOf(asked)}”.`,
     );
     this.onChange(this.changes);
   }
 
   private resetAll(): void {
     this.changes = {};
-    this.ask(null, "All keys are as they were at first.");
+    this.ask(null, "All keys are reset.");
     this.onChange(this.changes);
   }
 
-  /** Write each key as it is now. */
+  /** Shows the present key of each row. */
   private write(): void {
     for (const { label, caps } of this.rows) {
       for (const { name, root } of caps) {
@@ -204,7 +210,7 @@ export class Help {
       const keys = row.caps.map(({ name }) => textOf(keyNow(name, this.changes))).join(" ");
       return { row, text: `${row.group} ${keys} ${row.label}` };
     });
-    const left = new Set(sought(rows, words.trim()).map(({ row }) => row));
+    const left = new Set(filterRows(rows, words.trim()).map(({ row }) => row));
     const sections = new Set([...left].map(({ section }) => section));
     for (const row of this.rows) {
       for (const each of row.elements) each.hidden = !left.has(row);
@@ -230,7 +236,7 @@ export class Help {
       return;
     }
     this.dialog.close();
-    // Until the next frame the focus may stay in the hidden field, which would swallow the keys.
+    // Until the next frame the hidden field may keep the focus and swallow keys.
     const { activeElement } = document;
     if (activeElement instanceof HTMLElement && this.dialog.contains(activeElement)) {
       activeElement.blur();

@@ -1,4 +1,4 @@
-/** Elements over the picture: the progress bar, notices, and the page of a fatal error. */
+/** Elements over the view: the progress bar, notices, and the page of a fatal error. */
 
 import { element, setText } from "../../dom/element";
 import { groupNotices } from "../../state/notice_groups";
@@ -6,12 +6,15 @@ import type { Progress } from "../../state/overview_progress";
 import type { Mode } from "../../state/parameters/volumes";
 import { showsVolumes, type ViewerState } from "../../state/viewer_state";
 
-/** Time for which an announcement stays, ms; a screen reader reads it at once. */
-const SAID_MS = 4000;
-/** Time for which an announcement with a button stays, ms: a person has to find the button first. */
+/** Milliseconds for which an announcement stays; a screen reader reads it at once. */
+const SHOWN_MS = 4000;
+/**
+ * Milliseconds for which an announcement with a button stays, because a user has to find the button
+ * first.
+ */
 const OFFERED_MS = 8000;
 
-/** A thin bar at the top with its count in words; hidden once complete. */
+/** A thin bar at the top with a count; hidden once complete. */
 export class ProgressBar {
   private readonly fill = element("div", { className: "fill" });
   private readonly label = element("span");
@@ -32,7 +35,7 @@ export class ProgressBar {
   }
 }
 
-/** Faults that leave the rest usable. Each can be dismissed. */
+/** Notices of faults that leave the rest usable. Each can be dismissed. */
 export class Notices {
   readonly root = element("div", { className: "notices", role: "status" }, { notices: "" });
 
@@ -48,15 +51,15 @@ export class Notices {
     private readonly onRetry: () => void,
   ) {}
 
-  update({ notices, mendable }: Pick<ViewerState, "notices" | "mendable">): void {
-    if (notices === this.drawn) return; // what is written anew is read out anew
+  update({ notices, retryable }: Pick<ViewerState, "notices" | "retryable">): void {
+    if (notices === this.drawn) return; // screen readers read an element again when it is replaced
     this.drawn = notices;
-    // A broken host fails for every file: the newest few notices are enough.
+    // A broken server fails for every file, so the newest few notices are enough.
     const groups = groupNotices(notices);
     const shown = groups.slice(-3);
     const hidden = groups.length - shown.length;
     this.root.replaceChildren(
-      ...(hidden > 0 ? [element("p", { textContent: `and ${hidden} more like these` })] : []),
+      ...(hidden > 0 ? [element("p", { textContent: `and ${hidden} more notices` })] : []),
       ...shown.map(({ text, of }) =>
         element(
           "p",
@@ -70,25 +73,25 @@ export class Notices {
           }),
         ),
       ),
-      ...(mendable.length > 0 ? [this.retry] : []),
+      ...(retryable.length > 0 ? [this.retry] : []),
     );
   }
 }
 
-/** Text on the result of going near, or of waiting, by the mode that shows volumes. */
-const THEN: Readonly<Partial<Record<Mode, string>>> = {
-  disc: ", go near for volumes",
-  tile: ", go near for volumes",
-  traced: "; at rest the picture clears up",
+/** Result of moving closer or waiting, by mode. */
+const NEXT_STEP: Readonly<Partial<Record<Mode, string>>> = {
+  disc: ", move closer for volumes",
+  tile: ", move closer for volumes",
+  traced: ", hold still for a clearer image",
 };
 
-/** How to begin, beside a picture that nobody has touched yet. */
+/** How to begin: a line over a view that nobody has touched yet. */
 export class FirstHint {
-  /** What a small window has no room for. */
+  /** The second half of the line, for which a small window has no space. */
   private readonly outcome = element("span");
   readonly root: HTMLElement;
 
-  /** @param isFramed whether the wheel alone scrolls the page that holds this one */
+  /** @param isFramed whether this page is in a frame, whose holder scrolls with the wheel */
   constructor(isTouch: boolean, isFramed: boolean) {
     const zoom = isTouch ? "pinch" : isFramed ? "Ctrl and wheel" : "wheel";
     const words = `drag to turn, ${zoom} to zoom`;
@@ -96,28 +99,31 @@ export class FirstHint {
   }
 
   update(state: Pick<ViewerState, "mode" | "channels" | "tiles">): void {
-    const isNews = showsVolumes(state) && !state.tiles.some((tile) => tile.isUnfinished);
-    setText(this.outcome, isNews ? (THEN[state.mode] ?? "") : "");
+    const isUseful = showsVolumes(state) && !state.tiles.some((tile) => tile.isUnfinished);
+    setText(this.outcome, isUseful ? (NEXT_STEP[state.mode] ?? "") : "");
   }
 
-  /** From the first touch on nobody needs it. */
+  /** Hides the line after the first touch. */
   leave(): void {
     this.root.classList.add("gone");
   }
 }
 
-/** Says in a line what a key or a button has just done. The line goes by itself, unless someone is about to undo it. */
-export class Said {
+/**
+ * Announces in a line what a key or a button has just done. The line disappears after some time,
+ * unless the pointer or the focus is on its button.
+ */
+export class Announcement {
   private readonly words = element("p", { role: "status" }, { said: "" });
   private readonly button = element("button", { type: "button" }, { action: "offer" });
   readonly root = element("div", { className: "said" }, {}, this.words);
   private timer = 0;
 
   say(text: string): void {
-    this.write(text, SAID_MS);
+    this.write(text, SHOWN_MS);
   }
 
-  /** A button beside the words, if they still stand. */
+  /** Adds a button to the announcement, if it is still shown. */
   offer(text: string, label: string, act: () => void): void {
     if (this.words.textContent !== text) return;
     this.write(text, OFFERED_MS);
@@ -129,7 +135,7 @@ export class Said {
     };
   }
 
-  /** Take the button away: its offer holds no longer. */
+  /** Removes the button, because its offer no longer applies. */
   withdraw(): void {
     this.button.remove();
   }
@@ -143,14 +149,17 @@ export class Said {
 
   private leaveLater(after_ms: number): void {
     this.timer = window.setTimeout(() => {
-      if (this.button.matches(":hover, :focus")) this.leaveLater(SAID_MS);
+      if (this.button.matches(":hover, :focus")) this.leaveLater(SHOWN_MS);
       else this.write("", 0);
     }, after_ms);
   }
 }
 
-/** The way back from a tile that is shown alone, for thumbs: see overlays.css. */
-export class WayBack {
+/**
+ * The button that leads from an isolated tile back to all tiles, within reach of a thumb (see
+ * overlays.css).
+ */
+export class BackButton {
   readonly root: HTMLButtonElement;
 
   constructor(onBack: () => void) {
@@ -169,7 +178,7 @@ export class WayBack {
   }
 }
 
-/** Nothing can be shown: report the fault and what can be done, in the page. */
+/** Shows a fatal error on the page, with a button to try again. */
 export function showFatal(parent: HTMLElement, title: string, text: string): void {
   parent.replaceChildren(
     element(

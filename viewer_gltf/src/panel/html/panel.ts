@@ -1,4 +1,4 @@
-/** The panel in HTML: draws a layout, hands back wishes. Keeps no state of its own. */
+/** The panel in HTML: draws a layout and sends requests. It keeps no state of its own. */
 
 import { arrange, element, setText } from "../../dom/element";
 import type { Control, Group, Layout, Section } from "../controls";
@@ -8,14 +8,14 @@ import { makeWidget } from "./widgets";
 
 type Item = Control | Group;
 
-/** An item of another shape needs another element. */
+/** Returns a key that changes when an item needs another element. */
 function shapeOf(item: Item): string {
   if (item.kind !== "group") return item.id;
   const opens = item.more.length > 0 ? "opens" : "";
   return `${item.id}, group of ${item.controls.length} ${opens}`;
 }
 
-/** The elements of a list of controls, each kept for as long as its control is listed. */
+/** The elements of a list of controls. Each stays as long as its control is listed. */
 export class Items {
   private readonly made = new Map<string, Widget<Item>>();
 
@@ -44,7 +44,7 @@ export class Items {
   }
 }
 
-/** A channel, as a card or as a row of a long list. */
+/** Makes a channel, as a card or as a row of a long list. */
 function makeGroup(first: Group, send: Send): Widget<Group> {
   let now = first;
   const canOpen = first.more.length > 0;
@@ -124,7 +124,7 @@ export class Panel {
   private readonly status = element("p", { className: "status" }, { status: "" });
   private readonly fold: HTMLButtonElement;
   private readonly sections = new Map<string, Widget<Section>>();
-  /** The list of the deeper sections, and what opens it. */
+  /** The list of the deeper sections, and the button that opens it. */
   private readonly more = element("div", { className: "deeper", id: "panel-more" });
   private readonly moreOpener: HTMLButtonElement;
   private readonly moreRoot: HTMLElement;
@@ -190,7 +190,7 @@ export class Panel {
       deeper.map((section) => this.rootOf(section)),
     );
     arrange(this.body, [...first.map((section) => this.rootOf(section)), this.moreRoot]);
-    // A channel that comes or goes moves in the list: the focus goes with it.
+    // A channel that is shown or hidden may move in the list, and takes the focus with it.
     if (focused !== undefined && document.activeElement !== activeElement) this.focus(focused);
   }
 
@@ -204,14 +204,14 @@ export class Panel {
     return widget.root;
   }
 
-  /** Bring the keyboard to a control, by its id; whether there is one. */
+  /** Focuses a control by its id. Returns whether the panel has it. */
   focus(id: string): boolean {
     const found = this.find(id);
     found?.focus();
     return found !== null;
   }
 
-  /** Scroll a control into view; of a section that is closed, or of a panel that is folded away, nothing moves. */
+  /** Scrolls a control into view. A control in a closed section or a hidden panel does not scroll. */
   reveal(id: string): void {
     const isCalm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.find(id)?.scrollIntoView({ block: "nearest", behavior: isCalm ? "auto" : "smooth" });

@@ -1,6 +1,6 @@
-/** A picture that only its owner can draw, and takes hold of where it is pressed. */
+/** A picture that only its owner can draw, and which reports the places of presses and drags. */
 import { element, setText } from "../../dom/element";
-import type { Picture, Wish } from "../controls";
+import type { Picture, Request } from "../controls";
 import { withExplainer } from "./explain";
 import { hooks, type Send, type Widget } from "./widget";
 
@@ -12,12 +12,12 @@ export function makePicture(first: Picture, send: Send): Widget<Picture> {
   let painted = "";
   const canvas = element("canvas", { width: WIDTH, role: "img" }, hooks(first.id));
   const context = canvas.getContext("2d");
-  const at = (event: PointerEvent, to: (x: number, y: number) => Wish | null) => {
+  const at = (event: PointerEvent, to: (x: number, y: number) => Request | null) => {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     const inside = (share: number) => Math.min(1, Math.max(0, share));
     const x = inside((event.clientX - left) / width);
-    const wish = to(x, inside((event.clientY - top) / height));
-    if (wish !== null) send(wish);
+    const request = to(x, inside((event.clientY - top) / height));
+    if (request !== null) send(request);
   };
   canvas.addEventListener("pointerdown", (event) => {
     if (!event.isPrimary || event.button !== 0) return;
@@ -39,7 +39,7 @@ export function makePicture(first: Picture, send: Send): Widget<Picture> {
       const text = `${height} ${control.version}`;
       if (context === null || text === painted) return;
       painted = text;
-      canvas.height = height; // which clears it
+      canvas.height = height; // setting the height also clears the canvas
       control.draw(context, WIDTH, height);
     },
   };

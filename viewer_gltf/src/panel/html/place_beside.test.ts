@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { GAP_PX, type Point, placeBeside, type Size } from "./place_beside";
 
 const CARD: Size = { width: 248, height: 200 };
-/** Areas of the picture beside or above the panel, for the windows that the viewer is looked at in. */
+/** Areas of the view beside or above the panel, for common sizes of windows. */
 const AREAS: readonly Size[] = [
   { width: 390, height: 464 }, // 390 x 844
   { width: 580, height: 390 }, // 844 x 390
@@ -17,7 +17,7 @@ function distance({ x, y }: Point, at: Point, { width, height }: Size): number {
 }
 
 describe("a card beside a place", () => {
-  it.each(AREAS)("stays in $width x $height and leaves the place free, wherever it is", (area) => {
+  it.each(AREAS)("stays in $width x $height and does not cover the place, at any place", (area) => {
     for (let x = 0; x <= area.width; x += 10) {
       for (let y = 0; y <= area.height; y += 10) {
         const at = placeBeside({ x, y }, CARD, area);
@@ -30,7 +30,7 @@ describe("a card beside a place", () => {
     }
   });
 
-  it("goes to the far corner of an area that has room on no side", () => {
+  it("goes to the far corner of an area without space on any side", () => {
     expect(placeBeside({ x: 100, y: 90 }, CARD, { width: 300, height: 240 })).toEqual({
       x: 300 - 8 - CARD.width,
       y: 240 - 8 - CARD.height,

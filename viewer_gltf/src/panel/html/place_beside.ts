@@ -1,18 +1,19 @@
-/** Where a card lies beside a place of the picture, without covering it. Pure. */
+/** Places a card beside a point of the view without covering it. Pure. */
 
 export type Size = Readonly<{ width: number; height: number }>;
 export type Point = Readonly<{ x: number; y: number }>;
 
-/** Space between the place and the card, px: a fingertip's radius. */
+/** Space between the point and the card, px: the radius of a fingertip. */
 export const GAP_PX = 20;
 /** Space between the card and the edges of its area, px. */
 const MARGIN_PX = 8;
 
 /**
- * The upper left corner of a card beside a place: to the right of it, else to the left, below or above. Where the
- * area has room on no side, the card lies in the corner that is farthest from the place.
+ * Returns the upper left corner of a card beside a point: to the right of it, else to the left,
+ * below or above. If the area has no space on any side, the card goes to the corner that is
+ * farthest from the point.
  *
- * @param place within the area, px from the upper left
+ * @param place point in the area, px from the upper left
  */
 export function placeBeside({ x, y }: Point, card: Size, area: Size): Point {
   const most = {

@@ -1,23 +1,25 @@
-/** A dialog with the camera's picture, until it shows the code of a phone viewer. */
+/** A dialog with the camera image, until it shows the QR code of a Cardboard viewer. */
 
 import { element } from "../../dom/element";
 
-/** The text of the first code that the video shows. */
+/** Returns the text of the first code that the video shows. */
 export type Scan = (video: HTMLVideoElement, signal: AbortSignal) => Promise<string>;
 
 /**
- * The code's text; null: closed without one. Throws what `scan` throws, and DOMException where the
- * camera is refused.
+ * Returns the text of the code; null if the dialog was closed without one. Throws the errors of
+ * `scan`, and DOMException if the camera is refused.
  */
 export async function scanByCamera(parent: HTMLElement, scan: Scan): Promise<string | null> {
   const closed = new AbortController();
   const video = element("video", { muted: true, playsInline: true });
-  video.ariaLabel = "What the camera sees";
+  video.ariaLabel = "Camera image";
   const dialog = element(
     "dialog",
     { className: "scanner" },
     { scanner: "" },
-    element("p", { textContent: "Hold the code of your phone viewer before the camera." }),
+    element("p", {
+      textContent: "Hold the QR code of your Cardboard viewer in front of the camera.",
+    }),
     video,
     element("button", { textContent: "Cancel", onclick: () => dialog.close() }),
   );

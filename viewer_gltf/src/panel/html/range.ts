@@ -1,4 +1,4 @@
-/** A slider with two ends: two range inputs on one track, each worked by its own thumb. */
+/** A slider with two ends: two range inputs on one track, each moved by its own thumb. */
 
 import { element, setText } from "../../dom/element";
 import type { Window } from "../controls";
@@ -20,7 +20,7 @@ export function makeWindow(first: Window, send: Send): Widget<Window> {
         ariaLabel: `${name}, ${end === 0 ? "lower" : "upper"} end`,
         oninput: () => {
           const value = Number(input.value) / now.steps;
-          // An end that meets the other stays before it.
+          // an end cannot pass the other end
           if (end === 0) send(now.to([Math.min(value, now.value[1]), now.value[1]]));
           else send(now.to([now.value[0], Math.max(value, now.value[0])]));
           input.value = String(Math.round(now.value[end] * now.steps));
@@ -59,7 +59,7 @@ export function makeWindow(first: Window, send: Send): Widget<Window> {
       });
       track.style.setProperty("--low", String(low));
       track.style.setProperty("--high", String(high));
-      track.classList.toggle("at-the-end", low > 0.5); // then the lower thumb must be on top
+      track.classList.toggle("at-the-end", low > 0.5); // the lower thumb must then be on top
       setText(text, `${control.texts[0]} – ${control.texts[1]}`);
     },
   };

@@ -1,4 +1,4 @@
-/** The card beside a tapped place, in HTML: a small dialog that leaves the picture in use. */
+/** The card beside a tapped place, in HTML: a small dialog that does not block the view. */
 import "./tap_card.css";
 import { element, setText } from "../../dom/element";
 import type { TapCardContent } from "../tap_card";
@@ -13,14 +13,14 @@ export class TapCard {
   private readonly items: Items;
   private readonly mark = element("div", { className: "tap-mark" });
   private readonly card: HTMLElement;
-  /** The part of the picture in which the card may lie. */
+  /** The part of the view in which the card may lie. */
   private readonly area: HTMLElement;
   private readonly closed = new AbortController();
   private place: Point = { x: 0, y: 0 };
-  /** The element that had the keyboard before the card took it. */
+  /** The element that had the focus before the card. */
   private returnTo: HTMLElement | null = null;
 
-  /** @param view the part of the page with the picture */
+  /** @param view the part of the page with the canvas */
   constructor(
     view: HTMLElement,
     send: Send,
@@ -43,7 +43,7 @@ export class TapCard {
     this.card.setAttribute("aria-labelledby", this.title.id);
     this.area = element("div", { className: "tap-area", hidden: true }, {}, this.mark, this.card);
     ignoreSecondClicks(this.card);
-    // after the picture, so that Tab leads from there into the card
+    // the card follows the canvas, so that Tab leads from there into the card
     view.querySelector(".stage")?.after(this.area);
     const { signal } = this.closed;
     addEventListener("keydown", (event) => this.leaveByEscape(event), { capture: true, signal });
@@ -74,7 +74,7 @@ export class TapCard {
     this.lay();
   }
 
-  /** The place that the card is about, px of the picture. */
+  /** Moves the tapped place, px of the view, and the card with it. */
   moveTo({ x, y }: Point): void {
     if (Math.hypot(x - this.place.x, y - this.place.y) < 0.1) return;
     this.place = { x, y };
@@ -84,7 +84,7 @@ export class TapCard {
   private lay(): void {
     const { place, card, mark, area } = this;
     const [width, height] = [area.clientWidth, area.clientHeight];
-    // the area leaves the safe area's edges out of the picture
+    // the area excludes the safe-area insets of the screen
     const within = { x: place.x - area.offsetLeft, y: place.y - area.offsetTop };
     mark.style.transform = `translate(${within.x}px, ${within.y}px)`;
     const size = { width: card.offsetWidth, height: card.offsetHeight };
@@ -100,7 +100,7 @@ export class TapCard {
     this.returnTo = null;
   }
 
-  /** The first Escape closes the card; it does nothing else then. */
+  /** The first Escape closes the card and has no other effect. */
   private leaveByEscape(event: KeyboardEvent): void {
     if (event.key !== "Escape" || !this.isOpen || event.defaultPrevented) return;
     if (document.querySelector("dialog[open]") !== null) return;

@@ -1,4 +1,4 @@
-/** The tiles by row and column; the gazed, the chosen and the isolated one are marked. */
+/** Buttons of the tiles by row and column. The gazed, the selected and the isolated tile are marked. */
 
 import { element } from "../../dom/element";
 import { RovingTabindex } from "../../dom/roving_tabindex";
@@ -7,8 +7,8 @@ import type { MapTile, TileMap } from "../controls";
 import { hooks, type Send, type Widget } from "./widget";
 
 function nameOf({ id, title, isFocus, isSelected, isIsolated }: MapTile): string {
-  const marks = [isIsolated && "shown alone", isSelected && "chosen", isFocus && "looked at"];
-  // people who speak to their computer call a button by the text on it
+  const marks = [isIsolated && "shown alone", isSelected && "selected", isFocus && "looked at"];
+  // users of voice control call a button by the text on it, so the name ends with that text
   const names = [title, ...marks.filter(Boolean), shortTileName(id)];
   return [...new Set(names)].join(", ");
 }

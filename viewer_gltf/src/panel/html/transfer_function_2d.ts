@@ -1,6 +1,6 @@
 /**
- * The joint histogram: shapes are taken hold of by mouse or finger; with the keyboard
- * on it the arrows move the shape that is meant.
+ * The joint histogram with shapes that the mouse or a finger drags. When it has the focus, the
+ * arrow keys move the selected shape.
  */
 
 import { element, setText } from "../../dom/element";
@@ -16,13 +16,13 @@ import { hooks, type Send, type Widget } from "./widget";
 const WIDTH = 640;
 const HEIGHT = 320;
 const HANDLE = 22;
-/** Space around the plane, px of the canvas: half a handle lies beyond its edge. */
+/** Space around the histogram, px of the canvas, for the half of a handle beyond its edge. */
 const PAD = 14;
 const PLANE: Rect = { x: PAD, y: PAD, width: WIDTH - 2 * PAD, height: HEIGHT - 2 * PAD };
 /** Reach of the pointer, px of the page. */
 const MOUSE_REACH = 8;
 const FINGER_REACH = 22;
-/** One step of an arrow, in cells of the table. */
+/** One step of an arrow key, as a share of the histogram. */
 const ARROWS: Readonly<Record<string, HistogramPoint>> = {
   ArrowLeft: { value: -2 / 255, gradient: 0 },
   ArrowRight: { value: 2 / 255, gradient: 0 },
@@ -47,8 +47,8 @@ export function makeHistogram(first: HistogramEditor, send: Send): Widget<Histog
     };
   };
   const drag = (at: HistogramPoint) => {
-    const wish = now.refusal ? null : now.drag(at);
-    if (wish !== null) send(wish);
+    const request = now.refusal ? null : now.drag(at);
+    if (request !== null) send(request);
   };
   canvas.addEventListener("pointerdown", (event) => {
     if (now.refusal || !event.isPrimary || event.button !== 0) return;
@@ -68,7 +68,7 @@ export function makeHistogram(first: HistogramEditor, send: Send): Widget<Histog
     const index = now.selected ?? 0;
     const from = { value: 0.5, gradient: 0.5 };
     const meant = { index, count: now.shapes.length };
-    send({ panel: "shape", shape: meant, grasp: { index, part: "body", from, shape } });
+    send({ panel: "shape", shape: meant, grab: { index, part: "body", from, shape } });
     drag({ value: from.value + by.value, gradient: from.gradient + by.gradient });
   });
   const low = element("span");
@@ -81,9 +81,9 @@ export function makeHistogram(first: HistogramEditor, send: Send): Widget<Histog
     update(control) {
       now = control;
       const shape = control.selected === null ? undefined : control.shapes[control.selected];
-      const what =
+      const content =
         shape === undefined ? "no shape" : `${control.shapes.length} shapes, ${shapeText(shape)}`;
-      canvas.ariaLabel = `${control.name ?? control.label}: ${control.refusal || what}`;
+      canvas.ariaLabel = `${control.name ?? control.label}: ${control.refusal || content}`;
       canvas.ariaDisabled = control.refusal ? "true" : null;
       setText(low, control.texts[0]);
       setText(high, control.texts[1]);

@@ -1,4 +1,4 @@
-/** Why the picture is empty, in its middle, with the one button that leads back. */
+/** Why the view is empty, in its middle, with a button that leads back. */
 import "./view_message.css";
 import { element, setText } from "../../dom/element";
 
@@ -20,12 +20,12 @@ export class ViewMessage {
   );
   private message: Message | null = null;
 
-  /** @param view the part of the page with the picture */
+  /** @param view the part of the page with the canvas */
   constructor(view: HTMLElement) {
     view.querySelector(".stage")?.after(this.root);
   }
 
-  /** @param message null: the picture shows something */
+  /** @param message null: the view is not empty */
   show(message: Message | null): void {
     this.message = message;
     this.root.hidden = message === null;

@@ -1,6 +1,6 @@
 /**
- * One element a control, made once and updated in place, so that a slider that is dragged and a
- * field that is typed in keep the focus.
+ * Makes one element for each control and updates it in place. A slider that is dragged and a field
+ * that is typed in therefore keep the focus.
  */
 
 import { element, setText } from "../../dom/element";
@@ -11,7 +11,7 @@ import { makePicture } from "./picture";
 import { makeWindow } from "./range";
 import { makeMap } from "./tile_map";
 import { makeHistogram } from "./transfer_function_2d";
-import { askedBy, hooks, type Send, type Widget } from "./widget";
+import { hooks, requestOrRefusal, type Send, type Widget } from "./widget";
 
 type Maker<C> = (first: C, send: Send) => Widget<C>;
 
@@ -32,7 +32,7 @@ const MAKERS: Readonly<{
   link: makeLink,
 };
 
-/** A widget may only be updated with a control of the kind that it was made of. */
+/** Makes the widget of a control. It may only be updated with a control of the same kind. */
 export function makeWidget<C extends Control>(control: C, send: Send): Widget<C> {
   const widget = (MAKERS[control.kind] as unknown as Maker<C>)(control, send);
   widget.update(control);
@@ -52,8 +52,8 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
       ariaLabel: first.name ?? first.label,
       onchange: () => {
         const wanted = input.checked;
-        input.checked = now.value; // the state holds its value
-        send(askedBy(now, () => now.to(wanted)));
+        input.checked = now.value; // the state decides whether the value changes
+        send(requestOrRefusal(now, () => now.to(wanted)));
       },
     },
     hooks(first.id),
@@ -71,7 +71,10 @@ function makeToggle(first: Toggle, send: Send): Widget<Toggle> {
   };
 }
 
-/** A control that refuses keeps the focus: it may be the one that was just used. */
+/**
+ * Marks a refused control without disabling it, because it may be the one that was just used and
+ * has the focus.
+ */
 function refuse(target: HTMLElement, refusal = ""): void {
   const isRefused = refusal !== "";
   if ((target.ariaDisabled === "true") === isRefused) return;
@@ -79,7 +82,7 @@ function refuse(target: HTMLElement, refusal = ""): void {
   target.title = refusal;
 }
 
-/** A press on a disabled slider or list says why it is disabled: a finger sees no tooltip. */
+/** Reports the refusal of a disabled slider or list after a press, because a finger sees no tooltip. */
 function explainRefusal(root: HTMLElement, now: () => Control, send: Send): void {
   root.addEventListener("click", () => {
     const { refusal } = now();
@@ -102,7 +105,7 @@ function makeSlider(first: Slider, send: Send): Widget<Slider> {
     },
     hooks(first.id),
   );
-  const text = element("output", { ariaHidden: "true" }); // the input announces it itself
+  const text = element("output", { ariaHidden: "true" }); // screen readers read the value from the input
   const head = element(
     "span",
     { className: "head" },
@@ -155,7 +158,7 @@ function makeSegments(first: Choice, send: Send): Widget<Choice> {
   };
 }
 
-/** Puts the label of a row of segments before it, where the label has an explanation. */
+/** Puts the label of a row of segments before it, if the label has an explanation. */
 function named(first: Choice, segments: HTMLElement): HTMLElement {
   const explainer = explainerOf(first);
   if (explainer === null) return segments;
@@ -210,7 +213,7 @@ function makeButton(first: Button, send: Send): Widget<Button> {
     {
       type: "button",
       className: first.isPrimary ? "primary" : "",
-      onclick: () => send(askedBy(now, () => now.to())),
+      onclick: () => send(requestOrRefusal(now, () => now.to())),
     },
     { ...hooks(first.id), action: first.id, ...(first.isStep ? { step: "" } : {}) },
   );

@@ -1,4 +1,4 @@
-/** The parameters that each channel has by itself. Pure. */
+/** The parameters that each channel has. Pure. */
 import type { Rgb } from "../../math/color";
 import {
   type ColourParameter,
@@ -8,11 +8,11 @@ import {
   type SwitchParameter,
 } from "./kinds";
 
-/** A channel of a bundle that has just opened; its colour is the bundle's. */
+/** Settings of a channel in a bundle that has just opened; the colour is the bundle's. */
 export const START_CHANNEL = {
-  /** Factor to the opacity of its surface and of its volume, 0..1. */
+  /** Factor to the opacity of the surface and of the volume, 0..1. */
   opacity: 1,
-  /** Whether it may be drawn as a volume, where volumes are. */
+  /** Whether the channel may be drawn as a volume. */
   volume: true,
 };
 
@@ -30,7 +30,7 @@ export const COLOR: ColourParameter<Channel> = {
   name: ({ name }) => `Colour of ${name}`,
   link: "c",
   ...lens("color"),
-  spoken: () => "another colour",
+  spoken: () => "new colour",
 };
 
 export const OPACITY: NumberParameter<Channel> = {

@@ -1,6 +1,7 @@
 /**
- * What a parameter is: a number, a switch, a choice or a colour that a user sets, as one row of a
- * table. Panels, keys, links, the page's address and spoken words are made from its row. Pure.
+ * A parameter: a number, a switch, a choice or a colour that a user sets, as one row of a table.
+ * The panels, the keys, the links, the page's address and the spoken feedback are made from its
+ * row. Pure.
  */
 import type { Rgb } from "../../math/color";
 
@@ -9,24 +10,24 @@ export type Value = number | boolean | string | Rgb;
 /** A key and its text in the list of keys. */
 type KeyWords = readonly [key: string, label: string];
 
-/** `On`: what of the state it is of. */
+/** `On`: the part of the state that the parameter belongs to. */
 type Row<On, T extends Value> = Readonly<{
-  /** Of the panel's control, and of the action that sets it. */
+  /** Id of the panel's control, and of the action that sets the parameter. */
   id: string;
   label: string;
-  /** The label where nothing around names its subject. */
+  /** Label for places where nothing nearby names the subject. */
   name?: (on: On) => string;
-  /** Its name in a link; absent: it is in none. */
+  /** Name in a link; absent: no link has the parameter. */
   link?: string;
-  /** Why the panel can't set it now; "": it can. */
+  /** Reason why the panel cannot set it now; "": it can. */
   refusal?: (on: On) => string;
-  /** What it does, in a sentence, where its name can't say it. */
+  /** Explanation in one sentence, where the label does not say it. */
   about?: string;
   get: (on: On) => T;
-  /** The announcement once a key has set it. */
+  /** The announcement after a key has set it. */
   spoken: (on: On) => string;
 }> & {
-  /** @param value one that `accepted` gives back */
+  /** @param value a value that `accepted` returns */
   set<S extends On>(on: S, value: T): S;
 };
 
@@ -34,11 +35,11 @@ export type NumberParameter<On> = Row<On, number> &
   Readonly<{
     kind: "number";
     limits: readonly [number, number];
-    /** From one end of a slider to the other. */
+    /** Number of steps from one end of the slider to the other. */
     steps: number;
-    /** Equal steps are equal factors. */
+    /** Whether equal steps are equal factors. */
     isLogarithmic?: boolean;
-    /** A slider's value, with as many digits as a step needs: more would lengthen a link. */
+    /** Rounds a slider's value to the digits that a step needs. More digits would lengthen a link. */
     rounded: (value: number) => number;
     text: (value: number) => string;
     keys?: Readonly<{
@@ -54,15 +55,15 @@ export type ChoiceParameter<On, T extends string = string> = Row<On, T> & {
   readonly kind: "choice";
   readonly values: readonly T[];
   readonly names: Readonly<Record<T, string>>;
-  /** Those that can be chosen now; absent: all. */
+  /** Values that can be chosen now; absent: all. */
   readonly options?: (on: On) => readonly T[];
-  /** Long names: a list to open, where others stand side by side. */
+  /** Whether the choices open as a list, because their names are long. Other choices stand side by side. */
   readonly isListed?: boolean;
-  /** The key for the next one. */
+  /** Key that chooses the next value. */
   readonly key?: KeyWords;
-  /** A value that stays with the user: no link has it, no key leads to it. */
+  /** A value that depends on the user's own file: no link has it, and no key leads to it. */
   readonly ownValue?: T;
-  /** Why a value can't be had on this device; null: it can. */
+  /** Returns why this device does not support a value; null: it does. */
   fault?(on: On, value: T): string | null;
 };
 
@@ -74,10 +75,10 @@ export type Parameter<On> =
   | ChoiceParameter<On>
   | ColourParameter<On>;
 
-/** `channel`: the id of the one that it is of; absent: it is no channel's. */
+/** `channel`: id of the channel that the parameter belongs to; absent: it belongs to no channel. */
 export type SetAction = Readonly<{ type: "set"; id: string; value: Value; channel?: string }>;
 
-/** The action that gives a parameter another value. */
+/** Returns the action that gives a parameter a value. */
 export function setTo<T extends Value>(
   { id }: Readonly<{ id: string; get: (on: never) => T }>,
   value: T,
@@ -88,7 +89,7 @@ export function setTo<T extends Value>(
 
 type Lens<On, T> = Readonly<{ get: (on: On) => T }> & { set<S extends On>(on: S, value: T): S };
 
-/** How a field is read and written. */
+/** Returns functions that read and write a field. */
 export function lensesOf<On>(): <K extends keyof On & string>(name: K) => Lens<On, On[K]> {
   return (name) => ({
     get: (on) => on[name],
@@ -96,7 +97,7 @@ export function lensesOf<On>(): <K extends keyof On & string>(name: K) => Lens<O
   });
 }
 
-/** What is set where a value is asked for: within the limits; null: it is none of the parameter's. */
+/** Returns the value within the limits; null if the parameter has no such value. */
 function accepted<On>(row: Parameter<On>, value: Value): Value | null {
   switch (row.kind) {
     case "number": {
@@ -113,15 +114,15 @@ function accepted<On>(row: Parameter<On>, value: Value): Value | null {
   }
 }
 
-/** With the parameter set; the same where that changes nothing. */
+/** Returns the object with the parameter set: the same object if that changes nothing. */
 export function withValue<On>(row: Parameter<On>, on: On, value: Value): On {
   const next = accepted(row, value);
   if (next === null || next === row.get(on)) return on;
-  // each kind accepts values of its own type alone
+  // each kind accepts only values of its own type
   return (row.set as (on: On, value: Value) => On)(on, next);
 }
 
-/** Where a value is between the ends, 0..1. */
+/** Returns the place of a value between the limits, 0..1. */
 export function shareOf<On>(
   { limits: [low, high], isLogarithmic }: NumberParameter<On>,
   value: number,
@@ -137,7 +138,7 @@ export function valueAtShare<On>(
   return rounded(isLogarithmic ? low * (high / low) ** share : low + (high - low) * share);
 }
 
-/** The choices that are offered now. */
+/** Returns the choices that are available now. */
 export function optionsOf<On, T extends string>(
   { values, options }: ChoiceParameter<On, T>,
   on: On,

@@ -1,4 +1,4 @@
-/** The parameters of the path-traced picture: its medium, its light, and what comes after. Pure. */
+/** The parameters of the path-traced image: its medium, its light and the image adjustments. Pure. */
 import {
   ENVIRONMENTS,
   type EnvironmentName,
@@ -23,13 +23,13 @@ import {
 } from "./kinds";
 import { isTraced, type VolumeSettings } from "./volumes";
 
-/** The light of a bundle that has just opened. */
+/** Settings of the light in a bundle that has just opened. */
 export const START_LIGHT = {
-  /** How the picture of the mode `traced` is made. */
+  /** Settings of path tracing, the mode `traced`. */
   trace: START_TRACE,
-  /** Whether the stage has a room, the light of its domes. */
+  /** Whether the stage has an environment, which is made of its dome lights. */
   hasStageRoom: false,
-  /** Whether its lamps can be seen, and taken hold of. */
+  /** Whether the lamps are shown, so that they can be dragged. */
   areLampsShown: false,
 };
 
@@ -37,7 +37,7 @@ export type LightSettings = Readonly<typeof START_LIGHT>;
 
 type Light = LightSettings & Pick<VolumeSettings, "mode">;
 
-/** Why nothing of the light can be set: nothing is drawn by it. */
+/** Reason why the settings of the light have no effect: nothing is drawn with them. */
 export const TRACED_ALONE = "Only path tracing has this setting: switch path tracing on first.";
 const refusal = (on: Light) => (isTraced(on) ? "" : TRACED_ALONE);
 
@@ -45,7 +45,7 @@ const lens = lensesOf<Light>();
 const traceLens = lensesOf<TraceSettings>();
 const lampLens = lensesOf<Lamp>();
 
-/** How a field of the picture's settings is read and written. */
+/** Returns functions that read and write a field of the settings of path tracing. */
 function ofTrace<K extends keyof TraceSettings>(name: K) {
   const inner = traceLens(name);
   return {
@@ -57,7 +57,7 @@ function ofTrace<K extends keyof TraceSettings>(name: K) {
   };
 }
 
-/** The same of a lamp. */
+/** Returns functions that read and write a field of a lamp. */
 function ofLamp<K extends keyof Lamp>(lamp: number, name: K) {
   const inner = lampLens(name);
   return {
@@ -69,7 +69,7 @@ function ofLamp<K extends keyof Lamp>(lamp: number, name: K) {
   };
 }
 
-/** Six digits are more than a step of the slider needs. */
+/** Rounds to six digits, which are more than a step of the slider needs. */
 const rounded = (value: number) => Number(value.toPrecision(6));
 
 function numbersOf<K extends string & keyof TraceSettings>(
@@ -106,13 +106,14 @@ function numbersOf<K extends string & keyof TraceSettings>(
 const MULTIPLE: SwitchParameter<Light> = {
   kind: "switch",
   id: "trace/multiple",
-  label: "Scattered many times",
-  about: "Softer light, which goes on from where it is stopped; off: it stops there.",
+  label: "Multiple scattering",
+  about:
+    "Light is scattered until it leaves the specimen, which looks softer. Off: it is scattered once.",
   link: "many",
   refusal,
   ...ofTrace("isMultiple"),
-  key: ["M", "Scattered once or many times"],
-  spoken: ({ trace }) => `Scattered ${trace.isMultiple ? "many times" : "once"}`,
+  key: ["M", "Multiple scattering on or off"],
+  spoken: ({ trace }) => `Multiple scattering: ${trace.isMultiple ? "on" : "off"}`,
 };
 
 const environmentOf = ofTrace("environment");
@@ -120,7 +121,7 @@ const environmentOf = ofTrace("environment");
 export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
   kind: "choice",
   id: "trace-room",
-  label: "Room",
+  label: "Environment",
   link: "room",
   refusal,
   get: environmentOf.get,
@@ -133,19 +134,19 @@ export const ENVIRONMENT: ChoiceParameter<Light, EnvironmentName> = {
         (name !== "own" || trace.environment === "own") && (name !== "stage" || hasStageRoom),
     ),
   ownValue: "own",
-  key: ["I", "Next room"],
-  spoken: ({ trace }) => `Room: ${trace.environment}`,
+  key: ["I", "Next environment"],
+  spoken: ({ trace }) => `Environment: ${trace.environment}`,
 };
 
 export const LAMPS_SHOWN: SwitchParameter<Light> = {
   kind: "switch",
   id: "trace/lamps",
   label: "Show lamps",
-  name: () => "Show the lamps, to be dragged",
+  name: () => "Show the lamps, so that they can be dragged",
   link: "lamps",
   refusal,
   ...lens("areLampsShown"),
-  key: ["$", "Show or hide the lamps, to be dragged"],
+  key: ["$", "Show or hide the lamps, which can be dragged"],
   spoken: ({ areLampsShown, trace }) => {
     if (!areLampsShown) return "Lamps hidden";
     return trace.lamps.some(({ isOn }) => isOn) ? "Lamps shown: drag them" : "No lamp is on";
@@ -155,20 +156,20 @@ export const LAMPS_SHOWN: SwitchParameter<Light> = {
 const POST: SwitchParameter<Light> = {
   kind: "switch",
   id: "trace/post",
-  label: "After (off: before)",
-  name: () => "Show the picture after these changes",
+  label: "Image adjustments",
+  name: () => "Apply the image adjustments",
   link: "after",
   refusal,
   ...ofTrace("isPostOn"),
-  key: ["Z", "Before or after what comes after the light"],
-  spoken: ({ trace }) => (trace.isPostOn ? "After" : "Before"),
+  key: ["Z", "Image adjustments on or off"],
+  spoken: ({ trace }) => `Image adjustments: ${trace.isPostOn ? "on" : "off"}`,
 };
 
 const TONE_MAP: ChoiceParameter<Light, TraceSettings["toneMap"]> = {
   kind: "choice",
   id: "trace-tone-map",
   label: "Tone map",
-  about: "Film keeps what is bright from turning white.",
+  about: "Film keeps detail in bright areas, which would turn white otherwise.",
   link: "tone",
   refusal,
   ...ofTrace("toneMap"),
@@ -182,9 +183,9 @@ export type LampParameters = Readonly<{
   name: string;
   isOn: SwitchParameter<Light>;
   color: ColourParameter<Light>;
-  /** Where it is: x, y, z. */
+  /** Place of the lamp: x, y, z. */
   place: readonly NumberParameter<Light>[];
-  /** All of its numbers. */
+  /** All numbers of the lamp: its place and its strength. */
   numbers: readonly NumberParameter<Light>[];
 }>;
 
@@ -227,14 +228,14 @@ function lampOf(lamp: number): LampParameters {
       link: `${id}/color`,
       refusal,
       ...ofLamp(lamp, "color"),
-      spoken: () => `${title}: another colour`,
+      spoken: () => `${title}: new colour`,
     },
     place: numbers.slice(0, 3),
     numbers,
   };
 }
 
-/** In the panel's order: what light goes through and where it is, the room, the lamps, what comes after. */
+/** Rows in the order of the panel: the medium, the environment, the lamps, the image adjustments. */
 export const MEDIUM: readonly Parameter<Light>[] = [
   ...numbersOf(MEDIUM_NUMBERS),
   MULTIPLE,
@@ -251,9 +252,9 @@ const rows: readonly Parameter<Light>[] = [
   ...AFTER,
 ];
 
-/** Every number, which two keys turn one at a time. */
+/** All numbers. Two keys change the chosen number. */
 export const LIGHT_NUMBERS = rows.filter((row) => row.kind === "number");
-/** All of the light, in a link's order: numbers first. */
+/** All parameters of the light in the order of a link: numbers first. */
 export const LIGHT: readonly Parameter<Light>[] = [
   ...LIGHT_NUMBERS,
   ...rows.filter((row) => row.kind !== "number"),

@@ -1,6 +1,6 @@
 /**
- * All settings, but for those of the channels, in a bundle that has just opened. Their rows are in table.ts. A part adds
- * its own settings by `declare module`, and their rows in its definition. Pure.
+ * All settings but those of the channels, in a bundle that has just opened. Their rows are in
+ * table.ts. A part adds its settings by `declare module`; its definition has their rows. Pure.
  */
 import { type LightSettings, START_LIGHT } from "./light";
 import { START_TOOLS, type ToolSettings } from "./tools";
@@ -8,7 +8,7 @@ import { START_VOLUMES, type VolumeSettings } from "./volumes";
 
 export interface Settings extends VolumeSettings, ToolSettings, LightSettings {}
 
-/** Besides those of parts. */
+/** Opening values of all settings but those of parts. */
 export const START_SETTINGS = { ...START_VOLUMES, ...START_TOOLS, ...START_LIGHT };
 
 export type SettingsOfParts = Omit<Settings, keyof typeof START_SETTINGS>;

@@ -18,16 +18,16 @@ function isUnique(names: readonly (string | undefined)[]): boolean {
 }
 
 describe("the parameters", () => {
-  it("have an id of their own, and a name of their own in a link", () => {
+  it("have unique ids, and unique names in a link", () => {
     expect(isUnique(PARAMETERS.map(({ id }) => id))).toBe(true);
     expect(isUnique(PARAMETERS.map(({ link }) => link))).toBe(true);
     expect(isUnique(CHANNEL.map(({ link }) => link))).toBe(true);
     expect(parametersInAddress().every(({ link }) => link !== undefined)).toBe(true);
-    // of a channel's look, a letter names the part
+    // in a channel's part of a link, a letter names the parameter
     expect(CHANNEL.every(({ link }) => link?.length === 1 && !"wst".includes(link))).toBe(true);
   });
 
-  it("set what they show, and nothing else", () => {
+  it("set their own value and no other", () => {
     for (const row of NUMBERS) {
       for (const share of [0, 0.3, 1]) {
         const value = valueAtShare(row, share);
@@ -40,7 +40,7 @@ describe("the parameters", () => {
     }
   });
 
-  it("stay within their limits, whatever is asked for", () => {
+  it("stay within their limits for any requested value", () => {
     for (const row of NUMBERS) {
       const [low, high] = row.limits;
       const set = (value: number) => row.get(reduce(START, setTo(row, value)));
@@ -53,7 +53,7 @@ describe("the parameters", () => {
     }
   });
 
-  it("take no value of another kind", () => {
+  it("accept no value of another kind", () => {
     for (const { id, kind } of PARAMETERS) {
       for (const value of ["cube", 7, true, [1, 0, 0]] as const) {
         if (kind === "number" && value === 7) continue;
@@ -64,7 +64,7 @@ describe("the parameters", () => {
     }
   });
 
-  it("leave the state as it is where it has the value", () => {
+  it("leave the state unchanged if it has the value already", () => {
     for (const row of PARAMETERS) {
       const value = row.get(START);
       expect(reduce(START, { type: "set", id: row.id, value }), row.id).toBe(START);
@@ -73,20 +73,20 @@ describe("the parameters", () => {
     expect(reduce(START, { type: "set", id: "opacity", value: 1, channel })).toBe(START);
   });
 
-  it("of a channel leave the other channels", () => {
+  it("leave the other channels unchanged if they belong to one channel", () => {
     const [first, second] = START.channels;
     const set = reduce(START, { type: "set", id: "opacity", value: 0.25, channel: second.id });
     expect(set.channels).toEqual([first, { ...second, opacity: 0.25 }]);
   });
 
-  it("report in a notice what this device can't do", () => {
+  it("report in a notice what this device does not support", () => {
     const poor = initialState(sampleManifest(1), false);
     const asked = reduce(poor, setTo(MODE, "traced"));
     expect(asked.mode).toBe(poor.mode);
     expect(asked.notices).toHaveLength(1);
   });
 
-  it("are a bug where nobody knows them", () => {
+  it("throw an error if their name is unknown", () => {
     expect(() => reduce(START, { type: "set", id: "size", value: 1 })).toThrow("no parameter size");
     const action = JSON.parse('{"type": "wind-clock"}');
     expect(() => reduce(START, action)).toThrow('no part has the action {"type":"wind-clock"}');
@@ -96,7 +96,7 @@ describe("the parameters", () => {
 describe("a number's slider", () => {
   const sliders: readonly NumberParameter<typeof START>[] = NUMBERS;
 
-  it("goes from one limit to the other, and back to where it stood", () => {
+  it("goes from one limit to the other, and returns the same place for a value", () => {
     for (const row of sliders) {
       const [low, high] = row.limits;
       expect(valueAtShare(row, 0), row.id).toBeCloseTo(low, 9);
@@ -111,11 +111,11 @@ describe("a number's slider", () => {
     }
   });
 
-  it("of factors: equal steps are equal factors", () => {
+  it("on a logarithmic scale has equal factors for equal steps", () => {
     const density = LIGHT_NUMBERS.find(({ link }) => link === "density");
     if (density === undefined) throw new Error("no number of the density");
     const at = (share: number) => valueAtShare(density, share);
     expect(at(0.5) / at(0.25)).toBeCloseTo(at(0.75) / at(0.5), 4);
-    expect(at(0.5)).toBeCloseTo(1, 4); // between a twentieth and twenty
+    expect(at(0.5)).toBeCloseTo(1, 4); // the limits are 0.05 and 20
   });
 });

@@ -1,4 +1,4 @@
-/** All parameters, and the action that sets one. Pure. */
+/** All parameters, and the action that sets one of them. Pure. */
 import { addressRowsOfParts, rowsOfParts } from "../part_settings";
 import type { ChannelState, ViewerState } from "../viewer_state";
 import { CHANNEL } from "./channel";
@@ -13,7 +13,7 @@ import {
 } from "./tools";
 import { DISC_RADIUS, MODE, SWITCH_DISTANCE, VOLUMES } from "./volumes";
 
-/** Besides those of the channels and of parts. */
+/** The parameters of neither a channel nor a part. */
 const OWN: readonly Parameter<ViewerState>[] = [
   ...VOLUMES,
   ...MEASURE_PARAMETERS,
@@ -24,7 +24,7 @@ const OWN: readonly Parameter<ViewerState>[] = [
   LAMPS_SHOWN,
 ];
 
-/** Besides those of the channels. */
+/** Returns all parameters but those of the channels. */
 export const allParameters = (): readonly Parameter<ViewerState>[] => [...OWN, ...rowsOfParts()];
 
 const OWN_IN_ADDRESS: readonly Parameter<ViewerState>[] = [
@@ -35,7 +35,7 @@ const OWN_IN_ADDRESS: readonly Parameter<ViewerState>[] = [
   SCREEN_STEREO,
 ];
 
-/** The parameters that the page's address may set, by the names that links have. */
+/** Returns the parameters that the query of the page's address may set, under the same names as in links. */
 export const parametersInAddress = (): readonly Parameter<ViewerState>[] => [
   ...OWN_IN_ADDRESS,
   ...addressRowsOfParts(),
@@ -44,7 +44,10 @@ export const parametersInAddress = (): readonly Parameter<ViewerState>[] => [
 const byId = new Map(OWN.map((row) => [row.id, row]));
 const channelById = new Map(CHANNEL.map((row) => [row.id, row]));
 
-/** The parameter of an id. Throws Error where there is none: ids come from tables. */
+/**
+ * Returns the parameter with an id. Throws Error if there is none: ids come from tables, so that
+ * would be a bug.
+ */
 export function parameterOf(id: string): Parameter<ViewerState> {
   const row = byId.get(id) ?? rowsOfParts().find((each) => each.id === id);
   if (row === undefined) throw new Error(`no parameter ${id}`);
@@ -57,13 +60,13 @@ export function channelParameterOf(id: string): Parameter<ChannelState> {
   return row;
 }
 
-/** Why a value can't be had on this device; null: it can. */
+/** Returns why this device does not support a value; null: it does. */
 export function faultOfValue(state: ViewerState, id: string, value: Value): string | null {
   const row = parameterOf(id);
   return row.kind === "choice" ? (row.fault?.(state, String(value)) ?? null) : null;
 }
 
-/** The state with a parameter set. Returns the same object if that changes nothing. */
+/** Returns the state with a parameter set: the same object if that changes nothing. */
 export function withParameter(state: ViewerState, { id, value, channel }: SetAction): ViewerState {
   if (channel === undefined) return withValue(parameterOf(id), state, value);
   const row = channelParameterOf(id);

@@ -1,4 +1,4 @@
-/** The parameters of what a tap and a gaze do, and of how finely is drawn. Pure. */
+/** The parameters of taps, gaze, stereo and quality. Pure. */
 import { QUALITY_LEVELS, type QualityLevel } from "../quality_controller";
 import { REFUSED } from "../refusals";
 import {
@@ -10,31 +10,31 @@ import {
 } from "./kinds";
 
 const TOOLS = ["select", "measure"] as const;
-/** `select`: the tile that is tapped; `measure`: from one tapped point to another. */
+/** `select` selects the tile that is tapped; `measure` adds the tapped point to a measurement. */
 export type Tool = (typeof TOOLS)[number];
 
 const MEASURES = ["distance", "angle", "line"] as const;
-/** Between two points, at the second of three, through several. */
+/** Between two points; the angle at the second of three points; along a line through several points. */
 export type MeasureKind = (typeof MEASURES)[number];
 
 const SCREEN_STEREO_KINDS = ["off", "anaglyph", "side-by-side"] as const;
-/** Stereo on the page's own screen: in red and cyan for glasses, or both eyes' pictures side by side. */
+/** Stereo on the screen of the page: for red-cyan glasses, or both eyes' images side by side. */
 export type ScreenStereo = (typeof SCREEN_STEREO_KINDS)[number];
 
-/** The tools of a bundle that has just opened. */
+/** Settings of the tools in a bundle that has just opened. */
 export const START_TOOLS = {
-  /** The effect of a tap or a dwell on the specimen. */
+  /** Effect of a tap or a resting gaze on the specimen. */
   tool: "select" as Tool,
-  /** The kind of the next measurement. */
+  /** Kind of the next measurement. */
   measureKind: "distance" as MeasureKind,
-  /** Whether looking at something for long is as good as pressing the button. */
+  /** Whether a gaze that rests for 1.5 s acts like a press of the button. */
   isDwellOn: true,
   quality: "auto" as QualityLevel,
-  /** Between the user's pupils, mm: adults have 54 to 74. */
+  /** Distance between the user's pupils, mm; adults have 54 to 74. */
   eyeDistance_mm: 63,
-  /** Factor to it: 0 shows both eyes the same. */
+  /** Factor to the eye distance; 0 shows both eyes the same image. */
   stereoStrength: 1,
-  /** Of the specimen's longest edge in stereo, m. */
+  /** Length of the specimen's longest edge in stereo, m. */
   specimenSize_m: 1.2,
   screenStereo: "off" as ScreenStereo,
 };
@@ -46,7 +46,7 @@ const lens = lensesOf<ToolSettings>();
 export const TOOL: ChoiceParameter<ToolSettings, Tool> = {
   kind: "choice",
   id: "tool",
-  label: "A tap",
+  label: "Tap to",
   about: "The effect of a click, a tap or a resting gaze on the specimen.",
   link: "tool",
   ...lens("tool"),
@@ -73,7 +73,7 @@ export const MEASURE_KIND: ChoiceParameter<ToolSettings, MeasureKind> = {
 export const DWELL: SwitchParameter<ToolSettings> = {
   kind: "switch",
   id: "dwell",
-  label: "Gaze for 1.5 s chooses",
+  label: "Choose by gaze (1.5 s)",
   about: "In stereo, looking at something for 1.5 s is the same as pressing a button.",
   link: "dwell",
   ...lens("isDwellOn"),
@@ -110,14 +110,14 @@ export const EYE_DISTANCE: NumberParameter<ToolSettings> = {
 export const STEREO_STRENGTH: NumberParameter<ToolSettings> = {
   kind: "number",
   id: "stereo-strength",
-  label: "Strength of stereo",
-  about: "100 % is as your eyes see it. At 0 % both eyes see the same.",
+  label: "Stereo strength",
+  about: "100 % shows the depth as your eyes would see it. At 0 % both eyes see the same image.",
   ...lens("stereoStrength"),
   limits: [0, 2],
   steps: 40,
   rounded: (value) => Number(value.toFixed(2)),
   text: (value) => `${Math.round(100 * value)} %`,
-  spoken: ({ stereoStrength }) => `Strength of stereo ${Math.round(100 * stereoStrength)} %`,
+  spoken: ({ stereoStrength }) => `Stereo strength ${Math.round(100 * stereoStrength)} %`,
 };
 
 const size = (value: number) =>
@@ -141,7 +141,8 @@ export const SCREEN_STEREO: ChoiceParameter<ToolSettings, ScreenStereo> = {
   kind: "choice",
   id: "screen-stereo",
   label: "On this screen",
-  about: "Esc leaves it. The eye distance and the strength below hold here as well.",
+  about:
+    "Shows depth without a headset; Esc ends it. The eye distance and the strength below apply here as well.",
   link: "stereo",
   ...lens("screenStereo"),
   values: SCREEN_STEREO_KINDS,
@@ -151,14 +152,14 @@ export const SCREEN_STEREO: ChoiceParameter<ToolSettings, ScreenStereo> = {
   spoken: ({ screenStereo }) => `Stereo on this screen: ${SCREEN_STEREO.names[screenStereo]}`,
 };
 
-/** They have the keys of the light's numbers. */
+/** Numbers of stereo. The keys for the numbers of the light change them, too. */
 export const STEREO_NUMBERS: readonly NumberParameter<ToolSettings>[] = [
   EYE_DISTANCE,
   STEREO_STRENGTH,
   SPECIMEN_SIZE,
 ];
 
-/** By the panel's section that lists them. */
+/** Rows by the section of the panel that lists them. */
 export const STEREO_PARAMETERS: readonly Parameter<ToolSettings>[] = [DWELL, ...STEREO_NUMBERS];
 export const MEASURE_PARAMETERS: readonly Parameter<ToolSettings>[] = [TOOL, MEASURE_KIND];
 export const QUALITY_PARAMETERS: readonly Parameter<ToolSettings>[] = [QUALITY];

@@ -1,49 +1,51 @@
-/** The parameters of where volumes show. Pure. */
+/** The parameters that decide where volumes are drawn, and how. Pure. */
 
 import { REFUSED } from "../refusals";
 import { type ChoiceParameter, lensesOf, type NumberParameter, type Parameter } from "./kinds";
 
 /**
- * Where volumes are drawn. `disc`: round the gaze, across tiles. `tile`: in the gazed tile. `all`:
- * in all tiles. `stage`: as the stage has it; there are none of these unless an artist chose it.
- * `traced`: in all tiles, by paths of light. `off`: nowhere. The first two hold within the switch distance.
+ * Where volumes are drawn. Mode `disc` draws them around the gaze, across tiles, and `tile` in the
+ * gazed tile; both only within the volume distance. Mode `all` draws them in all tiles, and `traced`
+ * does so by path tracing. Mode `stage` follows the stage, if that draws any tile as a volume. Mode
+ * `off` draws no volumes.
  */
 const MODES = ["disc", "tile", "all", "stage", "traced", "off"] as const;
 export type Mode = (typeof MODES)[number];
 
 /**
- * What a ray makes of its samples. `over`: each veils those behind it. `maximum`: the largest value of each
- * channel, within its window. `sum`: their light adds up, and nothing veils.
+ * How the samples along a ray are combined. With `over`, each sample partly hides those behind it.
+ * With `maximum`, only the largest value of each channel counts, within its window. With `sum`, the
+ * light of all samples is added, and nothing is hidden.
  */
 const COMPOSITINGS = ["over", "maximum", "sum"] as const;
 export type Compositing = (typeof COMPOSITINGS)[number];
 
-/** The volumes' parameters of a bundle that has just opened. */
+/** Settings of volumes in a bundle that has just opened. */
 export const START_VOLUMES = {
   mode: "disc" as Mode,
-  /** Metres of the room: nearer than a headset's specimen is at the start. */
+  /** Metres of the scene. The opening distance of a headset's specimen is larger. */
   switchDistance_m: 1.25,
-  /** Angle between the gaze and the disc's rim. */
+  /** Angle between the gaze and the rim of the disc, degrees. */
   discRadius_deg: 16,
   compositing: "over" as Compositing,
-  /** By how much volumes shade one another, 0..1. */
+  /** How strongly volumes cast shadows on one another, 0..1. */
   depthShading: 0.5,
 };
 
 export type VolumeSettings = Readonly<typeof START_VOLUMES>;
 
-/** With what else decides which modes there are. */
+/** The settings of volumes, with the values that decide which modes are available. */
 type Volumes = VolumeSettings &
   Readonly<{ canTrace: boolean; tiles: readonly Readonly<{ representation: string }>[] }>;
 
 const NO_FLOATS =
   "This device can't do path tracing: its graphics can't draw into floating-point textures.";
-/** One step of a distance, as a factor: near and far feel alike. */
+/** Factor of one step of the distance, so that steps feel equal near and far. */
 const DISTANCE_FACTOR = 1.1;
 
 const lens = lensesOf<Volumes>();
 
-/** The modes that can be chosen: as staged only where an artist has staged something. */
+/** Returns the available modes. `stage` is one of them only if the stage draws a tile as a volume. */
 function modesOf({ tiles, canTrace }: Volumes): readonly Mode[] {
   const isStaged = tiles.some(({ representation }) => representation !== "mesh");
   return MODES.filter((mode) => (mode === "stage" ? isStaged : mode !== "traced" || canTrace));
@@ -62,7 +64,7 @@ export const MODE: ChoiceParameter<Volumes, Mode> = {
   kind: "choice",
   id: "mode",
   label: "Show",
-  about: "Where the specimen shows its surfaces, and where its volumes.",
+  about: "Where the specimen is drawn as surfaces, and where as volumes.",
   isListed: true,
   link: "mode",
   ...lens("mode"),
@@ -82,7 +84,7 @@ export const SWITCH_DISTANCE: NumberParameter<Volumes> = {
   label: "Volume distance",
   name: () => "Volume distance: volumes show within",
   about:
-    "From nearer than this, the focus disc or the tile shows the volume. From farther away it shows surfaces.",
+    "Closer than this, the focus disc or the tile shows the volume; farther away it shows surfaces.",
   link: "switch",
   ...lens("switchDistance_m"),
   limits: [0.1, 10],
@@ -106,7 +108,7 @@ export const DISC_RADIUS: NumberParameter<Volumes> = {
   id: "disc-radius",
   label: "Focus disc",
   about:
-    "Half of the angle that the round window in the middle of the view takes. Volumes show inside it. At most twelve tiles show as volumes in it.",
+    "Radius of the round window in the middle of the view in which volumes are shown, as an angle. It shows the volumes of at most twelve tiles.",
   link: "disc",
   ...lens("discRadius_deg"),
   limits: [2, 40],
@@ -125,15 +127,15 @@ export const DISC_RADIUS: NumberParameter<Volumes> = {
 export const COMPOSITING: ChoiceParameter<Volumes, Compositing> = {
   kind: "choice",
   id: "compositing",
-  label: "Along a ray",
-  about: "How things that lie behind one another appear.",
+  label: "Projection",
+  about: "How structures that lie behind one another are combined.",
   link: "ray",
   ...lens("compositing"),
   values: COMPOSITINGS,
   names: { over: "Opacity", maximum: "Maximum", sum: "Sum" },
   refusal: ({ mode }) => (mode === "traced" || mode === "off" ? REFUSED.marched : ""),
-  key: ["%", "Next: opacity, maximum or sum along a ray"],
-  spoken: ({ compositing }) => `Along a ray: ${compositing}`,
+  key: ["%", "Next projection: opacity, maximum, sum"],
+  spoken: ({ compositing }) => `Projection: ${compositing}`,
 };
 
 const percent = (value: number) => `${Math.round(100 * value)} %`;
@@ -142,7 +144,7 @@ const DEPTH_SHADING: NumberParameter<Volumes> = {
   kind: "number",
   id: "depth-shading",
   label: "Depth shading",
-  about: "Enclosed places are darker, and things that lie before others throw shadows on them.",
+  about: "Darkens enclosed places, and lets structures in front cast shadows on those behind.",
   link: "depth",
   ...lens("depthShading"),
   limits: [0, 1],
@@ -163,14 +165,14 @@ const DEPTH_SHADING: NumberParameter<Volumes> = {
 };
 
 /**
- * Whether volumes throw shadows on one another. Surfaces get none: beside them a volume would look like
- * something else.
+ * Returns whether volumes cast shadows on one another. Surfaces get no shadows, so a shaded volume
+ * beside them would look like another material.
  */
 export function canBeShaded({ mode, compositing }: Volumes): boolean {
   return mode === "all" && compositing === "over";
 }
 
-/** In the panel's order. */
+/** Rows in the order of the panel. */
 export const VOLUMES: readonly Parameter<Volumes>[] = [
   MODE,
   SWITCH_DISTANCE,
@@ -179,7 +181,7 @@ export const VOLUMES: readonly Parameter<Volumes>[] = [
   DEPTH_SHADING,
 ];
 
-/** Whether volumes are drawn by paths of light. */
+/** Returns whether volumes are drawn by path tracing. */
 export function isTraced({ mode }: Pick<VolumeSettings, "mode">): boolean {
   return mode === "traced";
 }

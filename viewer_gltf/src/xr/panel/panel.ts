@@ -5,7 +5,7 @@
 import { Group, type Matrix4, Vector3 } from "three";
 import type { RoomRay, Target } from "../../interaction/ray_pointer";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
-import type { CanvasChange, CanvasWish, Region } from "../../panel/canvas/draw_list";
+import type { CanvasChange, CanvasRequest, Region } from "../../panel/canvas/draw_list";
 import { CONTENT, HEIGHT, type Page, pageOf, WIDTH } from "../../panel/canvas/page";
 import { keepPlaces } from "../../panel/channel_cards";
 import {
@@ -37,7 +37,7 @@ import {
 /** Time between readings of values outside the state (frame time, gazed tile), s. */
 const REFRESH_S = 0.5;
 export type RoomPanelOptions = Readonly<{
-  layOut: (view: PanelView) => Layout;
+  buildPanel: (view: PanelView) => Layout;
   onWish: (wish: Action | Command) => void;
   onLeave: () => void;
   /** The phone is in a viewer of other lenses. */
@@ -223,7 +223,7 @@ export class RoomPanel {
       return false;
     }
     this.view = keepPlaces(this.view, state);
-    this.page = pageOf(this.options.layOut(this.view), this.pages.view);
+    this.page = pageOf(this.options.buildPanel(this.view), this.pages.view);
     return this.menu.show(this.page);
   }
 
@@ -244,7 +244,7 @@ export class RoomPanel {
     this.grant(wish);
   }
 
-  private grant(wish: CanvasWish): void {
+  private grant(wish: CanvasRequest): void {
     const { options } = this;
     if (typeof wish === "string") options.onWish(wish);
     else if ("panel" in wish) {

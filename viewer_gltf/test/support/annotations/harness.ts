@@ -1,4 +1,4 @@
-/** Runs in the page: marks on a specimen of its own, seen by a camera of its own. */
+/** Runs in the page: marks on a specimen of the test, seen by a camera of the test. */
 import {
   BoxGeometry,
   Color,
@@ -73,7 +73,7 @@ const MANIFEST: Manifest = {
   files: FILE,
 };
 
-/** Its texels are all TEXEL. */
+/** All its texels are TEXEL. */
 const VOLUME: LevelSource = {
   volume: {
     tile: "r0_c1",
@@ -90,7 +90,7 @@ const VOLUME: LevelSource = {
 };
 const TEXEL = 51;
 
-/** In place of the one that decompresses, which a page without an address can't start. */
+/** Replaces the worker that decompresses, which cannot start in a page without an address. */
 class DecodingWorker extends EventTarget {
   postMessage({ id, bytes }: DecodeRequest): void {
     const data: DecodeAnswer = { id, texels: new Uint8Array(bytes).fill(TEXEL) };
@@ -105,7 +105,7 @@ type View = Readonly<{
   target: Vec3;
   isStereo?: boolean;
   isPanelOpen?: boolean;
-  /** The bar does not hang below the specimen in the user's own room. */
+  /** Whether the user is in augmented reality, where the bar is not below the specimen. */
   isInUsersRoom?: boolean;
   dt_s?: number;
 }>;
@@ -121,9 +121,9 @@ class Bench {
   private view: View = { position: [0, 0, 2], target: [0, 0, 0] };
   state = initialState(MANIFEST);
   announced = "";
-  /** What would have turned the camera. */
+  /** Number of pointer events that would have turned the camera. */
   leaked = 0;
-  /** The list of volumes comes when it is asked for. */
+  /** Whether the list of volumes has been loaded; it is loaded on demand. */
   private isKnown = false;
 
   constructor(
@@ -191,7 +191,7 @@ class Bench {
     canvas.addEventListener("pointerdown", () => this.leaked++);
   }
 
-  /** Objects on the GPU. */
+  /** Number of objects on the GPU. */
   get held(): Readonly<{ geometries: number; textures: number }> {
     const { geometries, textures } = this.renderer.info.memory;
     return { geometries, textures };
@@ -237,7 +237,7 @@ class Bench {
     this.renderer.render(this.scene, camera);
   }
 
-  /** Where a point, um, is on the page, CSS pixels of the stage. */
+  /** Returns the place of a point (um) on the page, in CSS pixels of the stage. */
   project(point: Vec3): Place {
     const room = new Vector3(...point).applyMatrix4(this.specimen.group.matrixWorld);
     return this.projectRoom(room);
@@ -249,7 +249,10 @@ class Bench {
     return { x: ((x + 1) / 2) * clientWidth, y: ((1 - y) / 2) * clientHeight };
   }
 
-  /** The scale bar's text, its pixels, and those of as much of the specimen at the focus. */
+  /**
+   * Returns the text of the scale bar, its width in pixels, and the width of the same length of the
+   * specimen at the focus.
+   */
   scale() {
     const bar = this.marks.scaleBar.root;
     const text = bar.textContent ?? "";
@@ -265,13 +268,13 @@ class Bench {
     return { text, shown_px, true_px: Math.hypot(a.x - b.x, a.y - b.y) };
   }
 
-  /** Angle under which the distance's label is seen, its text, and how often it was drawn. */
+  /** Returns the visual angle of the distance's label, its text, and how often it was drawn. */
   label() {
     const { distance } = this.marks.measured;
     return { angle_rad: this.angleOf(distance), text: distance.text, draws: distance.draws };
   }
 
-  /** Where measurements' labels lie in the picture, pixels. */
+  /** Returns the places of the labels of measurements in the view, in pixels. */
   labelBoxes() {
     const { clientWidth: width, clientHeight: height } = this.stage;
     return labelBoxes(this.marks.measured.group, this.camera, { width, height });
@@ -284,7 +287,7 @@ class Bench {
     return 2 * Math.atan(height_m / 2 / middle.distanceTo(eye));
   }
 
-  /** What is written at a measured point. */
+  /** Returns the text at a measured point. */
   valuesAt(index: number): string {
     return this.marks.measured.valuesAt(index);
   }
@@ -300,17 +303,17 @@ class Bench {
     return this.state.measured;
   }
 
-  /** The handle that the gaze meets straight ahead; null: it meets none. */
+  /** Returns the handle that the gaze hits straight ahead; null: none. */
   meet(): Hit | null {
     return this.marks.target.meet(gazeOf(this.camera.matrixWorld));
   }
 
-  /** Carry what was met to where the gaze is now. */
+  /** Drags a handle to the present direction of the gaze. */
   carry(key: string): void {
     this.marks.target.drag(key, gazeOf(this.camera.matrixWorld));
   }
 
-  /** `up_um`: height of the ruler's middle. */
+  /** `up_um` is the height of the ruler's middle. */
   ruler(): { length_um: number; up_um: number; isVisible: boolean; hasAxes: boolean } {
     const { ruler, axes } = this.marks;
     const { length_um, group } = ruler;
@@ -340,7 +343,7 @@ class Bench {
     });
   }
 
-  /** Objects of the GPU that are alive. */
+  /** Number of objects on the GPU. */
   memory(): { geometries: number; textures: number } {
     const { geometries, textures } = this.renderer.info.memory;
     return { geometries, textures };

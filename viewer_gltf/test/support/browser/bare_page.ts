@@ -1,4 +1,4 @@
-/** A page with nothing on it, for numbers out of the GPU: by shaders' chunks, or by a harness. */
+/** An empty page for numbers from the GPU, by chunks of shaders or by a harness. */
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll } from "vitest";
 import { readChunks, runProgram } from "../shaders/chunk";
@@ -10,12 +10,12 @@ type Calls = Readonly<Record<string, (...given: never[]) => unknown>>;
 
 export type BarePage<H extends Calls> = Readonly<{
   page: Page;
-  /** What a function of the harness returns. */
+  /** Calls a function of the harness and returns its result. */
   call: <K extends keyof H & string>(
     name: K,
     ...given: Parameters<H[K]>
   ) => Promise<ReturnType<H[K]>>;
-  /** `oColor` after `body`, which uses chunks: see runProgram. */
+  /** Returns `oColor` after `body`, which uses chunks (see runProgram). */
   run: (
     chunks: readonly string[],
     head: string,
@@ -26,9 +26,9 @@ export type BarePage<H extends Calls> = Readonly<{
 }>;
 
 /**
- * Set up and cleared away around the tests of one `describe`; to be used inside them.
+ * Sets up and closes the page around the tests of one `describe`. Must be called inside it.
  *
- * @param harness a module that puts its functions on the window, as `harness`
+ * @param harness module that puts its functions on the window, as `harness`
  */
 export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
   let browser: Browser;
@@ -47,7 +47,8 @@ export function prepareBarePage<H extends Calls>(harness?: URL): BarePage<H> {
       return page;
     },
     async call(name, ...given) {
-      // as text: volumes are long, and what carries them else wraps every number by itself
+      // arguments are sent as text: volumes are long, and playwright would wrap every number
+      // separately
       const answer = await page.evaluate(
         ([name, given]) => {
           const { harness } = window as {

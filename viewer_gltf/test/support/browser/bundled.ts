@@ -1,7 +1,7 @@
-/** A module of the tests with all that it imports, as one classic script for a page. */
+/** Bundles a module of the tests with all its imports as one classic script for a page. */
 import { build } from "vite";
 
-/** Scripts by their entry: several files of tests share a harness, and each build takes seconds. */
+/** Scripts by their entry. Several test files share a harness, and each build takes seconds. */
 const scripts = new Map<string, Promise<string>>();
 
 export function bundled(entry: URL): Promise<string> {

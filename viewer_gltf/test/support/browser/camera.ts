@@ -1,13 +1,19 @@
-/** Where the start view shows a point, from the viewer's own rules of placement. */
+/** Places of points in the start view, by the viewer's own rules of placement. */
 import type { Manifest } from "../../../src/bundle/generated/bundle";
 import { framingDistance, place } from "../../../src/render/placement";
 
 export const FIELD_OF_VIEW_RAD = (40 * Math.PI) / 180;
 
-/** Where the eye is: at the start (towards +z), or after a quarter turn (towards -x). */
+/**
+ * Side from which the eye sees the specimen: the front at the start (towards +z), or the left after
+ * a quarter turn.
+ */
 export type Side = "front" | "left";
 
-/** Pixel of a point (um, world) in a stage of that size, and the cosine of its ray to the axis. */
+/**
+ * Returns the pixel of a point (um, world) in a stage of a size, and the cosine between its ray and
+ * the axis.
+ */
 export function project(
   point: readonly [number, number, number],
   bounds: Manifest["specimen"]["bounds_um"],

@@ -7,7 +7,7 @@ import { IS_EXHAUSTIVE } from "../exhaustive";
 export const CHROMIUM = process.env.CHROMIUM || "/usr/bin/chromium";
 export const HOW_TO_GET = `no Chromium at ${CHROMIUM}: apt-get install chromium, or set CHROMIUM to its path`;
 
-/** Features of the browser's own window, which nobody sees; and those of playwright's own list. */
+/** Features of the browser's window, which no test sees, and those that playwright also switches off. */
 const WITHOUT = [
   ...["WebUIOmniboxPopup", "WebUIOmniboxAimPopup"],
   "SpareRendererForSitePerProcess",
@@ -26,16 +26,19 @@ const FLAGS = [
   "--disable-sync",
   "--ignore-gpu-blocklist",
 ];
-/** Where the vendors of EGL are listed, Mesa is this one. */
+/** Mesa's entry in the list of EGL vendors. */
 const MESA = "/usr/share/glvnd/egl_vendor.d/50_mesa.json";
 const BY_MESA = ["--use-angle=gl-egl"];
 const BY_SWIFTSHADER = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const SOFTWARE = [
-  // what is round the canvas is drawn without the software GPU, which takes most of it otherwise
+  // the page around the canvas is drawn without the software GPU, which would take most of the time
   "--disable-gpu-compositing",
   "--disable-gpu-rasterization",
 ];
-/** Mesa alone, and no graphics card, though one be there; no threads of its own, which wait for one another. */
+/**
+ * Uses only Mesa, even if there is a graphics card, and no threads of Mesa's own, which wait for
+ * one another.
+ */
 const ENVIRONMENT = {
   __EGL_VENDOR_LIBRARY_FILENAMES: MESA,
   LIBGL_ALWAYS_SOFTWARE: "1",
@@ -48,23 +51,33 @@ export function hasChromium(): boolean {
 
 export type Browser = Readonly<{ context: BrowserContext; close: () => Promise<void> }>;
 
-/** What a page finds: CSS pixels, small ones, since software draws them; and what a device has. */
+/**
+ * Conditions of a page: its size in CSS pixels, which is small because software draws it, and the
+ * abilities of the device.
+ */
 export type Surroundings = Readonly<{
   viewport: { width: number; height: number };
-  /** Of the device to one of CSS: half of one, but where a picture's detail is looked at. */
+  /** Device pixels per CSS pixel; 0.5 unless a test looks at details. */
   pixelRatio?: number;
   hasTouch?: boolean;
-  /** Nothing is drawn: where no picture is looked at, software's drawing is most of the time. */
+  /**
+   * Whether nothing is drawn, for tests that look at no pixels, since drawing by software takes
+   * most of the time.
+   */
   isBlind?: boolean;
-  /** Between frames thrice the time passes that the last one took: of stereo, which draws frame after frame. */
+  /**
+   * Whether there is a rest between frames, three times as long as the last frame. For stereo,
+   * which draws continuously.
+   */
   hasRests?: boolean;
   serviceWorkers?: "allow" | "block";
 }>;
 
 /**
- * Start the browser, in a profile that goes when it closes. STEREOCELL_GPU_FLAGS holds Chromium's flags for
- * a GPU; without them Mesa's software draws, in two thirds of the time of Chromium's own, SwiftShader. That
- * draws where Mesa can't, and in exhaustive runs: so both are tried now and then.
+ * Starts the browser in a profile that is deleted when it closes. STEREOCELL_GPU_FLAGS has
+ * Chromium's flags for a GPU. Without them, Mesa draws in two thirds of the time of SwiftShader,
+ * Chromium's own software. SwiftShader draws if Mesa cannot, and in exhaustive runs, so that both
+ * are tested.
  */
 export async function startChromium(): Promise<Process> {
   if (!hasChromium()) throw new Error(HOW_TO_GET);
@@ -72,7 +85,7 @@ export async function startChromium(): Promise<Process> {
   if (ofGpu !== undefined) return launch(ofGpu);
   if (existsSync(MESA) && !IS_EXHAUSTIVE) {
     const started = await launch([...BY_MESA, ...SOFTWARE], ENVIRONMENT);
-    if (await draws(started)) return started;
+    if (await hasWebGl(started)) return started;
     await started.close();
   }
   return launch([...BY_SWIFTSHADER, ...SOFTWARE]);
@@ -81,14 +94,14 @@ export async function startChromium(): Promise<Process> {
 function launch(flags: readonly string[], environment = {}): Promise<Process> {
   return chromium.launch({
     executablePath: CHROMIUM,
-    headless: false, // playwright's own switch is the old mode; the flag below is the new one
+    headless: false, // playwright's switch is the old headless mode; the flag below is the new one
     args: ["--headless=new", ...FLAGS, ...flags],
     env: { ...process.env, ...environment },
   });
 }
 
-/** Whether pages have WebGL. */
-async function draws(browser: Process): Promise<boolean> {
+/** Returns whether pages have WebGL. */
+async function hasWebGl(browser: Process): Promise<boolean> {
   const page = await browser.newPage();
   const isThere = await page.evaluate(
     () => document.createElement("canvas").getContext("webgl2") !== null,
@@ -98,12 +111,13 @@ async function draws(browser: Process): Promise<boolean> {
 }
 
 /**
- * Longest time that an action waits for its element, ms. Playwright's own 30 s are too short while other
- * programs use the cores. The time limit of the test is longer, and ends an action that waits in vain.
+ * Milliseconds that an action waits for its element at most. Playwright's own 30 s are too short
+ * while other programs use the cores. The time limit of a test is longer, so a missing element ends
+ * the action first.
  */
 const PATIENCE_MS = 150_000;
 
-/** Pages of their own in a browser: nothing is kept of others, or for them. */
+/** Opens a separate context in the browser, which shares nothing with others. */
 export async function enter(
   browser: Process,
   {
@@ -120,13 +134,14 @@ export async function enter(
     deviceScaleFactor: pixelRatio,
     hasTouch,
     serviceWorkers,
-    reducedMotion: "reduce", // what opens with a turn would never come to rest
+    reducedMotion: "reduce", // otherwise the opening view would turn, and never come to rest
     colorScheme: "dark",
-    contrast: "more", // a background of one colour, which tests tell from the specimen
+    contrast: "more", // a background of one colour, which tests distinguish from the specimen
   });
   context.setDefaultTimeout(PATIENCE_MS);
   await context.addInitScript(() => {
-    // the card at the beginning of stereo lies over pictures: whoever has seen it gets none
+    // the card at the start of stereo would cover the view; it is not shown to users who have seen
+    // it
     if (location.protocol.startsWith("http")) localStorage.setItem("stereocell-told", "3");
   });
   if (isBlind) {
@@ -146,10 +161,10 @@ export async function enter(
 }
 
 /**
- * Give the page an emulated headset (iwer, `window.headset`), before its own scripts run.
+ * Gives the page an emulated headset (iwer, `window.headset`), before its own scripts run.
  *
- * It draws frame after frame; unless a test needs many, most of the time is left to what goes on
- * beside.
+ * The headset draws continuously. Unless a test needs many frames, most of the time is left to
+ * other work.
  */
 export async function addHeadset(page: Page, needsFrames = false): Promise<void> {
   const script = new URL(import.meta.resolve("iwer/build/iwer.min.js"));
@@ -160,9 +175,9 @@ export async function addHeadset(page: Page, needsFrames = false): Promise<void>
     device.installRuntime({ forceInstall: true }); // Chromium has a runtime, but no headset
     device.position.set(0, 1.6, 0);
     Object.assign(window, { headset: device }); // for tests to move
-    // The emulator gives the canvas the window's size; the page's own style would squash it.
+    // the emulator gives the canvas the size of the window, which the page's style would compress
     document.addEventListener("DOMContentLoaded", () => {
-      const sheet = new CSSStyleSheet(); // the page's policy allows no other
+      const sheet = new CSSStyleSheet(); // the page's policy allows no other kind of style
       sheet.replaceSync(
         "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }",
       );
@@ -172,10 +187,10 @@ export async function addHeadset(page: Page, needsFrames = false): Promise<void>
   if (!needsFrames) await restBetweenFrames(page);
 }
 
-/** Time between frames, to that of a frame. */
+/** Ratio of the rest between frames to the time of a frame. */
 const REST = 3;
 
-/** Leave most of the time to what goes on beside. It must be called before the page opens. */
+/** Leaves most of the time to other work. Must be called before the page opens. */
 export async function restBetweenFrames(pages: Page | BrowserContext): Promise<void> {
   await pages.addInitScript((rest) => {
     const next = window.requestAnimationFrame.bind(window);
@@ -185,7 +200,7 @@ export async function restBetweenFrames(pages: Page | BrowserContext): Promise<v
       const handle = ++handles;
       const start = performance.now();
       next(() => {
-        const took_ms = performance.now() - start; // of the frame that was drawn before
+        const took_ms = performance.now() - start; // time of the frame that was drawn before
         setTimeout(() => next((time) => cancelled.delete(handle) || draw(time)), rest * took_ms);
       });
       return handle;

@@ -1,4 +1,7 @@
-/** The page's frames, one by one: what fades or rests is then no matter of the machine's speed. */
+/**
+ * Controls the frames of a page one by one, so that fades and rests do not depend on the speed of
+ * the machine.
+ */
 import type { Page } from "playwright-core";
 
 type Clock = { now_ms: number; isHeld: boolean; run: (time_ms: number) => void };
@@ -9,7 +12,7 @@ declare global {
   }
 }
 
-/** Give the page such a clock, which runs as time does; to be called before it is opened. */
+/** Gives the page a clock that follows real time until it is held. Must be called before the page opens. */
 export async function addClock(page: Page): Promise<void> {
   await page.addInitScript(() => {
     const real = window.requestAnimationFrame.bind(window);
@@ -41,7 +44,7 @@ export async function addClock(page: Page): Promise<void> {
   });
 }
 
-/** From now on time passes by `tick` alone. */
+/** Stops the clock, which advances only by `tick` from then on. */
 export async function holdFrames(page: Page): Promise<void> {
   await page.evaluate(() => {
     if (window.frameClock === undefined) throw new Error("the page has no clock");
@@ -49,7 +52,7 @@ export async function holdFrames(page: Page): Promise<void> {
   });
 }
 
-/** Draw so many frames, `each_ms` after one another. */
+/** Draws frames at intervals of `each_ms`. */
 export async function tick(page: Page, each_ms: number, frames = 1): Promise<void> {
   await page.evaluate(
     ([ms, count]) => {

@@ -1,4 +1,7 @@
-/** Firefox, on a screen of its own, by its own protocol, Marionette: messages of JSON over TCP, each with its length before it. */
+/**
+ * Firefox on a virtual screen, controlled by its protocol Marionette: JSON messages over TCP, each
+ * after its length.
+ */
 import { type ChildProcess, spawn } from "node:child_process";
 import { existsSync } from "node:fs";
 import { mkdtemp, rm, writeFile } from "node:fs/promises";
@@ -7,12 +10,12 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 
 const FIREFOX = [process.env.FIREFOX, "/usr/bin/firefox", "/usr/bin/firefox-esr"].find(isThere);
-/** A screen in memory: Firefox has no WebGL without any. */
+/** A virtual screen, without which Firefox has no WebGL. */
 const SCREEN = ["/usr/bin/Xvfb"].find(isThere);
 export const HOW_TO_GET_FIREFOX =
   "no Firefox, or no screen for it: apt-get install firefox-esr xvfb, or set FIREFOX to its path";
 const START_MS = 60_000;
-/** Longest time of a script in the page, ms. */
+/** Longest duration of a script in the page, ms. */
 const SCRIPT_MS = 120_000;
 
 export const hasFirefox = FIREFOX !== undefined && SCREEN !== undefined;
@@ -41,7 +44,7 @@ export class Firefox {
     socket.on("data", (part) => this.take(part));
   }
 
-  /** A browser with a profile of its own, which ends with it. */
+  /** Starts a browser with a profile of its own, which is deleted when it stops. */
   static async start(): Promise<Firefox> {
     if (FIREFOX === undefined || SCREEN === undefined) throw new Error(HOW_TO_GET_FIREFOX);
     const profile = await mkdtemp(join(tmpdir(), "stereocell-firefox-"));
@@ -52,7 +55,7 @@ export class Firefox {
     );
     await writeFile(join(profile, "user.js"), lines.join("\n"));
     const { screen, display } = await startScreen(SCREEN);
-    const size = ["--width", "560", "--height", "480"]; // software draws
+    const size = ["--width", "560", "--height", "480"]; // small, because software draws
     const words = ["--marionette", "--no-remote", "--profile", profile, ...size];
     const env = { ...process.env, DISPLAY: display, HOME: profile, LIBGL_ALWAYS_SOFTWARE: "1" };
     const child = spawn(FIREFOX, words, { stdio: "ignore", env });
@@ -67,7 +70,7 @@ export class Firefox {
     await this.send("WebDriver:Navigate", { url });
   }
 
-  /** The value of a script in the page: `resolve` is its last argument. */
+  /** Returns the value of a script in the page, whose last argument is `resolve`. */
   async run(script: string): Promise<unknown> {
     const answer = await this.send("WebDriver:ExecuteAsyncScript", { script, args: [] });
     return (answer as { value: unknown }).value;
@@ -108,7 +111,7 @@ export class Firefox {
       if (colon === -1 || this.rest.length < start + length) return;
       const message = JSON.parse(this.rest.subarray(start, start + length).toString());
       this.rest = this.rest.subarray(start + length);
-      if (!Array.isArray(message)) continue; // its greeting
+      if (!Array.isArray(message)) continue; // the greeting of the browser
       const answer = message as unknown as Answer;
       this.waiting.get(answer[1])?.(answer);
       this.waiting.delete(answer[1]);
@@ -116,7 +119,7 @@ export class Firefox {
   }
 }
 
-/** Start a screen that nobody sees; its name is what the program writes to its third stream. */
+/** Starts a virtual screen. The program writes the name of the screen to its third stream. */
 async function startScreen(program: string) {
   const words = ["-displayfd", "3", "-screen", "0", "1280x800x24", "-nolisten", "tcp"];
   const screen = spawn(program, words, { stdio: ["ignore", "ignore", "ignore", "pipe"] });

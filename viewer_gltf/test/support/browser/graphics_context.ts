@@ -1,7 +1,7 @@
-/** Takes the graphics context of a page away, as a graphics driver does, and gives it back. */
+/** Drops the graphics context of a page, like a graphics driver, and restores it. */
 import type { Page } from "playwright-core";
 
-/** Remembers the context that the page draws with. Must be called before the page opens. */
+/** Stores the context that the page draws with. Must be called before the page opens. */
 export function rememberContext(page: Page): Promise<unknown> {
   return page.addInitScript(() => {
     const original = HTMLCanvasElement.prototype.getContext;
@@ -13,14 +13,14 @@ export function rememberContext(page: Page): Promise<unknown> {
   });
 }
 
-/** Takes the remembered context away, or gives it back. */
+/** Drops or restores the stored context. */
 export function changeContext(page: Page, change: "loseContext" | "restoreContext"): Promise<void> {
   return page.evaluate((each) => {
-    const held = window as unknown as {
+    const stored = window as unknown as {
       drawnBy: WebGL2RenderingContext;
       loss?: WEBGL_lose_context | null;
     };
-    held.loss ??= held.drawnBy.getExtension("WEBGL_lose_context");
-    held.loss?.[each]();
+    stored.loss ??= stored.drawnBy.getExtension("WEBGL_lose_context");
+    stored.loss?.[each]();
   }, change);
 }

@@ -1,4 +1,4 @@
-/** A static host on localhost for tests, with or without HTTP ranges, that remembers requests. */
+/** A static host on localhost for tests, with or without HTTP ranges, that records requests. */
 import { readFile } from "node:fs/promises";
 import { createServer, type Server } from "node:http";
 import type { AddressInfo } from "node:net";
@@ -19,17 +19,17 @@ const TYPES: Readonly<Record<string, string>> = {
 };
 
 export type Request = Readonly<{ path: string; query: string; range: string | null }>;
-/** `times`: answered so only that often, then by the folder's file. */
+/** `times`: number of requests with this answer; later ones get the file of the folder. */
 export type Answer = { status: number; body: string | Uint8Array; times?: number };
 
 export class Host {
   readonly requests: Request[] = [];
-  /** Paths that are answered instead of the folder's file. */
+  /** Answers by path, in place of the files of the folder. */
   readonly overrides = new Map<string, Answer>();
   hasRanges = true;
-  /** Of every answer, beside its own. */
+  /** Headers of every answer, besides its own. */
   headers: Readonly<Record<string, string>> = {};
-  /** Before every answer. */
+  /** Delay of every answer. */
   delay_ms = 0;
 
   private constructor(
@@ -37,7 +37,7 @@ export class Host {
     readonly address: string,
   ) {}
 
-  /** Serve folders under their prefixes, such as `{"/": dist, "/bundle/": bundle}`. */
+  /** Serves folders under their prefixes, for example `{"/": dist, "/bundle/": bundle}`. */
   static async start(mounts: Readonly<Record<string, string>>): Promise<Host> {
     const prefixes = Object.keys(mounts).sort((a, b) => b.length - a.length);
     const server = createServer((request, response) => {
@@ -66,18 +66,18 @@ export class Host {
           const length = { "Content-Length": String(bytes.length) };
           const sized = request.method === "HEAD" ? length : {};
           const headers = { ...host.headers, "Content-Type": type, ...sized };
-          const asked =
+          const bounds =
             host.hasRanges && answer === undefined ? /^bytes=(\d+)-(\d+)$/.exec(range ?? "") : null;
-          if (asked === null) {
+          if (bounds === null) {
             response.writeHead(answer?.status ?? 200, headers).end(bytes);
             return;
           }
-          const part = bytes.subarray(Number(asked[1]), Number(asked[2]) + 1);
-          const last = Number(asked[1]) + part.length - 1;
+          const part = bytes.subarray(Number(bounds[1]), Number(bounds[2]) + 1);
+          const last = Number(bounds[1]) + part.length - 1;
           response
             .writeHead(206, {
               ...headers,
-              "Content-Range": `bytes ${asked[1]}-${last}/${bytes.length}`,
+              "Content-Range": `bytes ${bounds[1]}-${last}/${bytes.length}`,
             })
             .end(part);
         },
@@ -89,7 +89,7 @@ export class Host {
     return host;
   }
 
-  /** Forget the requests, and answer as at the start. */
+  /** Forgets the requests and all changes of answers. */
   reset(): void {
     this.requests.length = 0;
     this.overrides.clear();

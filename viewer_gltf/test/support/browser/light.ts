@@ -1,4 +1,4 @@
-/** The light of pixels, and that of the room on what faces the eye. */
+/** The light of pixels, and the light of the scene on surfaces that face the eye. */
 import { type FarLamp, OWN_LIGHT } from "../../../src/gpu/room_light";
 import { fromHex } from "../../../src/math/color";
 import type { Vec3 } from "../../../src/math/vec3";
@@ -6,20 +6,20 @@ import { FIELD_OF_VIEW_RAD } from "./camera";
 import type { Picture } from "./picture";
 
 const BACKGROUND_RED = 11;
-/** Light of what has no boundary to that of what faces the eye, as in chunks/shade. */
+/** Light of a homogeneous volume relative to that of a surface that faces the eye, as in chunks/shade. */
 export const SCATTERED = 1.2;
 
-/** Linear light, 0..1, of a byte of sRGB. */
+/** Returns the linear light, 0..1, of a byte of sRGB. */
 export function lightOf(byte: number): number {
   return fromHex(`#${byte.toString(16).padStart(2, "0")}0000`)[0];
 }
 
-/** Red light over the background's, 0..1. */
+/** Returns the red light of a pixel above that of the background, 0..1. */
 export function lightAt(picture: Picture, { x, y }: Readonly<{ x: number; y: number }>): number {
   return lightOf(picture.at(x, y)[0]) - lightOf(BACKGROUND_RED);
 }
 
-/** Red light that a white surface sends on that faces the eye, at a pixel of the start view. */
+/** Returns the red light of a white surface that faces the eye, at a pixel of the start view. */
 export function lightFacing(
   { width, height }: Picture,
   { x, y }: Readonly<{ x: number; y: number }>,

@@ -1,4 +1,4 @@
-/** Open all that the panel has: its sections, the first channel's card, and the histogram in the card. */
+/** Opens all sections of the panel, the card of the first channel, and its joint histogram. */
 import type { ViewerPage } from "./page";
 
 const SECTIONS = [

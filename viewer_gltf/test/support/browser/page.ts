@@ -1,9 +1,9 @@
-/** Drive the viewer's page as a person does: by its controls. */
+/** Operates the viewer's page through its controls, like a user. */
 import type { Page } from "playwright-core";
 import type { Snapshot } from "../../../src/host/snapshot";
 import type { Mode } from "../../../src/state/parameters/volumes";
 
-/** Time after which a click is no second one of a double click. */
+/** Milliseconds after which a click is not the second one of a double click. */
 const APART_MS = 500;
 
 export class ViewerPage {
@@ -11,14 +11,14 @@ export class ViewerPage {
 
   constructor(readonly page: Page) {}
 
-  /** Open an address and wait until the overview is on screen. */
+  /** Opens an address and waits until the overview is on screen. */
   async open(address: string): Promise<void> {
     await this.page.goto(address);
     await this.page.waitForFunction(() => window.stereocell !== undefined);
     await this.page.evaluate(() => window.stereocell?.ready);
   }
 
-  /** A click that is no second one of a double click, and that no card of a click before it lies over. */
+  /** Clicks once: not as the second click of a double click, and not on the card of an earlier click. */
   async clickOnce(x: number, y: number): Promise<void> {
     await this.page.waitForTimeout(Math.max(0, this.clicked_ms + APART_MS - Date.now()));
     const close = this.page.locator('[data-control="tap-close"]');
@@ -27,16 +27,15 @@ export class ViewerPage {
     this.clicked_ms = Date.now();
   }
 
-  /** Wait until nothing loads and the picture shows all of it. */
+  /** Waits until nothing is loading and the view shows everything. */
   async settled(): Promise<void> {
     await this.page.evaluate(() => window.stereocell?.settled());
   }
 
   /**
-   * Ask for a link to the view, and return it once it stands in the address.
+   * Requests a link to the view, and returns it once it is in the address.
    *
-   * The address is emptied first. What stood there before, or what the page writes there by itself as it
-   * follows the view, can so not be taken for the link.
+   * The address is emptied first, so that an older link in it is not mistaken for the new one.
    */
   async writeLink(): Promise<string> {
     await this.page.evaluate(() => history.replaceState(history.state, "", "#"));
@@ -47,7 +46,7 @@ export class ViewerPage {
     return this.page.url();
   }
 
-  /** Wait until so many frames were drawn, since a busy machine may draw none for a second. */
+  /** Waits for a number of frames, since a busy machine may draw none for a second. */
   async drawn(frames: number): Promise<void> {
     await this.page.evaluate(async (count) => {
       for (let i = 0; i < count; i++)
@@ -65,20 +64,20 @@ export class ViewerPage {
     return this.page.locator(`[data-channel="${channel}"] [data-part="${name}"]`);
   }
 
-  /** Open a section of the panel, such as `measure`. */
+  /** Opens a section of the panel, for example `measure`. */
   async unfold(section: string): Promise<void> {
     const opener = this.page.locator(`h2 [data-opener="${section}"]`);
     if ((await opener.count()) === 0) await this.page.locator('h2 [data-opener="more"]').click();
     if ((await opener.getAttribute("aria-expanded")) === "false") await opener.click();
   }
 
-  /** Open a channel's card: its opacity, window and palettes. */
+  /** Opens the card of a channel, with its opacity, window and palettes. */
   async openCard(channel: string): Promise<void> {
     const opener = this.page.locator(`[data-channel="${channel}"] [data-opener]`);
     if ((await opener.getAttribute("aria-expanded")) === "false") await opener.click();
   }
 
-  /** Drag a slider to a share of its length. */
+  /** Moves a slider to a share of its length. */
   async slide(control: string, share: number): Promise<void> {
     const slider = this.page.locator(`[data-control="${control}"]`);
     const most = Number(await slider.getAttribute("max"));
@@ -88,13 +87,14 @@ export class ViewerPage {
 
   async show(channel: string, isShown: boolean): Promise<void> {
     if ((await this.part(channel, "shown").count()) === 0) {
-      await this.page.locator('[data-control="find-channel"]').fill(channel); // one of many
+      // one of many channels
+      await this.page.locator('[data-control="find-channel"]').fill(channel);
     }
     await this.part(channel, "shown").setChecked(isShown);
     await this.settled();
   }
 
-  /** Show these channels and no others; at once, since each picture in between takes a while. */
+  /** Shows these channels and no others, without waiting for frames in between. */
   async showOnly(...channels: readonly string[]): Promise<void> {
     const { state } = await this.snapshot();
     const others = state.channels.filter(({ id, shown }) => shown && !channels.includes(id));
@@ -109,7 +109,7 @@ export class ViewerPage {
     await this.settled();
   }
 
-  /** Show a channel as its surface, or as its volume in all tiles. */
+  /** Shows a channel as its surface, or as its volume in all tiles. */
   async showAs(channel: string, as: "surface" | "volume"): Promise<void> {
     await this.show(channel, true);
     await this.drawVolume(channel, as === "volume");
@@ -127,7 +127,7 @@ export class ViewerPage {
     await this.settled();
   }
 
-  /** Choose a tile, which then stays chosen; by the map, or by the list where there is none. */
+  /** Selects a tile, which then stays selected, on the map or in the list. */
   async chooseTile(tile: string): Promise<void> {
     const { selected } = (await this.snapshot()).state;
     const onMap = this.page.locator(`[data-tile-choice="${tile}"]`);
@@ -142,7 +142,7 @@ export class ViewerPage {
     await this.settled();
   }
 
-  /** Drag from one point of the page to another, and wait until the turn has come to rest. */
+  /** Drags from one point of the page to another, and waits until the view is at rest. */
   async drag(from: readonly [number, number], to: readonly [number, number]): Promise<void> {
     await this.page.mouse.move(...from);
     await this.page.mouse.down();
@@ -151,16 +151,19 @@ export class ViewerPage {
     await this.still();
   }
 
-  /** Turn the specimen by a quarter, so that what was on the left faces the viewer. */
+  /** Turns the specimen by a quarter, so that its left side faces the viewer. */
   async turnLeftSideToFront(): Promise<void> {
     const box = await this.page.locator(".stage").boundingBox();
     if (box === null) throw new Error("no stage");
     const y = box.y + box.height / 2;
     const x = box.x + box.width / 4;
-    await this.drag([x, y], [x + box.height / 4, y]); // the stage's height is a whole turn
+    await this.drag([x, y], [x + box.height / 4, y]); // the height of the stage is a whole turn
   }
 
-  /** Wait until some of the page's turns pass without a frame: a drag goes on for a while. */
+  /**
+   * Waits until several frames of the browser pass without a frame of the viewer, because a drag
+   * goes on for a while.
+   */
   async still(): Promise<void> {
     await this.settled();
     await this.page.evaluate(async () => {
@@ -174,11 +177,11 @@ export class ViewerPage {
   }
 
   async enterStereo(): Promise<void> {
-    // not by the pointer: in a page of a few pixels a line of text may lie over the button
+    // not by the pointer: on a small page, a text may cover the button
     await this.page.locator('[data-action="stereo"]').dispatchEvent("click");
     await this.page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
     await this.settled();
-    // Two more frames, so that both eyes have been drawn at the pose that holds.
+    // waits for two more frames, so that both eyes have been drawn at the final pose
     const frames = await this.page.evaluate(() => window.stereocell?.frames ?? 0);
     await this.page.waitForFunction((n) => (window.stereocell?.frames ?? 0) > n + 1, frames);
   }

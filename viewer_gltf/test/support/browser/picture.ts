@@ -1,4 +1,4 @@
-/** Pixels of what the page shows. */
+/** Pixels of a screenshot of the page. */
 import type { Page } from "playwright-core";
 import { decodePng } from "./png";
 
@@ -21,7 +21,7 @@ export class Picture {
     return this.where(matches).length;
   }
 
-  /** Positions of the matching pixels. */
+  /** Returns the positions of the matching pixels. */
   where(matches: (pixel: Pixel) => boolean): [number, number][] {
     const found: [number, number][] = [];
     for (let y = 0; y < this.height; y++) {
@@ -33,7 +33,7 @@ export class Picture {
   }
 }
 
-/** Share of the pixels that differ by more than a little. */
+/** Returns the share of pixels that clearly differ. */
 export function difference(a: Picture, b: Picture): number {
   let differing = 0;
   for (let y = 0; y < a.height; y++) {
@@ -45,7 +45,7 @@ export function difference(a: Picture, b: Picture): number {
   return differing / (a.width * a.height);
 }
 
-/** Scale bar, axes, names, announcements and buttons lie over the picture: they are no part of it. */
+/** Runs a job while marks, announcements and buttons over the view are hidden. */
 export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promise<T> {
   const show = (visibility: string) =>
     page.evaluate((value) => {
@@ -63,7 +63,7 @@ export async function withoutMarks<T>(page: Page, job: () => Promise<T>): Promis
   }
 }
 
-/** What the page shows in the stage (or in `area`), without what lies over it. */
+/** Takes a screenshot of the stage (or of `area`), without the elements over it. */
 export async function takePicture(page: Page, area?: Area): Promise<Picture> {
   const clip = area ?? (await page.locator(".stage").boundingBox()) ?? undefined;
   const png = await withoutMarks(page, () => page.screenshot({ clip }));
@@ -71,14 +71,14 @@ export async function takePicture(page: Page, area?: Area): Promise<Picture> {
   return new Picture(width, height, rgba);
 }
 
-/** The room's background. */
+/** Returns whether a pixel has the colour of the background. */
 export function isBackground([r, g, b]: Pixel): boolean {
   return Math.abs(r - 11) + Math.abs(g - 13) + Math.abs(b - 18) < 8;
 }
 
 /**
- * Whether a pixel shows a colour (linear) in any light: its hue is near, and it is not grey.
- * Hue and saturation are taken in sRGB, which light from a white lamp leaves about as they are.
+ * Returns whether a pixel has a colour (linear) in any light: its hue is similar, and it is not
+ * grey. Hue and saturation are compared in sRGB, which white light hardly changes.
  */
 export function hasColor(linear: Pixel, tolerance_deg = 22): (pixel: Pixel) => boolean {
   const wanted = hue(linear.map((v) => 255 * v ** (1 / 2.2)) as unknown as Pixel);
@@ -90,7 +90,7 @@ export function hasColor(linear: Pixel, tolerance_deg = 22): (pixel: Pixel) => b
   };
 }
 
-/** Degrees; null where a pixel is too grey or too dark to have one. */
+/** Returns the hue in degrees; null if a pixel is too grey or too dark. */
 function hue([r, g, b]: Pixel): number | null {
   const high = Math.max(r, g, b);
   const spread = high - Math.min(r, g, b);

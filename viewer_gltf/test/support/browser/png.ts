@@ -1,12 +1,12 @@
-/** Pixels of a PNG file as Chromium writes its screenshots: 8 bits a part, not interlaced. */
+/** Reads the pixels of a PNG file as Chromium writes screenshots: 8 bits per component, not interlaced. */
 import { inflateSync } from "node:zlib";
 
 const SIGNATURE_BYTES = 8;
-/** Bytes of a pixel by the colour type that the header states: RGB, RGBA. */
+/** Bytes of a pixel, by the colour type in the header: RGB, RGBA. */
 const PARTS: Readonly<Record<number, number>> = { 2: 3, 6: 4 };
 
-/** What the left, the upper and the upper left neighbour foretell (Paeth 1991, as the format has it). */
-function foretold(a: number, b: number, c: number): number {
+/** Predicts a byte from its left, upper and upper left neighbours (Paeth 1991, a filter of PNG). */
+function paeth(a: number, b: number, c: number): number {
   const [pa, pb, pc] = [Math.abs(b - c), Math.abs(a - c), Math.abs(a + b - 2 * c)];
   return pa <= pb && pa <= pc ? a : pb <= pc ? b : c;
 }
@@ -23,7 +23,7 @@ export function decodePng(png: Buffer): { width: number; height: number; rgba: U
       parts = PARTS[data[9]] ?? 0;
       if (data[8] !== 8 || parts === 0 || data[12] !== 0) throw new Error("another kind of PNG");
     } else if (type === "IDAT") packed.push(data);
-    at += length + 12; // with the checksum
+    at += length + 12; // and the checksum
   }
   const rows = inflateSync(Buffer.concat(packed));
   const pitch = width * parts;
@@ -39,7 +39,7 @@ export function decodePng(png: Buffer): { width: number; height: number; rgba: U
       if (filter === 1) row[i] += left;
       else if (filter === 2) row[i] += up;
       else if (filter === 3) row[i] += (left + up) >> 1;
-      else row[i] += foretold(left, up, corner);
+      else row[i] += paeth(left, up, corner);
     }
     for (let x = 0; x < width; x++) {
       for (let part = 0; part < parts; part++) {

@@ -1,4 +1,4 @@
-/** What all files of tests share: the synthetic bundle, which none changes. */
+/** Writes the synthetic bundle that all test files share and none changes. */
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -7,7 +7,7 @@ import { writeFixture } from "../fixture/bundle";
 
 declare module "vitest" {
   interface ProvidedContext {
-    /** The bundle's folder. */
+    /** Folder of the bundle. */
     fixture: string;
   }
 }

@@ -1,4 +1,4 @@
-/** Browser tests need Chromium: a clear skip without it, a failure in CI. */
+/** Browser tests need Chromium. Without it they are skipped with a message, or fail in CI. */
 import { describe } from "vitest";
 import { HOW_TO_GET, hasChromium } from "./chromium";
 

@@ -1,4 +1,4 @@
-/** What a browser test stands on: a bundle served beside the built viewer, Chromium, a page. */
+/** The set-up of a browser test: a bundle served beside the built viewer, Chromium, and a page. */
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -12,56 +12,57 @@ import { ViewerPage } from "./page";
 import { openBrowser } from "./shared_browser";
 
 export const DIST = new URL("../../../dist/", import.meta.url).pathname;
-/** The bundle that `make test` built of the demo, if it did. */
+/** The bundle that `make test` has built of the demo, if any. */
 export const DEMO_BUNDLE = process.env.STEREOCELL_TEST_BUNDLE;
-/** A bundle that was built with `--maps`, of real data. */
+/** A bundle of real data, built with `--maps`. */
 export const MAPS_BUNDLE = process.env.STEREOCELL_REAL_BUNDLE;
-/** A bundle of an MR head, of one tile. */
+/** A bundle of an MR head, with one tile. */
 export const HEAD_BUNDLE = process.env.STEREOCELL_HEAD_BUNDLE;
 
 export type Stand = Readonly<{
-  /** Its folder. */
+  /** Folder of the bundle. */
   bundle: string;
   manifest: Manifest;
   host: Host;
-  /** A page, not opened yet. Tests have it one after another: only a test can leave traces in it. */
+  /** A page that is not opened yet. Tests use it one after another. */
   viewer: ViewerPage;
   /**
-   * Open the bundle in it, seen from the front; `query` goes behind the bundle's address.
+   * Opens the bundle in the page, seen from the front; `query` follows the address of the bundle.
    *
-   * The fixture has no depth shading unless its link says `depth=`: it takes a third of the time until
-   * volumes are drawn. Built bundles have it, as they have for users; in exhaustive runs all have it.
+   * The fixture has no depth shading unless its link has `depth=`, because that takes a third of
+   * the time until volumes are drawn. Built bundles have it, as for users. In exhaustive runs all
+   * bundles have it.
    */
   open: (query?: string) => Promise<void>;
 }>;
 
 export type StandOptions = Readonly<{
-  /** A bundle's folder; without one, the synthetic fixture's. */
+  /** Folder of a bundle; absent: the synthetic fixture. */
   bundle?: string;
-  /** Of a fixture of its own. */
+  /** Options of a fixture that is written for these tests. */
   fixture?: FixtureOptions;
-  /** CSS pixels; small ones, since software draws them. */
+  /** CSS pixels; small, because software draws them. */
   viewport: { width: number; height: number };
-  /** Of the device to one of CSS: half of one, but where a picture's detail is looked at. */
+  /** Device pixels per CSS pixel; 0.5 unless a test looks at details. */
   pixelRatio?: number;
   hasTouch?: boolean;
-  /** Nothing is drawn. */
+  /** Whether nothing is drawn. */
   isBlind?: boolean;
-  /** The panel is as somebody finds it who has never been there. */
+  /** Whether the panel is in the state of a first visit. */
   isFirstVisit?: boolean;
-  /** Between frames thrice the time passes that the last one took. */
+  /** Whether there is a rest between frames, three times as long as the last frame. */
   hasRests?: boolean;
-  /** The page stays open from test to test of the `describe`, none of which disturbs another. */
+  /** Whether the page stays open for all tests of the `describe`, which do not disturb one another. */
   sharesPage?: boolean;
-  /** Served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
+  /** Folders that are served beside the viewer (`/app/`) and the bundle (`/bundle/`), by prefix. */
   mounts?: (bundle: string) => Readonly<Record<string, string>>;
 }>;
 
-/** The sections of the panel that a reader has opened, whose controls most tests use. */
+/** Sections of the panel that are open, because most tests use their controls. */
 const OPEN =
   "channels objects additions volumes tiles stereo slices save more view volume-settings light";
 
-/** Opens the sections as on a later visit. It runs in the page before the page's own scripts. */
+/** Opens the sections as on a later visit. Runs in the page before its own scripts. */
 function openSections(open: string): void {
   try {
     if (localStorage.getItem("stereocell-open") === null) {
@@ -72,7 +73,7 @@ function openSections(open: string): void {
   }
 }
 
-/** Set up and cleared away around the tests of one `describe`; to be used inside them. */
+/** Sets up and closes everything around the tests of one `describe`. Must be called inside it. */
 export function prepareStand(options: StandOptions): Stand {
   const { bundle: given, fixture, viewport, pixelRatio, hasTouch, mounts } = options;
   const { isBlind, hasRests, sharesPage = false } = options;
@@ -92,7 +93,7 @@ export function prepareStand(options: StandOptions): Stand {
     bundle = given ?? folder ?? inject("fixture");
     manifest = JSON.parse(await readFile(join(bundle, "manifest.json"), "utf8"));
     host = await Host.start({ "/app/": DIST, "/bundle/": bundle, ...mounts?.(bundle) });
-    // its own requests would be counted with the page's
+    // requests of a service worker would be counted with those of the page
     browser = await openBrowser({
       ...{ viewport, pixelRatio, hasTouch, isBlind, hasRests },
       serviceWorkers: "block",
@@ -106,7 +107,7 @@ export function prepareStand(options: StandOptions): Stand {
     if (folder !== undefined) await rm(folder, { recursive: true, force: true });
   });
 
-  /** Whether the page has scripts that run before its own: there is no way to take them away. */
+  /** Whether the page has scripts that run before its own. They cannot be removed. */
   let isAltered = false;
 
   const openPage = async () => {
@@ -121,7 +122,7 @@ export function prepareStand(options: StandOptions): Stand {
     viewer = new ViewerPage(page);
   };
 
-  /** A page that navigates costs half of what a new one does. */
+  /** Empties the page. A navigation costs half as much as a new page. */
   const clearPage = async () => {
     const { page } = viewer;
     await page.context().setOffline(false);
@@ -137,7 +138,7 @@ export function prepareStand(options: StandOptions): Stand {
       await viewer.page.close();
       await openPage();
     } else if (!sharesPage) await clearPage();
-    host.reset(); // what the page still asked for is forgotten, too
+    host.reset(); // late requests of the page are forgotten, too
   });
 
   return {
@@ -155,7 +156,8 @@ export function prepareStand(options: StandOptions): Stand {
     },
     open: (query = "") => {
       const quality = query.includes("&quality=") ? "" : "&quality=low";
-      const view = query.includes("&view=") ? "" : "&view=front"; // where points are known to show
+      // the view in which tests know the places of points
+      const view = query.includes("&view=") ? "" : "&view=front";
       const [, search, link = ""] = /^([^#]*)(.*)$/.exec(query) ?? [];
       const hash = hasDepthShading || link.includes("&depth=") ? link : `${link || "#v=1"}&depth=0`;
       return viewer.open(`${host.address}/app/?bundle=../bundle/${search}${view}${quality}${hash}`);

@@ -1,8 +1,8 @@
-/** What careless readers do. */
+/** The acts of a careless user. */
 import type { Locator } from "playwright-core";
 import { type Act, choose, type Reader } from "./walk";
 
-/** Of other windows, of files, of the next test; or of an act of its own. */
+/** Controls that open other windows or files, affect the next test, or have an act of their own. */
 const LEFT_OUT =
   /^(save-|own-light|scan|measure-screen|stereo|split|room|share|link|keys|letters|full|find-channel|undo|redo|retry)/;
 
@@ -28,14 +28,14 @@ const turnAWindow = async ({ page }: Reader) => {
   await page.setViewportSize({ width: height, height: width });
 };
 
-/** Move a slider by some steps, as a hand does. */
+/** Moves a slider in several steps, like a hand. */
 async function slide({ random }: Reader, slider: Locator): Promise<void> {
   const most = Number(await slider.getAttribute("max"));
   for (let i = 0; i < 3; i++) await slider.fill(String(Math.round(random() * most)));
 }
 
-/** @returns the control's name */
-async function work(reader: Reader, control: Locator): Promise<string> {
+/** @returns name of the control */
+async function operate(reader: Reader, control: Locator): Promise<string> {
   const { random } = reader;
   const [tag, type, name] = await control.evaluate((each) => [
     each.tagName,
@@ -96,7 +96,7 @@ export const ACTS: readonly Act[] = [
     changes: CHOICES,
     weight: 2,
     run: async (reader) => {
-      await reader.page.waitForTimeout(450); // no second click of a double click
+      await reader.page.waitForTimeout(450); // not the second click of a double click
       await reader.page.mouse.click(...(await somewhere(reader, ".stage canvas")));
       await reader.page.waitForTimeout(450);
     },
@@ -107,7 +107,8 @@ export const ACTS: readonly Act[] = [
     weight: 2,
     run: async (reader) => {
       await reader.page.mouse.dblclick(...(await somewhere(reader, ".stage canvas")));
-      await reader.page.waitForTimeout(2500); // the flight begins once it is known what lies there
+      // the flight begins after the structure at that place is known
+      await reader.page.waitForTimeout(2500);
     },
   },
   {
@@ -120,12 +121,12 @@ export const ACTS: readonly Act[] = [
     },
   },
   {
-    name: "work a control",
+    name: "operate a control",
     changes: ["any", "look"],
     weight: 6,
     run: async (reader) => {
       const control = await someControl(reader, "[data-control]");
-      return control === null ? "none" : work(reader, control);
+      return control === null ? "none" : operate(reader, control);
     },
   },
   {
@@ -154,7 +155,7 @@ export const ACTS: readonly Act[] = [
     weight: 1,
     run: async (reader) => {
       const modes = reader.page.locator("select[data-mode]:visible");
-      if ((await modes.count()) > 0) await work(reader, modes.first());
+      if ((await modes.count()) > 0) await operate(reader, modes.first());
       await turnAWindow(reader);
       await reader.page.waitForTimeout(200);
       await turnAWindow(reader);
@@ -186,7 +187,7 @@ export const ACTS: readonly Act[] = [
   },
 ];
 
-/** Hold the phone in its viewer: turned about the vertical, and tilted; -90 degrees is level. */
+/** Holds the phone in its Cardboard viewer, turned about the vertical and tilted; -90 degrees is level. */
 function holdHead({ page }: Reader, alpha_deg: number, gamma_deg: number): Promise<void> {
   return page.evaluate(
     ([alpha, gamma]) => {
@@ -196,7 +197,7 @@ function holdHead({ page }: Reader, alpha_deg: number, gamma_deg: number): Promi
   );
 }
 
-/** Look from side to side, and in the end far away from all that is there. */
+/** Looks from side to side, and finally far away from everything. */
 async function lookAround(reader: Reader): Promise<void> {
   const { page, random } = reader;
   const [alpha, gamma] = [360 * random(), -90 + 30 * (random() - 0.5)];
@@ -216,7 +217,7 @@ export const IN_STEREO: readonly Act[] = [
   },
   {
     name: "rest a gaze anywhere",
-    // the controls that a gaze rests on do what they say
+    // the controls that a gaze rests on do what they are made for
     changes: ["any", "look"],
     weight: 2,
     run: async (reader) => {
@@ -227,9 +228,10 @@ export const IN_STEREO: readonly Act[] = [
   },
 ];
 
-/** Enter the split screen; leave it. */
+/** Enters the split screen. */
 export async function enterStereo({ page }: Reader): Promise<void> {
-  await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur()); // letters go to no field
+  // otherwise letters would go to a field
+  await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
   await page.keyboard.press("P");
   await page.waitForFunction(() => window.stereocell?.snapshot().isStereo);
 }

@@ -1,4 +1,4 @@
-/** What a page holds on to: figures that must not grow with its use. */
+/** Figures of a page that must not grow with its use. */
 import type { CDPSession, Page } from "playwright-core";
 
 export type Figures = Readonly<{
@@ -20,9 +20,9 @@ export class Figured {
     return new Figured(page, await page.context().newCDPSession(page));
   }
 
-  /** The figures after the garbage was collected. */
+  /** Returns the figures after garbage collection. */
   async now(): Promise<Figures> {
-    // what a collection lets go of may hold the next
+    // objects that one collection frees may refer to others, which the next one frees
     for (let i = 0; i < 3; i++) await this.devtools.send("HeapProfiler.collectGarbage");
     const { jsEventListeners, nodes } = await this.devtools.send("Memory.getDOMCounters");
     const { usedSize } = await this.devtools.send("Runtime.getHeapUsage");

@@ -1,34 +1,34 @@
 /**
- * A careless reader: acts at random, as the same seed always does, and compares what each act has changed with what
- * it asked for.
+ * A careless user: acts at random, reproducibly by a seed, and compares the changes of each act
+ * with those that it may make.
  */
 import type { Page } from "playwright-core";
 import type { Snapshot } from "../../../src/host/snapshot";
 import type { ViewerPage } from "../browser/page";
 
-/** Parts of the state that an act may change; "look": from where the specimen is seen; "any": whatever a control sets. */
+/** Parts of the state that an act may change; "look": the camera; "any": anything that a control sets. */
 export type Change = keyof Snapshot["state"] | "look" | "any";
 
 export type Reader = Readonly<{
   viewer: ViewerPage;
   page: Page;
-  /** 0..1, the next one of the seed's. */
+  /** Returns the next random number of the seed, 0..1. */
   random: () => number;
 }>;
 
 export type Act = Readonly<{
   name: string;
   changes: readonly Change[];
-  /** Of all acts, so many parts. */
+  /** Relative frequency of the act. */
   weight: number;
-  /** @returns the name of the control, if it was one */
+  /** @returns name of the operated control, if any */
   run: (reader: Reader) => Promise<unknown>;
 }>;
 
-/** Largest change of a length that is none, m: what is left of a glide. */
+/** Largest difference between two coordinates that count as equal, m: the rest of a glide. */
 const SAME_M = 1e-3;
-/** Changes by themselves: what has come, and what could not come. */
-const NOBODYS: ReadonlySet<string> = new Set(["notices", "mendable"]);
+/** Parts that change without an act: loaded data and faults. */
+const PASSIVE: ReadonlySet<string> = new Set(["notices", "retryable"]);
 
 type View = Readonly<{ state: Snapshot["state"]; look: Snapshot["look"] }>;
 
@@ -36,11 +36,11 @@ function channelsOf({ channels }: Snapshot["state"]): string {
   return JSON.stringify(channels.map(({ turn, transfer2d, ...channel }) => channel));
 }
 
-/** The names of all that differs. */
+/** Returns the names of everything that differs. */
 export function changesBetween(before: View, after: View): readonly string[] {
   const keys = Object.keys(before.state) as (keyof Snapshot["state"])[];
   const changed: string[] = keys.filter((key) => {
-    if (NOBODYS.has(key)) return false;
+    if (PASSIVE.has(key)) return false;
     if (key === "channels") return channelsOf(before.state) !== channelsOf(after.state);
     return JSON.stringify(before.state[key]) !== JSON.stringify(after.state[key]);
   });
@@ -49,13 +49,13 @@ export function changesBetween(before: View, after: View): readonly string[] {
   return changed;
 }
 
-export function unasked({ changes }: Act, changed: readonly string[]): readonly string[] {
-  const isAsked = (name: string) =>
+export function unexpected({ changes }: Act, changed: readonly string[]): readonly string[] {
+  const isExpected = (name: string) =>
     changes.includes(name as Change) || (changes.includes("any") && name !== "look");
-  return changed.filter((name) => !isAsked(name));
+  return changed.filter((name) => !isExpected(name));
 }
 
-/** Wait until a glide or a flight has ended. */
+/** Waits until a glide or a flight has ended. */
 export async function comeToRest({ page, viewer }: Reader): Promise<View> {
   let before = await viewer.snapshot();
   for (let i = 0; i < 60; i++) {

@@ -1,7 +1,7 @@
-/** Files and folders that are dropped as a person does it: by the browser's own events. */
+/** Drops files and folders on the page like a user, by the browser's own events. */
 import type { Page } from "playwright-core";
 
-/** @param paths absolute ones */
+/** @param paths absolute paths */
 export async function drop(page: Page, ...paths: readonly string[]): Promise<void> {
   const session = await page.context().newCDPSession(page);
   const data = { items: [], files: [...paths], dragOperationsMask: 1 };

@@ -1,4 +1,4 @@
-/** A small server that speaks the inbox's interface, and cuts connections when a test says so. */
+/** A small server with the interface of the inbox, which cuts connections on request of a test. */
 import { createHash } from "node:crypto";
 import { readFile } from "node:fs/promises";
 import { createServer, type IncomingMessage, type Server, type ServerResponse } from "node:http";
@@ -12,7 +12,7 @@ const TYPES: Readonly<Record<string, string>> = {
   ".css": "text/css",
   ".svg": "image/svg+xml",
 };
-/** Of the websocket's handshake: RFC 6455. */
+/** Constant of the websocket handshake (RFC 6455). */
 const GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
 
 export type FakeItem = Record<string, unknown> & { id: string; doing: string; bytes: number };
@@ -23,16 +23,16 @@ export class FakeInbox {
   items: FakeItem[] = [];
   mayUpload = true;
   understood: unknown = {};
-  /** Files of the middle slices, by address; without one, the viewer's icon. */
+  /** Image files of the middle slices, by address; without one, the viewer's icon is sent. */
   readonly pictures = new Map<string, string>();
-  /** Places in the stream at which a connection is cut, each once. */
+  /** Byte offsets in the upload at which a connection is cut, once each. */
   readonly cuts: number[] = [];
-  /** Answers to requests other than those for bytes, as `POST items/i1/build {"keep_upload":false}`. */
+  /** Requests other than those for bytes, for example `POST items/i1/build {"keep_upload":false}`. */
   readonly requests: string[] = [];
-  /** What has arrived, by item, and the lists of files. */
+  /** Bytes that have arrived and lists of files, by item. */
   readonly arrived = new Map<string, Buffer>();
   readonly lists = new Map<string, readonly (readonly [string, number])[]>();
-  /** Time that each piece takes, ms. */
+  /** Delay of each piece, ms. */
   delay_ms = 0;
   private readonly sockets = new Set<Duplex>();
   private readonly server: Server;
@@ -70,7 +70,7 @@ export class FakeInbox {
     await new Promise<void>((resolve) => this.server.close(() => resolve()));
   }
 
-  /** Changes an item, and reports the new state. */
+  /** Changes an item, and sends the new state to all clients. */
   change(id: string, changes: Readonly<Record<string, unknown>>): void {
     this.items = this.items.map((item) => (item.id === id ? { ...item, ...changes } : item));
     this.report();
@@ -101,11 +101,11 @@ export class FakeInbox {
   private async answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
     const { pathname } = new URL(request.url ?? "/", "http://host");
     const path = pathname.slice(1);
-    const [, id = "", what = ""] = /^items\/([^/]+)\/?(.*)$/.exec(path) ?? [];
-    if (what === "bytes") return this.takeBytes(id, request, response);
+    const [, id = "", action = ""] = /^items\/([^/]+)\/?(.*)$/.exec(path) ?? [];
+    if (action === "bytes") return this.takeBytes(id, request, response);
     if (!path.startsWith("items")) return this.sendFile(path || "inbox.html", response);
-    if (what.startsWith("slices/")) {
-      const picture = this.pictures.get(what) ?? join(this.dist, "icon-192.png");
+    if (action.startsWith("slices/")) {
+      const picture = this.pictures.get(action) ?? join(this.dist, "icon-192.png");
       response.writeHead(200, { "Content-Type": "image/png" }).end(await readFile(picture));
       return;
     }
@@ -116,9 +116,9 @@ export class FakeInbox {
         .writeHead(status, { "Content-Type": "application/json" })
         .end(content === undefined ? "" : JSON.stringify(content));
     if (path === "items") send(...this.begin(JSON.parse(body)));
-    else if (what === "understood") send(200, this.understood);
-    else if (what === "look") send(200, { page: `items/${id}/view/` });
-    else if (what === "view/") response.writeHead(200, TEXT).end("<title>The view</title>");
+    else if (action === "understood") send(200, this.understood);
+    else if (action === "look") send(200, { page: `items/${id}/view/` });
+    else if (action === "view/") response.writeHead(200, TEXT).end("<title>The view</title>");
     else if (request.method === "DELETE") {
       this.items = this.items.filter((item) => item.id !== id);
       send(204);
@@ -126,18 +126,18 @@ export class FakeInbox {
     this.report();
   }
 
-  private begin(asked: { files?: [string, number][]; address?: string }): [number, unknown] {
-    const digest = JSON.stringify(asked.files ?? asked.address);
+  private begin(request: { files?: [string, number][]; address?: string }): [number, unknown] {
+    const digest = JSON.stringify(request.files ?? request.address);
     const id = `i${createHash("sha256").update(digest).digest("hex").slice(0, 8)}`;
     const known = this.items.find((item) => item.id === id);
     if (known !== undefined) return [200, { id, offset: known.bytes }];
-    const files = asked.files ?? [];
+    const files = request.files ?? [];
     const total = files.reduce((sum, [, bytes]) => sum + bytes, 0);
-    const title = ""; // a name of a file may be that of a patient
-    const doing = asked.address === undefined ? "uploading" : "understanding";
+    const title = ""; // the name of a file may be that of a patient
+    const doing = request.address === undefined ? "uploading" : "understanding";
     const item = { id, title, doing, line: "", bytes: 0, total, place: 0, share: 0, label: "" };
     const rest = { tiles: 0, all_tiles: 0, left_s: null, page: "", keep_upload: false };
-    this.items.push({ ...item, ...rest, has_upload: asked.address === undefined });
+    this.items.push({ ...item, ...rest, has_upload: request.address === undefined });
     this.lists.set(id, files);
     this.arrived.set(id, Buffer.alloc(0));
     return [201, { id, offset: 0 }];
@@ -197,7 +197,7 @@ async function readAll(request: IncomingMessage): Promise<Buffer> {
   return Buffer.concat(chunks);
 }
 
-/** A text in one frame of a websocket. */
+/** Returns a text as one frame of a websocket. */
 function frameOf(text: string): Buffer {
   const content = Buffer.from(text);
   const head = Buffer.from([0x81, 126, content.length >> 8, content.length & 255]);

@@ -12,13 +12,13 @@ declare global {
 
 type Vec3 = readonly [number, number, number];
 
-/** What the host has to serve under `/cesium/`. */
+/** Folder that the host must serve under `/cesium/`. */
 export const CESIUM = new URL("../../../node_modules/cesium/Build/Cesium/", import.meta.url)
   .pathname;
 
 /**
- * The specimen is a tenth of a millimetre long. Cesium's clipping planes begin at 0.1 m, so the
- * tileset is drawn this much larger.
+ * Factor to the size of the specimen, which is a tenth of a millimetre long. Cesium's near clipping
+ * plane is at 0.1 m.
  */
 const SCALE = 1e5;
 
@@ -27,15 +27,15 @@ const PAGE = `<!doctype html>
 <div id="view" class="stage"></div><script>window.CESIUM_BASE_URL = "/cesium/";</script>
 <script src="/cesium/Cesium.js"></script>`;
 
-/** `center`: what the camera looks at, um, world, from +z; `width_um` of the picture there. */
+/** `center`: point that the camera looks at from +z, um, world; `width_um`: width of the view there. */
 export type View = Readonly<{ center: Vec3; width_um: number }>;
-/** Tiles that came, and those that did not, in Cesium's words. */
+/** Number of loaded tiles, and Cesium's messages about failed ones. */
 export type Report = Readonly<{ loaded: number; failed: readonly string[] }>;
 
 export class Globe {
   private constructor(
     private readonly page: Page,
-    /** The errors on the page's console. */
+    /** Errors on the console of the page. */
     readonly errors: readonly string[],
   ) {}
 
@@ -55,7 +55,7 @@ export class Globe {
         globe: false,
         skyBox: false,
         skyAtmosphere: false,
-        creditContainer: document.createElement("div"), // it would lie over the picture
+        creditContainer: document.createElement("div"), // otherwise it would cover the view
       });
       widget.scene.backgroundColor = Cesium.Color.fromBytes(11, 13, 18); // as in the viewer
       window.globe = { widget };
@@ -64,9 +64,9 @@ export class Globe {
   }
 
   /**
-   * Draw a tileset in place of the one before, and wait until all that the view asks for is there.
+   * Draws a tileset in place of the one before, and waits until the view is complete.
    *
-   * @param error_px Cesium's maximumScreenSpaceError: a large one stays at coarse surfaces
+   * @param error_px Cesium's maximumScreenSpaceError; a large one keeps surfaces coarse
    */
   draw(address: string, view: View, error_px: number): Promise<Report> {
     return this.page.evaluate(
@@ -93,7 +93,8 @@ export class Globe {
             new Cesium.Cartesian3(),
           );
         const [x, y, z] = view.center;
-        const { fov } = scene.camera.frustum as CesiumModule.PerspectiveFrustum; // of the width
+        // the angle of the width
+        const { fov } = scene.camera.frustum as CesiumModule.PerspectiveFrustum;
         if (fov === undefined) throw new Error("no field of view");
         const eye = at(x, y, z + view.width_um / 2 / Math.tan(fov / 2));
         const between = (a: CesiumModule.Cartesian3, b: CesiumModule.Cartesian3) => {
@@ -124,7 +125,7 @@ export class Globe {
     );
   }
 
-  /** Colour objects by a condition on a property, in Cesium's styling language; the rest is white. */
+  /** Colours objects by a condition on a property, in Cesium's styling language. The others are white. */
   async style(property: string, condition: string, color: string): Promise<void> {
     await this.page.evaluate(
       async ([condition, color]) => {
@@ -142,7 +143,7 @@ export class Globe {
     );
   }
 
-  /** What Cesium knows of the object at a pixel, by property; null: nothing is there. */
+  /** Returns the properties of the object at a pixel; null: none. */
   pick(x: number, y: number): Promise<Readonly<Record<string, unknown>> | null> {
     return this.page.evaluate(
       ([x, y]) => {
@@ -158,7 +159,7 @@ export class Globe {
     );
   }
 
-  /** Where the picture shows a point (um, world). */
+  /** Returns the pixel of a point (um, world). */
   pixelOf(point: Vec3): Promise<{ x: number; y: number }> {
     return this.page.evaluate(([x, y, z]) => {
       const { Cesium, globe } = window;

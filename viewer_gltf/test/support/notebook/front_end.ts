@@ -1,6 +1,6 @@
 /**
- * A notebook's side of a widget, as anywidget's front end has it: a model with `get`, `set`,
- * `save_changes`, `on`, `off` and `send`, and the widget's own module beside it.
+ * The notebook's side of a widget, like anywidget's front end: a model with `get`, `set`,
+ * `save_changes`, `on`, `off` and `send`, and the module of the widget.
  */
 import { readFile } from "node:fs/promises";
 import type { Frame, Page } from "playwright-core";
@@ -11,7 +11,7 @@ const NOTEBOOK = new URL("../../../../pipeline/stereocell/notebook/", import.met
 
 type Callback = (...values: unknown[]) => void;
 type State = Record<string, unknown>;
-/** Of the page. */
+/** Members of the page's window. */
 type Given = {
   toKernel: (message: string) => void;
   hear: (message: Message) => void;
@@ -47,9 +47,9 @@ function listen(): void {
       call(`change:${name}`);
     },
     save_changes() {
-      const told = Object.fromEntries([...changed].map((name) => [name, state[name]]));
+      const values = Object.fromEntries([...changed].map((name) => [name, state[name]]));
       changed.clear();
-      send({ method: "update", state: told, buffer_paths: [] }, []);
+      send({ method: "update", state: values, buffer_paths: [] }, []);
     },
     on: (event: string, then: Callback) =>
       callbacks.set(event, (callbacks.get(event) ?? new Set()).add(then)),
@@ -66,9 +66,9 @@ function listen(): void {
     };
     const views = message.buffers.map((one) => new DataView(bytes(one).buffer));
     if (data.method === "custom") return call("msg:custom", data.content, views);
-    const told = { ...data.state };
-    for (const [i, [name]] of (data.buffer_paths ?? []).entries()) told[name] = views[i];
-    for (const [name, value] of Object.entries(told)) {
+    const values = { ...data.state };
+    for (const [i, [name]] of (data.buffer_paths ?? []).entries()) values[name] = views[i];
+    for (const [name, value] of Object.entries(values)) {
       state[name] = value;
       call(`change:${name}`);
     }
@@ -76,22 +76,22 @@ function listen(): void {
 }
 
 export type Surroundings = Readonly<{
-  /** What the notebook's program sends with its pages. */
+  /** Headers that the notebook's server sends with its pages. */
   headers?: Readonly<Record<string, string>>;
-  /** The output is a frame of another host, as in Colab and VS Code. */
+  /** Whether the output is a frame of another host, as in Colab and VS Code. */
   isForeign?: boolean;
 }>;
 
-/** A page with the widget in it. */
+/** A page that contains the widget. */
 export class FrontEnd {
   private constructor(
     private readonly hosts: readonly Host[],
     readonly page: Page,
-    /** The output. */
+    /** Frame of the output. */
     readonly cell: Frame,
   ) {}
 
-  /** All requests that reached the notebook's hosts. */
+  /** All requests that reached the hosts of the notebook. */
   get requests(): readonly string[] {
     return this.hosts.flatMap(({ requests }) => requests.map(({ path }) => path));
   }
@@ -124,8 +124,8 @@ export class FrontEnd {
     let order = Promise.resolve();
     kernel.onMessage = (message) => {
       const deliver = () =>
-        cell.evaluate((told) => (window as unknown as Given).hear(told), message);
-      order = order.then(deliver).catch(() => undefined); // the page has gone
+        cell.evaluate((values) => (window as unknown as Given).hear(values), message);
+      order = order.then(deliver).catch(() => undefined); // the page has been closed
     };
     for (const message of [await kernel.opened, ...kernel.sent]) kernel.onMessage(message);
     await order;
@@ -134,7 +134,7 @@ export class FrontEnd {
     return front;
   }
 
-  /** The output is gone. */
+  /** Removes the output. */
   async leave(): Promise<void> {
     await this.cell.evaluate(() => (window as unknown as Given).leave());
   }
@@ -147,7 +147,7 @@ export class FrontEnd {
     });
   }
 
-  /** The viewer's own frame, once its picture stands. */
+  /** Returns the frame of the viewer, once it shows the specimen. */
   async viewer(): Promise<Frame> {
     await this.cell.waitForSelector('.stereocell[data-state="live"]', { timeout: 90_000 });
     const frame = this.page.frames().find((each) => each.url() === "about:srcdoc");

@@ -1,4 +1,4 @@
-/** The widget in Python, without a notebook: tests/support/widget_host.py. */
+/** The widget in Python without a notebook (tests/support/widget_host.py). */
 import { type ChildProcess, spawn } from "node:child_process";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
@@ -6,19 +6,19 @@ import { createInterface } from "node:readline";
 const REPOSITORY = new URL("../../../../", import.meta.url).pathname;
 const PYTHON = process.env.STEREOCELL_PYTHON ?? join(REPOSITORY, ".venv/bin/python");
 
-/** As it goes over the wire; buffers in base64. */
+/** A message as it is sent; buffers are in base64. */
 export type Message = Readonly<{ type: string; data: unknown; buffers: readonly string[] }>;
 
 type Answer = Readonly<{ answer?: unknown; fault?: string }>;
 
 export class Kernel {
-  /** The widget's first message: its state. */
+  /** First message of the widget: its state. */
   readonly opened: Promise<Message>;
-  /** What changed in its state since, for a page that opens later. */
+  /** Later changes of the state, for a page that opens afterwards. */
   readonly sent: Message[] = [];
-  /** All that a page has told. */
+  /** All messages of the page. */
   readonly told: string[] = [];
-  /** How many messages have passed, both ways. */
+  /** Number of messages in both directions. */
   heard = 0;
   onMessage: (message: Message) => void = () => undefined;
   private readonly answers: ((told: Answer) => void)[] = [];
@@ -47,7 +47,7 @@ export class Kernel {
     });
   }
 
-  /** What a page tells. */
+  /** Passes a message of the page to Python. */
   tell(message: unknown): void {
     this.heard++;
     this.told.push(JSON.stringify(message));
@@ -58,12 +58,12 @@ export class Kernel {
     this.child.stdin?.write(`${JSON.stringify(message)}\n`);
   }
 
-  /** A statement in Python, with the widget as `viewer`. */
+  /** Runs a statement in Python, with the widget as `viewer`. */
   run(statement: string): void {
     this.write({ run: statement });
   }
 
-  /** An expression's value. */
+  /** Returns the value of an expression in Python. */
   ask<T>(expression: string): Promise<T> {
     return new Promise((resolve, reject) => {
       this.answers.push(({ answer, fault }) => {

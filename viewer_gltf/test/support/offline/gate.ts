@@ -1,4 +1,4 @@
-/** A way to a host that a test can shut: every connection then breaks, as without a network. */
+/** A proxy of a host that a test can shut. All connections then break, as without a network. */
 
 import type { AddressInfo } from "node:net";
 import { connect, createServer, type Server, type Socket } from "node:net";
@@ -12,7 +12,7 @@ export class Gate {
     readonly address: string,
   ) {}
 
-  /** @param host such as http://127.0.0.1:8000 */
+  /** @param host address, for example http://127.0.0.1:8000 */
   static async before(host: string): Promise<Gate> {
     const { hostname, port } = new URL(host);
     const server = createServer((inner) => {
@@ -37,7 +37,7 @@ export class Gate {
     return gate;
   }
 
-  /** Break what is under way, and whatever comes. */
+  /** Breaks present connections, and rejects new ones. */
   shut(): void {
     this.isOpen = false;
     for (const socket of this.sockets) socket.destroy();

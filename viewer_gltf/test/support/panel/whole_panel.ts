@@ -1,6 +1,6 @@
 /**
- * The panel with the sections of all parts, as the whole viewer has it. It takes no part as a whole: pages of tests have
- * it, too.
+ * The panel with the sections of all parts, as in the whole viewer. It imports only the sections
+ * and not the parts, because pages of tests use it, too.
  */
 import { measureSections } from "../../../src/annotations/section";
 import { saveSections } from "../../../src/capture/section";
@@ -12,7 +12,7 @@ import {
 } from "../../../src/channels/section";
 import { labelMapSections } from "../../../src/objects/label_maps";
 import type { Layout, PanelView, Section } from "../../../src/panel/controls";
-import { layOut as layOutOwn, type Facts as OwnFacts } from "../../../src/panel/layout";
+import { buildPanel as buildOwnPanel, type Facts as OwnFacts } from "../../../src/panel/layout";
 import { lightSections } from "../../../src/pathtrace/section";
 import { sliceSections } from "../../../src/slices/section";
 import { SLICE_SETTINGS } from "../../../src/slices/settings";
@@ -27,29 +27,29 @@ export { CHANNELS_OF_A_PAGE };
 addSettings("capture", CAPTURE_SETTINGS);
 addSettings("slices", SLICE_SETTINGS);
 
-/** What is known beside the state, by the panel and by the parts. */
+/** Inputs of the panel and of the sections of the parts that are not in the state. */
 export type Facts = OwnFacts &
   ChannelFacts &
   StereoFacts &
   Readonly<{
-    /** The tile that is looked at. */
+    /** The gazed tile. */
     focusTile: string | null;
-    /** Where the limit of tiles in the disc ends it; null or absent: it covers no more. */
+    /** Radius at which the limit of tiles ends the focus disc; null or absent: it covers fewer tiles. */
     discLimit_deg?: number | null;
-    /** Of each measured point: the channels' values there. */
+    /** For each measured point, the values of the channels. */
     values?: readonly (readonly string[])[];
-    /** The channels' values where the slices meet. */
+    /** Values of the channels where the slices meet. */
     sliceValues?: readonly string[];
     isPatient?: boolean;
     isFilming?: boolean;
-    /** The label maps whose tables have come. */
+    /** The label maps whose tables are loaded. */
     objects?: readonly Readonly<{ id: string; items: Section["items"] }>[];
   }>;
 
-export function layOut(state: ViewerState, facts: Facts, view: PanelView): Layout {
+export function buildPanel(state: ViewerState, facts: Facts, view: PanelView): Layout {
   const { values = [], sliceValues = [], isPatient = false, isFilming = false } = facts;
   const made = new Map((facts.objects ?? []).map(({ id, items }) => [id, items]));
-  return layOutOwn(state, facts, view, [
+  return buildOwnPanel(state, facts, view, [
     ...measureSections(state, values),
     ...saveSections(state, isFilming, 0),
     ...labelMapSections(state, made, facts.isStereo),

@@ -1,4 +1,4 @@
-/** Runs in the page: traces synthetic media and hands back what was gathered, as numbers. */
+/** Runs in the page: traces synthetic media and returns the gathered light, as numbers. */
 import {
   Data3DTexture,
   FloatType,
@@ -32,11 +32,11 @@ import { alikeRows } from "../../../src/voxels/transfer_table_2d";
 import { volumeTexture } from "../../../src/voxels/volume_texture";
 
 export type Run = Readonly<{
-  /** Texels along x, y, z, apron and all; one byte each, x fastest. */
+  /** Texels along x, y, z including the apron; one byte each, x fastest. */
   size: readonly [number, number, number];
   texels: readonly number[];
   spacing_um: readonly [number, number, number];
-  /** Of intensity 0..255: 256 opacities, 0..255; the channel's linear colour. */
+  /** Opacities 0..255 of the 256 intensities, and the linear colour of the channel. */
   opacities: readonly number[];
   color: readonly [number, number, number];
   settings: Partial<TraceSettings>;
@@ -45,32 +45,35 @@ export type Run = Readonly<{
   pixels: number;
   passes: number;
   brick?: number;
-  /** Standard error of the luminance at which tiles rest. */
+  /** Standard error of the luminance below which tiles are finished. */
   calm?: number;
-  /** Where the eye is aside of `camera.eye`, um, frame by frame, over and over; it may tremble so. */
+  /**
+   * Offsets of the eye from `camera.eye`, um, frame by frame, repeated. The path tracer may reuse
+   * samples then.
+   */
   asides?: readonly (readonly number[])[];
-  /** Samples of every pixel in a frame: below 1, of so many pixels. */
+  /** Samples per pixel in a frame; below 1, only a share of the pixels gets one. */
   share?: number;
-  /** The form of the same medium: as so many alike channels, by value and gradient, in bricks. */
+  /** Form of the same medium: as several equal channels, as a 2D transfer function, or in bricks. */
   channels?: 1 | 2 | 4;
   isTwoD?: boolean;
   isBricked?: boolean;
-  /** As while the picture moves. */
+  /** Whether the medium is drawn as during a motion. */
   isDraft?: boolean;
-  /** Number of equal parts of the passes that are reported one by one. */
+  /** Number of equal parts of the passes that are reported separately. */
   batches?: number;
 }>;
 
-/** Rows from below. */
+/** Rows are ordered from the bottom. */
 export type Gathered = Readonly<{
   /** r, g, b and coverage. */
   sums: number[];
-  /** Squared luminance, samples, distance and openness, summed. */
+  /** Sums of squared luminance, samples, distance and openness. */
   moments: number[];
   picture: number[];
-  /** Of each batch: what its passes added to the sums, in the mean of the picture. */
+  /** For each batch, the mean over the frame of what its passes added to the sums. */
   batches: number[][];
-  /** The tracer's own figures. */
+  /** Samples per pixel, as the tracer reports them. */
   samples: number;
 }>;
 
@@ -103,7 +106,10 @@ export function texelsOf(run: Run): MediumTexels {
   };
 }
 
-/** All of a volume's bricks of STREAM_BRICK^3 texels with their aprons, and where each is, from the last on. */
+/**
+ * Returns all bricks of STREAM_BRICK^3 texels of a volume with their aprons, in reverse order, and
+ * their index.
+ */
 function inBricks(size: Run["size"], texels: Uint8Array) {
   const cells = size.map((n) => Math.ceil(n / STREAM_BRICK));
   const [cx, cy, cz] = cells;
@@ -131,7 +137,7 @@ function inBricks(size: Run["size"], texels: Uint8Array) {
   return { texture: volumeTexture(atlas, [sides[0], sides[1], sides[2]], 1), index };
 }
 
-/** Alike channels share the opacity. */
+/** Equal channels share the opacity. */
 export function appearancesOf(run: Run) {
   const count = run.channels ?? 1;
   const table = new Uint8Array(1024).fill(255);
@@ -144,7 +150,8 @@ export function appearancesOf(run: Run) {
   return Array.from({ length: count }, () => ({ color: run.color, table, table2d }));
 }
 
-// One for all runs, and no tracer of it is disposed: what one has compiled does for the next
+// one renderer for all runs, whose tracers are not disposed, so that later runs reuse compiled
+// shaders
 let shared: WebGLRenderer | undefined;
 
 function gather(run: Run): Gathered {
@@ -223,16 +230,16 @@ function gather(run: Run): Gathered {
 export type Warp = Readonly<{
   pixels: number;
   fov_deg: number;
-  /** Where the eye was and is, um; it looks along -z. */
+  /** Places of the eye before and after, um; it looks along -z. */
   from: readonly [number, number, number];
   to: readonly [number, number, number];
-  /** Of each pixel as it was seen: distance, um (0: nothing), and r, g, b, coverage. */
+  /** For each pixel of the old view: distance, um (0: nothing), and r, g, b, coverage. */
   away_um: readonly number[];
   colors: readonly number[];
   size_um: readonly [number, number, number];
 }>;
 
-/** A picture as it is seen from elsewhere: r, g, b, coverage of each pixel. */
+/** Returns an image seen from another place: r, g, b, coverage of each pixel. */
 function warp(run: Warp): number[] {
   const { pixels: n } = run;
   const renderer = new WebGLRenderer();

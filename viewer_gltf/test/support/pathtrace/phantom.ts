@@ -1,10 +1,10 @@
-/** What the path tracer's tests look at: blobs in a block, in a white room. */
+/** The specimen of the path tracer's tests: blobs in a block, in white light from all sides. */
 import { seeded } from "../seeded";
 import type { Run } from "./harness";
 
 export const SIZE = [35, 35, 35] as const;
 
-/** Blobs of random intensity in a block; the outermost texels hold none. */
+/** Returns blobs of random intensity in a block, whose outermost texels are empty. */
 function blobs(size: readonly [number, number, number], seed: number): number[] {
   const random = seeded(seed);
   const [nx, ny, nz] = size;
@@ -25,7 +25,7 @@ function blobs(size: readonly [number, number, number], seed: number): number[] 
   return texels;
 }
 
-/** Of 256 intensities, from 0 up to `top` of 255. */
+/** Returns 256 opacities, from 0 up to `top` of 255. */
 export const opacityRamp = (top: number) =>
   Array.from({ length: 256 }, (_, i) => Math.round((top * i) / 255));
 

@@ -1,4 +1,7 @@
-/** Runs in the page: a picture as it is while the view moves, marched, and the same at rest, traced. */
+/**
+ * Runs in the page: a view during motion, which is marched, and the same view at rest, which is
+ * path-traced.
+ */
 import { Matrix4, PerspectiveCamera, Scene, Vector3, Vector4, WebGLRenderer } from "three";
 import type { TileVolume } from "../../../src/bundle/generated/volumes";
 import { Cuts } from "../../../src/gpu/clip_planes";
@@ -17,11 +20,11 @@ import { appearancesOf, type Run, texelsOf } from "./harness";
 
 export type View = Run &
   Readonly<{
-    /** What is left of the specimen, um along x. */
+    /** The part of the specimen that is kept, um along x. */
     cut?: readonly [number, number];
   }>;
 
-/** Encoded and premultiplied, rows from below. */
+/** Encoded and premultiplied pixels; rows are ordered from the bottom. */
 export type Pair = Readonly<{ moving: number[]; resting: number[] }>;
 
 let shared: WebGLRenderer | undefined;
@@ -46,7 +49,7 @@ function cameraOf({ camera: { eye, target, fov_deg } }: View): PerspectiveCamera
   return camera;
 }
 
-/** A specimen before a camera, drawn as the page draws it. */
+/** A specimen in front of a camera, drawn like on the page. */
 class Shown {
   private readonly renderer: WebGLRenderer;
   private readonly depth = new DepthPass(new Cuts());
@@ -95,7 +98,7 @@ class Shown {
     return { specimen: new Matrix4(), clip: this.clip, solids: 0, bounds };
   }
 
-  /** Take settings, and march by them. */
+  /** Applies settings, and marches with them. */
   set(changed: Partial<TraceSettings>): void {
     this.settings = { ...START_TRACE, ...changed };
     const { settings, frame, tracer } = this;
@@ -112,14 +115,14 @@ class Shown {
     this.pass.render(this.scene, this.eyes, 1);
   }
 
-  /** The picture while the view moves. */
+  /** Returns the frame during motion. */
   move(): number[] {
     const { renderer, eyes, given, settings, pass } = this;
     this.tracer.standIn(renderer, eyes, given, settings, pass.marched);
     return this.read();
   }
 
-  /** The picture after so many frames at rest, of so many samples of each pixel. */
+  /** Returns the frame after `frames` frames at rest, with `passes` samples per pixel each. */
   rest(frames: number, passes: number): number[] {
     const { renderer, eyes, given, settings, pass } = this;
     const gathering = { scale: 1, passes, mayTremble: false, isDraft: false };
@@ -150,7 +153,7 @@ function pair(run: View): Pair {
   return { moving, resting };
 }
 
-/** A picture at rest, those after a change of its settings, frame by frame, and the one at rest then. */
+/** Returns a frame at rest, the frames after a change of its settings, and the frame at rest after those. */
 function change(
   run: View,
   changed: Partial<TraceSettings>,

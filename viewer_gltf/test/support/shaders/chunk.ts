@@ -1,9 +1,9 @@
-/** Run a shader chunk as a small program: a fragment shader of few pixels that outputs numbers. */
+/** Runs a shader chunk as a small program: a fragment shader of few pixels that outputs numbers. */
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { includeChunks } from "../../../src/gpu/glsl_include";
 
-/** As three puts it before each shader of the page: what is said of no sampler has few bits otherwise. */
+/** Precisions that three.js puts before each shader. Without them, samplers may have few bits. */
 const PRECISION = ["float", "int", "sampler2D", "sampler3D", "sampler2DArray", "usampler3D"]
   .map((type) => `precision highp ${type};\n`)
   .join("");
@@ -15,7 +15,7 @@ export async function readChunks(...names: string[]): Promise<Record<string, str
   return Object.fromEntries(await Promise.all(names.map(read)));
 }
 
-/** A 2D or 3D texture of bytes or floats, nearest unless linear; `size` has two or three parts. */
+/** A 2D or 3D texture of bytes or floats, nearest unless linear; `size` has two or three components. */
 export type Texture = Readonly<{
   size: readonly number[];
   channels: 1 | 4;
@@ -25,12 +25,12 @@ export type Texture = Readonly<{
 }>;
 
 /**
- * What `oColor` is after the program, of several pixels its mean.
+ * Runs a program and returns `oColor`, averaged over the pixels.
  *
  * @param head declarations, with `#include <chunks/...>` lines
- * @param body of main()
- * @param uniforms textures, and vectors of four numbers
- * @param pixels in a row, where one would take more turns of loops than some GPUs allow it (Mesa's software: 65 535)
+ * @param body body of main()
+ * @param uniforms textures and vec4s
+ * @param pixels several share a long loop; Mesa allows 65 535 turns for one
  */
 export async function runProgram(
   page: Page,

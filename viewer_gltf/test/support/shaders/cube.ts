@@ -1,10 +1,10 @@
-/** A tile's volume for small programs: a cube of voxels that are one um apart. */
+/** A tile's volume for small programs: a cube of voxels with a spacing of one um. */
 import type { TileVolume } from "../../../src/bundle/generated/volumes";
 
-/** Of the picture, along each edge. */
+/** Pixels of the frame along each edge. */
 export const PIXELS = 64;
 
-/** A cube of `side` texels along each edge; its low corner lies `left_um` along x. */
+/** Returns a cube of `side` texels along each edge, whose lower corner is at x = `left_um`. */
 export function cube(side: number, left_um = 0): TileVolume {
   const file = { path: "x", bytes: 0, sha256: "" };
   const edge = side - 3; // lattice intervals without the apron, one um each

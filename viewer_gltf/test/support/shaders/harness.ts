@@ -1,4 +1,4 @@
-/** Runs in the page: marches a synthetic volume with COUNT_STEPS and reads the numbers back. */
+/** Runs in the page: marches a synthetic volume with COUNT_STEPS and reads the numbers. */
 import {
   ClampToEdgeWrapping,
   Data3DTexture,
@@ -32,13 +32,13 @@ import { columnsOverBorder } from "./seam";
 export type Run = Readonly<{
   /** Texels along each edge of the cube. */
   side: number;
-  /** Opacity of a voxel's length, of 255, where there is anything. */
+  /** Opacity of a voxel's length, 0..255, in bricks that are not empty. */
   opacity: number;
-  /** Which bricks hold anything: all, none, or every second one along each axis. */
+  /** Bricks that are not empty: all, none, or every second one along each axis. */
   bricks: "all" | "none" | "checkerboard";
 }>;
 
-/** Over the pixels that the volume covers. */
+/** Steps over the pixels that the volume covers. */
 export type Counts = Readonly<{ pixels: number; most: number; least: number; covered: number }>;
 
 function texture3D(texels: Uint8Array<ArrayBuffer>, side: number): Data3DTexture {
@@ -95,7 +95,7 @@ function makeMarch(
   return marchOf(volume, full, ranges, entries, true, depth);
 }
 
-/** Draw marches, one over the other, as `camera` sees them; the rows of pixels as they come. */
+/** Draws marches, one over the other, as `camera` sees them. Returns the pixels by row. */
 export function draw(
   marches: readonly TileMarch[],
   camera: PerspectiveCamera,
@@ -121,7 +121,7 @@ export function draw(
   return rgba;
 }
 
-/** Along the cube's space diagonal, its longest ray. */
+/** Returns a camera along the space diagonal of the cube, which is its longest ray. */
 export function diagonalCamera(edge: number): PerspectiveCamera {
   const camera = new PerspectiveCamera(10, 1, edge / 10, edge * 40);
   const away = 6 * edge;
@@ -156,7 +156,7 @@ function countSteps(run: Run): Counts {
   };
 }
 
-/** Steps of rays through a row of cubes, seen along the row: the most that one ray takes in all. */
+/** Returns the largest number of steps of a ray through a row of cubes, seen along the row. */
 function countThrough(run: Run, cubes: number): number {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
@@ -177,7 +177,10 @@ function countThrough(run: Run, cubes: number): number {
   return Math.max(...sum);
 }
 
-/** Blobs of random intensity in a cube, and a random function that shows some intensities. */
+/**
+ * Returns blobs of random intensity in a cube, and a random transfer function that shows some
+ * intensities.
+ */
 export function randomScene(seed: number, side: number) {
   const random = seeded(seed);
   const texels = new Uint8Array(side ** 3);
@@ -199,9 +202,12 @@ export function randomScene(seed: number, side: number) {
   return { texels, table, bricks };
 }
 
-/** The picture of a random scene with skips and without: the largest difference, and what shows. */
+/**
+ * Returns the largest difference between a random scene drawn with and without skips, and the
+ * number of visible pixels.
+ */
 function compareSkips(seed: number): Readonly<{ apart: number; drawn: number }> {
-  const side = 51; // shorter rays than steps: then samples lie at whole voxels
+  const side = 51; // rays are shorter than the steps, so samples are at whole voxels
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
   const { texels, table, bricks } = randomScene(seed, side);
@@ -218,15 +224,15 @@ function compareSkips(seed: number): Readonly<{ apart: number; drawn: number }> 
   return { apart: Math.max(...plain.map((v, i) => Math.abs(v - skipping[i]))), drawn };
 }
 
-/** Intensities of a cube from 0 to 255 along x, or 255 everywhere. */
+/** Intensities of a cube: from 0 to 255 along x, or 255 everywhere. */
 export type Filling = "ramp" | "uniform";
 
-/** Mean opacity, 0..1, seen along x through a cube. */
+/** Returns the mean opacity, 0..1, seen along x through a cube. */
 function meanOpacity(filling: Filling, side: number, opacity: number): number {
   return meanAlong("over", filling, side, opacity)[3];
 }
 
-/** Mean colour and opacity, 0..1, of a white cube that is seen along x. */
+/** Returns the mean colour and opacity, 0..1, of a white cube seen along x. */
 function meanAlong(
   compositing: Compositing,
   filling: Filling,

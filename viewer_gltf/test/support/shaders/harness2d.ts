@@ -1,4 +1,4 @@
-/** Runs in the page: marches synthetic volumes by tables of value and gradient. */
+/** Runs in the page: marches synthetic volumes with two-dimensional transfer functions. */
 import { PerspectiveCamera, WebGLRenderer } from "three";
 import type { Range } from "../../../src/bundle/transfer_2d";
 import { Cuts } from "../../../src/gpu/clip_planes";
@@ -16,10 +16,10 @@ import { diagonalCamera, draw, marchOf, randomScene } from "./harness";
 
 const SIDE = 51;
 const EDGE = SIDE - 3;
-/** The slope between 0 and 255: from here, and so long, voxels. */
+/** Place and length of the slope between 0 and 255, voxels. */
 const SLOPE = { from: 20, length: 8 };
 
-/** A table of one shape with hard edges. */
+/** Returns the table of one shape with hard edges. */
 function oneTable2d(values: Range, gradients: Range, opacity: number): TransferTable2d {
   const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), values, gradients };
   return transferTable2d(
@@ -31,9 +31,10 @@ function oneTable2d(values: Range, gradients: Range, opacity: number): TransferT
 }
 
 /**
- * Opacity, 0..1, of a slope between two uniform halves, seen along it, in PIXELS columns.
+ * Returns the opacity, 0..1, of a slope between two uniform halves, seen from the side, in PIXELS
+ * columns.
  *
- * @param opacity of a voxel's length
+ * @param opacity opacity of a voxel's length
  */
 function showSlope(values: Range, gradients: Range, opacity: number): number[] {
   const renderer = new WebGLRenderer();
@@ -64,7 +65,7 @@ function compare(one: Uint8Array, other: Uint8Array): Apart {
   return { apart: Math.max(...one.map((v, i) => Math.abs(v - other[i]))), drawn };
 }
 
-/** The picture of a one-dimensional function, and of the same as a table: by how much they differ. */
+/** Compares a one-dimensional function with the same function as a two-dimensional table. */
 function compareAlike(seed: number): Apart {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());
@@ -82,7 +83,7 @@ function compareAlike(seed: number): Apart {
   return compare(flat, table2d);
 }
 
-/** The picture of random shapes with skips and without. */
+/** Compares random shapes drawn with and without skips. */
 function compareSkips2d(seed: number): Apart {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());

@@ -1,9 +1,9 @@
-/** The running mean of pictures of one colour each. */
+/** The running mean of frames of one colour each. */
 import { WebGLRenderer } from "three";
 import { linearTarget } from "../../../src/gpu/linear_target";
 import { RunningMean } from "../../../src/gpu/running_mean";
 
-/** Red of the mean of pictures of these reds, after each of them. */
+/** Returns the red of the running mean after each frame of these reds. */
 export function meansOf(reds: readonly number[]): number[] {
   const renderer = new WebGLRenderer();
   const mean = new RunningMean(renderer);

@@ -1,4 +1,4 @@
-/** Two surfaces in one place, but for coordinates that were quantized apart: which of them shows. */
+/** Two surfaces in one place, with coordinates that were quantized separately: which of them is visible. */
 import {
   DepthTexture,
   DirectionalLight,
@@ -25,7 +25,7 @@ import { seeded } from "../seeded";
 const PIXELS = 64;
 const APART_M = 4e-5; // half a step of 14 bits of 1.2 m
 
-/** What surfaces share, where nothing is a volume. */
+/** Returns the shared uniforms of surfaces without any volume. */
 function makeFrame(target: WebGLRenderTarget, cuts: Cuts) {
   const disc = {
     uDisc: { value: new Vector2(3, 2) },
@@ -47,7 +47,7 @@ function makeCamera(position: Vec3): PerspectiveCamera {
   return camera;
 }
 
-/** Row by row, the pixels of a scene. */
+/** Returns the pixels of a scene, row by row. */
 function draw(
   renderer: WebGLRenderer,
   target: WebGLRenderTarget,
@@ -62,9 +62,10 @@ function draw(
 }
 
 /**
- * Pixels of the first channel, which is red, and of the second, blue, of a picture that both fill, from each eye.
+ * Counts pixels of the first channel, which is red, and of the second, blue, in a view that both
+ * fill, from each eye.
  *
- * @param eyes m
+ * @param eyes places of the eyes, m
  */
 function shownOfTwo(
   opacity: number,
@@ -96,10 +97,10 @@ function shownOfTwo(
 }
 
 /**
- * Least and most light, of 255, on the inside of a half of a sphere that ends at z = 0, open towards the eye, at the
- * face of a tile before it.
+ * Returns the least and most light, 0..255, on the inside of a half sphere that ends at z = 0. It
+ * opens towards the eye, at the face of a tile in front of it.
  *
- * @param isVolume whether the tile is drawn as a volume, which shows nothing there
+ * @param isVolume whether the tile is drawn as a volume, which is empty there
  */
 function insideOfHalf(isVolume: boolean): readonly [number, number] {
   const renderer = new WebGLRenderer({ antialias: false });

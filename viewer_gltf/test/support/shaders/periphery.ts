@@ -1,4 +1,4 @@
-/** A picture for two eyes whose lens's middle is known: what is marched of it, and what is filled. */
+/** A frame for two eyes with known lens centres: which pixels are marched, and which are filled. */
 import { DepthTexture, PerspectiveCamera, Scene, Vector4, WebGLRenderer } from "three";
 import { Eyes } from "../../../src/gpu/eyes";
 import { CHUNKS } from "../../../src/gpu/glsl_chunks";
@@ -7,15 +7,15 @@ import { ScreenPass } from "../../../src/gpu/screen_pass";
 import { MarchPass } from "../../../src/render/raymarch_pass";
 import { makeFrame } from "../../../src/voxels/march_frame";
 
-/** Of one eye's part. */
+/** Pixels along each edge of one eye's part. */
 const SIDE = 90;
-/** Tangents of each eye's sides: left, right, bottom, top. */
+/** Tangents of the sides of each eye's view: left, right, bottom, top. */
 const SIDES = [
   [-1.2, 0.6, -1, 0.8],
   [-0.6, 1.2, -1, 0.8],
 ] as const;
 
-/** A slope from left to right, where the march draws. */
+/** A slope from left to right, in the pixels that are marched. */
 const SLOPE = includeChunks(
   `precision highp float;
 uniform vec4 uPart;
@@ -30,13 +30,13 @@ void main() {
   CHUNKS,
 );
 
-/** Of a pixel: its eye; the angle from the eye's axis, degrees; whether it was marched; how far off it is. */
+/** A pixel: its eye, the angle from the eye's axis in degrees, whether it was marched, and its error. */
 export type SparsePixel = Readonly<{
   eye: number;
   angle: number;
   isMarched: boolean;
   steps: number;
-  /** From the slope, in pixels' steps of it: as it is shown. */
+  /** Difference from the slope, in steps per pixel. */
   off: number;
 }>;
 

@@ -1,4 +1,7 @@
-/** Two tiles side by side, with two channels that overlap: every ray meets the same, wherever it crosses the border. */
+/**
+ * Two tiles side by side with two overlapping channels. Every ray must give the same colour,
+ * wherever it crosses the border.
+ */
 import {
   Data3DTexture,
   LinearFilter,
@@ -21,7 +24,7 @@ import { cube, PIXELS } from "./cube";
 const SIDE = 51;
 const EDGE = SIDE - 3;
 const AWAY = 2000;
-/** Where along z the channels are, voxels. */
+/** Extents of the channels along z, voxels. */
 const SLABS = [
   [8, 32],
   [16, 40],
@@ -47,7 +50,7 @@ function slabs(): Data3DTexture {
   return texture;
 }
 
-/** Mean colour of each column, 0..255, of a picture that the border crosses at every depth. */
+/** Returns the mean colour of each column, 0..255, of a view that the border crosses at every depth. */
 export function columnsOverBorder(): number[][] {
   const renderer = new WebGLRenderer();
   const depth = new DepthPass(new Cuts());

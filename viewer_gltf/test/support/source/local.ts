@@ -1,9 +1,9 @@
-/** Sources of a folder on disk, as a person drops them on the page. */
+/** Sources of a folder on disk, as a user drops them on the page. */
 import { readFile, stat } from "node:fs/promises";
 import { basename, join } from "node:path";
 import type { LocalSource } from "../../../src/source/open_source";
 
-/** The file or folder at a path. */
+/** Returns the file or folder at a path. */
 export async function localSource(path: string): Promise<LocalSource> {
   const name = basename(path);
   if (!(await stat(path)).isDirectory()) {

@@ -1,4 +1,4 @@
-/** Runs in the page: a room with known points in it, seen through a SplitSession. */
+/** Runs in the page: a scene with known points, seen through a SplitSession. */
 import {
   BackSide,
   BoxGeometry,
@@ -19,10 +19,10 @@ import { SplitSession } from "../../../src/xr/cardboard/split_session";
 import { askInTap } from "../../../src/xr/cardboard/user_gesture";
 import { BUILT_IN, parseProfile } from "../../../src/xr/cardboard/viewer_profile";
 
-/** Of an iPhone with pixel ratio 3; the page's own would be the desktop's. */
+/** Pixels per inch of an iPhone with pixel ratio 3; the page would use those of the desktop. */
 export const PIXELS_PER_INCH = 153.3;
 
-/** Where the marks of the room are in a picture, in pixels from its lower left corner. */
+/** Place of the mark in an image, in pixels from its lower left corner. */
 export type Spot = Readonly<{ x: number; y: number; pixels: number }>;
 
 type At = readonly [x_m: number, y_m: number, z_m: number];
@@ -60,7 +60,7 @@ class Stand {
     );
   }
 
-  /** @param viewer name of a built-in one, or a code */
+  /** @param viewer name of a built-in profile, or a code */
   async start(viewer: string): Promise<string> {
     const profile = viewer === "v1" || viewer === "v2" ? BUILT_IN[viewer] : parseProfile(viewer);
     try {
@@ -82,7 +82,7 @@ class Stand {
     return { isRunning, problems, log: this.log, geometries, textures };
   }
 
-  /** The mark in each eye's undistorted picture: left, then right, from its viewport's corner. */
+  /** Returns the mark in each eye's undistorted image: left, then right, from the corner of its viewport. */
   lookAt(at: At, radius_m: number): Spot[] {
     this.draw(at, radius_m, false);
     return this.split.eyes.map(({ viewport: { x, y, z, w } }) => {
@@ -92,7 +92,10 @@ class Stand {
     });
   }
 
-  /** The mark on the canvas, in its left and its right half; x from the canvas's left edge. */
+  /**
+   * Returns the mark on the canvas, in its left and its right half; x is from the left edge of the
+   * canvas.
+   */
   lookThroughLens(at: At, radius_m: number): Spot[] {
     this.draw(at, radius_m, false);
     this.split.present();
@@ -106,7 +109,7 @@ class Stand {
     });
   }
 
-  /** Colours of the canvas, with the mark out of sight. */
+  /** Returns colours of the canvas, with the mark outside the view. */
   colorsAt(points: readonly (readonly [number, number])[], hasRoom: boolean): number[][] {
     this.draw([0, 0, 5], 0.01, hasRoom);
     this.split.present();
@@ -132,11 +135,11 @@ class Stand {
   }
 }
 
-/** The green pixels' centre. */
+/** Returns the centre of the green pixels. */
 function findMark(rgba: Uint8Array, width: number): Spot {
   let [x, y, pixels] = [0, 0, 0];
   for (let i = 0; i < rgba.length / 4; i++) {
-    // An edge's pixel counts by its share, since the picture is anti-aliased.
+    // pixels at an edge count by their share, because the frame is anti-aliased
     const share = Math.max(0, (rgba[4 * i + 1] - 0x34) / (255 - 0x34));
     if (share < 0.3 || rgba[4 * i] > 0x20) continue;
     x += share * ((i % width) + 0.5);

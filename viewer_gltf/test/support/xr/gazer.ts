@@ -1,20 +1,23 @@
-/** A head in a Cardboard viewer, on the whole page: it looks at controls of the panel, and trembles. */
+/** A head in a Cardboard viewer, in the page: it looks at controls of the panel, and trembles. */
 import type { Page } from "playwright-core";
 import { tick } from "../browser/clock";
 import type { ViewerPage } from "../browser/page";
 import { tremble } from "./tremble";
 
-/** Time of a frame, ms: the longest that counts in full. */
+/** Milliseconds of a frame, the longest that counts in full. */
 const FRAME_MS = 100;
-/** The eyes move with the neck, so that looking at a place takes a few corrections. */
+/** Number of corrections until the gaze is at a place, because the eyes move with the neck. */
 const CORRECTIONS = 4;
-/** Age of a report, ms, from which nothing is predicted: the head's turn is then the same in every run. */
+/**
+ * Age of a report, ms, beyond which nothing is predicted, so that the head's rotation is the same
+ * in every run.
+ */
 const OLD_MS = 1000;
 
-/** Time after which where the head rests is ahead, ms of the phone's own clock. */
+/** Milliseconds of the phone's clock after which the direction of a resting head is straight ahead. */
 const SETTLED_MS = 600;
 
-/** The page's clock must be held: see `addClock`. */
+/** The clock of the page must be held (see `addClock`). */
 export class Gazer {
   private yaw_deg = 0;
   private pitch_deg = 0;
@@ -27,7 +30,7 @@ export class Gazer {
     return this.viewer.page;
   }
 
-  /** Look at the middle of a control of the panel, or at its button (`opener`). */
+  /** Looks at the middle of a control of the panel, or at its button (`opener`). */
   async lookAt(id: string): Promise<void> {
     for (let i = 0; i < CORRECTIONS; i++) {
       const { menu } = await this.viewer.snapshot();
@@ -37,7 +40,10 @@ export class Gazer {
     }
   }
 
-  /** To the right of where the head first looked, and up. There it rests, so that this is ahead. */
+  /**
+   * Turns to the right of the first direction, and up. The head rests at first, which defines
+   * straight ahead.
+   */
   async turnTo(yaw_deg: number, pitch_deg: number): Promise<void> {
     const isFirst = !this.hasLooked;
     this.hasLooked = true;
@@ -49,7 +55,7 @@ export class Gazer {
     await tick(this.page, 10);
   }
 
-  /** Keep looking at the same place, with the tremble of a head. */
+  /** Keeps looking at the same place, with the tremble of a head. */
   async rest(seconds: number): Promise<void> {
     for (let k = 0; k < Math.round((1000 * seconds) / FRAME_MS); k++) {
       await this.report(...(this.offsets.next().value as readonly [number, number]));

@@ -32,7 +32,7 @@ import { Hands } from "../../../src/xr/interaction";
 import { XrSession } from "../../../src/xr/session";
 import { STEREO_FACTS } from "../fixture/facts";
 import { sampleManifest } from "../fixture/manifest";
-import { type Facts, layOut } from "../panel/whole_panel";
+import { buildPanel, type Facts } from "../panel/whole_panel";
 
 type At = readonly [number, number, number];
 type Side = "left" | "right";
@@ -45,7 +45,7 @@ const FACTS: Facts = {
   frame_ms: null,
   triangles: 123_456,
 };
-/** Before the specimen's upper edge. */
+/** Place of the handle, in front of the upper edge of the specimen. */
 export const HANDLE_m: At = [0, 0.45, -1.2];
 const HANDLE_RADIUS_m = 0.04;
 const HEAD_m: At = [0, 1.6, 0];
@@ -58,7 +58,7 @@ class Stand {
   readonly chosen: { ray: Ray; tile: string }[] = [];
   state = initialState(sampleManifest(6));
   leaves = 0;
-  /** Where the handle was dragged to. */
+  /** Directions to which the handle was dragged. */
   readonly drags: At[] = [];
   private readonly handle: Target = {
     isOnTop: true,
@@ -72,7 +72,7 @@ class Stand {
     choose: () => undefined,
     drag: (_key, { direction }) => this.drags.push(direction.toArray()),
   };
-  /** Distance between the hands, as WebXR itself gives it. */
+  /** Distance between the hands according to WebXR. */
   apart_m = Number.NaN;
   changes = 0;
   private readonly renderer = new WebGLRenderer({ antialias: true });
@@ -80,7 +80,7 @@ class Stand {
   private readonly specimen = new Specimen(sampleManifest(6).specimen.bounds_um);
   private readonly hands: Hands;
   private readonly xr: XrSession;
-  /** Time passes only as it is asked to. */
+  /** Times of the requested frames; time advances only by these. */
   private readonly times: number[] = [];
   private waiting: (() => void) | null = null;
   private settling = 0;
@@ -107,7 +107,7 @@ class Stand {
       specimen: this.specimen,
       tiles: sampleManifest(6).tiles,
       handles: () => [this.handle],
-      layOut: (view) => layOut(this.state, FACTS, view),
+      buildPanel: (view) => buildPanel(this.state, FACTS, view),
       onAction: (action) => this.dispatch(action),
       onCommand: (command) => {
         this.commands.push(command);
@@ -140,7 +140,7 @@ class Stand {
     return this.xr.end();
   }
 
-  /** One frame for each time, then one more without, so that what was pressed has arrived. */
+  /** Draws a frame for each time, and one more without a step, so that presses have arrived. */
   step(times_s: readonly number[]): Promise<void> {
     this.times.push(...times_s, 0);
     return new Promise((resolve) => {
@@ -148,7 +148,7 @@ class Stand {
     });
   }
 
-  /** Look from the head at a point of the room. */
+  /** Looks from the head at a point of the scene. */
   lookAt(at: At): Promise<void> {
     const { quaternion } = this.device;
     const q = facing(new Vector3(...at));
@@ -157,8 +157,8 @@ class Stand {
   }
 
   /**
-   * Look at a control of the panel, or away from all (null), for some seconds, in frames of a tenth that are not
-   * drawn: the gaze alone, of a head that has no session.
+   * Looks at a control of the panel, or away from everything (null), for some seconds. The frames
+   * of 0.1 s are not drawn: only the gaze of a head without a session is tested.
    */
   gazeFor(id: string | null, seconds: number): void {
     const at = id === null ? new Vector3(0, 5, -1) : new Vector3(...this.controlAt(id));
@@ -168,7 +168,7 @@ class Stand {
     }
   }
 
-  /** Put a controller at a point of the room, pointing at another. */
+  /** Puts a controller at a point of the scene, pointing at another point. */
   point(side: Side, from: At, at: At): Promise<void> {
     const controller = this.device.controllers[side];
     if (controller === undefined) throw new Error("no controller");
@@ -179,7 +179,7 @@ class Stand {
     return this.step([0]);
   }
 
-  /** The right controller becomes one with a trigger alone. */
+  /** Turns the right controller into one with only a trigger. */
   useRemote(): void {
     const profiles = this.device.controllers.right?.inputSource.profiles;
     profiles?.splice(0, profiles.length, "oculus-go", "generic-trigger-touchpad");
@@ -197,7 +197,7 @@ class Stand {
     return this.step([0, 0]);
   }
 
-  /** Degrees from the upper to the lower edge of what an eye sees. */
+  /** Vertical field of view of an eye, degrees. */
   set fieldOfView_deg(degrees: number) {
     this.device.fovy = (degrees * Math.PI) / 180;
   }
@@ -206,7 +206,7 @@ class Stand {
     this.device.controllers[side]?.updateAxes("thumbstick", x, y);
   }
 
-  /** The middle of a tile's front face in the room. */
+  /** Returns the middle of a tile's front face in the scene. */
   tileAt(id: string): At {
     const tile = sampleManifest(6).tiles.find((each) => each.id === id);
     if (tile === undefined) throw new Error(`no tile ${id}`);
@@ -215,7 +215,7 @@ class Stand {
     return front.applyMatrix4(this.specimen.group.matrixWorld).toArray();
   }
 
-  /** A control of the panel in the room. */
+  /** Returns the place of a control of the panel in the scene. */
   controlAt(id: string, across?: number, down?: number): At {
     const point = this.hands.panel.pointOf(id, across, down);
     if (point === null) {
@@ -229,7 +229,7 @@ class Stand {
     return this.step([0]);
   }
 
-  /** How far the notice's middle is from straight ahead, degrees: to the right, and up. */
+  /** Returns the direction of the notice's middle relative to straight ahead, degrees to the right and up. */
   noticeAt(): readonly [number, number] {
     const { mesh } = this.hands.notice;
     const head = betweenEyes(this.renderer.xr.getCamera().cameras).invert();
@@ -238,7 +238,10 @@ class Stand {
     return [degrees(Math.atan2(at.x, -at.z)), degrees(Math.atan2(at.y, Math.hypot(at.x, at.z)))];
   }
 
-  /** Where the panel's middle is: to the right of the head's heading, and above its level, degrees. */
+  /**
+   * Returns the direction of the panel's middle: right of the head's heading, and above its level,
+   * degrees.
+   */
   panelAt(): readonly [number, number] {
     const head = betweenEyes(this.renderer.xr.getCamera().cameras);
     const eye = new Vector3().setFromMatrixPosition(head);
@@ -304,7 +307,7 @@ class Stand {
     this.apart_m = this.measureHands();
     if (this.times.length > 0 || this.waiting === null) return;
     this.settling++;
-    if (this.settling < 2) return; // a button is seen by the frame after the one it was set in
+    if (this.settling < 2) return; // a press is detected in the frame after it was set
     this.settling = 0;
     const resolve = this.waiting;
     this.waiting = null;
@@ -313,8 +316,8 @@ class Stand {
 }
 
 /**
- * Pixels that a material which cuts everything leaves of two planes side by side, the left one
- * being no part of the specimen. In both orders of drawing.
+ * Returns the pixels that remain of two planes side by side with a material that cuts everything.
+ * The left plane is not part of the specimen. Both orders of drawing are tested.
  */
 function leftOfTheUncut(): readonly (readonly [number, number])[] {
   const renderer = new WebGLRenderer();
@@ -325,7 +328,7 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
   const both = new BothEyes();
   const { uCuts, uCutCount } = cuts;
   const material = depthMaterial({ uCuts, uCutCount, ...both.uniforms }, both);
-  material.colorWrite = true; // it writes zeros
+  material.colorWrite = true; // the material writes zeros
   const scene = new Scene();
   scene.overrideMaterial = material;
   const planes = [-0.5, 0.5].map((x) => {
@@ -354,7 +357,7 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
   return counts;
 }
 
-/** Turned to look along a direction, the head upright. */
+/** Returns the rotation of an upright head that looks along a direction. */
 function facing(direction: Vector3): Quaternion {
   const turn = new Matrix4().lookAt(new Vector3(), direction, new Vector3(0, 1, 0));
   return new Quaternion().setFromRotationMatrix(turn);

@@ -1,4 +1,7 @@
-/** A person in stereo who looks, rests and presses, without a browser: the hands as they are, nothing painted. */
+/**
+ * A user in stereo who looks, rests and presses, without a browser: with the real hands, but
+ * without drawing.
+ */
 import { Euler, Matrix4, Quaternion, Scene, Vector3 } from "three";
 import { HandleTarget } from "../../../src/annotations/handle_target";
 import {
@@ -21,18 +24,21 @@ import type { ViewerState } from "../../../src/state/viewer_state";
 import { Hands } from "../../../src/xr/interaction";
 import { STEREO_FACTS } from "../fixture/facts";
 import { SPECIMEN_BOX, sampleManifest } from "../fixture/manifest";
-import { type Facts, layOut } from "../panel/whole_panel";
+import { buildPanel, type Facts } from "../panel/whole_panel";
 import { tremble } from "./tremble";
 
-/** Longest time that a frame counts, s. */
+/** Longest time step of a frame, s. */
 const FRAME_S = 0.1;
-/** Time that a head takes to turn, ms. */
+/** Milliseconds in which a head turns. */
 const TURN_MS = 500;
 const EYE = new Vector3();
 const RAD = Math.PI / 180;
 const SPECIMEN: Box = { min: [...SPECIMEN_BOX.min], max: [...SPECIMEN_BOX.max] };
 
-/** Stereo is offered in both ways, and a step can be undone and redone, so that every control can be operated. */
+/**
+ * The two kinds of stereo are available, and a step can be undone and redone, so that every control
+ * can be operated.
+ */
 const FACTS: Facts = {
   ...STEREO_FACTS,
   split: { isAvailable: true, reason: "" },
@@ -40,7 +46,7 @@ const FACTS: Facts = {
   redo: "Colour",
 };
 
-/** A WebXR session of a Cardboard: its one button selects what the head looks at. */
+/** A WebXR session of a Cardboard, whose one button selects what the head looks at. */
 class ButtonSession extends EventTarget {
   readonly inputSources = [{ targetRayMode: "gaze", profiles: ["generic-button"] }];
 
@@ -56,16 +62,19 @@ class ButtonSession extends EventTarget {
 
 export class LookingPerson {
   state: ViewerState;
-  /** Everything that was asked for outside of the panel. */
+  /** All requests that left the panel. */
   readonly wishes: unknown[] = [];
-  /** How often anything has changed, the panel's own pages too; what follows in the next frame is the same change. */
+  /**
+   * Number of changes, including the pages of the panel. A change in the following frame counts as
+   * the same one.
+   */
   changes = 0;
-  /** The object that every ray meets; null: none. */
+  /** Returns the object that every ray hits; null: none. */
   objectAlong: () => Readonly<{ id: string; distance: number }> | null = () => null;
   readonly hands: Hands;
-  /** The handles of the cut and of the lamps. */
+  /** Handles of the cut and of the lamps. */
   readonly handles = new HandleTarget(TOLERANCE_RAD.gaze, (id, ray) => this.drag(id, ray));
-  /** Rays by which a point was measured, um. */
+  /** Rays by which points were measured, um. */
   readonly measured: Ray[] = [];
   /** Time on the clock of the frames, in milliseconds. */
   now_ms = 1000;
@@ -97,7 +106,7 @@ export class LookingPerson {
       objectAlong: () => this.objectAlong(),
       isPainted: false,
       now_ms: () => this.now_ms,
-      layOut: (view) => layOut(this.state, FACTS, view),
+      buildPanel: (view) => buildPanel(this.state, FACTS, view),
       onAction: (action) => {
         this.wishes.push(action);
         this.state = reduce(this.state, action);
@@ -125,15 +134,15 @@ export class LookingPerson {
     return this.hands.panel.regions;
   }
 
-  /** The names of all controls of the panel that are on or off. */
+  /** Ids of all switches of the panel. */
   get switches(): readonly string[] {
-    return layOut(this.state, FACTS, { ...START_VIEW, ...this.view })
+    return buildPanel(this.state, FACTS, { ...START_VIEW, ...this.view })
       .sections.flatMap(({ items }) => items)
       .flatMap((item) => (item.kind === "group" ? [...item.controls, ...item.more] : [item]))
       .flatMap(({ kind, id }) => (kind === "toggle" ? [id] : []));
   }
 
-  /** The sections of the menu. */
+  /** Sections of the menu. */
   get tabs(): readonly string[] {
     while (this.has("up")) this.pressOn("up");
     const found = new Set<string>();
@@ -150,7 +159,7 @@ export class LookingPerson {
     return found;
   }
 
-  /** Look at a control of the panel, or at its button, `opener`. `across` and `down` are shares of it. */
+  /** Looks at a control of the panel, or at its button, `opener`. `across` and `down` are shares of it. */
   lookAt(id: string, across?: number, down?: number): void {
     const at = this.hands.panel.pointOf(id, across, down);
     if (at === null) throw new Error(`no ${id} in ${this.regions.map((each) => each.id)}`);
@@ -167,7 +176,7 @@ export class LookingPerson {
     this.turnBy(20);
   }
 
-  /** Look at the middle of a tile's front. */
+  /** Looks at the middle of a tile's front face. */
   lookAtTile(name: string): void {
     const tile = this.tiles.find(({ id }) => `tile:${id}` === name);
     if (tile === undefined) throw new Error(`no ${name}`);
@@ -176,21 +185,21 @@ export class LookingPerson {
     this.faceTo(front.applyMatrix4(this.specimen.group.matrixWorld));
   }
 
-  /** Look at the middle of a handle. */
+  /** Looks at the middle of a handle. */
   lookAtHandle(id: HandleId): void {
     const handle = this.handles.handles.find((each) => each.id === id);
     if (handle === undefined) throw new Error(`no ${id}`);
     this.faceTo(new Vector3(...handle.position).applyMatrix4(this.specimen.group.matrixWorld));
   }
 
-  /** Look where it looked before it looked up. */
+  /** Looks in the direction before `lookUp`. */
   lookBack(): void {
     this.facing.copy(this.earlier);
     this.now_ms += TURN_MS;
     this.frame(0);
   }
 
-  /** Where the specimen is and how it is turned. */
+  /** Place and rotation of the specimen. */
   get place(): string {
     const { position, orientation, scale } = this.specimen.pose;
     return JSON.stringify([position.toArray(), orientation.toArray(), scale]);
@@ -201,7 +210,7 @@ export class LookingPerson {
     return this.hands.isCarrying;
   }
 
-  /** Turn from where it looks to the right, degrees. */
+  /** Turns to the right of the present direction, degrees. */
   turnBy(yaw_deg: number): void {
     const { x, y } = new Euler().setFromQuaternion(this.facing, "YXZ");
     this.turnTo(y / RAD - yaw_deg, x / RAD);
@@ -226,19 +235,19 @@ export class LookingPerson {
     this.frame(0);
   }
 
-  /** Look on at the same place, trembling as heads do. */
+  /** Keeps looking at the same place, with the tremble of a head. */
   rest(seconds: number): void {
     for (let k = 0; k < Math.round(seconds / FRAME_S); k++) this.frame(FRAME_S);
   }
 
-  /** Go on in a session of WebXR, whose events tell of the button. */
+  /** Continues in a WebXR session, whose events report the button. */
   enterSession(): void {
     this.session = new ButtonSession();
     this.hands.start(this.session as unknown as XRSession);
     this.frame(0);
   }
 
-  /** Press the Cardboard's button, so many ms after what was done before. */
+  /** Presses the Cardboard's button after a time. */
   press(after_ms = 0): void {
     this.now_ms += after_ms;
     if (this.session === null) this.hands.tap();
@@ -246,7 +255,7 @@ export class LookingPerson {
     this.frame(0);
   }
 
-  /** Open the panel's page of a tab, or of a group of it (`channels/c2`), and go on by so many pages. */
+  /** Opens a section of the panel, or a group of it (`channels/c2`), and one of its pages. */
   open(where: string, page = 0, view: Partial<PanelView> = {}): void {
     const [tab, group] = where.split("/");
     this.view = view;
@@ -264,19 +273,19 @@ export class LookingPerson {
     this.changes = 0;
   }
 
-  /** Whether there is such a target of the menu or of the bar. */
+  /** Returns whether the menu or the bar has a target. */
   has(id: string): boolean {
     return this.hands.panel.places.some((each) => each.id === id);
   }
 
-  /** The first target of the menu or of the bar whose name begins so. */
+  /** Returns the first target of the menu or the bar whose name has a beginning. */
   find(start: string): string {
     const found = this.hands.panel.places.find(({ id }) => id.startsWith(start));
     if (found === undefined) throw new Error(`no ${start}`);
     return found.id;
   }
 
-  /** Whether the specimen is elsewhere, or turned otherwise, than at the start. */
+  /** Whether the specimen has been moved or rotated. */
   get hasMoved(): boolean {
     const [{ position, orientation }, then] = [this.specimen.pose, this.pose];
     return !position.equals(then.position) || !orientation.equals(then.orientation);
@@ -320,7 +329,7 @@ export class LookingPerson {
   }
 }
 
-/** The tabs of the panel, and how many pages each has. */
+/** Returns the sections of the panel, with the targets of each page. */
 export function pagesOf(
   view: Partial<PanelView>,
   change?: (state: ViewerState) => ViewerState,
@@ -347,5 +356,5 @@ export function pagesOf(
   return pages;
 }
 
-/** The bar's buttons are the same on every page. */
+/** The buttons of the bar are the same on every page. */
 const isOfThePage = (id: string) => !["leave", "close", "up"].includes(id);

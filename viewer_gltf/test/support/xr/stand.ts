@@ -1,4 +1,4 @@
-/** Opens the harness of the hands in Chromium, and drives it. */
+/** Opens the harness of the hands in Chromium, and operates it. */
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach } from "vitest";
 import { bundled } from "../browser/bundled";
@@ -13,7 +13,7 @@ const PAGE = `<!doctype html><style>
 </style><body><div id="stage"></div>`;
 
 const MOST_PAGES = 12;
-/** Time, ms, after which a press is no second one of a double press, which does nothing. */
+/** Milliseconds after which a press is not the second one of a double press, which is ignored. */
 const PRESS_APART_MS = 450;
 
 export type At = readonly [number, number, number];
@@ -39,7 +39,7 @@ export class HandsStand {
     this.page.evaluate(([i, a, d]) => window.hands.controlAt(i, a, d), [id, across, down] as const);
   tap = () => this.page.evaluate(() => window.hands.tap());
 
-  /** Seconds pass, in frames of a tenth at most, as a real frame counts. */
+  /** Lets seconds pass, in frames of 0.05 s. */
   async wait(seconds: number): Promise<void> {
     const frames = Math.floor(seconds * 20 + 1e-9);
     await this.step(Array.from({ length: frames }, () => 0.05));
@@ -50,7 +50,7 @@ export class HandsStand {
     await this.button(side, "trigger", 0);
   }
 
-  /** Without controllers, as in a Cardboard. */
+  /** Disconnects both controllers, as in a Cardboard. */
   async gazeOnly(): Promise<void> {
     await this.connect("left", false);
     await this.connect("right", false);
@@ -60,13 +60,13 @@ export class HandsStand {
     await this.tapOn("opener");
   }
 
-  /** Look at a control of the panel or of the bar, and press the button. */
+  /** Looks at a control of the panel or the bar, and presses the button. */
   async tapOn(id: string): Promise<void> {
     await this.lookAt(await this.controlAt(id));
     await this.tap();
   }
 
-  /** Go from any page of the open panel to a section, by the bar and the list of sections. */
+  /** Goes from any page of the open panel to a section, by the bar and the list of sections. */
   async openSection(section: string): Promise<void> {
     const regions = async () => (await this.status()).regions;
     while ((await regions()).includes("up")) {
@@ -77,7 +77,7 @@ export class HandsStand {
     await this.tapOn(`tab=${section}`);
   }
 
-  /** Go on to the page of the list or section that has a control. */
+  /** Turns to the page of the list or section that has a control. */
   async reach(id: string): Promise<void> {
     for (let page = 0; page < MOST_PAGES; page++) {
       if ((await this.status()).regions.includes(id)) return;
@@ -86,7 +86,7 @@ export class HandsStand {
     throw new Error(`no page has ${id}`);
   }
 
-  /** Go from the list of channels to the page of one of them, by its swatch. */
+  /** Goes from the list of channels to the page of one of them, by its swatch. */
   async openChannel(channel: string): Promise<void> {
     await this.tapOn(`${channel}/open`);
     await this.tapOn(`${channel}/more`);

@@ -1,4 +1,4 @@
-/** What leads on from a refusal: the button beside its sentence. Pure. */
+/** Buttons beside refusals, each with the actions that solve the problem. Pure. */
 import type { Box } from "../math/box";
 import { setTo } from "../state/parameters/kinds";
 import { TRACED_ALONE } from "../state/parameters/light";
@@ -10,11 +10,11 @@ import type { ViewerState } from "../state/viewer_state";
 import type { Offer } from "./controls";
 import { middlePlane } from "./layout";
 
-export type WayOn = Readonly<{
+export type RemedyContext = Readonly<{
   state: ViewerState;
-  /** The specimen, or the tile that is shown alone, um. */
+  /** Bounds of the specimen or the isolated tile, um. */
   shown: Box;
-  /** Rows of the objects that show, by channel. */
+  /** Rows of the shown objects, by channel. */
   objects: ReadonlyMap<string, readonly number[]>;
 }>;
 
@@ -22,10 +22,10 @@ const mode = (label: string, value: Mode) => (): Offer => ({ label, to: [setTo(M
 const EVERYWHERE = mode("Show volumes everywhere", "all");
 const measure = (): Offer => ({ label: "Measure", to: [setTo(TOOL, "measure")] });
 
-/** Buttons by the refusal that they lead on from. */
-export type WaysOn = Readonly<Record<string, (now: WayOn) => Offer>>;
+/** Buttons by the refusal that they solve. */
+export type Remedies = Readonly<Record<string, (now: RemedyContext) => Offer>>;
 
-const WAYS: WaysOn = {
+const REMEDIES: Remedies = {
   [REFUSED.tile]: ({ state: { middle, tiles } }) => ({
     label: `Only ${tileName(middle, tiles)}`,
     to: [{ type: "isolate", tile: middle }],
@@ -35,7 +35,7 @@ const WAYS: WaysOn = {
   [REFUSED.marched]: EVERYWHERE,
   [REFUSED.shaded]: EVERYWHERE,
   [REFUSED.opacity]: () => ({ label: "Choose Opacity", to: [setTo(COMPOSITING, "over")] }),
-  [TRACED_ALONE]: mode("Show natural light", "traced"),
+  [TRACED_ALONE]: mode("Show volumes in natural light", "traced"),
   [REFUSED.measuring]: measure,
   [REFUSED.measured]: measure,
   [REFUSED.cut]: ({ state: { clip }, shown }) => ({
@@ -43,14 +43,18 @@ const WAYS: WaysOn = {
     to: [{ type: "set-clip", clip: { ...clip, plane: middlePlane(shown) } }],
   }),
   [REFUSED.objects]: ({ objects }) => ({
-    label: "Select all that show",
+    label: "Select all shown",
     to: [...objects].map(([channel, selected]) => ({
       ...{ type: "objects", channel, change: { selected } },
     })),
   }),
 };
 
-/** @param ofParts those of the parts; null: nothing leads on but what the sentence says */
-export function offerFor(refusal: string, now: WayOn, ofParts: WaysOn = {}): Offer | null {
-  return (WAYS[refusal] ?? ofParts[refusal])?.(now) ?? null;
+/** @param ofParts buttons of the parts @returns null: the refusal has no button */
+export function offerFor(
+  refusal: string,
+  now: RemedyContext,
+  ofParts: Remedies = {},
+): Offer | null {
+  return (REMEDIES[refusal] ?? ofParts[refusal])?.(now) ?? null;
 }
