@@ -18,7 +18,7 @@ describe("a handle that the gaze carries", () => {
   };
   const met: Met = { key: "h", distance_m: 1.3, hold: "carry", target, ray: look(0) };
 
-  it("follows until it is put down, and is as far away as it was", () => {
+  it("follows the gaze until it is put down, and keeps its distance", () => {
     const carry = new GazeCarry();
     expect([carry.follow(look(0)), carry.meet()]).toEqual([false, null]);
     carry.take(met);
@@ -29,7 +29,7 @@ describe("a handle that the gaze carries", () => {
     expect(carry.follow(look(6))).toBe(false);
   });
 
-  it("counts a gaze that trembles as resting, one that goes on as new", () => {
+  it("counts a trembling gaze as resting, and a turn as a new gaze", () => {
     const carry = new GazeCarry();
     carry.take(met);
     carry.follow(look(0));

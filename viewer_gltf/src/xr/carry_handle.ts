@@ -1,18 +1,18 @@
 /**
- * A handle that the gaze carries, where there is no button to hold: chosen once it follows the
- * gaze, and the next choice puts it down, by button or by letting the gaze rest.
+ * A handle that the gaze carries, for devices without a button to hold. Once chosen, the handle
+ * follows the gaze. The next choice puts it down, by a button or by a resting gaze.
  */
 import type { Hit, Met, RoomRay, Target } from "../interaction/ray_pointer";
 
-/** A gaze that stays within this angle of its first direction rests, radians. */
+/** Radians. A gaze that stays within this angle of its first direction is resting. */
 const REST_RAD = (1.5 * Math.PI) / 180;
 
 export class GazeCarry implements Target {
-  /** While it is carried, nothing else is met. */
+  /** While a handle is carried, no other target can be hit. */
   readonly isOnTop = true;
   readonly layout = "carry";
   private carried: Met | null = null;
-  /** Where the gaze has come to rest, and how often it has gone on. */
+  /** The gaze since which the head has rested, and the number of such rests so far. */
   private rest: RoomRay | null = null;
   private rests = 0;
 
@@ -20,7 +20,7 @@ export class GazeCarry implements Target {
     return this.carried !== null;
   }
 
-  /** The name of what is carried; null: nothing is. */
+  /** The key of the carried handle, or null. */
   get key(): string | null {
     return this.carried?.key ?? null;
   }
@@ -34,7 +34,7 @@ export class GazeCarry implements Target {
     this.carried = null;
   }
 
-  /** It is as far away as it was when it was taken. */
+  /** The carried handle, at the distance at which it was picked up. */
   meet(): Hit | null {
     if (this.carried === null) return null;
     return { key: `carry:${this.rests}`, distance_m: this.carried.distance_m };
@@ -44,7 +44,7 @@ export class GazeCarry implements Target {
     this.drop();
   }
 
-  /** True if the handle was dragged. */
+  /** Drags the carried handle along the gaze. Returns whether a handle was dragged. */
   follow(gaze: RoomRay): boolean {
     const { carried, rest } = this;
     if (carried?.key == null) return false;

@@ -1,4 +1,6 @@
-/** Buttons, hands and fingers that hold something: a control that goes on, a handle, the specimen. */
+/**
+ * Buttons, hands and fingers that hold something: a repeating control, a handle, or the specimen.
+ */
 import type { Vector3 } from "three";
 import {
   type Met,
@@ -23,23 +25,29 @@ import {
 } from "./hold_specimen";
 import type { SpecimenMover } from "./specimen_mover";
 
-/** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
+/** Without a squeeze button, a trigger holds the specimen after this time, s, or this motion, m. */
 const HOLD_S = 0.35;
 const HOLD_M = 0.02;
-/** Time for which a Cardboard's button is held before the head holds the specimen by it, s: a thumb is slow. */
+/**
+ * Seconds that a Cardboard's button is held before the head holds the specimen: longer than HOLD_S,
+ * since a thumb is slow.
+ */
 const HEAD_HOLD_S = 0.6;
 
-/** A trigger that is down. */
+/** A trigger that is held down. */
 type Press = {
-  /** Where it went down. */
+  /** The target at which it was pressed, and the place of the hand. */
   readonly met: Met | null;
   readonly at: Vector3 | null;
   elapsed_s: number;
-  /** It drags or holds something: letting go of it chooses nothing. */
+  /** True once the press drags or holds something: then its release chooses nothing. */
   isUsed: boolean;
 };
 
-/** `source`: of the button that is held; null: the gaze stays. */
+/**
+ * A control that repeats its command. `source`: the button that is held; null: the gaze rests on
+ * it.
+ */
 type GoesOn = {
   readonly met: Met;
   readonly source: XRInputSource | "finger" | null;
@@ -56,7 +64,7 @@ export type GripOptions = Readonly<{
   tiles: TileTarget;
   /** The gaze, and the targets that can be chosen now. */
   aim: () => Readonly<{ gaze: RoomRay; free: readonly Target[] }>;
-  /** Moves the specimen by a share of a command's step. */
+  /** Moves the specimen by a share of a command's step, and returns whether it moved. */
   run: (command: Command, state: ViewerState, share: number) => boolean;
   onPress: (ray: RoomRay, time_ms: number) => void;
   onTap: (time_ms: number) => void;
@@ -64,13 +72,15 @@ export type GripOptions = Readonly<{
 
 export class Grips {
   private readonly presses = new Map<XRInputSource, Press>();
-  /** The hands that hold the specimen, and their places in the frame before. */
+  /** The hands that hold the specimen, and their poses in the last frame. */
   private held = new Map<XRInputSource, HandPose | null>();
-  /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
+  /**
+   * A finger that rests on the split screen; `met`: the target under the gaze when it went down.
+   */
   private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
-  /** The head holds the specimen by a button that is down. */
+  /** Set while the head holds the specimen because a button is held. */
   headHold: HeadHold | null = null;
-  /** What is gone on with. */
+  /** The control that repeats now. */
   private goesOn: GoesOn | null = null;
   private readonly mover: SpecimenMover;
   private readonly pointer: Pointer;
@@ -84,7 +94,7 @@ export class Grips {
     return this.held.size > 0;
   }
 
-  /** Whether a control goes on. */
+  /** Whether a control is repeating its command. */
   get isGoingOn(): boolean {
     return this.goesOn !== null;
   }
@@ -97,12 +107,12 @@ export class Grips {
     return this.options.aim();
   }
 
-  /** A gaze that stays goes on with a control that it has chosen. */
+  /** Repeats a control's command while the gaze rests on it. */
   goOnWith(met: Met): void {
     if (met.repeats !== undefined) this.goesOn = { met, source: null, elapsed_s: 0 };
   }
 
-  /** Lets go of everything. */
+  /** Releases everything. */
   drop(): void {
     this.presses.clear();
     this.held.clear();
@@ -139,7 +149,8 @@ export class Grips {
 
   private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
     const met = meetFirst(ray ?? this.aim.gaze, this.aim.free);
-    // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
+    // A Cardboard's button can't be held for long: one tap picks up a handle, and the next puts it
+    // down.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
     if (met !== null && isUsed && this.pointer.press(met, this.aim.free, time_ms)) {
       met.target.choose(met, met.ray, false);
@@ -149,7 +160,10 @@ export class Grips {
     return { met, at, elapsed_s: 0, isUsed };
   }
 
-  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
+  /**
+   * Applies the gestures on the split screen since the last frame. Returns whether the specimen
+   * moved.
+   */
   followFingers(gestures: readonly TimedGesture[], state: ViewerState): boolean {
     const before = this.mover.pose;
     for (const [gesture, time_ms] of gestures) {
@@ -167,7 +181,7 @@ export class Grips {
     return this.mover.pose !== before;
   }
 
-  /** Input sources come and go, also while they hold something. */
+  /** Forgets input sources that have disconnected, even while they held something. */
   forgetTheLost(): void {
     for (const map of [this.presses, this.held]) {
       for (const source of [...map.keys()]) {
@@ -176,7 +190,7 @@ export class Grips {
     }
   }
 
-  /** What the buttons that are down drag and hold; whether anything has moved. */
+  /** Drags and holds with the buttons that are down. Returns whether the specimen moved. */
   hold(dt_s: number): boolean {
     for (const [source, press] of this.presses) this.advance(source, press, dt_s);
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
@@ -202,7 +216,10 @@ export class Grips {
     this.held.set(source, null);
   }
 
-  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
+  /**
+   * Repeats the command of a control while it is gazed at or held. Returns whether the specimen
+   * moved.
+   */
   goOn(dt_s: number, state: ViewerState): boolean {
     const { goesOn } = this;
     if (goesOn === null) return false;
@@ -216,13 +233,13 @@ export class Grips {
     }
     goesOn.elapsed_s += dt_s;
     if (goesOn.elapsed_s < HOLD_S) return false;
-    if (press != null) press.isUsed = true; // letting go of it is no further step
+    if (press != null) press.isUsed = true; // so its release does not count as another step
     return this.options.run(met.repeats, state, STEPS_PER_S * dt_s);
   }
 
   /**
-   * A button that is held where no control is takes the specimen along with the head, if no hand is there to
-   * do it; whether it has moved.
+   * Moves the specimen with the head while a button is held outside the controls and no hand is
+   * tracked. Returns whether the specimen moved.
    */
   followHead(dt_s: number, state: ViewerState): boolean {
     if (this.touched !== null) this.touched.elapsed_s += dt_s;
@@ -235,7 +252,7 @@ export class Grips {
       return false;
     }
     const { gaze } = this.aim;
-    press.isUsed = true; // letting go of it chooses nothing
+    press.isUsed = true; // so its release chooses nothing
     if (this.headHold === null) {
       this.headHold = this.mover.holdBy(gaze, state);
       return false;
@@ -261,7 +278,10 @@ export class Grips {
   }
 }
 
-/** Of what was met when the button went down: a control has its own use for it. */
+/**
+ * Whether the head may hold the specimen by a button that was pressed on this target: controls use
+ * the button themselves.
+ */
 function mayFollow(met: Met | null): boolean {
   return met === null || met.key?.startsWith(TILE) === true;
 }
