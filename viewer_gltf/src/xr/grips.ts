@@ -48,7 +48,7 @@ type Press = {
  * A control that repeats its command. `source`: the button that is held; null: the gaze rests on
  * it.
  */
-type GoesOn = {
+type Repeating = {
   readonly met: Met;
   readonly source: XRInputSource | "finger" | null;
   elapsed_s: number;
@@ -63,7 +63,7 @@ export type GripOptions = Readonly<{
   mover: SpecimenMover;
   tiles: TileTarget;
   /** The gaze, and the targets that can be chosen now. */
-  aim: () => Readonly<{ gaze: RoomRay; free: readonly Target[] }>;
+  aim: () => Readonly<{ gaze: RoomRay; choosable: readonly Target[] }>;
   /** Moves the specimen by a share of a command's step, and returns whether it moved. */
   run: (command: Command, state: ViewerState, share: number) => boolean;
   onPress: (ray: RoomRay, time_ms: number) => void;
@@ -81,7 +81,7 @@ export class Grips {
   /** Set while the head holds the specimen because a button is held. */
   headHold: HeadHold | null = null;
   /** The control that repeats now. */
-  private goesOn: GoesOn | null = null;
+  private repeating: Repeating | null = null;
   private readonly mover: SpecimenMover;
   private readonly pointer: Pointer;
 
@@ -95,8 +95,8 @@ export class Grips {
   }
 
   /** Whether a control is repeating its command. */
-  get isGoingOn(): boolean {
-    return this.goesOn !== null;
+  get isRepeating(): boolean {
+    return this.repeating !== null;
   }
 
   get tracked(): readonly Hand[] {
@@ -108,8 +108,8 @@ export class Grips {
   }
 
   /** Repeats a control's command while the gaze rests on it. */
-  goOnWith(met: Met): void {
-    if (met.repeats !== undefined) this.goesOn = { met, source: null, elapsed_s: 0 };
+  startRepeating(met: Met): void {
+    if (met.repeats !== undefined) this.repeating = { met, source: null, elapsed_s: 0 };
   }
 
   /** Releases everything. */
@@ -117,7 +117,7 @@ export class Grips {
     this.presses.clear();
     this.held.clear();
     this.touched = null;
-    this.goesOn = null;
+    this.repeating = null;
     this.headHold = null;
   }
 
@@ -148,14 +148,14 @@ export class Grips {
   }
 
   private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
-    const met = meetFirst(ray ?? this.aim.gaze, this.aim.free);
+    const met = meetFirst(ray ?? this.aim.gaze, this.aim.choosable);
     // A Cardboard's button can't be held for long: one tap picks up a handle, and the next puts it
     // down.
     const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed && this.pointer.press(met, this.aim.free, time_ms)) {
+    if (met !== null && isUsed && this.pointer.press(met, this.aim.choosable, time_ms)) {
       met.target.choose(met, met.ray, false);
     }
-    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
+    if (met?.repeats !== undefined) this.repeating = { met, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
     return { met, at, elapsed_s: 0, isUsed };
   }
@@ -168,9 +168,9 @@ export class Grips {
     const before = this.mover.pose;
     for (const [gesture, time_ms] of gestures) {
       if (gesture.kind === "press") {
-        const met = meetFirst(this.aim.gaze, this.aim.free);
+        const met = meetFirst(this.aim.gaze, this.aim.choosable);
         this.touched = { met, isUsed: false, elapsed_s: 0 };
-        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
+        if (met?.repeats !== undefined) this.repeating = { met, source: "finger", elapsed_s: 0 };
       } else if (gesture.kind === "release") this.touched = null;
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.options.onTap(time_ms);
@@ -182,7 +182,7 @@ export class Grips {
   }
 
   /** Forgets input sources that have disconnected, even while they held something. */
-  forgetTheLost(): void {
+  forgetLostSources(): void {
     for (const map of [this.presses, this.held]) {
       for (const source of [...map.keys()]) {
         if (this.handOf(source) === undefined) map.delete(source);
@@ -220,19 +220,23 @@ export class Grips {
    * Repeats the command of a control while it is gazed at or held. Returns whether the specimen
    * moved.
    */
-  goOn(dt_s: number, state: ViewerState): boolean {
-    const { goesOn } = this;
-    if (goesOn === null) return false;
-    const { met, source } = goesOn;
+  repeat(dt_s: number, state: ViewerState): boolean {
+    const { repeating } = this;
+    if (repeating === null) return false;
+    const { met, source } = repeating;
     const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
     const isHeld = source === null || press != null;
     const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.aim.gaze;
-    if (!isHeld || meetFirst(ray, this.aim.free)?.key !== met.key || met.repeats === undefined) {
-      this.goesOn = null;
+    if (
+      !isHeld ||
+      meetFirst(ray, this.aim.choosable)?.key !== met.key ||
+      met.repeats === undefined
+    ) {
+      this.repeating = null;
       return false;
     }
-    goesOn.elapsed_s += dt_s;
-    if (goesOn.elapsed_s < HOLD_S) return false;
+    repeating.elapsed_s += dt_s;
+    if (repeating.elapsed_s < HOLD_S) return false;
     if (press != null) press.isUsed = true; // so its release does not count as another step
     return this.options.run(met.repeats, state, STEPS_PER_S * dt_s);
   }

@@ -111,16 +111,16 @@ describe("a command", () => {
       ...START,
       position: pivot.clone().setZ(-distance),
     });
-    const goOn = (pose: SpecimenPose, command: Command) => {
+    const repeat = (pose: SpecimenPose, command: Command) => {
       let next = pose;
       for (let i = 0; i < 200; i++) {
         next = moveByCommand(next, command, next.position, eye, 0.3) ?? next;
       }
       return next.position.distanceTo(eye);
     };
-    expect(goOn(from(1.4), "zoom-in")).toBeCloseTo(0.1, 9);
-    expect(goOn(from(1.4), "zoom-out")).toBeCloseTo(5, 9);
-    expect(goOn(from(0.04), "zoom-in")).toBeCloseTo(0.04, 9); // where hands put it: no jump
+    expect(repeat(from(1.4), "zoom-in")).toBeCloseTo(0.1, 9);
+    expect(repeat(from(1.4), "zoom-out")).toBeCloseTo(5, 9);
+    expect(repeat(from(0.04), "zoom-in")).toBeCloseTo(0.04, 9); // where hands put it: no jump
     const there = moveByCommand(from(0), "zoom-in", eye, eye);
     expect(there?.position.toArray().every(Number.isFinite)).toBe(true);
   });

@@ -9,14 +9,14 @@ import type { Setting } from "./panel/placement";
  */
 export function howItWorks(setting: Setting): string {
   const way = setting === "over-table" ? "up" : "down";
-  return `Look ${way}: the bar.\nRest or press: choose.\nHold: it follows you.`;
+  return `Look ${way} for a bar.\nRest or press to choose.\nHold: move specimen.`;
 }
 /** Number of times that the card is shown on a device. */
 const TIMES_SHOWN = 3;
 const STORAGE_KEY = "stereocell-told";
 
 /** Whether the card is due, which also counts this time. */
-export function isToBeTold(): boolean {
+export function isIntroductionDue(): boolean {
   try {
     const times = Number(localStorage.getItem(STORAGE_KEY) ?? 0);
     localStorage.setItem(STORAGE_KEY, String(times + 1));

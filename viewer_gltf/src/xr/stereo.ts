@@ -179,7 +179,7 @@ export class Stereo {
       const before = running.head.clone();
       running.recentre();
       running.update();
-      this.hands?.panel.comeAlong(before, running.head);
+      this.hands?.panel.keepPlace(before, running.head);
     }
     return this.head;
   }

@@ -8,10 +8,12 @@ const DEG = Math.PI / 180;
 const EYE = new Vector3(0.1, 1.6, 0.2);
 const LONG = "This mode shows volumes at every distance, or none: choose one with near volumes.";
 
-/** A head at the eye that looks so far up. */
+/** A head at EYE with this pitch. */
 const headAt = (pitch_deg: number) => new Matrix4().makeRotationX(pitch_deg * DEG).setPosition(EYE);
 
-/** Pitch of the lower end of a notice's texts at the left, in the middle and at the right, degrees. */
+/**
+ * Pitch of the lower end of a notice's texts at the left, in the middle and at the right, degrees.
+ */
 function lowerEnd({ mesh, texts }: RoomNotice): readonly number[] {
   const y = NOTICE_HEIGHT / 2 - textsHeight(texts);
   return [-0.5, 0, 0.5].map((across) => {
@@ -22,7 +24,7 @@ function lowerEnd({ mesh, texts }: RoomNotice): readonly number[] {
 
 describe("a notice while the menu is open", () => {
   it.each([["Saved."], [LONG], ["Saved.", LONG]])(
-    "covers none of the menu's rows: %s",
+    "does not cover the menu's rows: %s",
     (...texts) => {
       for (const top_deg of [-12, 31]) {
         const rows = pointAt({ yaw: 0, pitch: top_deg * DEG }, EYE, PANEL_DISTANCE_M);
@@ -33,7 +35,7 @@ describe("a notice while the menu is open", () => {
           expect(notice.texts).toEqual(texts);
           const ends = lowerEnd(notice);
           expect(ends[1]).toBeGreaterThan(top_deg);
-          // high up both edges, of the notice and of the menu, are lower beside the middle
+          // seen high up, the edges of notice and menu are lower at the sides than in the middle
           if (top_deg < 0) expect(Math.min(...ends)).toBeGreaterThan(top_deg);
           expect(ends[1]).toBeLessThan(top_deg + 1);
           expect(notice.mesh.visible).toBe(true);
@@ -42,7 +44,7 @@ describe("a notice while the menu is open", () => {
     },
   );
 
-  it("lies under the gaze where the menu's rows end far above it", () => {
+  it("lies below the gaze if the menu's upper edge is far above the gaze", () => {
     const notice = new RoomNotice(false);
     notice.announce("Saved.");
     const rows = pointAt({ yaw: 0, pitch: 31 * DEG }, EYE, PANEL_DISTANCE_M);
@@ -50,7 +52,7 @@ describe("a notice while the menu is open", () => {
     expect(bearingOf(notice.mesh.position.clone().sub(EYE)).pitch / DEG).toBeCloseTo(-30);
   });
 
-  it("lies under the gaze where no menu is open", () => {
+  it("lies below the gaze if no menu is open", () => {
     const notice = new RoomNotice(false);
     notice.announce("Saved.");
     notice.update(0.1, headAt(-10));
