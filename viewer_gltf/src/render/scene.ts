@@ -72,15 +72,15 @@ export class Room {
     this.backdrop?.dispose();
     this.backdrop = backdrop;
     if (backdrop === null) return;
-    backdrop.dress(theme);
-    backdrop.standUnder(this.outermost);
+    backdrop.setTheme(theme);
+    backdrop.fitTo(this.outermost);
     this.scene.add(backdrop.mesh);
   }
 
   /** @param points outermost ones of what is shown, in the room, m */
   standUnder(points: readonly Vec3[]): void {
     this.outermost = points;
-    this.backdrop?.standUnder(points);
+    this.backdrop?.fitTo(points);
   }
 
   /**

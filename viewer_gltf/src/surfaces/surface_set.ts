@@ -183,7 +183,7 @@ export class SurfaceSet implements Surfaces {
     const outlines = blended.map(([, { outline }]) => outline ?? []);
     const turns = turnsOf([x, y, z], outlines);
     for (const [i, [, { surfaces }]] of blended.entries()) {
-      for (const { blend } of surfaces.values()) blend.take(turns[i]);
+      for (const { blend } of surfaces.values()) blend.setTurn(turns[i]);
     }
   }
 

@@ -1,4 +1,7 @@
-/** How the specimen is moved in stereo: by commands, fingers, sticks and hands, and along with gaze or head. */
+/**
+ * Moves the specimen in stereo: by commands, fingers, sticks and hands, or with the gaze or the
+ * head.
+ */
 import type { Vector3 } from "three";
 import type { RoomRay } from "../interaction/ray_pointer";
 import { type SpecimenPose, zoomAbout } from "../math/grab";
@@ -22,19 +25,21 @@ export class SpecimenMover {
     return this.specimen.pose;
   }
 
-  /** Middle of what is shown, room. */
+  /** Middle of the shown tiles, in the scene. */
   middle({ isolated }: ViewerState): Vector3 {
     return middleOf(hullOf(shownTiles(this.tiles, isolated), this.specimen.group.matrixWorld));
   }
 
-  /** To a pose, as an eye sees it; whether that is another one. */
+  /**
+   * Moves the specimen to a pose, as seen from `eye`. Returns false if it has this pose already.
+   */
   to(pose: SpecimenPose, eye: Vector3): boolean {
     if (pose === this.pose) return false;
     this.specimen.moveTo(pose, eye);
     return true;
   }
 
-  /** To an earlier pose, at once. */
+  /** Returns to an earlier pose at once, without motion. */
   backTo(pose: SpecimenPose, eye: Vector3): void {
     this.specimen.jumpTo(pose, eye);
   }
@@ -48,7 +53,7 @@ export class SpecimenMover {
     return true;
   }
 
-  /** So much larger about its middle. */
+  /** Scales the specimen by a factor about its middle. */
   resize(factor: number, state: ViewerState, eye: Vector3): void {
     this.specimen.moveTo(zoomAbout(this.pose, this.middle(state), factor), eye);
   }
@@ -57,7 +62,7 @@ export class SpecimenMover {
     this.specimen.moveTo(moveByFingers(this.pose, gesture, this.middle(state), eye), eye);
   }
 
-  /** How a gaze holds it that takes it now. */
+  /** State of a gaze or head that starts to hold the specimen now. */
   holdBy(gaze: RoomRay, state: ViewerState): HeadHold {
     return { pose: this.pose, pivot: this.middle(state), gaze };
   }

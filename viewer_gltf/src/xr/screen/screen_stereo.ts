@@ -1,4 +1,6 @@
-/** Stereo on the page's own screen: red-cyan for glasses, or both pictures side by side. */
+/**
+ * Stereo on the page's own screen: an anaglyph for red-cyan glasses, or two images side by side.
+ */
 import {
   Camera,
   Matrix3,
@@ -22,7 +24,10 @@ const matrixOf = (projection: Projection) => ({
 
 export class ScreenPictures {
   private readonly eyes = new ScreenEyes();
-  /** Both pictures of an anaglyph, the left eye's on the left, encoded as on the canvas. */
+  /**
+   * Images of both eyes for an anaglyph, the left eye's on the left, with colours encoded like the
+   * canvas's.
+   */
   private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   private readonly pass = new ScreenPass(includeChunks(anaglyph, CHUNKS), {
     uEyes: { value: this.target.texture },
@@ -33,7 +38,7 @@ export class ScreenPictures {
 
   constructor(private readonly renderer: WebGLRenderer) {}
 
-  /** Where the eyes are in this frame: see ScreenEyes. */
+  /** Places the eyes for this frame; see ScreenEyes. */
   follow(
     eyes: Eyes,
     camera: PerspectiveCamera,
@@ -48,7 +53,7 @@ export class ScreenPictures {
     eyes.follow(this.eyes.pairs);
   }
 
-  /** Draw a frame as an anaglyph. */
+  /** Draws a frame as an anaglyph. */
   present(draw: () => void): void {
     const { renderer } = this;
     renderer.setRenderTarget(this.target);
