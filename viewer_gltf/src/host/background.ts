@@ -15,7 +15,7 @@ export class Background {
   /** @param isPlain one colour and no shadow: for cutting out, and for readers who ask for more contrast */
   dress(theme: Theme, isPlain: boolean): void {
     const dressIn = (backdrop: Backdrop | null) => {
-      this.room.dress(theme, backdrop);
+      this.room.setTheme(theme, backdrop);
       this.onChange();
     };
     dressIn(null);

@@ -52,7 +52,7 @@ export class SceneFrame {
     const outline = forms.outline(state);
     if (outline !== null) navigation.surround(outline);
     const shown = forms.shownPoints(state);
-    if (shown !== null) this.options.room.standUnder(navigation.inRoom(shown));
+    if (shown !== null) this.options.room.fitBackdrop(navigation.inRoom(shown));
     navigation.update(dt_s);
     this.followScreen();
     return navigation.camera;

@@ -8,7 +8,8 @@ describe("the disc", () => {
   const manifest = sampleManifest(1);
   const state = { ...initialState(manifest), mode: "disc" as const, switchDistance_m: 1000 };
   const radius_rad = (state.discRadius_deg * Math.PI) / 180;
-  // above the first tile; the next one lies within the disc, but not within half of it
+  // The gaze is above the first tile. The next tile lies within the disc, but not within half of
+  // its radius.
   const { min, max } = manifest.tiles[0].bounds_um;
   const AWAY = 4;
   const x = max[0] - 0.75 * AWAY * Math.tan(radius_rad);
@@ -20,7 +21,7 @@ describe("the disc", () => {
     return { hybrid, look };
   };
 
-  it("opens as far as is set, and as the frame's budget allows", () => {
+  it("opens as far as the setting and the frame's budget allow", () => {
     const { hybrid, look } = standing();
     const whole = hybrid.outer_rad;
     expect(whole).toBeCloseTo(radius_rad, 6);
@@ -29,7 +30,7 @@ describe("the disc", () => {
     expect(hybrid.outer_rad).toBeCloseTo(whole / 2, 6);
   });
 
-  it("comes to rest: the budget of a moving picture wants no other tiles than that at rest", () => {
+  it("comes to rest: the budget of a moving view and that of a resting view want the same tiles", () => {
     const { hybrid, look } = standing();
     const { disc } = hybrid.focusTiles;
     expect(disc).toEqual(["r0_c0", "r0_c1"]);
@@ -38,7 +39,8 @@ describe("the disc", () => {
       expect(look()).toBe(false);
       expect(hybrid.focusTiles.disc).toEqual(disc);
       expect(hybrid.mayRefine).toBe(true);
-      // else the picture at rest moves, its budget narrows the disc, and so on for ever
+      // otherwise the resting view would change, its budget would narrow the disc, and so on
+      // forever
       expect(hybrid.isChanging(state)).toBe(false);
     }
   });
