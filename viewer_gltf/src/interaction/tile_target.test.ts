@@ -9,7 +9,7 @@ const TILES: readonly BoxedTile[] = [
 ];
 
 describe("the tile along a ray", () => {
-  it("is chosen with a ray in um, and its distance is in metres", () => {
+  it("is chosen with a ray in um, and returns its distance in metres", () => {
     const specimen = new Group();
     specimen.matrixAutoUpdate = false;
     specimen.matrixWorld.makeScale(0.01, 0.01, 0.01).setPosition(-0.05, -0.05, -2);
@@ -30,7 +30,7 @@ describe("the tile along a ray", () => {
   });
 });
 
-it("an object in a tile is met before its tile, and is of that tile", () => {
+it("an object in a tile is hit instead of the tile, and names that tile", () => {
   const specimen = new Group();
   const chosen: unknown[][] = [];
   let hasObject = true;
