@@ -33,7 +33,7 @@ export class HandleTarget implements Target {
     private readonly onDrag: (id: HandleId, ray: ReturnType<typeof rayAlong>) => void,
   ) {}
 
-  meet(ray: RoomRay): Hit | null {
+  intersect(ray: RoomRay): Hit | null {
     if (this.handles.length === 0) return null;
     const id = pickHandle(this.into(ray), this.handles, this.tolerance_rad);
     const handle = this.handles.find((each) => each.id === id);

@@ -27,7 +27,7 @@ export class Commands {
   run(command: Command, isOnPage: boolean): boolean {
     const { host, parts } = this.options;
     const { state, viewpoint } = host;
-    const before = host.isInRoom ? null : viewpoint.lookNow;
+    const before = host.isInRoom ? null : viewpoint.cameraPose;
     if (parts.run(command, isOnPage)) return true;
     if (ENDS_A_LOOK.has(command)) host.undo.noteLook();
     if (!this.carryOut(command)) {

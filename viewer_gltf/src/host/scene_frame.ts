@@ -50,7 +50,7 @@ export class SceneFrame {
     const { viewpoint, forms, state } = this.options.shown();
     const { navigation } = viewpoint;
     const outline = forms.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) navigation.setOccupied(outline);
     const shown = forms.shownPoints(state);
     if (shown !== null) this.options.room.fitBackdrop(navigation.inRoom(shown));
     navigation.update(dt_s);

@@ -1,6 +1,6 @@
 /** The viewer in numbers: for automation, the panel and the benchmark. */
 import type { WebGLRenderer } from "three";
-import type { Look } from "../interaction/named_views";
+import type { CameraPose } from "../interaction/named_views";
 import type { VolumeStatus } from "../render/drawn_forms";
 import type { Hybrid } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
@@ -16,7 +16,7 @@ import type { Viewpoint } from "./viewpoint";
 export type Snapshot = Readonly<{
   state: ViewerState;
   /** From where the flat camera sees the specimen, m of the room. */
-  look: Look;
+  look: CameraPose;
   /** Whether all tiles show, in the first channel. */
   hasFirstPicture: boolean;
   /** The progress of the overviews of all shown channels. */
@@ -75,7 +75,7 @@ export function snapshotOf(source: SnapshotSource): Snapshot {
   const { memory, render, programs } = renderer.info;
   return {
     state,
-    look: viewpoint.navigation.lookNow,
+    look: viewpoint.navigation.cameraPose,
     hasFirstPicture: forms.hasFirst,
     overview: forms.overview,
     isLoading: source.isLoading,

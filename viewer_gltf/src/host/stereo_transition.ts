@@ -59,7 +59,7 @@ export class StereoTransition {
   /** From where the specimen is seen; null: as it opens. */
   get cameraView(): CameraView | null {
     const { navigation, poseOnScreen: pose } = this;
-    const eye = pose === null ? navigation.look : navigation.lookNow;
+    const eye = pose === null ? navigation.look : navigation.cameraPose;
     if (eye === null || pose === null) return eye && { ...eye, specimen: null };
     const { position, orientation, scale } = pose;
     const specimen = { position: position.toArray(), orientation: orientation.toArray(), scale };

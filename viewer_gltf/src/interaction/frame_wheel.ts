@@ -4,7 +4,7 @@
  * Lets the wheel scroll the outer page until the user has clicked on the canvas. With Ctrl, or by a
  * pinch on a trackpad, it zooms at once.
  */
-export function leaveWheelToHolder(stage: HTMLElement): void {
+export function leaveWheelToOuterPage(stage: HTMLElement): void {
   stage.addEventListener(
     "wheel",
     (event) => {

@@ -14,11 +14,11 @@ const SWAY_S = 30;
 const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
 
 /** The named views. A named view follows the window's shape until the user moves. */
-export const STANDS = ["opening", "front", "side", "top"] as const;
-export type Stand = (typeof STANDS)[number];
+export const NAMED_VIEWS = ["opening", "front", "side", "top"] as const;
+export type NamedView = (typeof NAMED_VIEWS)[number];
 
 /** Position of the camera and of the point that it looks at, metres of the scene. */
-export type Look = Readonly<{
+export type CameraPose = Readonly<{
   position: readonly [number, number, number];
   target: readonly [number, number, number];
 }>;
@@ -53,7 +53,7 @@ export class NamedViews {
   }
 
   /** Sets the outermost points of the occupied part of the specimen, um. */
-  surround(points: readonly Vec3[]): void {
+  setOccupied(points: readonly Vec3[]): void {
     this.occupied = this.inRoom(points);
   }
 
@@ -65,16 +65,16 @@ export class NamedViews {
   }
 
   /** The camera of a named view of the whole specimen: x to the right and y up from the front. */
-  lookAt(stand: Stand, swayed_s: number): Look {
+  lookAt(view: NamedView, swayed_s: number): CameraPose {
     const target = [0, 0, 0] as const;
-    if (stand === "opening") return this.lookAround(swayed_s);
-    if (stand === "front") return { position: [0, 0, this.framing(2)], target };
-    if (stand === "side") return { position: [this.framing(0), 0, 0], target };
+    if (view === "opening") return this.lookAround(swayed_s);
+    if (view === "front") return { position: [0, 0, this.framing(2)], target };
+    if (view === "side") return { position: [this.framing(0), 0, 0], target };
     return { position: [0, this.framing(1), 1e-4], target };
   }
 
   /** The camera of the opening after `swayed_s` seconds of its slow turn. */
-  private lookAround(swayed_s: number): Look {
+  private lookAround(swayed_s: number): CameraPose {
     const { top, bottom } = this.covered;
     const free = 1 - top - bottom;
     const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // half the image's height, at 1 m

@@ -85,7 +85,7 @@ describe("the opening", () => {
       const navigation = start();
       navigation.fit(8, covered);
       navigation.reset();
-      const { position, target } = navigation.lookNow;
+      const { position, target } = navigation.cameraPose;
       const away_m = Math.hypot(...position.map((v, i) => v - target[i]));
       expect(away_m).toBeGreaterThan(0.1);
       expect(away_m).toBeLessThan(20);
@@ -121,7 +121,7 @@ describe("the opening", () => {
   it("is framed on the occupied part of the specimen, and follows the window's shape", () => {
     const navigation = start();
     const far = navigation.camera.position.length();
-    navigation.surround(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] })); // one corner of the specimen, a third as large
+    navigation.setOccupied(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] })); // one corner of the specimen, a third as large
     const { target } = navigation.controls;
     expect(target.x).toBeLessThan(0);
     expect(target.y).toBeGreaterThan(0);
@@ -134,7 +134,7 @@ describe("the opening", () => {
   it("is not cut off by its slow turn, and stays as large as fits", () => {
     const navigation = start();
     const stick = [0, 1].map((i) => [64 * i, -48 * i, 24 * i] as const); // from corner to corner
-    navigation.surround(stick);
+    navigation.setOccupied(stick);
     navigation.turnSlowly();
     const { center, scale } = place({ min: [0, -48, 0], max: [64, 0, 24] });
     for (let k = 0; k < 60; k++) {

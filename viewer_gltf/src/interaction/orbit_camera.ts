@@ -10,12 +10,12 @@ import type { Vec3 } from "../math/vec3";
 import { distanceToSee, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
 import {
+  type CameraPose,
   type Covered,
   FARTHEST_M,
   FIELD_OF_VIEW_DEG,
-  type Look,
+  type NamedView,
   NamedViews,
-  type Stand,
 } from "./named_views";
 
 const NEAREST_M = 0.05;
@@ -34,16 +34,19 @@ const PAN = 0.1;
 const SAME_M = 1e-4;
 
 /** Whether the camera has not moved since `look` was read. */
-export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">): boolean {
-  const [was, is] = [look, lookNow].map(({ position, target }) => [...position, ...target]);
+export function isSameCameraPose(
+  look: CameraPose,
+  { cameraPose }: Pick<Navigation, "cameraPose">,
+): boolean {
+  const [was, is] = [look, cameraPose].map(({ position, target }) => [...position, ...target]);
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
 /** The camera's action for each command. */
 const ACTS: Readonly<Partial<Record<Command, (navigation: Navigation) => void>>> = {
-  front: (navigation) => navigation.standStill("front"),
-  side: (navigation) => navigation.standStill("side"),
-  top: (navigation) => navigation.standStill("top"),
+  front: (navigation) => navigation.showStill("front"),
+  side: (navigation) => navigation.showStill("side"),
+  top: (navigation) => navigation.showStill("top"),
   "zoom-in": (navigation) => navigation.move(0, 0, ZOOM),
   "zoom-out": (navigation) => navigation.move(0, 0, 1 / ZOOM),
   "turn-left": (navigation) => navigation.move(-TURN_RAD, 0, 1),
@@ -61,12 +64,12 @@ export class Navigation {
   readonly controls: OrbitControls;
   private readonly views: NamedViews;
   /** The view to which `reset` returns. */
-  private home: Stand = "opening";
+  private home: NamedView = "opening";
   /** The current named view; null after the user has moved. */
-  private stand: Stand | null = "opening";
+  private shownView: NamedView | null = "opening";
   /** Seconds since the opening's slow turn began; null if it does not turn. */
   private swayed_s: number | null = null;
-  private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
+  private flight: Readonly<{ from: CameraPose; to: CameraPose; elapsed_s: number }> | null = null;
   constructor(canvas: HTMLElement, placement: Placement, onChange: () => void) {
     this.views = new NamedViews(placement);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -78,7 +81,7 @@ export class Navigation {
       onChange();
     });
     this.controls.addEventListener("start", () => {
-      this.stand = null;
+      this.shownView = null;
       this.flight = null;
     });
   }
@@ -88,7 +91,7 @@ export class Navigation {
     this.fly(dt_s);
     if (this.swayed_s !== null) {
       this.swayed_s += dt_s;
-      this.standAt("opening");
+      this.showNamedView("opening");
     }
     this.controls.dampingFactor = 1 - LEFT_AFTER_A_SECOND ** dt_s;
     this.controls.update();
@@ -100,18 +103,18 @@ export class Navigation {
     this.views.fit(aspect, covered);
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
-    if (this.stand !== null) this.standAt(this.stand);
+    if (this.shownView !== null) this.showNamedView(this.shownView);
   }
 
   /** Shows the whole specimen as in the opening. */
   reset(): void {
     this.stopTurning();
-    this.standAt(this.home);
+    this.showNamedView(this.home);
   }
 
   /** Opens with another view than the default. */
-  openAt(stand: Stand): void {
-    this.home = stand;
+  openAt(view: NamedView): void {
+    this.home = view;
     this.reset();
   }
 
@@ -119,9 +122,9 @@ export class Navigation {
    * Sets the outermost points of the occupied part of the specimen, um, on which the opening is
    * framed.
    */
-  surround(points: readonly Vec3[]): void {
-    this.views.surround(points);
-    if (this.stand !== null) this.standAt(this.stand);
+  setOccupied(points: readonly Vec3[]): void {
+    this.views.setOccupied(points);
+    if (this.shownView !== null) this.showNamedView(this.shownView);
   }
 
   /** Converts points of the specimen, um, to the scene, metres, as a flat screen shows it. */
@@ -136,14 +139,14 @@ export class Navigation {
 
   /** Swings slowly until the user moves, if the opening is shown. */
   turnSlowly(): void {
-    if (this.stand === "opening") this.swayed_s = 0;
+    if (this.shownView === "opening") this.swayed_s = 0;
   }
 
   /** Stops the slow turn and keeps the view where it is. */
   stopTurning(): void {
     if (this.swayed_s === null) return;
     this.swayed_s = null;
-    this.stand = null;
+    this.shownView = null;
   }
 
   get isTurning(): boolean {
@@ -151,26 +154,26 @@ export class Navigation {
   }
 
   /** The camera; null while it shows the opening, which follows the window's shape. */
-  get look(): Look | null {
-    return this.stand === "opening" && !this.isTurning ? null : this.lookNow;
+  get look(): CameraPose | null {
+    return this.shownView === "opening" && !this.isTurning ? null : this.cameraPose;
   }
 
   /** The current named view; null after the user has moved. */
-  get standing(): Stand | null {
-    return this.stand;
+  get namedView(): NamedView | null {
+    return this.shownView;
   }
 
   /** Whether the specimen is seen straight from the front. */
   get isStraight(): boolean {
-    return this.stand === "front";
+    return this.shownView === "front";
   }
 
-  get lookNow(): Look {
+  get cameraPose(): CameraPose {
     return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
   }
 
-  lookFrom({ position, target }: Look): void {
-    this.stand = null;
+  lookFrom({ position, target }: CameraPose): void {
+    this.shownView = null;
     this.swayed_s = null;
     this.flight = null;
     this.place({ position, target });
@@ -183,9 +186,9 @@ export class Navigation {
     const eye = away.setLength(Math.max(NEAREST_M, away.length() / 2)).add(point);
     const to = { position: eye.toArray(), target: point.toArray() };
     this.stopTurning();
-    this.stand = null;
+    this.shownView = null;
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.place(to);
-    else this.flight = { from: this.lookNow, to, elapsed_s: 0 };
+    else this.flight = { from: this.cameraPose, to, elapsed_s: 0 };
   }
 
   private fly(dt_s: number): void {
@@ -207,7 +210,7 @@ export class Navigation {
     return this.flight !== null;
   }
 
-  private place({ position, target }: Look): void {
+  private place({ position, target }: CameraPose): void {
     this.controls.target
       .fromArray(target)
       .clamp(this.views.reach.clone().negate(), this.views.reach);
@@ -248,14 +251,14 @@ export class Navigation {
   }
 
   /** Shows the specimen from a named view without the slow turn. */
-  standStill(stand: Stand): void {
+  showStill(view: NamedView): void {
     this.swayed_s = null;
-    this.standAt(stand);
+    this.showNamedView(view);
   }
 
-  private standAt(stand: Stand): void {
-    this.place(this.views.lookAt(stand, this.swayed_s ?? 0));
-    this.stand = stand;
+  private showNamedView(view: NamedView): void {
+    this.place(this.views.lookAt(view, this.swayed_s ?? 0));
+    this.shownView = view;
   }
 
   /** Turns about the point that is looked at, and multiplies the distance from it by `zoom`. */

@@ -1,29 +1,29 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { gazeOf, type Hit, meetFirst, Pointer, type RoomRay, type Target } from "./ray_pointer";
+import { firstHit, gazeOf, type Hit, Pointer, type RoomRay, type Target } from "./ray_pointer";
 
 const AHEAD: RoomRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
 const FRAME_S = 1 / 60;
 
 function target(key: string | null, distance_m: number | null, isOnTop = false): Target {
-  const meet = (): Hit | null => (distance_m === null ? null : { key, distance_m });
-  return { isOnTop, meet, choose: () => undefined };
+  const intersect = (): Hit | null => (distance_m === null ? null : { key, distance_m });
+  return { isOnTop, intersect, choose: () => undefined };
 }
 
 describe("the first hit of a ray", () => {
   it("is the nearest target, in any order of the targets", () => {
     const [near, far] = [target("near", 1), target("far", 2)];
-    expect(meetFirst(AHEAD, [far, near])?.key).toBe("near");
-    expect(meetFirst(AHEAD, [near, far])?.key).toBe("near");
+    expect(firstHit(AHEAD, [far, near])?.key).toBe("near");
+    expect(firstHit(AHEAD, [near, far])?.key).toBe("near");
   });
 
   it("is a target that is drawn on top, even if another is nearer", () => {
     const handle = target("handle", 3, true);
-    expect(meetFirst(AHEAD, [target("panel", 1), handle, target("tile", 2)])?.key).toBe("handle");
+    expect(firstHit(AHEAD, [target("panel", 1), handle, target("tile", 2)])?.key).toBe("handle");
   });
 
   it("is null if the ray misses all targets", () => {
-    expect(meetFirst(AHEAD, [target("a", null), target("b", null, true)])).toBeNull();
+    expect(firstHit(AHEAD, [target("a", null), target("b", null, true)])).toBeNull();
   });
 
   it("is on a ray from the eye straight ahead of the head", () => {
@@ -66,7 +66,7 @@ describe("the gaze", () => {
   it("does not choose again the target that a button has chosen", () => {
     const pointer = new Pointer();
     pointer.advance(AHEAD, [], [tile], FRAME_S, true);
-    if (pointer.gaze === null) throw new Error("nothing is met");
+    if (pointer.gaze === null) throw new Error("nothing is hit");
     expect(pointer.press(pointer.gaze, [tile], 0)).toBe(true);
     for (let i = 0; i < 240; i++) {
       expect(pointer.advance(AHEAD, [], [tile], FRAME_S, true)).toBeNull();
@@ -78,9 +78,9 @@ describe("the gaze", () => {
     const pointer = new Pointer();
     const hand = { ...AHEAD, origin: new Vector3(0.2, 0, 0) };
     pointer.advance(AHEAD, [hand], [tile], FRAME_S, true);
-    const [met] = pointer.hands;
-    if (met === null) throw new Error("nothing is met");
-    pointer.press(met, [tile], 0);
+    const [hit] = pointer.hands;
+    if (hit === null) throw new Error("nothing is hit");
+    pointer.press(hit, [tile], 0);
     for (let i = 0; i < 240; i++) {
       expect(pointer.advance(AHEAD, [null], [tile], FRAME_S, true)).toBeNull();
     }

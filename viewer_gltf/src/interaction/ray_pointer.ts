@@ -41,7 +41,7 @@ export interface Target {
    */
   readonly layout?: string;
   /** Returns where the ray hits the target, or null. */
-  meet(ray: RoomRay): Hit | null;
+  intersect(ray: RoomRay): Hit | null;
   /**
    * Called when a hit is chosen by dwell (`isByGaze`) or button; a hit with `hold` is chosen before
    * it is dragged.
@@ -54,7 +54,7 @@ export interface Target {
 }
 
 /** A hit together with its target and the ray. */
-export type Met = Hit & Readonly<{ target: Target; ray: RoomRay }>;
+export type TargetHit = Hit & Readonly<{ target: Target; ray: RoomRay }>;
 
 /** The ray from the eyes straight ahead of the head. */
 export function gazeOf(head: Matrix4): RoomRay {
@@ -65,11 +65,11 @@ export function gazeOf(head: Matrix4): RoomRay {
 }
 
 /** The hit of the first target that is drawn on top, or else the nearest hit. */
-export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null {
-  let first: Met | null = null;
+export function firstHit(ray: RoomRay, targets: readonly Target[]): TargetHit | null {
+  let first: TargetHit | null = null;
   for (const target of targets) {
     if (first?.target.isOnTop) break;
-    const hit = target.meet(ray);
+    const hit = target.intersect(ray);
     if (hit === null || !(hit.distance_m < (first?.distance_m ?? Infinity) || target.isOnTop)) {
       continue;
     }
@@ -78,23 +78,27 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
   return first;
 }
 
-/** @param met null: nothing can be chosen */
-function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): RaySample {
+/** @param hit null: nothing can be chosen */
+function sampleOf(
+  { direction }: RoomRay,
+  hit: TargetHit | null,
+  targets: readonly Target[],
+): RaySample {
   return {
-    target: met?.isGlance ? null : (met?.key ?? null),
-    place: met?.place ?? null,
-    layout: met?.target.layout ?? "",
+    target: hit?.isGlance ? null : (hit?.key ?? null),
+    place: hit?.place ?? null,
+    layout: hit?.target.layout ?? "",
     layouts: ["", ...targets.map(({ layout = "" }) => layout)],
     direction: direction.toArray(),
-    isGradual: met?.isGradual === true || met?.hold === "slide",
+    isGradual: hit?.isGradual === true || hit?.hold === "slide",
   };
 }
 
 export class Pointer {
   /** The hit of the gaze. */
-  gaze: Met | null = null;
+  gaze: TargetHit | null = null;
   /** The hit of each hand's ray, in the order given. */
-  hands: readonly (Met | null)[] = [];
+  hands: readonly (TargetHit | null)[] = [];
   private dwell: Dwell = NO_DWELL;
   private lastPress: TimedPress | null = null;
 
@@ -104,8 +108,8 @@ export class Pointer {
   }
 
   /** The hit at which the ring is drawn: that of a hand, or else that of the gaze. */
-  get leading(): Met | null {
-    return this.hands.find((met) => met !== null) ?? this.gaze;
+  get leading(): TargetHit | null {
+    return this.hands.find((hit) => hit !== null) ?? this.gaze;
   }
 
   /**
@@ -119,10 +123,10 @@ export class Pointer {
     targets: readonly Target[],
     dt_s: number,
     isDwellOn: boolean,
-  ): Met | null {
-    this.gaze = meetFirst(gaze, targets);
-    this.hands = hands.map((ray) => ray && meetFirst(ray, targets));
-    const isGazing = this.hands.every((met) => met === null);
+  ): TargetHit | null {
+    this.gaze = firstHit(gaze, targets);
+    this.hands = hands.map((ray) => ray && firstHit(ray, targets));
+    const isGazing = this.hands.every((hit) => hit === null);
     const sample = sampleOf(gaze, isGazing ? this.gaze : null, targets);
     const [dwell, fires] = advanceDwell(this.dwell, sample, dt_s, isDwellOn);
     this.dwell = dwell;
@@ -134,11 +138,11 @@ export class Pointer {
    *
    * @returns whether the press counts; the second press of a double press does not
    */
-  press(met: Met, targets: readonly Target[], time_ms: number): boolean {
+  press(hit: TargetHit, targets: readonly Target[], time_ms: number): boolean {
     this.dwell = spend(this.dwell);
-    const sample = sampleOf(met.ray, met, targets);
+    const sample = sampleOf(hit.ray, hit, targets);
     // The second press on a tile isolates it, and a slider may be picked up again at once.
-    const isStep = met.isStep === true || met.hold !== undefined;
+    const isStep = hit.isStep === true || hit.hold !== undefined;
     const press = { time_ms, sample, isStep };
     const isSecond = isSecondPress(this.lastPress, press);
     this.lastPress = press;
@@ -154,6 +158,6 @@ export class Pointer {
 }
 
 /** The point where a ray hits a target. */
-export function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {
+export function pointOn({ ray, distance_m }: Pick<TargetHit, "ray" | "distance_m">): Vector3 {
   return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
 }

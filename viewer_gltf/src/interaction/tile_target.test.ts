@@ -17,7 +17,7 @@ describe("the tile along a ray", () => {
     const target = new TileTarget(specimen, (...given) => chosen.push(given));
     target.tiles = TILES;
     const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
-    const hit = target.meet(ray);
+    const hit = target.intersect(ray);
     expect(hit?.key).toBe("tile:near");
     expect(hit?.distance_m).toBeCloseTo(1.8, 12);
     if (hit !== null) target.choose(hit, ray, true);
@@ -41,9 +41,9 @@ it("an object in a tile is hit instead of the tile, and names that tile", () => 
   );
   target.tiles = [{ id: "r0_c0", bounds_um: { min: [-1, -1, -2], max: [1, 1, -1] } }];
   const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
-  expect(target.meet(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
+  expect(target.intersect(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
   target.choose({ key: "tile:r0_c0/cells/7", distance_m: 1.5 }, ray, true);
   expect(chosen.map(([, tile, isByGaze]) => [tile, isByGaze])).toEqual([["r0_c0", true]]);
   hasObject = false;
-  expect(target.meet(ray)?.key).toBe("tile:r0_c0");
+  expect(target.intersect(ray)?.key).toBe("tile:r0_c0");
 });

@@ -66,15 +66,15 @@ export class TileTarget implements Target {
     return `tiles ${this.names} ${this.changes} ${placeText(this.specimen.matrixWorld)}`;
   }
 
-  meet(ray: RoomRay): Hit | null {
+  intersect(ray: RoomRay): Hit | null {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     const inside = rayAlong(ray, this.toSpecimen);
-    const met = pickTile(inside, this.shown, this.clip);
-    const object = met && this.objectAlong(inside);
-    if (met === null) return null;
-    const key = TILE + (object ? `${met.id}${OF}${object.id}` : met.id);
+    const tileHit = pickTile(inside, this.shown, this.clip);
+    const object = tileHit && this.objectAlong(inside);
+    if (tileHit === null) return null;
+    const key = TILE + (object ? `${tileHit.id}${OF}${object.id}` : tileHit.id);
     // The ray's direction is one metre long, also when expressed in um.
-    const { distance } = object ?? met;
+    const { distance } = object ?? tileHit;
     return { key, place: key, distance_m: distance, isStep: true, isGradual: this.isMeasuring };
   }
 

@@ -2,7 +2,7 @@
  * A handle that the gaze carries, for devices without a button to hold. Once chosen, the handle
  * follows the gaze. The next choice puts it down, by a button or by a resting gaze.
  */
-import type { Hit, Met, RoomRay, Target } from "../interaction/ray_pointer";
+import type { Hit, RoomRay, Target, TargetHit } from "../interaction/ray_pointer";
 
 /** Radians. A gaze that stays within this angle of its first direction is resting. */
 const REST_RAD = (1.5 * Math.PI) / 180;
@@ -11,7 +11,7 @@ export class GazeCarry implements Target {
   /** While a handle is carried, no other target can be hit. */
   readonly isOnTop = true;
   readonly layout = "carry";
-  private carried: Met | null = null;
+  private carried: TargetHit | null = null;
   /** The gaze since which the head has rested, and the number of such rests so far. */
   private rest: RoomRay | null = null;
   private rests = 0;
@@ -25,8 +25,8 @@ export class GazeCarry implements Target {
     return this.carried?.key ?? null;
   }
 
-  take(met: Met): void {
-    this.carried = met;
+  take(hit: TargetHit): void {
+    this.carried = hit;
     this.rest = null;
   }
 
@@ -35,7 +35,7 @@ export class GazeCarry implements Target {
   }
 
   /** The carried handle, at the distance at which it was picked up. */
-  meet(): Hit | null {
+  intersect(): Hit | null {
     if (this.carried === null) return null;
     return { key: `carry:${this.rests}`, distance_m: this.carried.distance_m };
   }

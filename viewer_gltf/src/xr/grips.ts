@@ -3,12 +3,12 @@
  */
 import type { Vector3 } from "three";
 import {
-  type Met,
-  meetFirst,
+  firstHit,
   type Pointer,
   pointOn,
   type RoomRay,
   type Target,
+  type TargetHit,
 } from "../interaction/ray_pointer";
 import { TILE, type TileTarget } from "../interaction/tile_target";
 import type { HandPose } from "../math/grab";
@@ -37,7 +37,7 @@ const HEAD_HOLD_S = 0.6;
 /** A trigger that is held down. */
 type Press = {
   /** The target at which it was pressed, and the place of the hand. */
-  readonly met: Met | null;
+  readonly hit: TargetHit | null;
   readonly at: Vector3 | null;
   elapsed_s: number;
   /** True once the press drags or holds something: then its release chooses nothing. */
@@ -49,7 +49,7 @@ type Press = {
  * it.
  */
 type Repeating = {
-  readonly met: Met;
+  readonly hit: TargetHit;
   readonly source: XRInputSource | "finger" | null;
   elapsed_s: number;
 };
@@ -75,9 +75,9 @@ export class Grips {
   /** The hands that hold the specimen, and their poses in the last frame. */
   private held = new Map<XRInputSource, HandPose | null>();
   /**
-   * A finger that rests on the split screen; `met`: the target under the gaze when it went down.
+   * A finger that rests on the split screen; `hit`: the target under the gaze when it went down.
    */
-  private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
+  private touched: { hit: TargetHit | null; isUsed: boolean; elapsed_s: number } | null = null;
   /** Set while the head holds the specimen because a button is held. */
   headHold: HeadHold | null = null;
   /** The control that repeats now. */
@@ -108,8 +108,8 @@ export class Grips {
   }
 
   /** Repeats a control's command while the gaze rests on it. */
-  startRepeating(met: Met): void {
-    if (met.repeats !== undefined) this.repeating = { met, source: null, elapsed_s: 0 };
+  startRepeating(hit: TargetHit): void {
+    if (hit.repeats !== undefined) this.repeating = { hit, source: null, elapsed_s: 0 };
   }
 
   /** Releases everything. */
@@ -148,16 +148,16 @@ export class Grips {
   }
 
   private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
-    const met = meetFirst(ray ?? this.aim.gaze, this.aim.choosable);
+    const hit = firstHit(ray ?? this.aim.gaze, this.aim.choosable);
     // A Cardboard's button can't be held for long: one tap picks up a handle, and the next puts it
     // down.
-    const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed && this.pointer.press(met, this.aim.choosable, time_ms)) {
-      met.target.choose(met, met.ray, false);
+    const isUsed = hit?.hold === "slide" || (hit?.hold === "carry" && ray !== null);
+    if (hit !== null && isUsed && this.pointer.press(hit, this.aim.choosable, time_ms)) {
+      hit.target.choose(hit, hit.ray, false);
     }
-    if (met?.repeats !== undefined) this.repeating = { met, source, elapsed_s: 0 };
+    if (hit?.repeats !== undefined) this.repeating = { hit, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
-    return { met, at, elapsed_s: 0, isUsed };
+    return { hit, at, elapsed_s: 0, isUsed };
   }
 
   /**
@@ -168,9 +168,9 @@ export class Grips {
     const before = this.mover.pose;
     for (const [gesture, time_ms] of gestures) {
       if (gesture.kind === "press") {
-        const met = meetFirst(this.aim.gaze, this.aim.choosable);
-        this.touched = { met, isUsed: false, elapsed_s: 0 };
-        if (met?.repeats !== undefined) this.repeating = { met, source: "finger", elapsed_s: 0 };
+        const hit = firstHit(this.aim.gaze, this.aim.choosable);
+        this.touched = { hit, isUsed: false, elapsed_s: 0 };
+        if (hit?.repeats !== undefined) this.repeating = { hit, source: "finger", elapsed_s: 0 };
       } else if (gesture.kind === "release") this.touched = null;
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.options.onTap(time_ms);
@@ -202,13 +202,13 @@ export class Grips {
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
     const hand = this.handOf(source);
     press.elapsed_s += dt_s;
-    const { met } = press;
-    if (met?.key == null) return;
-    if (met.hold !== undefined) {
-      if (press.isUsed) met.target.drag?.(met.key, hand?.ray ?? this.aim.gaze);
+    const { hit } = press;
+    if (hit?.key == null) return;
+    if (hit.hold !== undefined) {
+      if (press.isUsed) hit.target.drag?.(hit.key, hand?.ray ?? this.aim.gaze);
       return;
     }
-    const mayHold = hand?.pose && !hand.canSqueeze && met.key.startsWith(TILE);
+    const mayHold = hand?.pose && !hand.canSqueeze && hit.key.startsWith(TILE);
     if (press.isUsed || !mayHold || !hand?.pose) return;
     const isFar = press.at !== null && press.at.distanceTo(hand.pose.position) > HOLD_M;
     if (!isFar && press.elapsed_s < HOLD_S) return;
@@ -223,14 +223,14 @@ export class Grips {
   repeat(dt_s: number, state: ViewerState): boolean {
     const { repeating } = this;
     if (repeating === null) return false;
-    const { met, source } = repeating;
+    const { hit, source } = repeating;
     const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
     const isHeld = source === null || press != null;
     const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.aim.gaze;
     if (
       !isHeld ||
-      meetFirst(ray, this.aim.choosable)?.key !== met.key ||
-      met.repeats === undefined
+      firstHit(ray, this.aim.choosable)?.key !== hit.key ||
+      hit.repeats === undefined
     ) {
       this.repeating = null;
       return false;
@@ -238,7 +238,7 @@ export class Grips {
     repeating.elapsed_s += dt_s;
     if (repeating.elapsed_s < HOLD_S) return false;
     if (press != null) press.isUsed = true; // so its release does not count as another step
-    return this.options.run(met.repeats, state, STEPS_PER_S * dt_s);
+    return this.options.run(hit.repeats, state, STEPS_PER_S * dt_s);
   }
 
   /**
@@ -249,7 +249,7 @@ export class Grips {
     if (this.touched !== null) this.touched.elapsed_s += dt_s;
     const handless = [...this.presses].filter(([source]) => this.handOf(source)?.pose == null);
     const press = [this.touched, ...handless.map(([, each]) => each)].find(
-      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
+      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.hit)),
     );
     if (press == null || press.elapsed_s < HEAD_HOLD_S) {
       this.headHold = null;
@@ -270,14 +270,14 @@ export class Grips {
     let { pose } = this.mover;
     for (const { stick, ray } of this.tracked) {
       if (stick.x === 0 && stick.y === 0) continue;
-      const met = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
-      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
+      const hit = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
+      pose = moveByStick(pose, stick, hit ?? this.mover.middle(state), dt_s);
     }
     return this.mover.to(pose, this.aim.gaze.origin);
   }
 
   private tileAlong(ray: RoomRay | null): Vector3 | null {
-    const hit = ray && this.options.tiles.meet(ray);
+    const hit = ray && this.options.tiles.intersect(ray);
     return hit && pointOn({ ...hit, ray });
   }
 }
@@ -286,6 +286,6 @@ export class Grips {
  * Whether the head may hold the specimen by a button that was pressed on this target: controls use
  * the button themselves.
  */
-function mayFollow(met: Met | null): boolean {
-  return met === null || met.key?.startsWith(TILE) === true;
+function mayFollow(hit: TargetHit | null): boolean {
+  return hit === null || hit.key?.startsWith(TILE) === true;
 }

@@ -5,12 +5,12 @@
 import { Matrix4 } from "three";
 import type { Ring } from "../interaction/dwell_ring";
 import {
+  firstHit,
   gazeOf,
-  type Met,
-  meetFirst,
   Pointer,
   type RoomRay,
   type Target,
+  type TargetHit,
 } from "../interaction/ray_pointer";
 import { TileTarget } from "../interaction/tile_target";
 import { shownTiles } from "../math/pick";
@@ -276,18 +276,18 @@ export class Hands {
 
   /** Chooses the target on the ray of the button, or else the one under the gaze. */
   private press(ray: RoomRay, time_ms: number): void {
-    const met = meetFirst(ray, this.choosable) ?? meetFirst(this.gaze, this.choosable);
-    if (met !== null) this.choose(met, time_ms);
+    const hit = firstHit(ray, this.choosable) ?? firstHit(this.gaze, this.choosable);
+    if (hit !== null) this.choose(hit, time_ms);
   }
 
-  private choose(met: Met, time_ms: number, isByGaze = false): void {
-    if (met.key === null) return;
-    const counts = this.pointer.press(met, this.choosable, time_ms);
+  private choose(hit: TargetHit, time_ms: number, isByGaze = false): void {
+    if (hit.key === null) return;
+    const counts = this.pointer.press(hit, this.choosable, time_ms);
     if (!counts && !isByGaze) return;
     const { pose } = this.mover;
-    if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
-    met.target.choose(met, met.ray, isByGaze);
-    if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
+    if (hit.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
+    hit.target.choose(hit, hit.ray, isByGaze);
+    if (hit.hold === "carry" && hit.ray === this.gaze) this.carry.take(hit);
   }
 
   private undo(): void {

@@ -116,7 +116,7 @@ export class CanvasQuad {
   }
 
   /** Returns where a ray hits the front of the quad; null if it misses or the quad is hidden. */
-  meet({ origin, direction }: RoomRay): Spot | null {
+  intersect({ origin, direction }: RoomRay): Spot | null {
     if (!this.mesh.visible) return null;
     this.toQuad.copy(this.mesh.matrixWorld).invert();
     const from = origin.clone().applyMatrix4(this.toQuad);

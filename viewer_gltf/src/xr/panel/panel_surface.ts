@@ -73,8 +73,8 @@ export class PanelSurface implements Target {
     return this.quad.pointOf(region.rect, across, down);
   }
 
-  meet(ray: RoomRay): Hit | null {
-    const spot = this.quad.meet(ray);
+  intersect(ray: RoomRay): Hit | null {
+    const spot = this.quad.intersect(ray);
     if (spot === null) return null;
     const region = this.shown.regions.find(({ rect }) => holds(rect, spot));
     const { distance_m } = spot;
@@ -99,7 +99,7 @@ export class PanelSurface implements Target {
 
   private chooseAt(key: string, ray: RoomRay, isPress: boolean): void {
     const region = this.shown.regions.find(({ id }) => PANEL + id === key);
-    const spot = this.quad.meet(ray);
+    const spot = this.quad.intersect(ray);
     if (region === undefined || (spot === null && !region.isCarry)) return;
     this.onChoose(region, spot ?? { x: 0, y: 0, distance_m: 0 }, ray, isPress);
   }

@@ -302,7 +302,7 @@ class Bench {
 
   /** The handle that the gaze meets straight ahead; null: it meets none. */
   meet(): Hit | null {
-    return this.marks.target.meet(gazeOf(this.camera.matrixWorld));
+    return this.marks.target.intersect(gazeOf(this.camera.matrixWorld));
   }
 
   /** Carry what was met to where the gaze is now. */

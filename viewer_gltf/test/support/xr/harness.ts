@@ -62,7 +62,7 @@ class Stand {
   readonly drags: At[] = [];
   private readonly handle: Target = {
     isOnTop: true,
-    meet: ({ origin, direction }) => {
+    intersect: ({ origin, direction }) => {
       const toHandle = new Vector3(...HANDLE_m).sub(origin);
       const distance_m = toHandle.dot(direction);
       const beside = Math.sqrt(Math.max(0, toHandle.lengthSq() - distance_m ** 2));
