@@ -1,4 +1,4 @@
-/** Between two points. Pure. */
+/** Distance between two points. */
 import type { Vec3 } from "./vec3";
 
 export function distanceBetween(a: Vec3, b: Vec3): number {

@@ -158,7 +158,7 @@ export class FrameRenderer {
     renderer.info.reset();
     room.aimLamps(head);
     room.isFlat = this.eyes.all.length === 1;
-    this.both.takeIn(room.scene);
+    this.both.prepare(room.scene);
     this.cuts.follow(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
