@@ -1,4 +1,4 @@
-/** Textures and targets of floats, which are read texel by texel. */
+/** Textures and render targets of floats, read texel by texel. */
 import {
   Camera,
   Data3DTexture,
@@ -18,12 +18,12 @@ import {
 const EXACT = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
 const NOBODY = new Camera();
 
-/** A uniform that holds no texture yet. */
+/** A uniform without a texture yet. */
 export function nothing(): { value: Texture | null } {
   return { value: null };
 }
 
-/** @param count textures that are drawn at once */
+/** @param count number of textures that are drawn at once */
 export function floatTarget(count: number, type: typeof FloatType | typeof HalfFloatType) {
   return new WebGLRenderTarget(1, 1, { count, type, depthBuffer: false, ...EXACT });
 }
@@ -56,7 +56,7 @@ export function float3D(data: Float32Array<ArrayBuffer>, size: readonly [number,
   return texture;
 }
 
-/** Draw over a target that becomes so large. */
+/** Draws over a whole target after setting its size. */
 export function drawWhole(
   renderer: WebGLRenderer,
   scene: Scene,

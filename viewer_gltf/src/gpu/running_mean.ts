@@ -1,4 +1,4 @@
-/** The mean of pictures that come one by one: what differs from one to the next, as noise does, goes. */
+/** The running mean of images, which removes differences between them, such as noise. */
 import {
   AddEquation,
   ConstantAlphaFactor,
@@ -14,7 +14,7 @@ import { ScreenPass } from "./screen_pass";
 import { COPY_FRAGMENT } from "./shaders/sources";
 
 export class RunningMean {
-  /** Of so many pictures. */
+  /** Number of images in the mean. */
   count = 0;
   readonly target: WebGLRenderTarget;
   private readonly pass = new ScreenPass(COPY_FRAGMENT, { uFirst: nothing(), uSecond: nothing() });
@@ -34,7 +34,7 @@ export class RunningMean {
     return this.target.textures;
   }
 
-  /** Take in both textures of a target. */
+  /** Adds both textures of a target to the means. */
   add({ textures, width, height }: WebGLRenderTarget): void {
     const { uFirst, uSecond } = this.pass.uniforms;
     [uFirst.value, uSecond.value] = textures;

@@ -1,6 +1,7 @@
 /**
- * The pass for the depth draws all that is opaque in one material, which is cut as the specimen is.
- * What is no part of the specimen must stay whole there, or a volume behind it would show through.
+ * Keeps objects that are not part of the specimen from being clipped in the depth pass. The depth
+ * pass draws everything opaque with one material, which is clipped like the specimen. An unclipped
+ * object that was clipped there would let a volume behind it show through.
  */
 import { type Material, type Mesh, ShaderMaterial } from "three";
 
@@ -25,7 +26,9 @@ export function leaveUncut(mesh: Mesh): void {
   };
 }
 
-/** three uploads a material's uniforms once for all its objects, unless the caller forces it. */
+/**
+ * three uploads a material's uniforms once for all its objects, unless `uniformsNeedUpdate` is set.
+ */
 function setCount(material: Material, uniform: Count, value: number): void {
   if (uniform.value === value) return;
   uniform.value = value;
