@@ -1,4 +1,4 @@
-/** The keys of where volumes show. Pure. */
+/** The keys that control where volumes are shown. */
 import { type KeyGroup, keysOf } from "../panel/key";
 import { VOLUMES } from "../state/parameters/volumes";
 
