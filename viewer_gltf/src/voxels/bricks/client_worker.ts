@@ -4,7 +4,7 @@
  */
 import { ZSTDDecoder } from "zstddec";
 import { BrickCache, type KeptBrick } from "./cache";
-import type { LinkAsk, LinkMessage } from "./client";
+import type { LinkMessage, LinkRequest } from "./client";
 import { BRICKS_FRAME, type Frame, parseFrame, type ServerMessage, TABLE_FRAME } from "./protocol";
 import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 
@@ -40,7 +40,7 @@ const volumes = new Map<string, Volume>();
 /** ... and of these, what this connection was asked for. */
 const askedFor = new Set<string>();
 const trees = new Map<number, Tree>();
-let view: Extract<LinkAsk, { type: "view" }> | null = null;
+let view: Extract<LinkRequest, { type: "view" }> | null = null;
 let viewId = 0;
 /** Answers are taken one after the other. */
 let turn: Promise<void> = decoder.init();
@@ -274,7 +274,7 @@ function ask(): void {
   });
 }
 
-self.addEventListener("message", ({ data }: MessageEvent<LinkAsk>) => {
+self.addEventListener("message", ({ data }: MessageEvent<LinkRequest>) => {
   if (data.type === "connect") {
     address = data.address;
     connect();
