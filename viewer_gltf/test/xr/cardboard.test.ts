@@ -232,7 +232,7 @@ describeInChromium("stereo without WebXR", () => {
     await page.evaluate(() => {
       Object.assign(DeviceOrientationEvent, { requestPermission: async () => "denied" });
     });
-    expect(await start()).toMatch(/not allowed to tell how the phone is turned.*open the page/);
+    expect(await start()).toMatch(/not allowed to read how the phone is turned.*open the page/);
     const { isRunning, log } = await status();
     expect(isRunning).toBe(false);
     expect(log).toEqual([]);
