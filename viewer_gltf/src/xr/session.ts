@@ -78,7 +78,7 @@ export class XrSession {
     });
     try {
       await prepared;
-      // The origin is at the eyes at the start, for any body height. On a table it is on the floor.
+      // The origin is at the eyes at the start, for any body height. In augmented reality it is on the floor if that is known.
       this.hasFloor = mode === "immersive-ar" && (await hasSpace(session, "local-floor"));
       this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");
       await this.renderer.xr.setSession(session);
