@@ -68,7 +68,8 @@ describe("the blue-noise tile", () => {
   });
 
   it("keeps the darkest texels apart, also across the edges", () => {
-    const dark = [...texels.keys()].filter((i) => texels[i] < 16); // one texel in 16 is dark: 4 texels apart
+    // One texel in 16 is dark: 4 texels apart.
+    const dark = [...texels.keys()].filter((i) => texels[i] < 16);
     const apart = (a: number, b: number) => {
       const wrap = (d: number) => Math.min(d, N - d);
       const dx = wrap(Math.abs((a % N) - (b % N)));

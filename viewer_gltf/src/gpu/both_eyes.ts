@@ -42,8 +42,9 @@ const FRAGMENT = insertionsOf(includeChunks(fragmentInsertions, CHUNKS));
 const BOTH = 4;
 
 /**
- * Shared by reference. `uEyeClip`: from the space between the eyes to the clip space of the whole
- * frame, in which each eye has its part. `uMiddle`: where the right eye's part begins, pixels.
+ * Shared by reference. The matrices `uEyeClip` transform from the space between the eyes to the
+ * clip space of the whole frame, in which each eye has its part. The number `uMiddle` is where the
+ * right eye's part begins, pixels.
  */
 function makeUniforms() {
   return {
@@ -109,7 +110,8 @@ export class BothEyes {
       const { material } = object;
       if (!(material instanceof Material)) throw new TypeError(`${object.name} has many materials`);
       if (!this.adopted.has(material)) {
-        if (material instanceof ShaderMaterial) return; // it covers the whole frame for any eye
+        // The material covers the whole frame for any eye.
+        if (material instanceof ShaderMaterial) return;
         this.patch(material);
         this.adopt(material);
       }

@@ -27,7 +27,8 @@ describe("the second of two quick presses", () => {
 
   it("is ignored on the same control", () => {
     expect(isSecondPress(first, pressed(1150))).toBe(true);
-    expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true); // pressing a trigger shakes the hand
+    // Pressing a trigger shakes the hand.
+    expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true);
   });
 
   it("counts if the first press was long ago or there was none", () => {

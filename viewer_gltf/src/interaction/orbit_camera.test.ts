@@ -121,7 +121,8 @@ describe("the opening", () => {
   it("is framed on the occupied part of the specimen, and follows the window's shape", () => {
     const navigation = start();
     const far = navigation.camera.position.length();
-    navigation.setOccupied(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] })); // one corner of the specimen, a third as large
+    // One corner of the specimen, a third as large.
+    navigation.setOccupied(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] }));
     const { target } = navigation.controls;
     expect(target.x).toBeLessThan(0);
     expect(target.y).toBeGreaterThan(0);
@@ -155,10 +156,11 @@ describe("the opening", () => {
     navigation.turnSlowly();
     navigation.update(4);
     expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);
-    expect(navigation.look).not.toBeNull(); // a link must contain the camera, since it does not contain the opening of the address
+    // A link must contain the camera, since it does not contain the opening of the address.
+    expect(navigation.look).not.toBeNull();
     expect(navigation.run("side")).toBe(true);
     expect(navigation.look).not.toBeNull();
-    navigation.fit(0.5); // it follows the window's shape, too
+    navigation.fit(0.5); // the view follows the window's shape, too
     expect(eye(navigation)[0]).toBeGreaterThan(1);
     navigation.reset();
     expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);

@@ -1,6 +1,6 @@
 /**
- * The specimen's tiles as a target: the boxes of the shown tiles, as far as they are not clipped,
- * and the objects in them, so that the gaze rests on an object and not on its tile.
+ * The specimen's tiles as a target: the boxes of the shown tiles, as far as they are not clipped.
+ * The objects in them are targets too, so that the gaze rests on an object and not on its tile.
  */
 import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
@@ -31,8 +31,7 @@ export class TileTarget implements Target {
 
   /**
    * @param onChoose called with the ray in um of the specimen
-   * @param objectAlong returns the name and the distance of the object along a ray in um of the
-   *   specimen, or null
+   * @param objectAlong returns name and distance of the object along a ray in um, or null
    */
   constructor(
     private readonly specimen: Object3D,

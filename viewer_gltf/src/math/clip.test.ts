@@ -119,7 +119,7 @@ describe("a box that is clipped away", () => {
   const TILE: Box = { min: [10, -20, 0], max: [20, 0, 50] };
 
   it("is one of which nothing is left by box and plane", () => {
-    const beside: Box = { min: [20, -20, 0], max: [100, 0, 50] }; // both share a face
+    const beside: Box = { min: [20, -20, 0], max: [100, 0, 50] }; // the boxes share a face
     const across: Box = { min: [19, -20, 0], max: [100, 0, 50] };
     const plane = { normal: [1, 0, 0], offset_um: 18 } as const;
     expect(isCutAway(TILE, { box: null, plane: null })).toBe(false);

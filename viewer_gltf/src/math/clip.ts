@@ -42,7 +42,8 @@ export function clipSpan(span: Span, ray: Ray, { box, plane, corner }: Clip): Sp
   if (inBox === null) return null;
   let [from, to] = inBox;
   if (plane !== null) {
-    const depth = plane.offset_um - dot(plane.normal, ray.origin); // how far inside the plane the ray begins
+    // Depth inside the plane at which the ray begins.
+    const depth = plane.offset_um - dot(plane.normal, ray.origin);
     const rate = dot(plane.normal, ray.direction);
     if (rate > 0) to = Math.min(to, depth / rate);
     else if (rate < 0) from = Math.max(from, depth / rate);
@@ -180,8 +181,8 @@ export function movePlane(plane: ClipPlane, by_um: number, specimen: Box): ClipP
 
 /**
  * Drags the plane's tip, which turns the plane about its middle. The tip goes to the intersection
- * of the ray and the sphere around the middle that is nearer to the tip, or, if the ray misses the
- * sphere, to the place nearest to the ray.
+ * of the ray and the sphere around the middle that is nearer to the tip. If the ray misses the
+ * sphere, the tip goes to the place nearest to the ray.
  */
 export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: number): ClipPlane {
   const { middle, tip } = planeHandles(plane, specimen, arm_um);
@@ -198,7 +199,8 @@ export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: num
   const handle = new Vector3(...tip);
   ends.sort((a, b) => a.distanceToSquared(handle) - b.distanceToSquared(handle));
   const normal = (ends[0] ?? foot).sub(center);
-  if (!(normal.length() > 0)) return plane; // the ray passes through the middle itself, so there is no direction
+  // The ray passes through the middle itself, so there is no direction.
+  if (!(normal.length() > 0)) return plane;
   return aboutMiddle(plane, normal.normalize().toArray(), specimen);
 }
 

@@ -35,7 +35,8 @@ export function pickTile(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): Met
     if (span === null) continue;
     const from = Math.max(span[0], kept[0]);
     const to = Math.min(span[1], kept[1]);
-    const isFlat = span[0] === span[1]; // a box that is not flat but has an empty span is clipped along its face
+    // A box that is not flat but has an empty span is clipped along its face.
+    const isFlat = span[0] === span[1];
     if (from >= nearest || !(from < to || (isFlat && from === to))) continue;
     nearest = from;
     picked = id;

@@ -85,7 +85,8 @@ export class Hybrid {
       tiles: shownTiles(this.manifest.tiles, state.isolated),
       clip: state.clip,
       switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
-      discRadius_rad: set_rad, // not the budgeted radius, so that tiles do not come and go with the frame's budget
+      // The set radius is used, so that tiles do not come and go with the frame's budget.
+      discRadius_rad: set_rad,
       dt_s,
     });
     const isSame =

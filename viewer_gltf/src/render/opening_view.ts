@@ -1,6 +1,6 @@
 /**
  * Chooses the opening view of a specimen: three-quarter from the front, a little from above, as
- * near as fits. Among these views it takes one in which the specimen covers much of the image: a
+ * near as fits. Among these views it takes one in which the specimen covers much of the image. A
  * long specimen lies across a wide image, and goes into the depth of a narrow one.
  */
 import { around, type Box, centerOf, cornersOf } from "../math/box";

@@ -24,9 +24,11 @@ describe("the distance at which points are seen", () => {
   const fov = Math.PI / 2; // half the height is 1 at distance 1
 
   it("is set by the point that lies nearest to the edge of the image", () => {
-    expect(distanceToSee([[0, 3, 0]], fov, 1)).toBeCloseTo(3.75); // limited by nearness to the middle; the edge alone would give 3.4
+    // The nearness to the middle limits this; the edge alone would give 3.4.
+    expect(distanceToSee([[0, 3, 0]], fov, 1)).toBeCloseTo(3.75);
     expect(distanceToSee([[0, 3, 1]], fov, 1)).toBeCloseTo(1 + 3 / 0.88);
-    expect(distanceToSee([[-3, 0, 1]], fov, 2)).toBeCloseTo(1.25 * Math.sqrt(10)); // the width alone would give 2.7
+    // The width alone would give 2.7.
+    expect(distanceToSee([[-3, 0, 1]], fov, 2)).toBeCloseTo(1.25 * Math.sqrt(10));
     expect(distanceToSee([[-3, 0, 1]], fov, 0.5)).toBeCloseTo(1 + 6 / 0.88);
     const both = distanceToSee(
       [

@@ -8,9 +8,9 @@ import { type HandPose, moveByOneHand, type SpecimenPose } from "../math/grab";
 /**
  * Converts a pose on the screen into stereo.
  *
- * @param screen the point about which the camera turns, and the camera's orientation
+ * @param screen the point about which the camera turns, and its orientation
  * @param ahead_m where that point lies in stereo, metres
- * @param facing orientation of the eyes that look at it
+ * @param facing orientation of the eyes
  */
 export function intoRoom(
   pose: SpecimenPose,

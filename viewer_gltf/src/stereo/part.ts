@@ -81,7 +81,8 @@ class StereoPart implements Part, StereoFinder {
   async afterOverview(): Promise<void> {
     const { stereo, hasRoom } = await this.found;
     if (wayToStereo(stereo, isTouch()) === null && !hasRoom) return;
-    const prepare = () => void this.host.stereo.prepare().catch(() => undefined); // a start reports the failure
+    // A start reports the failure.
+    const prepare = () => void this.host.stereo.prepare().catch(() => undefined);
     if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
     else setTimeout(prepare, AFTER_PICTURE_MS);
   }

@@ -20,7 +20,8 @@ export async function makeTextureLoader(renderer: WebGLRenderer): Promise<KTX2Lo
     return worker;
   });
   loader.transcoderBinary = binary;
-  loader.transcoderPending = Promise.resolve(); // so that three's loader does not load its own transcoder
+  // three's loader then does not load its own transcoder.
+  loader.transcoderPending = Promise.resolve();
   return loader;
 }
 

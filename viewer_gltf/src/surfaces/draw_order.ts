@@ -3,8 +3,8 @@ import type { Vec3 } from "../math/vec3";
 
 /**
  * Orders channels by the distance of the nearest point of their boxes, farthest first. The box of a
- * channel inside another one begins farther away. Of boxes at the same distance, the first channel
- * is drawn last, over the others.
+ * channel inside another one begins farther away. If boxes begin at the same distance, the first
+ * channel is drawn last, over the others.
  *
  * @param outlines points of each channel, from which its box is computed
  * @returns the turn of each channel, 0 for the one that is drawn first

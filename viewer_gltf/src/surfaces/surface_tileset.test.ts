@@ -17,7 +17,7 @@ const level = (geometricError: number, children: readonly unknown[] = []) => ({
 
 it("a channel's tiles in view are known by level, and are refined as far as requested", () => {
   const [channel] = sampleManifest(1).channels;
-  const triangles = [600, 200, 100]; // of both tiles, finest first
+  const triangles = [600, 200, 100]; // finest first, for both tiles
   const tileset = new SurfaceTileset(
     "http://host/bundle/",
     { ...channel, triangles },

@@ -1,9 +1,9 @@
 /**
  * The surfaces of one channel, streamed by 3d-tiles-renderer.
  *
- * The tileset is in metres and z-up (3D Tiles 1.1). 3d-tiles-renderer turns the glTF content, which
- * is y-up, into that space. `group` turns it back and scales it to um, so its parent is the stage's
- * world.
+ * The tileset is in metres and z-up (3D Tiles 1.1). The renderer turns the glTF content, which is
+ * y-up, into that space. The `group` turns it back and scales it to um, so its parent is the
+ * stage's world.
  */
 import { TilesRenderer } from "3d-tiles-renderer";
 import type { Tile } from "3d-tiles-renderer/core";
@@ -193,13 +193,15 @@ export class SurfaceTileset {
     const { triangles } = this.channel;
     const coarsest = this.tiles.root?.children ?? [];
     return coarsest.flatMap((tile) => {
-      const { inFrustum = false, error = 0 } = tile.traversal ?? {}; // undefined before its first update
+      // The traversal is undefined before the tile's first update.
+      const { inFrustum = false, error = 0 } = tile.traversal ?? {};
       if (!inFrustum) return [];
       const px = error / tile.geometricError;
       const levels: { error_px: number; triangles: number }[] = [];
       for (let each: Tile | undefined = tile; each !== undefined; each = each.children?.[0]) {
         const all = triangles[triangles.length - 1 - levels.length] ?? 0;
-        const error_px = each.geometricError && px * each.geometricError; // keeps 0 at the eye, where px is infinite
+        // The first operand keeps an error of 0 even at the eye, where px is infinite.
+        const error_px = each.geometricError && px * each.geometricError;
         levels.push({ error_px, triangles: all / coarsest.length });
       }
       return [levels];
@@ -263,7 +265,8 @@ export class SurfaceTileset {
     if (id === null) {
       throw new BundleError(`${tile.content?.uri}: extras.tile is missing; expected the tile's id`);
     }
-    for (const material of materials) material.side = DoubleSide; // surfaces are open at the tile's border
+    // Surfaces are open at the tile's border.
+    for (const material of materials) material.side = DoubleSide;
     const list = [...materials];
     const meshes = placedMeshes(scene, this.matrix);
     let shownFace: Face | null = null;

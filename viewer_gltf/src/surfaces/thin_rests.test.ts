@@ -69,7 +69,7 @@ describe("beside an open tile", () => {
   });
 
   it("a component stays whole even if its parts have separate vertices where they meet", () => {
-    const [flat, deep] = [cap(10, 0.5, 4), cap(10, 2, 4)]; // both share one rim
+    const [flat, deep] = [cap(10, 0.5, 4), cap(10, 2, 4)]; // two caps that share one rim
     const both = mergeGeometries([flat, deep]);
     const all = (both.index?.count ?? 0) / 3;
     expect(trianglesAfter(both)).toBe(all);

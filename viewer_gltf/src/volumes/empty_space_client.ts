@@ -38,7 +38,8 @@ export class OccupancyClient {
       this.next();
     };
     this.port.onerror = (event) => {
-      event.preventDefault(); // reported through the promise, so it need not be printed on the console too
+      // The promise reports the fault, so it need not be printed on the console too.
+      event.preventDefault();
       if (event.message) this.fail(event.message);
       else this.stop("the worker's script did not load");
     };

@@ -1,6 +1,6 @@
 /**
- * Which tiles have volumes on the GPU: how much memory each may use, how far it has faded in, and
- * which are removed.
+ * Tiles whose volumes are on the GPU: how much memory each may use, how far it has faded in, and
+ * when it is removed.
  */
 import type { WantedTile } from "../state/representation";
 import type { BrickTile } from "../voxels/bricks/brick_atlas";

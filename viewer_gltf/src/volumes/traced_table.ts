@@ -12,8 +12,7 @@ type Shift = Pick<TraceSettings, "bias" | "threshold">;
  * Returns the table with its settings applied.
  *
  * @param table RGBA, rows of 256 entries
- * @param bias shift by which a grey value takes the opacity of a brighter one, as a share of all
- *   intensities
+ * @param bias shift towards the opacity of brighter values, as a share
  * @param threshold share of the intensities below which voxels are empty
  */
 export function tracedTable<T extends Uint8Array>(table: T, { bias, threshold }: Shift): T {

@@ -43,7 +43,8 @@ describe("the memory of the volumes", { timeout: 120_000 }, () => {
     const text = JSON.stringify({ volumes: ids.map((tile) => ({ ...volume, tile })) });
     lists = new Map([["volumes.json", text]]);
     const [first, ...others] = ids.map((id) => ({ ...fixture.tiles[0], id }));
-    const volumes = { path: "volumes.json", bytes: text.length, sha256: "" }; // the test has no secure context, so no hash is checked
+    // The test has no secure context, so no hash is checked.
+    const volumes = { path: "volumes.json", bytes: text.length, sha256: "" };
     manifest = {
       ...fixture,
       tiles: [first, ...others],

@@ -20,9 +20,9 @@ export function texels(level: MipLevel): number {
 }
 
 /**
- * Returns indices into `levels` (which go from fine to coarse) in the order of fetching: first a
- * small level, then each finer one, up to the finest that fits into `budget_bytes` (one byte per
- * texel) and whose sides the GPU supports. The coarsest is always allowed.
+ * Returns indices into `levels` (which go from fine to coarse) in the order of fetching. A small
+ * level comes first, then each finer one. The last is the finest that fits into `budget_bytes` (one
+ * byte per texel) and whose sides the GPU supports. The coarsest is always allowed.
  */
 export function levelsToFetch(
   levels: readonly MipLevel[],

@@ -130,7 +130,8 @@ describe("the texture of a tile", { timeout: 120_000 }, () => {
     await isAt(0);
     texture.advance(1);
     const asked = host.asked.length;
-    texture.want(sources, [1], 0); // the gaze wanders, so no finer level is loaded and none is dropped
+    // The gaze wanders, so no finer level is loaded and none is dropped.
+    texture.want(sources, [1], 0);
     await isAt(0);
     expect(host.asked.length).toBe(asked);
   });

@@ -164,7 +164,7 @@ export class Controllers {
 
   private add(source: XRInputSource): void {
     const material = new MeshBasicMaterial({ color: 0x9fb4d0, toneMapped: false });
-    material.transparent = true; // so that it is drawn after the panel that it points at
+    material.transparent = true; // sorts the ray after the panel at which it points
     const line = new Mesh(this.tube, material);
     line.renderOrder = RENDER_ORDER;
     line.visible = false;

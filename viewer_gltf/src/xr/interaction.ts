@@ -270,7 +270,8 @@ export class Hands {
 
   /** Targets that can be chosen now. A carried object covers all others until it is put down. */
   private get choosable(): readonly Target[] {
-    if (this.grips.headHold !== null) return []; // nothing can be chosen while the head carries the specimen
+    // Nothing can be chosen while the head carries the specimen.
+    if (this.grips.headHold !== null) return [];
     return this.carry.isCarrying ? [this.carry] : this.targets;
   }
 

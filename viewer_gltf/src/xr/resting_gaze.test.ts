@@ -199,7 +199,8 @@ describe("a gaze that opens or closes the panel", () => {
     person.hands.stop();
     person.hands.start(null);
     person.rest(6);
-    expect(person.hands.pointed).toMatch(/^panel:bar-/); // the bar has moved to where the head faces
+    // The bar has moved to where the head faces.
+    expect(person.hands.pointed).toMatch(/^panel:bar-/);
     expect([person.hands.panel.isOpen, person.wishes]).toEqual([false, []]);
     person.lookUp();
     person.lookAt("opener");

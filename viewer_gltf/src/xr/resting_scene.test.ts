@@ -183,7 +183,8 @@ describe("the bar under a resting gaze", () => {
     person.lookAt("undo-choice");
     person.changes = 0;
     person.rest(LONG_S);
-    expect(person.changes).toBeLessThanOrEqual(2); // one for the undoing, one because Undo disappears from the bar
+    // One for the undoing, one because Undo disappears from the bar.
+    expect(person.changes).toBeLessThanOrEqual(2);
     expect(person.wishes.filter((wish) => JSON.stringify(wish).includes("restore"))).toHaveLength(
       1,
     );

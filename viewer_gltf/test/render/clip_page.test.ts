@@ -1,7 +1,7 @@
 /**
  * Clip plane and clip box cut surfaces and volumes alike, for one eye and for two. The expected
- * image follows from rays through the specimen: a ray that is removed over its whole length shows
- * nothing, and a ray that is kept over its whole length shows the same as before.
+ * image follows from rays through the specimen. A ray that is removed over its whole length shows
+ * nothing. A ray that is kept over its whole length shows the same as before.
  */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";
@@ -244,7 +244,8 @@ describeInChromium("a clip", () => {
   const AWAY_M = 1.8;
 
   async function shoot(mode: Mode, eye_m: readonly number[], hash: string): Promise<Picture> {
-    await page().goto("about:blank"); // an address that differs only in its hash does not reload the page
+    // An address that differs only in its hash does not reload the page.
+    await page().goto("about:blank");
     await stand.open(linkOf(mode, `&eye=${[...eye_m, 0, 0, 0]}${hash}`));
     await stand.viewer.still();
     return takePicture(page());
@@ -263,7 +264,8 @@ describeInChromium("a clip", () => {
   }
 
   it("is switched by a key: a plane through the middle, a box around it", async () => {
-    const whole = await shoot("off", [AWAY_M, 0, 0], ""); // from the side, since the plane faces the front
+    // The view is from the side, since the plane faces the front.
+    const whole = await shoot("off", [AWAY_M, 0, 0], "");
     const eye = eyeOf("side", AWAY_M, 40, whole);
     const press = async (key: string) => {
       await page().keyboard.press(key);

@@ -120,7 +120,8 @@ describeInChromium("surface or volume", () => {
     expect(gazed).not.toBeNull();
     expect(new Set(volumes.map(({ tile }) => tile))).toEqual(new Set(["r0_c0", "r0_c1"]));
     const inner_deg = 0.55 * DISC_DEG;
-    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25); // otherwise the test would prove nothing
+    // Without this difference the test would prove nothing.
+    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25);
     // the same image as with volumes everywhere, so no box edge shows
     expect(apart(disc, all, 0, inner_deg)).toBe(0);
     // a few pixels of silhouettes are multisampled differently where surfaces are blended
@@ -226,7 +227,8 @@ describeInChromium("surface or volume", () => {
     expect(at(tile, other)).toEqual(at(off, other));
     expect(at(tile, own)).not.toEqual(at(off, own));
     at(tile, own).forEach((v, i) => {
-      expect(Math.abs(v - at(all, own)[i])).toBeLessThanOrEqual(8); // steps are distributed differently
+      // The steps of the ray are distributed differently.
+      expect(Math.abs(v - at(all, own)[i])).toBeLessThanOrEqual(8);
     });
   });
 

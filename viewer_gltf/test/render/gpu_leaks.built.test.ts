@@ -71,7 +71,8 @@ describeInChromium("changing tiles", () => {
       for (let i = 0; i < n; i++) await stand.viewer.chooseTile(tiles[i % tiles.length]);
       await stand.viewer.still();
     };
-    await show(2 * tiles.length); // each tile twice, so that every shader was used with every surface
+    // Each tile is shown twice, so that every shader was used with every surface.
+    await show(2 * tiles.length);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.map(({ tile }) => tile)).toContain(tiles[tiles.length - 1]);
     const [first, firstBytes] = [await counts(), await heapBytes()];

@@ -80,7 +80,8 @@ describeInChromium("the object chunks", () => {
       for (const [x, y] of outline) {
         const [toX, toY, toZ] = await drawn(row, [x, y, 0], gap_um);
         places.push([toX, toY]);
-        expect(toZ).toBeCloseTo(gap_um / 2, 3); // half of the gap at either end of the narrowest side
+        // Half of the gap at either end of the narrowest side.
+        expect(toZ).toBeCloseTo(gap_um / 2, 3);
       }
       outlines.push(places);
       for (const place of along(places)) expect(isWithin(outline, place), `${place}`).toBe(true);

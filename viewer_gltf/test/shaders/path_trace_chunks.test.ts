@@ -295,7 +295,8 @@ describeInChromium("the path tracer's chunks", () => {
       a.forEach((v, k) => {
         expect(found[k]).toBeCloseTo(v + 0.25 * (b[k] - v), k === 3 ? 1 : 4);
       });
-      expect((await medium(1, [1.2, 0, 0, 0]))[3]).toBeCloseTo(255 ** 2, 1); // clamped to the last entry
+      // The lookup is clamped to the last entry.
+      expect((await medium(1, [1.2, 0, 0, 0]))[3]).toBeCloseTo(255 ** 2, 1);
       expect((await medium(1, [-0.1, 0, 0, 0]))[3]).toBe(0);
     });
 
@@ -520,7 +521,8 @@ describeInChromium("the path tracer's chunks", () => {
       }));
       expectClose(await history(2, 0.25, [1, 2], many, "sums"), [48 * 2.25, 0, 0, 48]);
       expect((await history(2, 0.25, [1, 2], many, "moments"))[1]).toBeCloseTo(48, 3);
-      expectClose(await history(1, 0, [1, 2], many, "sums"), many[9].sums); // a view at rest keeps all samples
+      // A view at rest keeps all samples.
+      expectClose(await history(1, 0, [1, 2], many, "sums"), many[9].sums);
     });
 
     it("is dropped where another surface was seen, or outside the earlier image", async () => {

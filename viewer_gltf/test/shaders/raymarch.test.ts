@@ -105,7 +105,8 @@ describeInChromium("the ray march", () => {
 
   it("shows the middle of a channel's window half as bright on the screen as its end", async () => {
     const [red] = await bare.call("meanAlong", "maximum", "uniform", 67, 255, [0, 2]);
-    expect(red).toBeCloseTo(((0.5 + 0.055) / 1.055) ** 2.4, 2); // linear light of an sRGB value of one half
+    // Linear light of an sRGB value of one half.
+    expect(red).toBeCloseTo(((0.5 + 0.055) / 1.055) ** 2.4, 2);
   });
 
   it("adds up values along a ray, without occlusion", async () => {
@@ -154,7 +155,7 @@ describeInChromium("the ray march", () => {
       const values = columns.map((column) => column[k]);
       expect(Math.max(...values) - Math.min(...values)).toBeLessThan(3);
     }
-    expect(columns[0][0]).toBeGreaterThan(60); // both tiles are visible
+    expect(columns[0][0]).toBeGreaterThan(60); // two tiles are visible
     expect(columns[0][1]).toBeGreaterThan(60);
   });
 

@@ -41,7 +41,8 @@ describeInChromium("the shader chunks", () => {
     ];
     expect(await clip(nowhere, ahead, [x, y, z])).toEqual([5, 8]);
     expect(await clip(nowhere, ahead, [[1, 0, 0, 0.5], y, z])).toEqual([4, 8]);
-    expect(await clip(nowhere, ahead, [x, y, [0, 0, 1, 0]])).toEqual([4, 8]); // the corner is only behind the eye
+    // The corner is only behind the eye.
+    expect(await clip(nowhere, ahead, [x, y, [0, 0, 1, 0]])).toEqual([4, 8]);
   });
 
   it("clip a ray's span by the disc's cone, from its apex or from another eye", async () => {
@@ -205,7 +206,8 @@ describeInChromium("the shader chunks", () => {
       cut([front, right], `oColor = vec4(cutNormal(${eye}, vec3(0.0)), 1.0);`);
     expect((await normal("vec3(0.0, 0.0, 9.0)")).slice(0, 3)).toEqual([0, 0, 1]);
     expect((await normal("vec3(9.0, 0.0, 1.0)")).slice(0, 3)).toEqual([1, 0, 0]);
-    expect((await normal("vec3(0.5, 0.0, 1.0)")).slice(0, 3)).toEqual([0, 0, 0]); // on the kept side
+    // The eye is on the kept side.
+    expect((await normal("vec3(0.5, 0.0, 1.0)")).slice(0, 3)).toEqual([0, 0, 0]);
     // through both planes: the one that is crossed last
     expect((await normal("vec3(9.0, 0.0, 9.0)")).slice(0, 3)).toEqual([1, 0, 0]);
   });
@@ -451,7 +453,8 @@ describeInChromium("the shader chunks", () => {
 
     it("without direction where the gradient is zero or noise, and gradually in between", async () => {
       // The lamp is beside the eye and behind the boundary, which would be dark.
-      const edgewise = [-1e-5, 0, -1]; // slightly off the axis, so that rounding does not decide the side
+      // The direction is slightly off the axis, so that rounding does not decide the side.
+      const edgewise = [-1e-5, 0, -1];
       const steep = (step: number) => lit([-step, 0, 0], edgewise, [-1, 0, 1]); // over 1 um
       const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as for a boundary that faces the eye
       expect(await steep(0)).toBeCloseTo(even, 4);

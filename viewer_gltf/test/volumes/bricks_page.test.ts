@@ -1,6 +1,6 @@
 /**
- * Volumes as bricks from `stereocell serve`: they give the same image as files, arrive piece by
- * piece, need no network on a second visit, and are replaced by files where bricks do not suffice.
+ * Volumes as bricks from `stereocell serve`. They give the same image as files, arrive piece by
+ * piece, and need no network on a second visit. Files replace them where bricks do not suffice.
  * Skipped without the repository's .venv (`make setup`).
  */
 import { existsSync } from "node:fs";

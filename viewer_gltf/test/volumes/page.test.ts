@@ -121,7 +121,8 @@ describeInChromium("volumes", () => {
     };
     await wander();
     await page().locator("select[data-mode]").selectOption("disc");
-    await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur()); // so that its keys do not apply
+    // The menu must not take the keys.
+    await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     await expect
       .poll(async () => {
         await wander();
@@ -183,7 +184,8 @@ describeInChromium("volumes", () => {
     const coarse = await takePicture(page());
     const { volumeBytes: coarseBytes } = await stand.viewer.snapshot();
     release();
-    await expect.poll(async () => areAt(await volumes(), FINEST), PATIENT).toBe(true); // no frame has been drawn yet
+    // No frame has been drawn yet.
+    await expect.poll(async () => areAt(await volumes(), FINEST), PATIENT).toBe(true);
 
     const frames = async () => (await page().evaluate(() => window.stereocell?.frames)) ?? 0;
     const bytes: number[] = [];
@@ -207,7 +209,7 @@ describeInChromium("volumes", () => {
       expect(away[i - 1] - away[i], `frame ${i}`).toBeLessThan(0.5 * away[0]);
     }
     expect(away[5]).toBeLessThan(0.02 * away[0]);
-    // both levels are kept while they are mixed, then only the new one
+    // two levels are kept while they are mixed, then only the new one
     expect(bytes.slice(0, 4)).toEqual(new Array(4).fill(coarseBytes + bytes[5]));
   });
 });

@@ -206,7 +206,8 @@ describeInChromium("stereo without WebXR", () => {
     expect(below.y).toBeLessThan(ahead.y - 20);
     expect(Math.abs(below.x - ahead.x)).toBeLessThan(1);
 
-    await turnTo(270, 80, 90); // the head tilts to its right shoulder, so the image rotates to the left
+    // The head tilts to its right shoulder, so the image rotates to the left.
+    await turnTo(270, 80, 90);
     const [rolled] = await lookAt([0, 0.5, -2], 0.04);
     expect(rolled.x).toBeLessThan(ahead.x - 5);
   });
@@ -269,7 +270,7 @@ describeInChromium("stereo without WebXR", () => {
     const { isRunning, problems } = await status();
     expect(isRunning).toBe(true);
     expect(problems.join(" ")).toMatch(/home screen.*dim.*can't follow your head/);
-    // It covers the page even without full screen.
+    // The canvas covers the page even without full screen.
     expect(await page.locator("#stage").evaluate(({ clientWidth }) => clientWidth)).toBe(WIDTH);
   });
 

@@ -32,7 +32,7 @@ describeInChromium("fingers in a Cardboard", () => {
   it("turn, bring nearer and choose, without choosing anything on the way", async () => {
     await stand.open("&mode=off");
     const { page } = stand.viewer;
-    await page.keyboard.press("j"); // so that the gaze alone chooses nothing
+    await page.keyboard.press("j"); // choosing by gaze off
     await page.locator('[data-overlay="stereo"]').tap(); // on the canvas: a phone has no headset
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     const told = async () => (await stand.viewer.snapshot()).told.length;

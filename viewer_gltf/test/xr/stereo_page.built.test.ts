@@ -77,7 +77,7 @@ describeInChromium("the page in stereo", () => {
   it("selects the target that is looked at for 1.5 s, and nothing with dwell off", async () => {
     await open("&mode=off", false);
     await expect.poll(async () => (await state()).selected).not.toBeNull();
-    expect((await state()).isolated).toBeNull(); // it was chosen once, not twice
+    expect((await state()).isolated).toBeNull(); // chosen once, not twice
     expect(await undo().isDisabled()).toBe(true); // no setting was changed
   });
 

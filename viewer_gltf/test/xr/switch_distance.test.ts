@@ -13,7 +13,7 @@ describeInChromium("nearer and farther on the split screen", () => {
   it("goes from surfaces to volumes, and back", async () => {
     const { page } = stand.viewer;
     await stand.open(`&mode=disc&switch=${SWITCH_M}&disc=20&quality=low`);
-    await page.keyboard.press("j"); // so that the gaze chooses nothing
+    await page.keyboard.press("j"); // choosing by gaze off
     await page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     const seen = async () => {

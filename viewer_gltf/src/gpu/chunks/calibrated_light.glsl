@@ -1,7 +1,7 @@
 // Scales the stand-in march to the mean brightness and colour of a small path-traced image of the
 // same view; light_probe.frag.glsl sums both.
-uniform sampler2D uTracedLight; // one texel: light and coverage of the path-traced pixels
-uniform sampler2D uMarchedLight; // one texel: light and coverage of the marched pixels
+uniform sampler2D uTracedLight;  // one texel: light and coverage of the path-traced pixels
+uniform sampler2D uMarchedLight;  // one texel: light and coverage of the marched pixels
 
 // Largest factor of one colour channel relative to that of the luminance. Where the march has
 // hardly any of a channel, such as a white highlight on a green surface, the missing light is added

@@ -22,7 +22,7 @@ vec3 cutNormal(vec3 eye, vec3 p) {
   for (int i = 0; i < uCutCount; i++) {
     float above = dot(uCuts[i].xyz, eye) - uCuts[i].w;
     float slope = dot(uCuts[i].xyz, eye - p);
-    if (above <= 0.0 || slope <= 0.0) continue; // the eye is on the kept side
+    if (above <= 0.0 || slope <= 0.0) continue;  // the eye is on the kept side
     float t = above / slope;
     if (t > latest) {
       latest = t;

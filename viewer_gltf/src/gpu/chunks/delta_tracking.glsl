@@ -1,16 +1,17 @@
 // Free flight through the medium. The extinction in a brick never exceeds the brick's majorant, so
-// tracking brick by brick is unbiased for bricks of any size: Woodcock et al. 1965; local
-// majorants: Szirmay-Kalos et al., Computer Graphics Forum 2010. `from` and `to` are lengths along
-// the ray, um. `dir` is a unit vector without zero components. Bricks are traversed as by
-// Amanatides & Woo 1987.
-const int MAX_EVENTS = 8192; // more than any path needs; a limit keeps a fault from hanging the page
+// tracking brick by brick is unbiased for bricks of any size (Woodcock et al. 1965). Local
+// majorants are from Szirmay-Kalos et al., Computer Graphics Forum 2010. The arguments `from` and
+// `to` are lengths along the ray, um. The direction `dir` is a unit vector without zero components.
+// Bricks are traversed as by Amanatides & Woo 1987.
+// The limit is more than any path needs; it keeps a fault from hanging the page.
+const int MAX_EVENTS = 8192;
 
 struct Bricks {
-  vec3 pace; // bricks per um
+  vec3 pace;  // bricks per um
   ivec3 cell;
   ivec3 way;
-  vec3 wall; // lengths along the ray to the next brick boundary of each axis
-  vec3 gap; // lengths between two boundaries of each axis
+  vec3 wall;  // lengths along the ray to the next brick boundary of each axis
+  vec3 gap;  // lengths between two boundaries of each axis
 };
 
 Bricks enterBricks(vec3 origin, vec3 dir, float from) {
@@ -75,7 +76,7 @@ float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
   if (uStride > 0.0) return trackBySteps(origin, dir, from, to, medium);
   Bricks b = enterBricks(origin, dir, from);
   float t = from;
-  float depth = -log(1.0 - random()); // optical depth of the majorants to the next event
+  float depth = -log(1.0 - random());  // optical depth of the majorants to the next event
   for (int i = 0; i < MAX_EVENTS; i++) {
     float end = brickEnd(b, to);
     float majorant = majorantOf(b);
@@ -115,7 +116,7 @@ float transmittance(vec3 origin, vec3 dir, float from, float to) {
     }
     t += depth / majorant;
     share *= 1.0 - mediumAt(origin + t * dir).a / majorant;
-    if (share < 0.1) { // Russian roulette
+    if (share < 0.1) {  // Russian roulette
       if (random() >= 0.5) return 0.0;
       share *= 2.0;
     }

@@ -7,7 +7,7 @@ uniform vec4 uOpen[6];
 vec3 openNormal(vec3 eye, vec3 p) {
   vec3 normal = vec3(0.0);
   float enters = 0.0;
-  float leaves = 1.001; // surfaces end exactly in the face
+  float leaves = 1.001;  // surfaces end exactly in the face
   for (int i = 0; i < 6; i++) {
     float slope = dot(uOpen[i].xyz, p - eye);
     float t = (uOpen[i].w - dot(uOpen[i].xyz, eye)) / slope;

@@ -1,10 +1,11 @@
 // For an eye that looks through a lens, the periphery is marched in fewer steps. Farther out, only
 // every second block of 2 x 2 pixels is marched, because the GPU shades a block together: radial
 // density masking (Vlachos, Advanced VR Rendering Performance, GDC 2016).
-uniform vec4 uLens; // tangents from the eye's axis for clip space: factor, offset; 0: no lens
+uniform vec4 uLens;  // tangents from the eye's axis for clip space: factor, offset; 0: no lens
 
-const vec2 SPARSE = vec2(0.36, 1.0); // tangents between which steps fall by half: 20 and 45 degrees
-const float MASKED = 0.47; // tangent from which blocks are skipped: 25 degrees
+// Tangents between which steps fall by half: 20 and 45 degrees.
+const vec2 SPARSE = vec2(0.36, 1.0);
+const float MASKED = 0.47;  // tangent from which blocks are skipped: 25 degrees
 
 // `part`: the eye's part of the image: x, y, width, height, pixels.
 float tangentAt(vec2 pixel, vec4 part) {

@@ -10,7 +10,7 @@ const float PI = 3.14159265358979;
 
 struct Scatter {
   int way;
-  vec3 normal; // of the surface, on the side from which the ray comes
+  vec3 normal;  // the surface's normal, on the side from which the ray comes
   vec3 mirrored;
 };
 

@@ -1,7 +1,8 @@
 #ifdef STREAM_BRICK
-// Virtual texturing: uVolume is an atlas of bricks of STREAM_BRICK^3 texels, each with an apron of
-// one texel. uIndex has an entry for each cell of STREAM_BRICK^3 texels, channel by channel: the
-// slot (x, y, z) and level (a) of its brick. If a is 255, the whole cell has the value r / 255.
+// Virtual texturing: the texture uVolume is an atlas of bricks of STREAM_BRICK^3 texels, each with
+// an apron of one texel. The texture uIndex has an entry for each cell of STREAM_BRICK^3 texels,
+// channel by channel. The entry is the slot (x, y, z) and level (a) of the cell's brick. If a is
+// 255, the whole cell has the value r / 255.
 vec4 sampleIntensities(vec3 p) {
   const float EDGE = float(STREAM_BRICK);
   ivec3 size = textureSize(uIndex, 0);

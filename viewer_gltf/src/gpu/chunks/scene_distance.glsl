@@ -19,13 +19,13 @@ float paneDistance(float back) {
   return distanceOf(texelFetch(uPaneDepth, pixelHere(), 0).r, back);
 }
 
-// Where the opaque scene ends the ray: x at the pixel's centre, y behind a silhouette that runs
-// through the pixel, z the share of the pixel that sees past the silhouette. The frame is
+// Where the opaque scene ends the ray. Component x is at the pixel's centre, y behind a silhouette
+// that runs through the pixel, z the share of the pixel that sees past the silhouette. The frame is
 // multisampled but its depth is not, so otherwise a pixel at a silhouette would show the background
 // between mesh and volume.
 vec3 sceneDistances(float back) {
   ivec2 pixel = pixelHere();
-  ivec2 first = ivec2(uEye.xy); // the other eye's depth begins next to this one's
+  ivec2 first = ivec2(uEye.xy);  // the other eye's depth begins next to this one's
   ivec2 last = ivec2(uEye.xy + uEye.zw) - 1;
   float near = distanceOf(texelFetch(uSceneDepth, pixel, 0).r, back);
   float far = near;
@@ -38,5 +38,6 @@ vec3 sceneDistances(float back) {
     far = max(far, there);
     farther += 1.0;
   }
-  return vec3(near, far, min(1.0, farther / 2.0)); // a slanted edge leaves two of the four neighbours free
+  // A slanted edge leaves two of the four neighbours free.
+  return vec3(near, far, min(1.0, farther / 2.0));
 }

@@ -1,13 +1,14 @@
-// The scene's light, the same as for surfaces. The including shader declares uKeyLight, uFillLight,
-// uSkyLight and uGroundLight, the light that a white surface reflects when it faces each of them;
-// vLight, vFill and vUp, the directions to them; and reached(), the shares of the surrounding and
-// of the key light that reach a place in the box.
+// The scene's light, the same as for surfaces. The including shader declares three things. The
+// light that a white surface reflects when it faces each lamp: uKeyLight, uFillLight, uSkyLight,
+// uGroundLight. The directions to the lamps and the sky: vLight, vFill, vUp. The function
+// reached(): the shares of the surrounding light and of the key light that reach a place in the
+// box.
 
 // Steps of intensity over two voxels. Steps below the first are noise of 8 bits and of the
 // detector; above the second they are boundaries. In between, shading fades in.
 const float NOISE_STEP = 0.03;
 const float BOUNDARY_STEP = 0.18;
-const float FLAT_STEP = 1e-4; // less than one step of 8 bits: no direction at all
+const float FLAT_STEP = 1e-4;  // less than one step of 8 bits: no direction at all
 
 // Matter without a boundary is lit from all around by this factor: on average as bright as the
 // surfaces.

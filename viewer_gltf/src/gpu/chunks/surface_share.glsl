@@ -4,9 +4,9 @@ uniform vec2 uDisc;
 uniform vec3 uApex;
 uniform vec3 uAxis;
 uniform float uOpacity;
-uniform float uTaken; // share that the volume replaces, 0 to 1: in the disc, or everywhere
+uniform float uTaken;  // share that the volume replaces, 0 to 1: in the disc, or everywhere
 uniform bool uInDisc;
-uniform bool uCrosses; // whether the images of volume and surface are mixed in the disc
+uniform bool uCrosses;  // whether the images of volume and surface are mixed in the disc
 
 // Returns the share of the surface that the volume replaces at a place of the scene, 0 to 1.
 float shareTaken(vec3 p) {

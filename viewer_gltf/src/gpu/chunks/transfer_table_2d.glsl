@@ -1,7 +1,8 @@
 // Two-dimensional transfer functions: value and gradient magnitude (Kniss, Kindlmann & Hansen 2002);
 // docs/transfer-functions.md describes the numbers.
 
-uniform vec4 uGradientMax; // for each channel: the step of intensity over two voxels that is 1 in its table
+// For each channel: the step of intensity over two voxels that is 1 in its table.
+uniform vec4 uGradientMax;
 
 // Differences of the intensities over two voxels, along the axes of the texture.
 struct Steps {

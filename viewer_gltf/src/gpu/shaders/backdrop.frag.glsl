@@ -2,12 +2,12 @@
 // light on the ground, and the specimen's soft shadow in it.
 precision highp float;
 
-uniform vec3 uFar; // sRGB: far away on the ground
-uniform vec3 uHigh; // sRGB: high up
-uniform vec3 uPool; // sRGB: on the ground beside the specimen
-uniform float uShade; // share of the light that the shadow takes, 0 to 1
-uniform vec4 uFoot; // x and z range of what stands on the ground, metres of the scene: low, high
-uniform float uGround; // height of the ground, metres
+uniform vec3 uFar;  // sRGB: far away on the ground
+uniform vec3 uHigh;  // sRGB: high up
+uniform vec3 uPool;  // sRGB: on the ground beside the specimen
+uniform float uShade;  // share of the light that the shadow takes, 0 to 1
+uniform vec4 uFoot;  // x and z range of what stands on the ground, metres of the scene: low, high
+uniform float uGround;  // height of the ground, metres
 uniform vec3 cameraPosition;
 
 in vec3 vRay;

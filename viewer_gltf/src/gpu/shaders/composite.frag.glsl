@@ -4,9 +4,9 @@ precision highp float;
 
 #ifdef CROSSING
 uniform bool uIsCrossing;
-uniform mat4 uToRoom[2]; // from each eye's clip space to the scene
-uniform vec3 uEyeAt[2]; // metres
-uniform float uRim; // metres: distance at which pixels without a surface are weighted
+uniform mat4 uToRoom[2];  // from each eye's clip space to the scene
+uniform vec3 uEyeAt[2];  // metres
+uniform float uRim;  // metres: distance at which pixels without a surface are weighted
 uniform vec3 uApex;
 uniform vec3 uAxis;
 uniform vec2 uDisc;

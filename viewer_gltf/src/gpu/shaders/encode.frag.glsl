@@ -3,9 +3,9 @@
 // earlier frame is mixed in.
 precision highp float;
 
-uniform sampler2D uLight; // linear
-uniform sampler2D uBefore; // linear
-uniform float uShareBefore; // 0 to 1
+uniform sampler2D uLight;  // linear
+uniform sampler2D uBefore;  // linear
+uniform float uShareBefore;  // 0 to 1
 
 out vec4 oColor;
 

@@ -4,7 +4,7 @@ precision highp float;
 
 uniform sampler2D uFirst;
 uniform sampler2D uSecond;
-uniform vec4 uPart; // the eye's part of the images: x, y, width, height, pixels
+uniform vec4 uPart;  // the eye's part of the images: x, y, width, height, pixels
 
 #include <chunks/periphery>
 
@@ -23,7 +23,8 @@ void main() {
   if (!isSparse(pixel, uPart)) return;
   oFirst = oSecond = vec4(0.0);
   float total = 0.0;
-  for (int reach = 1; reach < 3 && total == 0.0; reach++) { // 2 is needed in the corners of the part
+  // A reach of 2 is needed in the corners of the part.
+  for (int reach = 1; reach < 3 && total == 0.0; reach++) {
     for (int k = 0; k < 9; k++) {
       ivec2 side = ivec2(k % 3, k / 3) - 1;
       ivec2 tap = pixel + reach * side;

@@ -195,9 +195,9 @@ function gridOver(marched: readonly Marched[]): Grid {
 }
 
 /**
- * Returns the mip level for cells with an edge in um: the coarsest level with texels no larger than
- * that, among the levels that are loaded for all channels and have at most `most` texels; otherwise
- * the finest of these. Null if there is none.
+ * Returns the mip level for cells with an edge in um. Levels count if they are loaded for all
+ * channels and have at most `most` texels. The result is the coarsest of these with texels no
+ * larger than the edge, otherwise the finest of these. Null if there is none.
  */
 function levelFor(sources: readonly VolumeSource[], edge: number, most: number): number | null {
   const { levels } = sources[0].volume;

@@ -149,7 +149,8 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
   const [di, dj] = [Math.floor(aside), Math.floor(up)];
   const [fi, fj] = [aside - di, up - dj];
   const lit = new Float32Array(through.length);
-  let before = new Float32Array(np * nq).fill(1); // light that leaves the cells of the previous plane
+  // Light that leaves the cells of the previous plane.
+  let before = new Float32Array(np * nq).fill(1);
   let leaving = new Float32Array(np * nq);
   const at = (i: number, j: number) =>
     i < 0 || j < 0 || i >= np || j >= nq ? 1 : before[j * np + i];

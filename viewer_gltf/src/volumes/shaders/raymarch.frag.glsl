@@ -8,64 +8,66 @@ precision highp sampler3D;
 precision highp sampler2DArray;
 precision highp usampler3D;
 
-uniform vec3 uSize; // um
-uniform vec3 uTexLow; // texture coordinates at the box's low corner
-uniform vec3 uTexHigh; // texture coordinates at the box's high corner
-uniform vec3 uTexels; // texels of mip level 0
-uniform float uVoxel; // um: length of path for which the opacities of the transfer functions hold
-uniform float uDensity; // factor of uVoxel
-uniform float uMinStep; // um
-uniform vec4 uFloor; // for each channel: intensities up to this are invisible
-uniform vec4 uContrast; // for each channel: factor of the gradients used for shading
+uniform vec3 uSize;  // um
+uniform vec3 uTexLow;  // texture coordinates at the box's low corner
+uniform vec3 uTexHigh;  // texture coordinates at the box's high corner
+uniform vec3 uTexels;  // texels of mip level 0
+uniform float uVoxel;  // um: length of path for which the opacities of the transfer functions hold
+uniform float uDensity;  // factor of uVoxel
+uniform float uMinStep;  // um
+uniform vec4 uFloor;  // for each channel: intensities up to this are invisible
+uniform vec4 uContrast;  // for each channel: factor of the gradients used for shading
 #ifdef MAXIMUM
-uniform vec4 uWindowLow; // for each channel: intensity that is dark
-uniform vec4 uWindowHigh; // for each channel: intensity that is bright
+uniform vec4 uWindowLow;  // for each channel: intensity that is dark
+uniform vec4 uWindowHigh;  // for each channel: intensity that is bright
 #endif
-uniform int uSteps; // for the whole ray, at most MAX_STEPS
-uniform int uSpare; // steps reserved for the other tiles, one each
-uniform vec3 uAllLow; // um, the same space: low corner of the box around all marched tiles
-uniform vec3 uAllHigh; // high corner; these tiles share the ray's steps by length
-uniform float uBrickSlack; // bricks by which a coarse mip level spreads beyond its brick
-uniform vec3 uColor[CHANNELS]; // linear RGB
+uniform int uSteps;  // for the whole ray, at most MAX_STEPS
+uniform int uSpare;  // steps reserved for the other tiles, one each
+uniform vec3 uAllLow;  // um, the same space: low corner of the box around all marched tiles
+uniform vec3 uAllHigh;  // high corner; these tiles share the ray's steps by length
+uniform float uBrickSlack;  // bricks by which a coarse mip level spreads beyond its brick
+uniform vec3 uColor[CHANNELS];  // linear RGB
 #ifdef DISC
-uniform bvec4 uInDisc; // channels that are shown only in the disc
+uniform bvec4 uInDisc;  // channels that are shown only in the disc
 uniform bool uAllInDisc;
-uniform vec3 uApex; // um: apex of the disc's cone
-uniform vec3 uAxis; // its axis, a unit vector
-uniform vec2 uDisc; // cosines of its inner and outer radius
-uniform float uReach; // cosine of the marched radius, slightly larger for pixels that mix with others
-uniform bool uIsCrossing; // whether all marched channels are shown only in the disc
+uniform vec3 uApex;  // um: apex of the disc's cone
+uniform vec3 uAxis;  // its axis, a unit vector
+uniform vec2 uDisc;  // cosines of its inner and outer radius
+// Cosine of the marched radius, slightly larger for pixels that mix with others.
+uniform float uReach;
+uniform bool uIsCrossing;  // whether all marched channels are shown only in the disc
 #endif
-uniform float uPresence; // 0 to 1: volumes fade in when they are loaded
-uniform vec3 uClipLow; // um: nothing outside is drawn
+uniform float uPresence;  // 0 to 1: volumes fade in when they are loaded
+uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
-uniform vec4 uClipPlane; // xyz unit normal, w um: points with dot(normal, p) > w are not drawn
-uniform vec4 uCorner[3]; // points for which this holds for all three planes are not drawn
+uniform vec4 uClipPlane;  // xyz unit normal, w um: points with dot(normal, p) > w are not drawn
+uniform vec4 uCorner[3];  // points for which this holds for all three planes are not drawn
 uniform sampler3D uVolume;
-uniform usampler3D uIndex; // with STREAM_BRICK
-uniform sampler3D uOldVolume; // the volume before, at another mip level
-uniform float uFresh; // share of the new volume, 0 to 1
-uniform sampler3D uOccupancy; // distance to the nearest visible brick, in bricks / 255
-uniform sampler2D uLut; // 256 x CHANNELS: RGB factor of the colour, A opacity per voxel
+uniform usampler3D uIndex;  // with STREAM_BRICK
+uniform sampler3D uOldVolume;  // the volume before, at another mip level
+uniform float uFresh;  // share of the new volume, 0 to 1
+uniform sampler3D uOccupancy;  // distance to the nearest visible brick, in bricks / 255
+uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor of the colour, A opacity per voxel
 #ifdef TWO_D
-uniform sampler2DArray uTables2d; // 256 x 64 x CHANNELS: the same by intensity and steepness
+uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by intensity and steepness
 #endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
-uniform bool uHasPane; // whether any surface is translucent
-uniform vec3 uKeyLight; // light that a white surface reflects when it faces the key light
-uniform vec3 uFillLight; // the same for the fill light
-uniform vec3 uSkyLight; // the same for the sky
+uniform bool uHasPane;  // whether any surface is translucent
+uniform vec3 uKeyLight;  // light that a white surface reflects when it faces the key light
+uniform vec3 uFillLight;  // the same for the fill light
+uniform vec3 uSkyLight;  // the same for the sky
 uniform vec3 uGroundLight;  // the same for the ground
-uniform float uGloss; // largest share of the key light in a highlight
-uniform sampler3D uReached; // light that reaches each cell around all volumes: x from all around, y from the lamp
-uniform mat4 uToShading; // from the box, um, to its texture coordinates
-uniform float uShadingCell; // um
-uniform float uDepthShading; // strength of the shading, 0 to 1
+uniform float uGloss;  // largest share of the key light in a highlight
+// Light that reaches each cell around all volumes: x from all around, y from the lamp.
+uniform sampler3D uReached;
+uniform mat4 uToShading;  // from the box, um, to its texture coordinates
+uniform float uShadingCell;  // um
+uniform float uDepthShading;  // strength of the shading, 0 to 1
 uniform sampler2D uNoise;  // blue noise
-uniform float uPhase; // shift of the noise in this frame, 0 to 1
-uniform vec4 uEye; // the eye's part of the frame: x, y, width, height, pixels
-uniform vec4 uPart; // its part of the image that is drawn here, which may have fewer pixels
+uniform float uPhase;  // shift of the noise in this frame, 0 to 1
+uniform vec4 uEye;  // the eye's part of the frame: x, y, width, height, pixels
+uniform vec4 uPart;  // its part of the image that is drawn here, which may have fewer pixels
 
 // At a covered sample, because otherwise rays at a tile's edge would miss the tile and leave a
 // seam.
@@ -77,8 +79,8 @@ flat in vec3 vUp;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
-layout(location = 0) out vec4 oColor; // linear, premultiplied: up to the pane, or everything
-layout(location = 1) out vec4 oBehind; // behind the pane
+layout(location = 0) out vec4 oColor;  // linear, premultiplied: up to the pane, or everything
+layout(location = 1) out vec4 oBehind;  // behind the pane
 
 #include <chunks/intersect_box>
 #include <chunks/clip_span>
@@ -117,7 +119,7 @@ const float SUM_LIGHT = 4.0;
 vec4 brightest(vec4 largest) {
   vec4 low = max(uWindowLow, uFloor);
   vec4 share = clamp((largest - low) / max(uWindowHigh - low, 1e-3), 0.0, 1.0);
-  share = pow(share, vec4(2.2)); // the gamma of the screen
+  share = pow(share, vec4(2.2));  // the gamma of the screen
   vec3 color = vec3(0.0);
   // The maximum, like the blending of tiles; otherwise a border would show between two tiles with
   // one channel each.
@@ -162,17 +164,17 @@ void main() {
   vec3 texPerUm = (uTexHigh - uTexLow) / uSize;
   vec3 texStart = uTexLow + start * texPerUm;
   vec3 texDir = dir * texPerUm;
-  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK); // the same ray in bricks
+  vec3 brickStart = texStart * uTexels / float(SKIP_BRICK);  // the same ray in bricks
   vec3 brickDir = texDir * uTexels / float(SKIP_BRICK);
   brickDir += 1e-9 * vec3(equal(brickDir, vec3(0.0)));
   vec3 invBrickDir = 1.0 / brickDir;
 #ifdef MAXIMUM
-  vec4 largest = vec4(0.0); // intensities
+  vec4 largest = vec4(0.0);  // intensities
 #endif
   vec4 sum = vec4(0.0);
-  vec4 veil = vec4(0.0); // the sum in front of the edge
+  vec4 veil = vec4(0.0);  // the sum in front of the edge
   float pane = uHasPane ? paneDistance(back) - span.x : NOWHERE;
-  vec4 front = vec4(0.0); // the sum in front of the pane
+  vec4 front = vec4(0.0);  // the sum in front of the pane
   bool isBehind = false;
   float shift = jitter(gl_FragCoord.xy - uPart.xy);
   vec3 face = span.x > 0.0 ? cutFace(start) : vec3(0.0);
@@ -181,16 +183,16 @@ void main() {
   float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
 #endif
   float t = 0.0;
-  float exit = 0.0; // end of the bricks that are known
+  float exit = 0.0;  // end of the bricks that are known
   int i = 0;
 #if defined(MAXIMUM) || defined(SUM)
-  const float FULL = 2.0; // no sample hides another
+  const float FULL = 2.0;  // no sample hides another
 #else
   const float FULL = OPAQUE;
 #endif
   // The loop runs in legs: to the pane, to the edge and to the end, so that samples need not test
   // what they pass.
-  bool isPast = false; // whether the edge is passed
+  bool isPast = false;  // whether the edge is passed
   for (int leg = 0; leg < 3; leg++) {
     float stop = min(isPast ? end : edge, pane);
     for (; i < steps && t < stop && sum.a < FULL; i++) {
@@ -208,7 +210,7 @@ void main() {
         dt = max(uMinStep, (end - t) / float(steps - i));
       }
       if (i >= steps || t >= stop) break;
-      float here = min(dt, stop - t); // the last step may be shorter
+      float here = min(dt, stop - t);  // the last step may be shorter
       float at = t + shift * here;
       vec3 p = texStart + at * texDir;
       vec4 v = sampleIntensities(p);
@@ -236,7 +238,7 @@ void main() {
         sum.rgb += light * s.a * s.rgb;
 #else
         if (s.a > 0.0) {
-#ifndef UNLIT // for the benchmark, which times other programs without lighting
+#ifndef UNLIT  // for the benchmark, which times other programs without lighting
           vec3 gradient = -face;
           if (t >= uVoxel || face == vec3(0.0)) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);
@@ -264,7 +266,7 @@ void main() {
       isPast = true;
     }
   }
-#ifdef COUNT_STEPS // for tests: the number of steps, and the share of the ray that they covered
+#ifdef COUNT_STEPS  // for tests: the number of steps, and the share of the ray that they covered
   oColor = vec4(float(i % 256) / 255.0, float(i / 256) / 255.0, clamp(t / end, 0.0, 1.0), 1.0);
   return;
 #endif

@@ -1,7 +1,7 @@
 /**
- * The volumes of one tile as bricks that are streamed by view: an atlas of bricks, and an index
- * that gives the brick of each cell of STREAM_BRICK^3 texels (virtual texturing). It has the
- * interface of `TileTexture`.
+ * The volumes of one tile as bricks that are streamed by view. An atlas holds the bricks, and an
+ * index gives the brick of each cell of STREAM_BRICK^3 texels (virtual texturing). The class has
+ * the interface of `TileTexture`.
  */
 import {
   ClampToEdgeWrapping,

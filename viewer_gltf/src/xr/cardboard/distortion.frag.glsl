@@ -4,7 +4,8 @@ in vec2 vUv;
 in vec2 vPicture;
 out vec4 oColor;
 
-const float EDGE = 0.02; // share of the image's width and height over which the edge fades to black
+// Share of the image's width and height over which the edge fades to black.
+const float EDGE = 0.02;
 
 void main() {
   vec2 inside = smoothstep(0.0, EDGE, min(vPicture, 1.0 - vPicture));

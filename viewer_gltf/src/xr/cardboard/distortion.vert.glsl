@@ -1,7 +1,7 @@
 // Moves a vertex of an eye's image to where the lens shows it undistorted. Clip space.
-in vec2 aPicture; // position within this eye's own image, 0 to 1
+in vec2 aPicture;  // position within this eye's own image, 0 to 1
 
-out vec2 vUv; // position within the render target, which holds both eyes
+out vec2 vUv;  // position within the render target, which holds both eyes
 out vec2 vPicture;
 
 void main() {

@@ -109,8 +109,8 @@ export function eyeTangents(model: LensModel, screen: Screen, side: Side): Tange
 }
 
 /**
- * Returns the point of the screen at which an eye sees the direction (x, y, -1) of its own space,
- * as shares of the screen's width and height from its lower left corner.
+ * Returns the point of the screen at which an eye sees the direction (x, y, -1) of its own space.
+ * The point is given in shares of the screen's width and height from its lower left corner.
  */
 export function toScreen(
   model: LensModel,

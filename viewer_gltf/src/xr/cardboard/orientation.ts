@@ -4,8 +4,9 @@
  * eyes move when the head turns.
  *
  * The angles are those of the W3C's DeviceOrientation Event: intrinsic turns about z, x' and y''.
- * They take the earth's axes (x east, y north, z up) to the phone's axes (x to the right of its
- * upright screen, y to its top, z out of it). The scene has y up, so north becomes -z.
+ * They take the earth's axes to the phone's axes. The earth's axes are x east, y north, z up. The
+ * phone's are x to the right of its upright screen, y to its top, z out of it. The scene has y up,
+ * so north becomes -z.
  */
 import { Matrix4, Quaternion, Vector3 } from "three";
 

@@ -64,7 +64,8 @@ describe("the phone's screen", () => {
   it("reports each refused feature on its own", async () => {
     const { element, host } = fakePage({ canFill: false, canLock: false, canWake: false });
     const { problems } = await holdScreen(element, () => undefined, host);
-    expect(problems).toHaveLength(2); // a phone that can't be locked is turned by hand: see turn_sign.ts
+    // A phone that can't be locked is turned by hand: see turn_sign.ts.
+    expect(problems).toHaveLength(2);
     expect(problems.join(" ")).toMatch(/home screen.*dim/);
     const android = fakePage({ canWake: false });
     const { problems: few } = await holdScreen(android.element, () => undefined, android.host);

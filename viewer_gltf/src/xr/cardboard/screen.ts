@@ -51,7 +51,8 @@ export async function holdScreen(
       return false; // for example with a low battery
     }
   };
-  const awake = stayAwake(); // first, because Safari requires the tap for it and full screen uses the tap up
+  // The wake lock comes first: Safari requires a tap for it, and full screen uses the tap up.
+  const awake = stayAwake();
 
   // A page opened from the home screen is in full screen already.
   const isFull = await enterFullScreen(element);

@@ -26,7 +26,8 @@ const message = (parts: Record<string, string>) =>
     .join("");
 
 function near(found: number, wanted: number): void {
-  expect(found / wanted).toBeCloseTo(1, 3); // floats of 32 bits, which the sources print with four digits
+  // Floats of 32 bits, which the sources print with four digits.
+  expect(found / wanted).toBeCloseTo(1, 3);
 }
 
 describe("the code of a Cardboard viewer", () => {

@@ -127,7 +127,7 @@ export class RoomPanel {
     return this.isOpen ? [...this.menu.shown.regions, ...this.bar.shown.regions] : [];
   }
 
-  /** What surrounds the specimen. */
+  /** The surroundings of the specimen. */
   setting: Setting = "before-eyes";
 
   /** Shows the bar when stereo begins, hides everything when it ends. */

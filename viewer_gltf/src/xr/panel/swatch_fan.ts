@@ -16,7 +16,7 @@ export class SwatchFan {
 
   /**
    * Returns the group whose colours are open after `dt_s` more seconds. The colours cover the
-   * channel's name until the gaze has left the row for as long as it took to open them, so that a
+   * channel's name until the gaze has left the row for as long as it took to open them. So a
    * trembling head does not close them.
    *
    * @param fanned the group whose colours are open, or null

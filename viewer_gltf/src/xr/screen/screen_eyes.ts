@@ -43,7 +43,8 @@ export class ScreenEyes {
       eye.matrixWorld.multiplyMatrices(camera.matrixWorld, this.aside.makeTranslation(x_m, 0, 0));
       eye.projectionMatrix.copy(camera.projectionMatrix);
       const { elements } = eye.projectionMatrix;
-      elements[8] -= (elements[0] * x_m) / distance_m; // shifts the frustum, so that both eyes' frusta end at the screen's sides
+      // This shift makes both eyes' frusta end at the screen's sides.
+      elements[8] -= (elements[0] * x_m) / distance_m;
     });
   }
 }
