@@ -2,8 +2,8 @@
  * Draws a scene once for both eyes, as two instances, each in its eye's half of the frame.
  *
  * So each object costs one draw call in stereo too, on any WebGL 2. Multiview would do the same,
- * but three supports it only when it draws straight into a headset's layer. These frames are drawn
- * in linear light and encoded at the end.
+ * but three.js supports it only when it draws straight into a headset's layer. These frames are
+ * drawn in linear light and encoded at the end.
  */
 import {
   ArrayCamera,
@@ -119,7 +119,7 @@ export class BothEyes {
     });
   }
 
-  /** Inserts the chunks of both eyes into a material of three's own. */
+  /** Inserts the chunks of both eyes into a material of three.js's own. */
   private patch(material: Material): void {
     const { uniforms } = this;
     material.onBeforeCompile = (shader) => {

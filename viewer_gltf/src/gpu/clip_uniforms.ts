@@ -15,7 +15,7 @@ export type MarchClip = Readonly<{
   corner: readonly Vector4[];
 }>;
 
-/** Planes that remove nothing: three initialises them to 0, 0, 0, 1. */
+/** Planes that remove nothing: three.js initialises them to 0, 0, 0, 1. */
 export function noCorner(): Vector4[] {
   return Array.from({ length: CORNER_PLANES }, () => new Vector4());
 }

@@ -88,7 +88,7 @@ export class Overlay {
       blending: CustomBlending,
       blendSrc: OneFactor,
       blendDst: OneMinusSrcAlphaFactor,
-      stencilWrite: disc !== undefined, // switches on the stencil test in three
+      stencilWrite: disc !== undefined, // switches on the stencil test in three.js
       stencilWriteMask: 0,
       stencilRef: LAID,
       stencilFunc: NotEqualStencilFunc,

@@ -32,11 +32,11 @@ export class EncodePass {
     light: WebGLRenderTarget,
     target: WebGLRenderTarget | null,
   ): void {
-    const { enabled } = renderer.xr; // otherwise three would draw for each of the headset's eyes
+    const { enabled } = renderer.xr; // otherwise three.js would draw for each of the headset's eyes
     renderer.xr.enabled = false;
     this.pass.uniforms.uLight.value = light.texture;
     if (target !== null) {
-      // a headset's frame buffer may be larger than three reports
+      // a headset's frame buffer may be larger than three.js reports
       this.viewport.copy(target.viewport);
       target.viewport.set(0, 0, light.width, light.height);
     }

@@ -1,6 +1,6 @@
 /**
  * The eyes of a frame: one on a flat screen, two in a headset or in a Cardboard viewer. Passes that
- * draw into textures loop over the eyes, because three draws all eyes of a headset only into the
+ * draw into textures loop over the eyes, because three.js draws all eyes of a headset only into the
  * headset's own frame buffer.
  */
 import { PerspectiveCamera, Vector4, type WebGLRenderer } from "three";
@@ -32,7 +32,9 @@ export class Eyes {
     this.add(camera).viewport.set(0, 0, this.width_px, this.height_px);
   }
 
-  /** Uses the eyes of the running session; `camera` is the one that three moves with the head. */
+  /**
+   * Uses the eyes of the running session; `camera` is the one that three.js moves with the head.
+   */
   followHeadset(renderer: WebGLRenderer, camera: PerspectiveCamera): void {
     renderer.xr.updateCamera(camera);
     this.follow(renderer.xr.getCamera().cameras.map((each) => [each, each.viewport]));

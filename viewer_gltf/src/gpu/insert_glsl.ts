@@ -1,6 +1,6 @@
 /**
- * Inserts pieces of GLSL into a shader of another library, such as three's materials. A .glsl file
- * has the pieces, each under a line that declares its place:
+ * Inserts pieces of GLSL into a shader of another library, such as three.js's materials. A .glsl
+ * file has the pieces, each under a line that declares its place:
  *
  *   #insert start                 before the whole shader
  *   #insert main_start            at the start of `main`

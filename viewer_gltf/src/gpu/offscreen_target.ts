@@ -60,7 +60,7 @@ function drawInto(
 ): void {
   const before = renderer.getRenderTarget();
   const { autoClear } = renderer;
-  const { enabled } = renderer.xr; // otherwise three would draw the headset's eyes itself
+  const { enabled } = renderer.xr; // otherwise three.js would draw the headset's eyes itself
   const width = Math.max(1, Math.ceil(width_px * scale));
   const height = Math.max(1, Math.ceil(height_px * scale));
   target.setSize(width, height);

@@ -27,7 +27,8 @@ export function leaveUncut(mesh: Mesh): void {
 }
 
 /**
- * three uploads a material's uniforms once for all its objects, unless `uniformsNeedUpdate` is set.
+ * three.js uploads a material's uniforms once for all its objects, unless `uniformsNeedUpdate` is
+ * set.
  */
 function setCount(material: Material, uniform: Count, value: number): void {
   if (uniform.value === value) return;

@@ -304,7 +304,7 @@ export class FrameRenderer {
   private drawInto(light: WebGLRenderTarget): WebGLRenderTarget | null {
     const { renderer, eyes, both } = this;
     const before = renderer.getRenderTarget();
-    const { enabled } = renderer.xr; // otherwise three would draw the headset's eyes itself
+    const { enabled } = renderer.xr; // otherwise three.js would draw the headset's eyes itself
     light.setSize(eyes.width_px, eyes.height_px);
     renderer.xr.enabled = false;
     renderer.setRenderTarget(light);

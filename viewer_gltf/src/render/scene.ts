@@ -124,7 +124,7 @@ export class Room {
   }
 }
 
-/** A lamp's colour for three, whose white surface reflects a light's intensity divided by pi. */
+/** A lamp's colour for three.js, whose white surface reflects a light's intensity divided by pi. */
 function colorOf([r, g, b]: Rgb): Color {
   return new Color().setRGB(r, g, b);
 }

@@ -1,5 +1,5 @@
 /**
- * Loads Basis Universal textures with three's loader. Its own worker is made from text, so the
+ * Loads Basis Universal textures with three.js's loader. Its own worker is made from text, so the
  * page's content policy applies to it, and the transcoder's generated functions violate the policy.
  * A worker from a file avoids this. Imported when the first such texture is loaded.
  */
@@ -20,7 +20,7 @@ export async function makeTextureLoader(renderer: WebGLRenderer): Promise<KTX2Lo
     return worker;
   });
   loader.transcoderBinary = binary;
-  // three's loader then does not load its own transcoder.
+  // three.js's loader then does not load its own transcoder.
   loader.transcoderPending = Promise.resolve();
   return loader;
 }

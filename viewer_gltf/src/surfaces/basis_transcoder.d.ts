@@ -1,5 +1,5 @@
 /**
- * Types of the transcoder's script, which three ships without types: a function that makes the
+ * Types of the transcoder's script, which three.js ships without types: a function that makes the
  * module.
  */
 declare module "three/examples/jsm/libs/basis/basis_transcoder.js" {

@@ -19,7 +19,7 @@ class LazyGltfLoader extends GLTFLoader {
     onLoad: (gltf: GLTF) => void,
     onError?: (event: ErrorEvent) => void,
   ): void {
-    // three types this value as an event, but it is an Error
+    // three.js types this value as an event, but it is an Error
     const fail = (error: unknown) => onError?.(error as ErrorEvent);
     this.prepare(data).then(() => super.parse(data, path, onLoad, onError), fail);
   }
@@ -30,7 +30,7 @@ class LazyGltfLoader extends GLTFLoader {
       meshopt ? this.buffers() : null,
       basis ? this.textures() : null,
     ]);
-    // three's types require the whole decoder, but its loader uses only this part
+    // three.js's types require the whole decoder, but its loader uses only this part
     if (decoder !== null) this.setMeshoptDecoder(decoder as never);
     if (textures !== null) this.setKTX2Loader(textures);
   }

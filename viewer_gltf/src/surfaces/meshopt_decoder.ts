@@ -22,7 +22,7 @@ type Waiting = Readonly<{
   reject: (error: Error) => void;
 }>;
 
-/** The part of the decoder that three's loader uses. */
+/** The part of the decoder that three.js's loader uses. */
 export class MeshoptWorker {
   readonly supported = true;
   readonly ready = Promise.resolve();

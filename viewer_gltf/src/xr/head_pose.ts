@@ -1,6 +1,6 @@
 /**
- * The pose of the head, between its eyes. three 0.187 leaves a session's camera at the left eye. A
- * gaze from there would be off by 1.8 degrees at one metre.
+ * The pose of the head, between its eyes. three.js 0.187 leaves a session's camera at the left eye.
+ * A gaze from there would be off by 1.8 degrees at one metre.
  */
 import { Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 

@@ -22,7 +22,7 @@ async function hasSpace(session: XRSession, type: XRReferenceSpaceType): Promise
 }
 
 export class XrSession {
-  /** Camera that three moves with the head; near and far planes of both eyes, metres. */
+  /** Camera that three.js moves with the head; near and far planes of both eyes, metres. */
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 20);
   private session: XRSession | null = null;
   private mode: ImmersiveMode = "immersive-vr";
@@ -78,7 +78,8 @@ export class XrSession {
     });
     try {
       await prepared;
-      // The origin is at the eyes at the start, for any body height. In augmented reality it is on the floor if that is known.
+      // The origin is at the eyes at the start, for any body height. In augmented reality it is on
+      // the floor if that is known.
       this.hasFloor = mode === "immersive-ar" && (await hasSpace(session, "local-floor"));
       this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");
       await this.renderer.xr.setSession(session);

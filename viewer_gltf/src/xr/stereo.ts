@@ -170,7 +170,7 @@ export class Stereo {
 
   /** The camera whose view contains both eyes' views. */
   seenBy(camera: Camera): Camera {
-    // three moves the headset's own cameras, not the one passed to it
+    // three.js moves the headset's own cameras, not the one passed to it
     return this.renderer.xr.isPresenting ? this.renderer.xr.getCamera() : camera;
   }
 

@@ -1,4 +1,4 @@
-// Insertions into the fragment shader of three's standard material. A part may declare functions
+// Insertions into the fragment shader of three.js's standard material. A part may declare functions
 // for some surfaces and change `diffuseColor`.
 #insert start
 #include <surface>

@@ -1,4 +1,4 @@
-// Functions that surfaces call in addition to three's standard material.
+// Functions that surfaces call in addition to three.js's standard material.
 // ../insertions/surface.frag.glsl has the calls.
 varying vec3 vRoom;
 #include <chunks/both_eyes_fragment>

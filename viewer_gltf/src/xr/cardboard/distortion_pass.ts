@@ -66,7 +66,7 @@ export class DistortionPass {
 
   private drawLine(renderer: WebGLRenderer): void {
     const { width, height } = renderer.domElement;
-    const ratio = renderer.getPixelRatio(); // three's rectangles are in CSS pixels
+    const ratio = renderer.getPixelRatio(); // three.js's rectangles are in CSS pixels
     const thickness = Math.max(2, Math.round(ratio));
     renderer.getClearColor(this.clearColor);
     const alpha = renderer.getClearAlpha();

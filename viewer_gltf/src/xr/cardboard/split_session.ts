@@ -3,16 +3,16 @@
  * screen, lens distortion, and a view that follows the head.
  *
  * Why no polyfill is used: webxr-polyfill 2.0.3 with cardboard-vr-display 1.0.19 (both Apache-2.0)
- * were tried with three 0.187 on WebGL 2, with the browser's own WebXR removed. A session starts and
- * both eyes are drawn, because three uses XRWebGLLayer where XRWebGLBinding is absent. But:
+ * were tried with three.js 0.187 on WebGL 2, with the browser's own WebXR removed. A session starts
+ * and both eyes are drawn, because three.js uses XRWebGLLayer where XRWebGLBinding is absent. But:
  * - Its distorter sets vertex attributes without binding a vertex array of its own: submitFrame in
  *   cardboard-distorter.js restores the program, buffers and texture only. In WebGL 2 it overwrites
- *   the vertex array of the mesh that three drew last.
+ *   the vertex array of the mesh that three.js drew last.
  * - That mesh is no longer drawn, in stereo and after it. The second after the session logged 65
- *   times "no buffer is bound to enabled attribute". The fault was reported to both projects in 2023
- *   (webxr-polyfill 170, three 26166). One issue is open, the other was declined.
- * - It patches enable, viewport, bindFramebuffer and others of the context, although three caches
- *   its state. Its frame buffer has no anti-aliasing and 16 bits of depth.
+ *   times "no buffer is bound to enabled attribute". The fault was reported to both projects in
+ *   2023 (webxr-polyfill 170, three.js 26166). One issue is open, the other was declined.
+ * - It patches enable, viewport, bindFramebuffer and others of the context, although three.js
+ *   caches its state. Its frame buffer has no anti-aliasing and 16 bits of depth.
  * - It does not ask Safari for the orientation, so the view has not followed the head since iOS 13.
  * - It knows the two Cardboard viewers of 2014 and 2015, and does not read QR codes. It fetches a
  *   table of phones, which ends in 2020, from a host that our Content-Security-Policy forbids.
