@@ -25,7 +25,7 @@ export const LAST = 1000;
 /**
  * Stencil value of pixels at which a surface has already composited the volume that replaces it.
  */
-export const LAID = 1;
+export const VOLUME_DRAWN = 1;
 
 /** Uniforms of `chunks/marched_light`, shared by reference. */
 export function marchedUniforms(picture: Texture, uSceneDepth: { value: Texture }) {
@@ -90,7 +90,7 @@ export class Overlay {
       blendDst: OneMinusSrcAlphaFactor,
       stencilWrite: disc !== undefined, // switches on the stencil test in three.js
       stencilWriteMask: 0,
-      stencilRef: LAID,
+      stencilRef: VOLUME_DRAWN,
       stencilFunc: NotEqualStencilFunc,
       uniforms: { ...this.uniforms, ...this.rays, ...disc },
     });

@@ -4,7 +4,7 @@ import { nothing } from "./float_targets";
 import { ScreenPass } from "./screen_pass";
 import { ENCODE_FRAGMENT } from "./shaders/sources";
 
-const NOBODY = new Camera();
+const ANY_CAMERA = new Camera();
 
 export class EncodePass {
   private readonly pass = new ScreenPass(ENCODE_FRAGMENT, {
@@ -41,7 +41,7 @@ export class EncodePass {
       target.viewport.set(0, 0, light.width, light.height);
     }
     renderer.setRenderTarget(target);
-    renderer.render(this.pass.scene, NOBODY);
+    renderer.render(this.pass.scene, ANY_CAMERA);
     target?.viewport.copy(this.viewport);
     renderer.xr.enabled = enabled;
   }

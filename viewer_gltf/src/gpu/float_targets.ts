@@ -16,7 +16,7 @@ import {
 } from "three";
 
 const EXACT = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
-const NOBODY = new Camera();
+const ANY_CAMERA = new Camera();
 
 /** A uniform without a texture yet. */
 export function nothing(): { value: Texture | null } {
@@ -70,7 +70,7 @@ export function drawWhole(
   target.setSize(width, height);
   target.viewport.set(0, 0, width, height);
   renderer.setRenderTarget(target);
-  renderer.render(scene, NOBODY);
+  renderer.render(scene, ANY_CAMERA);
   renderer.setRenderTarget(before);
   renderer.xr.enabled = enabled;
 }

@@ -12,7 +12,7 @@ function countOf(material: Material): Count | null {
   return (material.uniforms.uCutCount as Count | undefined) ?? null;
 }
 
-export function leaveUncut(mesh: Mesh): void {
+export function keepUnclipped(mesh: Mesh): void {
   let count = 0;
   mesh.onBeforeRender = (_renderer, _scene, _camera, _geometry, material) => {
     const uniform = countOf(material);

@@ -5,7 +5,7 @@ import { rayAhead } from "../interaction/rays";
 import { sightOf } from "../marks/sight";
 import type { Vec3 } from "../math/vec3";
 import { type FramePace, FrameRenderer } from "../render/frame_renderer";
-import type { Hybrid } from "../render/gaze_focus";
+import type { GazeFocus } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
@@ -19,7 +19,7 @@ export type SceneFrameOptions = Readonly<{
   renderer: WebGLRenderer;
   stage: HTMLElement;
   room: Room;
-  hybrid: Hybrid;
+  hybrid: GazeFocus;
   /** The box of the specimen, um. */
   bounds: Bounds;
   /** What the frames show. It is made after the renderer of frames, whose uniforms the shaders share. */

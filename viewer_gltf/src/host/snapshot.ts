@@ -2,7 +2,7 @@
 import type { WebGLRenderer } from "three";
 import type { CameraPose } from "../interaction/named_views";
 import type { VolumeStatus } from "../render/drawn_forms";
-import type { Hybrid } from "../render/gaze_focus";
+import type { GazeFocus } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { discLimit } from "../state/focus_tiles";
 import type { Progress } from "../state/overview_progress";
@@ -60,7 +60,7 @@ export type SnapshotSource = Readonly<{
   state: ViewerState;
   renderer: WebGLRenderer;
   room: Room;
-  hybrid: Hybrid;
+  hybrid: GazeFocus;
   forms: Forms;
   stereo: Stereo;
   viewpoint: Viewpoint;

@@ -20,7 +20,7 @@ const DIAMETER_DEG = 1.5;
 /** Degrees. Diameter of the dot in its middle. */
 const DOT_DEG = 0.3;
 /** Inner radius as a share of the outer radius. */
-const HOLE = 0.72;
+const INNER_RADIUS = 0.72;
 /**
  * Width of the dark rim, as a share of the radius; the rim makes white visible on any background.
  */
@@ -43,14 +43,14 @@ export class Ring {
    */
   private readonly dark = flat(
     new CircleGeometry(DOT_DEG / DIAMETER_DEG + RIM, DOT_PARTS),
-    new RingGeometry(HOLE - RIM, 1 + RIM, PARTS),
+    new RingGeometry(INNER_RADIUS - RIM, 1 + RIM, PARTS),
     DARK,
     0.6,
   );
   /** Clockwise from the top, like a clock. */
   private readonly light = flat(
     new CircleGeometry(DOT_DEG / DIAMETER_DEG, DOT_PARTS),
-    new RingGeometry(HOLE, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
+    new RingGeometry(INNER_RADIUS, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
     WHITE,
     1,
   );

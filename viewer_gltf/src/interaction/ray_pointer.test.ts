@@ -1,8 +1,8 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { firstHit, gazeOf, type Hit, Pointer, type RoomRay, type Target } from "./ray_pointer";
+import { firstHit, gazeOf, type Hit, Pointer, type SceneRay, type Target } from "./ray_pointer";
 
-const AHEAD: RoomRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
+const AHEAD: SceneRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
 const FRAME_S = 1 / 60;
 
 function target(key: string | null, distance_m: number | null, isOnTop = false): Target {
@@ -38,7 +38,7 @@ describe("the gaze", () => {
   const tile = target("tile", 1.5);
   /** Seconds of looking until the first choice; null if there is none within 4 s. */
   const untilChosen = (
-    hands: readonly (RoomRay | null)[],
+    hands: readonly (SceneRay | null)[],
     targets: readonly Target[],
     isDwellOn = true,
   ) => {

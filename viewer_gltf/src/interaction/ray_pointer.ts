@@ -8,7 +8,7 @@ import { isSecondPress, type TimedPress } from "./double_press";
 import { advanceDwell, type Dwell, dwellProgress, NO_DWELL, type RaySample, spend } from "./dwell";
 
 /** `direction` has unit length. */
-export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
+export type SceneRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
 
 export type Hit = Readonly<{
   /** Key of the hit, unique among all targets; null if it cannot be chosen. */
@@ -41,23 +41,23 @@ export interface Target {
    */
   readonly layout?: string;
   /** Returns where the ray hits the target, or null. */
-  intersect(ray: RoomRay): Hit | null;
+  intersect(ray: SceneRay): Hit | null;
   /**
    * Called when a hit is chosen by dwell (`isByGaze`) or button; a hit with `hold` is chosen before
    * it is dragged.
    */
-  choose(hit: Hit, ray: RoomRay, isByGaze: boolean): void;
+  choose(hit: Hit, ray: SceneRay, isByGaze: boolean): void;
   /**
    * Called in each frame while a hit with `hold` follows the ray; `key` is that of the chosen hit.
    */
-  drag?(key: string, ray: RoomRay): void;
+  drag?(key: string, ray: SceneRay): void;
 }
 
 /** A hit together with its target and the ray. */
-export type TargetHit = Hit & Readonly<{ target: Target; ray: RoomRay }>;
+export type TargetHit = Hit & Readonly<{ target: Target; ray: SceneRay }>;
 
 /** The ray from the eyes straight ahead of the head. */
-export function gazeOf(head: Matrix4): RoomRay {
+export function gazeOf(head: Matrix4): SceneRay {
   return {
     origin: new Vector3().setFromMatrixPosition(head),
     direction: new Vector3(0, 0, -1).transformDirection(head),
@@ -65,7 +65,7 @@ export function gazeOf(head: Matrix4): RoomRay {
 }
 
 /** The hit of the first target that is drawn on top, or else the nearest hit. */
-export function firstHit(ray: RoomRay, targets: readonly Target[]): TargetHit | null {
+export function firstHit(ray: SceneRay, targets: readonly Target[]): TargetHit | null {
   let first: TargetHit | null = null;
   for (const target of targets) {
     if (first?.target.isOnTop) break;
@@ -80,7 +80,7 @@ export function firstHit(ray: RoomRay, targets: readonly Target[]): TargetHit | 
 
 /** @param hit null: nothing can be chosen */
 function sampleOf(
-  { direction }: RoomRay,
+  { direction }: SceneRay,
   hit: TargetHit | null,
   targets: readonly Target[],
 ): RaySample {
@@ -118,8 +118,8 @@ export class Pointer {
    *   points
    */
   advance(
-    gaze: RoomRay,
-    hands: readonly (RoomRay | null)[],
+    gaze: SceneRay,
+    hands: readonly (SceneRay | null)[],
     targets: readonly Target[],
     dt_s: number,
     isDwellOn: boolean,

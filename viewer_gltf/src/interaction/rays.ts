@@ -1,7 +1,7 @@
 /** Rays into the specimen: from a click on the canvas, or from the head. */
 import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from "three";
 import type { Ray } from "../math/vec3";
-import type { RoomRay } from "./ray_pointer";
+import type { SceneRay } from "./ray_pointer";
 
 /**
  * Milliseconds and pixels. Longest time and distance between the two clicks or taps of a double
@@ -41,7 +41,7 @@ export function rayAhead(head: Matrix4, specimen: Object3D): Ray {
  * Converts a ray of the scene into the specimen's own space; its direction keeps a length of one
  * metre.
  */
-export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): Ray {
+export function rayAlong({ origin, direction }: SceneRay, toSpecimen: Matrix4): Ray {
   const from = origin.clone().applyMatrix4(toSpecimen);
   const to = origin.clone().add(direction).applyMatrix4(toSpecimen);
   return { origin: from.toArray(), direction: to.sub(from).toArray() };

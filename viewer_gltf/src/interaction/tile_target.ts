@@ -7,7 +7,7 @@ import { type Clip, WHOLE } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { ViewerState } from "../state/viewer_state";
-import type { Hit, RoomRay, Target } from "./ray_pointer";
+import type { Hit, SceneRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
 export const TILE = "tile:";
@@ -65,7 +65,7 @@ export class TileTarget implements Target {
     return `tiles ${this.names} ${this.changes} ${placeText(this.specimen.matrixWorld)}`;
   }
 
-  intersect(ray: RoomRay): Hit | null {
+  intersect(ray: SceneRay): Hit | null {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     const inside = rayAlong(ray, this.toSpecimen);
     const tileHit = pickTile(inside, this.shown, this.clip);
@@ -77,7 +77,7 @@ export class TileTarget implements Target {
     return { key, place: key, distance_m: distance, isStep: true, isGradual: this.isMeasuring };
   }
 
-  choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
+  choose({ key }: Hit, ray: SceneRay, isByGaze: boolean): void {
     if (key === null) return;
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length).split(OF)[0], isByGaze);

@@ -6,7 +6,7 @@ import type { Ray } from "./vec3";
 export type BoxedTile = Readonly<{ id: string; bounds_um: Box }>;
 type Boxed<B extends Box> = Readonly<{ bounds_um: B }>;
 /** `distance` from the ray's origin, in multiples of the ray's direction. */
-export type MetTile = Readonly<{ id: string; distance: number }>;
+export type TileHit = Readonly<{ id: string; distance: number }>;
 
 /** The visible tiles: all, or the isolated one. */
 export function shownTiles<T extends Readonly<{ id: string }>>(
@@ -25,7 +25,7 @@ export function shownBox<B extends Box>(
 }
 
 /** Returns the first tile along the ray (um, world) that is not clipped away there, or null. */
-export function pickTile(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): MetTile | null {
+export function pickTile(ray: Ray, tiles: readonly BoxedTile[], clip: Clip): TileHit | null {
   const kept = clipSpan(AHEAD, ray, clip);
   if (kept === null) return null;
   let nearest = Number.POSITIVE_INFINITY;

@@ -23,7 +23,7 @@ import {
 } from "three";
 import type { BothEyes, BothEyesUniforms } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
-import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
+import { type Disc, type MarchedUniforms, VOLUME_DRAWN } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
 import { insertInto, insertionsOf } from "../gpu/insert_glsl";
@@ -142,10 +142,10 @@ const DEPTH_AHEAD = 0.5;
 export const PANES = 3;
 
 /** Blending of premultiplied colours, and the stencil value that marks their pixels. */
-const LAID_OVER = {
+const PREMULTIPLIED = {
   blendSrc: OneFactor,
   blendDst: OneMinusSrcAlphaFactor,
-  stencilRef: LAID,
+  stencilRef: VOLUME_DRAWN,
   stencilFunc: AlwaysStencilFunc,
   stencilZPass: ReplaceStencilOp,
 } as const;
@@ -154,7 +154,7 @@ export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly meshes: readonly Mesh[];
-  private readonly twins: readonly Mesh[];
+  private readonly depthMeshes: readonly Mesh[];
   /**
    * Opacity that the stage gives the surface, 0 to 1; each surface of a bundle has one material.
    */
@@ -180,7 +180,7 @@ export class BlendedSurface {
       this.patch(material);
       both.adopt(material);
       material.forceSinglePass = true; // the depth pass already sorts front and back
-      Object.assign(material, LAID_OVER);
+      Object.assign(material, PREMULTIPLIED);
       // the loader turns depth off for translucent materials; here a depth pass precedes them
       material.transparent = false;
       material.depthWrite = true;
@@ -200,12 +200,12 @@ export class BlendedSurface {
     });
     this.meshes = meshes;
     this.depth.transparent = true; // drawn in one order with the colours
-    this.twins = meshes.map((mesh) => {
-      const twin = new Mesh(mesh.geometry, this.depth);
-      twin.renderOrder = -DEPTH_AHEAD;
-      twin.visible = false;
-      mesh.add(twin);
-      return twin;
+    this.depthMeshes = meshes.map((mesh) => {
+      const depthMesh = new Mesh(mesh.geometry, this.depth);
+      depthMesh.renderOrder = -DEPTH_AHEAD;
+      depthMesh.visible = false;
+      mesh.add(depthMesh);
+      return depthMesh;
     });
   }
 
@@ -253,10 +253,10 @@ export class BlendedSurface {
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
       material.needsUpdate = true; // the shader of an opaque surface leaves alpha out
     }
-    for (const twin of this.twins) {
-      twin.visible = this.isBlended;
-      if (this.isPane) twin.layers.enable(PANES);
-      else twin.layers.disable(PANES);
+    for (const depthMesh of this.depthMeshes) {
+      depthMesh.visible = this.isBlended;
+      if (this.isPane) depthMesh.layers.enable(PANES);
+      else depthMesh.layers.disable(PANES);
     }
   }
 
@@ -269,7 +269,7 @@ export class BlendedSurface {
   setTurn(turn: number): void {
     const order = this.isTranslucent ? 1 + turn : 0;
     for (const mesh of this.meshes) mesh.renderOrder = order;
-    for (const twin of this.twins) twin.renderOrder = order - DEPTH_AHEAD;
+    for (const depthMesh of this.depthMeshes) depthMesh.renderOrder = order - DEPTH_AHEAD;
   }
 
   dispose(): void {

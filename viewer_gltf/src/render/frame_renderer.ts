@@ -25,7 +25,7 @@ import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
 import type { MarchedVolumes, TracedVolumes } from "./drawn_forms";
-import type { Hybrid } from "./gaze_focus";
+import type { GazeFocus } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
 import type { Room } from "./scene";
 
@@ -110,7 +110,7 @@ export class FrameRenderer {
   /** Number of frames of moving views. */
   private moved = 0;
   /** Key of the stand-in march; "" if it must be drawn. */
-  private stoodIn = "";
+  private standInKey = "";
   private readonly point = new Vector3();
   private readonly lamp = new Vector3();
   private readonly corner = new Vector3();
@@ -120,7 +120,7 @@ export class FrameRenderer {
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly room: Room,
-    private readonly hybrid: Hybrid,
+    private readonly gazeFocus: GazeFocus,
   ) {
     const { uDisc, uIsCrossing } = this.marchFrame;
     const disc = { ...this.cone, uDisc, uIsCrossing };
@@ -151,7 +151,7 @@ export class FrameRenderer {
     clip: Clip,
     { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
-    const { renderer, room, hybrid } = this;
+    const { renderer, room, gazeFocus } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
     const marches = volumes?.marches ?? null;
     const specimen = room.specimen.group.matrixWorld;
@@ -176,7 +176,8 @@ export class FrameRenderer {
     const hasMarches = marches !== null && !marches.isEmpty;
     if (tracer !== null || hasMarches) opaque();
     const isMarched = hasMarches && !this.needsNoMarch(drawn, clip, isMoving);
-    const isMixed = isMarched && tracer === null && hybrid.outer_rad > 0 && marches.isPartlyInDisc;
+    const isMixed =
+      isMarched && tracer === null && gazeFocus.outer_rad > 0 && marches.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
@@ -187,7 +188,7 @@ export class FrameRenderer {
       const toEye = this.toEye.copy(head).invert().multiply(axes);
       if (tracer === null) lightByRoom(this.marchFrame, room.light, toEye);
       else tracer.lightMarch(this.marchFrame, specimen, head);
-      const { apex_um: apex, axis_um: axis } = hybrid;
+      const { apex_um: apex, axis_um: axis } = gazeFocus;
       volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
       this.shiftNoise(isMoving, gathers);
       const marchBy = (pass: MarchPass, blended = panes) => {
@@ -214,7 +215,7 @@ export class FrameRenderer {
     }
     if (tracer !== null) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
-      const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
+      const standIn = isMarched || this.standInKey !== "" ? this.march.marched : null;
       tracer.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
       if (tracer.isOnScreen) this.march.hide();
     }
@@ -241,12 +242,12 @@ export class FrameRenderer {
     if (!traced?.isShown) return false;
     const isWorn = this.eyes.all.length > 1;
     if (isWorn && traced.standsAlone) {
-      this.stoodIn = "";
+      this.standInKey = "";
       return true;
     }
-    const stoodIn = isMoving ? "" : JSON.stringify([volumes?.marchKey, clip, solids]);
-    const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
-    this.stoodIn = stoodIn;
+    const standInKey = isMoving ? "" : JSON.stringify([volumes?.marchKey, clip, solids]);
+    const isSame = standInKey !== "" && standInKey === this.standInKey;
+    this.standInKey = standInKey;
     return isSame;
   }
 
@@ -264,19 +265,21 @@ export class FrameRenderer {
 
   /** Points the disc's cone along the gaze. */
   private aim({ min, max }: Bounds, resolution: number): void {
-    const { hybrid, cone, marchFrame, room } = this;
-    cone.uApex.value.copy(hybrid.apex);
-    cone.uAxis.value.copy(hybrid.axis);
+    const { gazeFocus, cone, marchFrame, room } = this;
+    cone.uApex.value.copy(gazeFocus.apex);
+    cone.uAxis.value.copy(gazeFocus.axis);
     const middle = this.point
       .set(...max)
       .add(this.corner.set(...min))
       .multiplyScalar(0.5);
-    cone.uRim.value = middle.applyMatrix4(room.specimen.group.matrixWorld).distanceTo(hybrid.apex);
-    marchFrame.uDisc.value.set(...hybrid.cosines);
+    cone.uRim.value = middle
+      .applyMatrix4(room.specimen.group.matrixWorld)
+      .distanceTo(gazeFocus.apex);
+    marchFrame.uDisc.value.set(...gazeFocus.cosines);
     const [eye] = this.eyes.all;
     const pixel_rad =
       eye === undefined ? 0 : 2 / (eye.camera.projectionMatrix.elements[5] * eye.viewport.w);
-    marchFrame.uReach.value = hybrid.reach((MIXED_PX * pixel_rad) / resolution);
+    marchFrame.uReach.value = gazeFocus.reach((MIXED_PX * pixel_rad) / resolution);
   }
 
   /**
@@ -284,12 +287,12 @@ export class FrameRenderer {
    * @param isMixed whether the frame inside the disc is mixed in
    */
   private show(light: WebGLRenderTarget, isMixed: boolean): void {
-    const { renderer, eyes, hybrid, marchFrame, fade } = this;
+    const { renderer, eyes, gazeFocus, marchFrame, fade } = this;
     fade.keep(this.last);
     this.last = light;
     const before = this.drawInto(light);
     if (isMixed) {
-      marchFrame.uDisc.value.set(...hybrid.cosines);
+      marchFrame.uDisc.value.set(...gazeFocus.cosines);
       this.overWithin.show(eyes, 1);
       const { autoClear } = renderer;
       renderer.autoClear = false;

@@ -25,7 +25,7 @@ const WIDEST_RAD = 1.5;
 
 const RADIANS = Math.PI / 180;
 
-export class Hybrid {
+export class GazeFocus {
   focusTiles: FocusState = FAR_AWAY;
   /** Share of the set radius that the frame's budget allows, 0 to 1. */
   radiusShare = 1;

@@ -14,6 +14,6 @@ export function pixelShare(): number {
 }
 
 /** Halves the share for the next time that the page opens. */
-export function takeFewerPixels(): void {
+export function halvePixelShare(): void {
   store(KEY, String(Math.max(LEAST, pixelShare() / 2)), "in-tab");
 }

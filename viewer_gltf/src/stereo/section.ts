@@ -25,14 +25,14 @@ export function stereoSections(
   ];
 }
 
-function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
+function availability({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
   return { refusal: isAvailable ? "" : reason || "This is not available here.", showsReason: true };
 }
 
 function stereoItems(state: ViewerState, facts: StereoFacts, view: PanelView): readonly Control[] {
   return [
     ...(facts.isStereo ? [] : [controlOf(SCREEN_STEREO, state)]),
-    { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
+    { ...command("stereo", "Enter stereo (VR)"), ...availability(facts.stereo), isPrimary: true },
     ...(facts.hasRoom ? [command("room", "In your room (AR)")] : []),
     ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),
     ...controlsOf(STEREO_PARAMETERS, state),
@@ -70,5 +70,5 @@ function splitItems(
   }
   const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
   items.push(command("measure-screen", "Measure the screen with a card"));
-  return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];
+  return [...items, { ...command("split", "Split screen"), ...availability(support) }];
 }

@@ -26,7 +26,7 @@ import { type Face, faceTowards } from "./thin_rests";
 import { coarserFor, FINEST } from "./triangle_budget";
 
 /** Presence of a volume, 0 to 1, from which on the thin rests beside it are not drawn. */
-const RESTS_GO_AT = 0.5;
+const REST_LIMIT = 0.5;
 
 const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
@@ -231,7 +231,7 @@ export class SurfaceSet implements Surfaces {
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
     const { open } = this;
-    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= RESTS_GO_AT;
+    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= REST_LIMIT;
     surface.leaveRestsOut((isOpen && open.faces.get(tile.id)) || null);
   }
 

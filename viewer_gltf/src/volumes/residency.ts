@@ -63,7 +63,7 @@ export class Residency {
   }
 
   /** Marks all tiles as not wanted, until they are requested again. */
-  unwantAll(): void {
+  clearWanted(): void {
     this.turn++;
     for (const resident of this.residents.values()) resident.wanted = null;
   }

@@ -190,7 +190,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     this.state = state;
     this.wanted = wanted;
     this.mayRefine = mayRefine;
-    this.residents.unwantAll();
+    this.residents.clearWanted();
     for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
@@ -295,7 +295,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     const resident = this.residents.get(tile);
     if (resident === undefined) return;
     if (resident.texture instanceof SharpenedTile) {
-      resident.texture.blur();
+      resident.texture.showCoarse();
       return;
     }
     this.bricks?.refuse(tile);

@@ -1,15 +1,15 @@
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import type { RoomRay, Target, TargetHit } from "../interaction/ray_pointer";
+import type { SceneRay, Target, TargetHit } from "../interaction/ray_pointer";
 import { GazeCarry } from "./carry_handle";
 
-const look = (yaw_deg: number): RoomRay => {
+const look = (yaw_deg: number): SceneRay => {
   const yaw = (yaw_deg * Math.PI) / 180;
   return { origin: new Vector3(), direction: new Vector3(Math.sin(yaw), 0, -Math.cos(yaw)) };
 };
 
 describe("a handle that the gaze carries", () => {
-  const dragged: RoomRay[] = [];
+  const dragged: SceneRay[] = [];
   const target: Target = {
     isOnTop: true,
     intersect: () => null,

@@ -2,7 +2,7 @@
  * A handle that the gaze carries, for devices without a button to hold. Once chosen, the handle
  * follows the gaze. The next choice puts it down, by a button or by a resting gaze.
  */
-import type { Hit, RoomRay, Target, TargetHit } from "../interaction/ray_pointer";
+import type { Hit, SceneRay, Target, TargetHit } from "../interaction/ray_pointer";
 
 /** Radians. A gaze that stays within this angle of its first direction is resting. */
 const REST_RAD = (1.5 * Math.PI) / 180;
@@ -13,7 +13,7 @@ export class GazeCarry implements Target {
   readonly layout = "carry";
   private carried: TargetHit | null = null;
   /** The gaze since which the head has rested, and the number of such rests so far. */
-  private rest: RoomRay | null = null;
+  private rest: SceneRay | null = null;
   private rests = 0;
 
   get isCarrying(): boolean {
@@ -45,7 +45,7 @@ export class GazeCarry implements Target {
   }
 
   /** Drags the carried handle along the gaze. Returns whether a handle was dragged. */
-  follow(gaze: RoomRay): boolean {
+  follow(gaze: SceneRay): boolean {
     const { carried, rest } = this;
     if (carried?.key == null) return false;
     if (rest === null || rest.direction.angleTo(gaze.direction) > REST_RAD) {

@@ -12,8 +12,8 @@ import {
   Quaternion,
   Vector3,
 } from "three";
-import { leaveUncut } from "../gpu/unclipped_material";
-import type { RoomRay } from "../interaction/ray_pointer";
+import { keepUnclipped } from "../gpu/unclipped_material";
+import type { SceneRay } from "../interaction/ray_pointer";
 import type { HandPose } from "../math/grab";
 
 /**
@@ -24,7 +24,7 @@ export type HandEvent = Readonly<{
   kind: "press" | "select" | "release" | "squeeze" | "let-go";
   source: XRInputSource;
   /** Ray at the time of the event; null: use the gaze. */
-  ray: RoomRay | null;
+  ray: SceneRay | null;
   time_ms: number;
 }>;
 
@@ -40,7 +40,7 @@ const KINDS = {
 export type Stick = Readonly<{ x: number; y: number }>;
 const AT_REST: Stick = { x: 0, y: 0 };
 /** Dead zone of a stick, as a share of its range: sticks do not rest exactly at zero. */
-const DEAD = 0.15;
+const DEAD_ZONE = 0.15;
 
 /** Radius of a drawn ray, metres. */
 const LINE_RADIUS_M = 0.0012;
@@ -49,7 +49,7 @@ const LINE_M = 1.5;
 
 export class Hand {
   /** Null if the source points with the gaze, or is not tracked now. */
-  ray: RoomRay | null = null;
+  ray: SceneRay | null = null;
   /** Pose of the hand's grip; null if it is not tracked now. */
   pose: HandPose | null = null;
 
@@ -81,7 +81,7 @@ export class Hand {
     if (gamepad?.mapping !== "xr-standard") return AT_REST;
     const { axes } = gamepad;
     const [x = 0, y = 0] = axes.length >= 4 ? [axes[2], axes[3]] : axes;
-    const live = (v: number) => (Math.abs(v) < DEAD ? 0 : v);
+    const live = (v: number) => (Math.abs(v) < DEAD_ZONE ? 0 : v);
     return { x: live(x), y: live(y) };
   }
 }
@@ -168,7 +168,7 @@ export class Controllers {
     const line = new Mesh(this.tube, material);
     line.renderOrder = RENDER_ORDER;
     line.visible = false;
-    leaveUncut(line);
+    keepUnclipped(line);
     this.group.add(line);
     this.hands = [...this.hands, new Hand(source, line)];
   }
@@ -189,7 +189,7 @@ export class Controllers {
     hand.pose = { position, orientation };
   }
 
-  private rayOf(source: XRInputSource, frame: XRFrame): RoomRay | null {
+  private rayOf(source: XRInputSource, frame: XRFrame): SceneRay | null {
     if (source.targetRayMode === "gaze") return null;
     // On a handheld screen a finger points. In a Cardboard viewer a touch is the button.
     const isHandheld = this.session?.interactionMode === "screen-space";

@@ -6,7 +6,7 @@ import {
   firstHit,
   type Pointer,
   pointOn,
-  type RoomRay,
+  type SceneRay,
   type Target,
   type TargetHit,
 } from "../interaction/ray_pointer";
@@ -63,10 +63,10 @@ export type GripOptions = Readonly<{
   mover: SpecimenMover;
   tiles: TileTarget;
   /** The gaze, and the targets that can be chosen now. */
-  aim: () => Readonly<{ gaze: RoomRay; choosable: readonly Target[] }>;
+  aim: () => Readonly<{ gaze: SceneRay; choosable: readonly Target[] }>;
   /** Moves the specimen by a share of a command's step, and returns whether it moved. */
   run: (command: Command, state: ViewerState, share: number) => boolean;
-  onPress: (ray: RoomRay, time_ms: number) => void;
+  onPress: (ray: SceneRay, time_ms: number) => void;
   onTap: (time_ms: number) => void;
 }>;
 
@@ -147,7 +147,7 @@ export class Grips {
     }
   }
 
-  private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
+  private begin(source: XRInputSource, ray: SceneRay | null, time_ms: number): Press {
     const hit = firstHit(ray ?? this.aim.gaze, this.aim.choosable);
     // A Cardboard's button can't be held for long: one tap picks up a handle, and the next puts it
     // down.
@@ -196,7 +196,7 @@ export class Grips {
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
     const pose = moveByHolders(this.mover.pose, this.held, now);
     this.held = now;
-    return this.mover.to(pose, this.aim.gaze.origin);
+    return this.mover.moveTo(pose, this.aim.gaze.origin);
   }
 
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
@@ -261,7 +261,7 @@ export class Grips {
       this.headHold = this.mover.holdBy(gaze, state);
       return false;
     }
-    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
+    this.mover.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
     return true;
   }
 
@@ -273,10 +273,10 @@ export class Grips {
       const hit = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
       pose = moveByStick(pose, stick, hit ?? this.mover.middle(state), dt_s);
     }
-    return this.mover.to(pose, this.aim.gaze.origin);
+    return this.mover.moveTo(pose, this.aim.gaze.origin);
   }
 
-  private tileAlong(ray: RoomRay | null): Vector3 | null {
+  private tileAlong(ray: SceneRay | null): Vector3 | null {
     const hit = ray && this.options.tiles.intersect(ray);
     return hit && pointOn({ ...hit, ray });
   }

@@ -8,7 +8,7 @@ import {
   firstHit,
   gazeOf,
   Pointer,
-  type RoomRay,
+  type SceneRay,
   type Target,
   type TargetHit,
 } from "../interaction/ray_pointer";
@@ -27,8 +27,8 @@ import { type HeadHold, moveByGaze } from "./hold_specimen";
 import { howItWorks, isIntroductionDue } from "./how_it_works";
 import { LastChoice } from "./last_choice";
 import { type MenuEntry, menuEntries } from "./panel/menu_entries";
-import { RoomNotice } from "./panel/notice";
-import { RoomPanel } from "./panel/panel";
+import { StereoNotice } from "./panel/notice";
+import { HeadsetPanel } from "./panel/panel";
 import { PANEL } from "./panel/panel_surface";
 import type { Setting } from "./panel/placement";
 import { PointedLight } from "./pointed_light";
@@ -48,9 +48,9 @@ const UNDO = `${PANEL}undo-choice`;
 const CARRY_BUTTON = `${PANEL}bar-move`;
 
 export class Hands {
-  readonly panel: RoomPanel;
+  readonly panel: HeadsetPanel;
   private readonly light: PointedLight;
-  readonly notice: RoomNotice;
+  readonly notice: StereoNotice;
   readonly ground = new Ground();
   private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
@@ -60,7 +60,7 @@ export class Hands {
   private readonly carry = new GazeCarry();
   private readonly grips: Grips;
   private gestures: TimedGesture[] = [];
-  private gaze: RoomRay = gazeOf(new Matrix4());
+  private gaze: SceneRay = gazeOf(new Matrix4());
   /** Times of the button presses since the last frame, ms. */
   private taps: number[] = [];
   private isRunning = false;
@@ -73,8 +73,8 @@ export class Hands {
     const { scene, specimen, handles = () => [], layOut, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
     this.mover = new SpecimenMover(specimen, options.tiles);
-    this.notice = new RoomNotice(isPainted);
-    this.panel = new RoomPanel({
+    this.notice = new StereoNotice(isPainted);
+    this.panel = new HeadsetPanel({
       layOut,
       onLeave,
       onLenses,
@@ -276,7 +276,7 @@ export class Hands {
   }
 
   /** Chooses the target on the ray of the button, or else the one under the gaze. */
-  private press(ray: RoomRay, time_ms: number): void {
+  private press(ray: SceneRay, time_ms: number): void {
     const hit = firstHit(ray, this.choosable) ?? firstHit(this.gaze, this.choosable);
     if (hit !== null) this.choose(hit, time_ms);
   }
@@ -295,16 +295,16 @@ export class Hands {
     const before = this.lastChoice.take();
     if (before === null) return;
     this.options.onAction({ type: "restore", state: before.state });
-    this.mover.backTo(before.pose, this.gaze.origin);
+    this.mover.jumpTo(before.pose, this.gaze.origin);
   }
 
   /** Picks up the specimen with the bar, then moves it with the gaze until the gaze rests. */
-  private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
+  private carrySpecimen(gaze: SceneRay, isStart: boolean): void {
     if (isStart && this.state !== null) {
       this.barHold = this.mover.holdBy(gaze, this.state);
       this.announce(CARRY);
     } else if (this.barHold !== null) {
-      this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
+      this.mover.moveTo(moveByGaze(this.barHold, gaze), gaze.origin);
     }
   }
 }

@@ -7,13 +7,13 @@ import { Ring } from "../interaction/dwell_ring";
 import { type Pointer, pointOn } from "../interaction/ray_pointer";
 import type { Controllers } from "./controllers";
 import type { Grips } from "./grips";
-import type { RoomPanel } from "./panel/panel";
+import type { HeadsetPanel } from "./panel/panel";
 
 export type PointedLightOptions = Readonly<{
   pointer: Pointer;
   controllers: Controllers;
   grips: Grips;
-  panel: RoomPanel;
+  panel: HeadsetPanel;
 }>;
 
 export class PointedLight {

@@ -3,7 +3,7 @@
  * head.
  */
 import type { Vector3 } from "three";
-import type { RoomRay } from "../interaction/ray_pointer";
+import type { SceneRay } from "../interaction/ray_pointer";
 import { type SpecimenPose, zoomAbout } from "../math/grab";
 import { type BoxedTile, shownTiles } from "../math/pick";
 import type { Specimen } from "../render/specimen_pose";
@@ -33,14 +33,14 @@ export class SpecimenMover {
   /**
    * Moves the specimen to a pose, as seen from `eye`. Returns false if it has this pose already.
    */
-  to(pose: SpecimenPose, eye: Vector3): boolean {
+  moveTo(pose: SpecimenPose, eye: Vector3): boolean {
     if (pose === this.pose) return false;
     this.specimen.moveTo(pose, eye);
     return true;
   }
 
   /** Returns to an earlier pose at once, without motion. */
-  backTo(pose: SpecimenPose, eye: Vector3): void {
+  jumpTo(pose: SpecimenPose, eye: Vector3): void {
     this.specimen.jumpTo(pose, eye);
   }
 
@@ -63,7 +63,7 @@ export class SpecimenMover {
   }
 
   /** State of a gaze or head that starts to hold the specimen now. */
-  holdBy(gaze: RoomRay, state: ViewerState): HeadHold {
+  holdBy(gaze: SceneRay, state: ViewerState): HeadHold {
     return { pose: this.pose, pivot: this.middle(state), gaze };
   }
 }

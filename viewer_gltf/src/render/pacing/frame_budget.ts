@@ -18,7 +18,7 @@ const RATE_HZ = 60;
  */
 const LATE = 1.3;
 
-export class Pace {
+export class FrameBudget {
   /** Time between the last two frames, smoothed. */
   frame_ms = 0;
   /** Whether the frames of a moving view come later than the display could show them. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { RestPace } from "./redraw_at_rest";
+import { RedrawAtRest } from "./redraw_at_rest";
 
 /**
  * A GPU that takes `picture_ms` for an image. Returns the times, ms, at which images were
@@ -14,7 +14,7 @@ function run(picture_ms: number, until_ms: number): number[] {
     deleteSync: () => undefined,
     flush: () => undefined,
   };
-  const pace = new RestPace(gl);
+  const pace = new RedrawAtRest(gl);
   const asked: number[] = [];
   for (; now < until_ms; now += 10) {
     if (!pace.isDue(now)) continue;
@@ -46,7 +46,7 @@ describe("a view at rest while data arrive", () => {
       deleteSync: () => undefined,
       flush: () => undefined,
     };
-    const pace = new RestPace(gl);
+    const pace = new RedrawAtRest(gl);
     pace.submit(0);
     expect(pace.isDue(5000)).toBe(false);
     pace.forget();

@@ -15,7 +15,7 @@ const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;
 const SIGNALED = 0x9119;
 
-export class RestPace {
+export class RedrawAtRest {
   private fence: WebGLSync | null = null;
   private began_ms = 0;
   private due_ms = 0;

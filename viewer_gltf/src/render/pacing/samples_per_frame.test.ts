@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { GatherPace } from "./samples_per_frame";
+import { SamplesPerFrame } from "./samples_per_frame";
 
 /** A GPU whose frame time depends on the number of samples. */
 function stand(msOf: (passes: number) => number) {
@@ -11,7 +11,7 @@ function stand(msOf: (passes: number) => number) {
     deleteSync: () => undefined,
     flush: () => undefined,
   };
-  const pace = new GatherPace(gl);
+  const pace = new SamplesPerFrame(gl);
   /** Advances one display frame of 16 ms. Returns whether an image was requested. */
   const step = () => {
     now += 16;

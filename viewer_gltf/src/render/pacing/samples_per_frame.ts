@@ -18,7 +18,7 @@ const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;
 const SIGNALED = 0x9119;
 
-export class GatherPace {
+export class SamplesPerFrame {
   /** Samples per pixel in the next frame; below 1 it is the share of the pixels that are drawn. */
   passes = 1 / 8;
   private fence: WebGLSync | null = null;

@@ -62,7 +62,7 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
         for (let z = 0, to = 0; z < nz; z++) {
           for (let y = 0; y < ny; y++, to += nx) {
             const at = (z + pad) * plane + (y + pad) * row + pad;
-            seeRow(seen, to, nx, isDimmed, cells, at, step, near, WEIGHTS[kind]);
+            addRow(seen, to, nx, isDimmed, cells, at, step, near, WEIGHTS[kind]);
           }
         }
       }
@@ -88,7 +88,7 @@ function copyRow(
 }
 
 /** Adds the light that the cells of a row receive from one direction. */
-function seeRow(
+function addRow(
   seen: Float32Array,
   to: number,
   count: number,

@@ -95,13 +95,13 @@ export class SharpenedTile {
 
   /** Requests the finer volumes. */
   sharpen(): void {
-    this.finer = this.make(() => this.blur());
+    this.finer = this.make(() => this.showCoarse());
     if (this.finer === null) this.isRefused = true;
     else this.finer.want(this.kept);
   }
 
   /** Draws the coarse volumes from now on, until other channels are wanted. */
-  blur(): void {
+  showCoarse(): void {
     this.isRefused = true;
     this.dropFiner();
     this.onChange();

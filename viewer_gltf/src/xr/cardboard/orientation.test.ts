@@ -73,9 +73,9 @@ describe("the orientation of the head, read from the phone", () => {
 describe("the direction that counts as ahead", () => {
   const turned = (yaw_deg: number) => toQuaternion(reading(90 + yaw_deg, 0, -90), 90);
   /** Heading after the phone has rested for a second. */
-  const rested = (head: Quaternion, isAcross = true, heading = FREE_HEADING) => {
-    const first = followHeading(heading, head, isAcross, 0);
-    return followHeading(first, head, isAcross, 1000);
+  const rested = (head: Quaternion, isLandscape = true, heading = FREE_HEADING) => {
+    const first = followHeading(heading, head, isLandscape, 0);
+    return followHeading(first, head, isLandscape, 1000);
   };
 
   it("is fixed where the phone rests for half a second, level and in landscape", () => {

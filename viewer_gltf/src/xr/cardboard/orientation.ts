@@ -74,7 +74,7 @@ export function toQuaternion(
 export function followHeading(
   heading: Heading,
   head: Quaternion,
-  isAcross: boolean,
+  isLandscape: boolean,
   time_ms: number,
 ): Heading {
   if (heading.isHeld) return heading;
@@ -83,7 +83,7 @@ export function followHeading(
   // If the phone lies on a table with its screen up, ahead is where the screen's upper edge points.
   if (!isLevel) ahead.set(0, ahead.y < 0 ? 1 : -1, 0).applyQuaternion(head);
   const yaw_rad = Math.atan2(-ahead.x, -ahead.z);
-  if (!isLevel || !isAcross) return { yaw_rad, isHeld: false, rest: null };
+  if (!isLevel || !isLandscape) return { yaw_rad, isHeld: false, rest: null };
   const { rest } = heading;
   const isAtRest = rest !== null && rest.head.angleTo(head) < REST_RAD;
   const next = isAtRest ? rest : { head: head.clone(), since_ms: time_ms };
@@ -101,7 +101,7 @@ export function headPose(head: Quaternion, heading: Heading, out = new Matrix4()
 }
 
 /** Orientation of the head at a time in milliseconds. */
-export type Turned = Readonly<{ head: Quaternion; time_ms: number }>;
+export type HeadTurn = Readonly<{ head: Quaternion; time_ms: number }>;
 
 /**
  * Milliseconds between two reports. A speed from closer reports is noise; from farther ones it says
@@ -121,8 +121,8 @@ const MAX_AHEAD_MS = 50;
  * two reports.
  */
 export function predictTurn(
-  before: Turned | null,
-  last: Turned,
+  before: HeadTurn | null,
+  last: HeadTurn,
   ahead_ms: number,
   out = new Quaternion(),
 ): Quaternion {
@@ -147,8 +147,8 @@ export const ORIENTATION_ABSENT =
 /** Reads the phone's orientation, and keeps the direction that counts as ahead. */
 export class HeadSensor {
   private reading: Reading | null = null;
-  private before: Turned | null = null;
-  private last: Turned | null = null;
+  private before: HeadTurn | null = null;
+  private last: HeadTurn | null = null;
   /**
    * Angle of the screen at the last report. After the screen rotates, the reading must be converted
    * again.

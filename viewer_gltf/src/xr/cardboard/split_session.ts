@@ -27,7 +27,7 @@ import { cssPixelsPerInch, screenOf } from "./lens";
 import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
 import type { ScreenHold } from "./screen";
 import { TurnSign } from "./turn_sign";
-import type { Asked } from "./user_gesture";
+import type { StereoPermissions } from "./user_gesture";
 import { CARDBOARD_V2, type Profile } from "./viewer_profile";
 
 /** Milliseconds from reading the sensor until the frame is seen: one frame. */
@@ -101,7 +101,7 @@ export class SplitSession {
    * Starts the session with the permissions that were asked for in a tap. Throws BundleError if the
    * orientation is refused.
    */
-  async start(profile: Profile, asked: Asked): Promise<void> {
+  async start(profile: Profile, asked: StereoPermissions): Promise<void> {
     if (this.running !== null) return;
     this.profile = profile;
     this.layout = "";
@@ -190,7 +190,11 @@ class Running {
    */
   private readonly step = Math.random();
 
-  constructor({ stage, screen }: Asked, end: () => void, onGesture: (gesture: Gesture) => void) {
+  constructor(
+    { stage, screen }: StereoPermissions,
+    end: () => void,
+    onGesture: (gesture: Gesture) => void,
+  ) {
     const { signal } = this.stopped;
     this.stage = stage;
     this.hold = screen;

@@ -6,7 +6,7 @@ import { holdScreen, type ScreenHold } from "./screen";
 
 export type OrientationAnswer = "granted" | "refused" | "absent";
 
-export type Asked = Readonly<{
+export type StereoPermissions = Readonly<{
   /** The element that fills the screen and covers the page. */
   stage: HTMLElement;
   orientation: Promise<OrientationAnswer>;
@@ -19,7 +19,7 @@ export type Asked = Readonly<{
  *
  * @param onLeave called when the user leaves full screen
  */
-export function askInTap(canvas: HTMLElement, onLeave: () => void): Asked {
+export function askInTap(canvas: HTMLElement, onLeave: () => void): StereoPermissions {
   const stage = canvas.parentElement ?? canvas;
   return { stage, orientation: askOrientation(), screen: holdScreen(stage, onLeave) };
 }

@@ -13,8 +13,8 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import { leaveUncut } from "../../gpu/unclipped_material";
-import type { RoomRay } from "../../interaction/ray_pointer";
+import { keepUnclipped } from "../../gpu/unclipped_material";
+import type { SceneRay } from "../../interaction/ray_pointer";
 import { holds, type Mark, type Rect } from "../../panel/canvas/draw_list";
 import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
@@ -57,7 +57,7 @@ export class CanvasQuad {
       new MeshBasicMaterial({ map: this.texture, toneMapped: false }),
     );
     this.mesh.visible = false;
-    leaveUncut(this.mesh);
+    keepUnclipped(this.mesh);
     this.lit = new Mesh(
       new PlaneGeometry(1, 1),
       new MeshBasicMaterial({
@@ -116,7 +116,7 @@ export class CanvasQuad {
   }
 
   /** Returns where a ray hits the front of the quad; null if it misses or the quad is hidden. */
-  intersect({ origin, direction }: RoomRay): Spot | null {
+  intersect({ origin, direction }: SceneRay): Spot | null {
     if (!this.mesh.visible) return null;
     this.toQuad.copy(this.mesh.matrixWorld).invert();
     const from = origin.clone().applyMatrix4(this.toQuad);

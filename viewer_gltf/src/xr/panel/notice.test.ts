@@ -1,6 +1,6 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { RoomNotice } from "./notice";
+import { StereoNotice } from "./notice";
 import { NOTICE_HEIGHT, NOTICE_PX_PER_M, NOTICE_WIDTH, textsHeight } from "./notice_queue";
 import { bearingOf, PANEL_DISTANCE_M, pointAt } from "./placement";
 
@@ -14,7 +14,7 @@ const headAt = (pitch_deg: number) => new Matrix4().makeRotationX(pitch_deg * DE
 /**
  * Pitch of the lower end of a notice's texts at the left, in the middle and at the right, degrees.
  */
-function lowerEnd({ mesh, texts }: RoomNotice): readonly number[] {
+function lowerEnd({ mesh, texts }: StereoNotice): readonly number[] {
   const y = NOTICE_HEIGHT / 2 - textsHeight(texts);
   return [-0.5, 0, 0.5].map((across) => {
     const end = new Vector3(across * NOTICE_WIDTH, y, 0).divideScalar(NOTICE_PX_PER_M);
@@ -29,7 +29,7 @@ describe("a notice while the menu is open", () => {
       for (const top_deg of [-12, 31]) {
         const rows = pointAt({ yaw: 0, pitch: top_deg * DEG }, EYE, PANEL_DISTANCE_M);
         for (const gaze_deg of [top_deg - 8, top_deg - 24]) {
-          const notice = new RoomNotice(false);
+          const notice = new StereoNotice(false);
           for (const text of texts) notice.announce(text);
           notice.update(0.1, headAt(gaze_deg), rows.clone());
           expect(notice.texts).toEqual(texts);
@@ -45,7 +45,7 @@ describe("a notice while the menu is open", () => {
   );
 
   it("lies below the gaze if the menu's upper edge is far above the gaze", () => {
-    const notice = new RoomNotice(false);
+    const notice = new StereoNotice(false);
     notice.announce("Saved.");
     const rows = pointAt({ yaw: 0, pitch: 31 * DEG }, EYE, PANEL_DISTANCE_M);
     notice.update(0.1, headAt(-10), rows);
@@ -53,7 +53,7 @@ describe("a notice while the menu is open", () => {
   });
 
   it("lies below the gaze if no menu is open", () => {
-    const notice = new RoomNotice(false);
+    const notice = new StereoNotice(false);
     notice.announce("Saved.");
     notice.update(0.1, headAt(-10));
     expect(bearingOf(notice.mesh.position.clone().sub(EYE)).pitch / DEG).toBeCloseTo(-30);

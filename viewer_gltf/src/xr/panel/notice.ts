@@ -34,7 +34,7 @@ export const NOTICE_DISTANCE_M = 0.9;
 /** Draw order: after volumes, marks and a specimen that is held closer, before the dwell ring. */
 const RENDER_ORDER = 1900;
 
-export class RoomNotice {
+export class StereoNotice {
   private readonly quad: CanvasQuad;
   private announcements: Announcements = NO_ANNOUNCEMENTS;
   /** True until the next frame, which knows where the head looks and places the notice. */

@@ -3,7 +3,7 @@
  * specimen, which is always there and opens the panel.
  */
 import { Group, type Matrix4, Vector3 } from "three";
-import type { RoomRay, Target } from "../../interaction/ray_pointer";
+import type { SceneRay, Target } from "../../interaction/ray_pointer";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
 import type { CanvasChange, CanvasWish, Region } from "../../panel/canvas/draw_list";
 import { CONTENT, HEIGHT, type Page, pageOf, WIDTH } from "../../panel/canvas/page";
@@ -38,7 +38,7 @@ import {
  * Seconds between readings of values outside the state, such as the frame time and the gazed tile.
  */
 const REFRESH_S = 0.5;
-export type RoomPanelOptions = Readonly<{
+export type HeadsetPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onRequest: (request: Action | Command) => void;
   onLeave: () => void;
@@ -51,19 +51,19 @@ export type RoomPanelOptions = Readonly<{
   /**
    * Called when the gaze picks up the specimen along a ray, and then with each ray that carries it.
    */
-  onCarry: (ray: RoomRay, isStart: boolean) => void;
+  onCarry: (ray: SceneRay, isStart: boolean) => void;
   /** False: nothing is painted, as in a test without a browser. Absent: true. */
   isPainted?: boolean;
 }>;
 
-export class RoomPanel {
+export class HeadsetPanel {
   readonly group = new Group();
   readonly quad: CanvasQuad;
   private readonly menu: PanelSurface;
   private readonly bar: PanelSurface;
   private page: Page | null = null;
   private view: PanelView = START_VIEW;
-  private readonly pages = new PanelPages(() => this.giveCards());
+  private readonly pages = new PanelPages(() => this.resetCards());
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
@@ -82,9 +82,9 @@ export class RoomPanel {
   /** True while the specimen is carried, which hides the bar. */
   isCarrying = false;
 
-  constructor(private readonly options: RoomPanelOptions) {
+  constructor(private readonly options: HeadsetPanelOptions) {
     const context = options.isPainted === false ? null : undefined;
-    const choose = (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) =>
+    const choose = (region: Region, spot: Spot, ray: SceneRay, isPress: boolean) =>
       this.choose(region, spot, ray, isPress);
     const refreshIfStale = () => {
       if (this.isStale && this.state !== null) this.refresh(this.state);
@@ -220,7 +220,7 @@ export class RoomPanel {
   }
 
   /** Gives cards to the channels that are shown now, when another page is opened. */
-  private giveCards(): void {
+  private resetCards(): void {
     this.view = { ...this.view, channelsWithCard: null };
     this.isStale = true;
   }
@@ -241,7 +241,7 @@ export class RoomPanel {
    * Carries out the request of a region at a spot. Spots beyond the region count as its edge, since
    * sliders are dragged past their ends.
    */
-  private choose(region: Region, spot: Spot, ray: RoomRay, isPress: boolean): void {
+  private choose(region: Region, spot: Spot, ray: SceneRay, isPress: boolean): void {
     if (region.isCarry) {
       this.options.onCarry(ray, isPress);
       return;

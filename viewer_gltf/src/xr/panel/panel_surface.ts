@@ -1,6 +1,6 @@
 /** A quad of the headset panel with targets on it: the menu, or the bar. */
 import type { Vector3 } from "three";
-import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
+import type { Hit, SceneRay, Target } from "../../interaction/ray_pointer";
 import { holds, type Mark, type Region } from "../../panel/canvas/draw_list";
 import type { CanvasQuad, Spot } from "./canvas_quad";
 
@@ -29,7 +29,12 @@ export class PanelSurface implements Target {
   constructor(
     private readonly name: string,
     readonly quad: CanvasQuad,
-    private readonly onChoose: (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) => void,
+    private readonly onChoose: (
+      region: Region,
+      spot: Spot,
+      ray: SceneRay,
+      isPress: boolean,
+    ) => void,
     /** Lays out the targets again if a choice has made them out of date. */
     private readonly refreshIfStale: () => void,
   ) {
@@ -73,7 +78,7 @@ export class PanelSurface implements Target {
     return this.quad.pointOf(region.rect, across, down);
   }
 
-  intersect(ray: RoomRay): Hit | null {
+  intersect(ray: SceneRay): Hit | null {
     const spot = this.quad.intersect(ray);
     if (spot === null) return null;
     const region = this.shown.regions.find(({ rect }) => holds(rect, spot));
@@ -88,16 +93,16 @@ export class PanelSurface implements Target {
     return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
   }
 
-  choose({ key }: Hit, ray: RoomRay): void {
+  choose({ key }: Hit, ray: SceneRay): void {
     if (key !== null) this.chooseAt(key, ray, true);
   }
 
-  drag(key: string, ray: RoomRay): void {
+  drag(key: string, ray: SceneRay): void {
     this.refreshIfStale(); // the target may have been laid out again since it was picked up
     this.chooseAt(key, ray, false);
   }
 
-  private chooseAt(key: string, ray: RoomRay, isPress: boolean): void {
+  private chooseAt(key: string, ray: SceneRay, isPress: boolean): void {
     const region = this.shown.regions.find(({ id }) => PANEL + id === key);
     const spot = this.quad.intersect(ray);
     if (region === undefined || (spot === null && !region.isCarry)) return;

@@ -34,7 +34,7 @@ export class ScreenPictures {
     uLeft: matrixOf(LEFT),
     uRight: matrixOf(RIGHT),
   });
-  private readonly nobody = new Camera();
+  private readonly anyCamera = new Camera();
 
   constructor(private readonly renderer: WebGLRenderer) {}
 
@@ -59,7 +59,7 @@ export class ScreenPictures {
     renderer.setRenderTarget(this.target);
     draw();
     renderer.setRenderTarget(null);
-    renderer.render(this.pass.scene, this.nobody);
+    renderer.render(this.pass.scene, this.anyCamera);
   }
 
   dispose(): void {
