@@ -175,7 +175,7 @@ export class FrameRenderer {
     const tracer = traced?.isShown ? traced : null;
     const hasMarches = marches !== null && !marches.isEmpty;
     if (tracer !== null || hasMarches) opaque();
-    const isMarched = hasMarches && !this.needsNoMarch(drawn, clip, isMoving);
+    const isMarched = hasMarches && !this.canSkipMarch(drawn, clip, isMoving);
     const isMixed =
       isMarched && tracer === null && gazeFocus.outer_rad > 0 && marches.isPartlyInDisc;
     if (isMarched) {
@@ -234,11 +234,11 @@ export class FrameRenderer {
   }
 
   /**
-   * Whether no stand-in march is needed for the path tracing, or the last one is still valid
-   * because the view is at rest. In a headset, whose view never rests, it stays valid until the
-   * first traced image.
+   * Whether the stand-in march for the path tracing can be skipped, because the view is at rest and
+   * the last march is still valid. In a headset, whose view never rests, a march is drawn until the
+   * path tracing has its first image.
    */
-  private needsNoMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
+  private canSkipMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
     if (!traced?.isShown) return false;
     const isWorn = this.eyes.all.length > 1;
     if (isWorn && traced.standsAlone) {

@@ -41,7 +41,8 @@ const SPLIT: XrSupport = { isAvailable: true, reason: "" };
  * time.
  */
 const AFTER_PICTURE_MS = 2000;
-const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+const NO_ROOM =
+  "This browser can't show the specimen in your room: it has no augmented reality (AR).";
 
 async function findSupport(): StereoFinder["found"] {
   const stereo = await findXrSupport(navigator.xr, isSecureContext);

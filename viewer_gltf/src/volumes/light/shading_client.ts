@@ -72,7 +72,7 @@ export class ShadingClient {
   private fail(reason: string): void {
     this.hasFailed = true;
     this.running = this.waiting = null;
-    this.onFault(new Error(`volumes can't shade one another: ${reason}`));
+    this.onFault(new Error(`volumes are drawn without shading: ${reason}`));
   }
 
   dispose(): void {

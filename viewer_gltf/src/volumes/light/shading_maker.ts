@@ -32,7 +32,8 @@ export class ShadingMaker {
       const radius = Math.min(RADII[1], Math.max(RADII[0], radius_um / grid.edge));
       this.made = { grid, through, open: openness(through, grid.size, radius) };
     }
-    if (this.made === null) throw new RangeError("the first request has no matter; expected it");
+    if (this.made === null)
+      throw new RangeError("the first shading request has no matter; expected grid and tiles");
     const { grid, through, open } = this.made;
     return asTexels(open, lampLight(through, grid.size, towards));
   }

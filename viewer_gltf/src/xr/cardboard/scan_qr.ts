@@ -14,7 +14,7 @@ type DetectorClass = {
 /** Milliseconds between two looks at the video. */
 const PAUSE_ms = 150;
 const NO_SCANNER =
-  "This browser can't read QR codes: scan the viewer's code with the phone's camera app, copy the " +
+  "This browser can't read QR codes. Scan the viewer's code with the phone's camera app, copy the " +
   "address that it shows, and paste it here.";
 
 async function findDetector(): Promise<Detector | null> {
