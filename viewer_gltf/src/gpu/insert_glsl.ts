@@ -17,7 +17,6 @@ export type Insertion = Readonly<{ place: string; text: string }>;
 const DECLARED = /^[ \t]*#insert (.+)$/m;
 const MAIN_START = "void main() {";
 
-/** Reads the pieces of a .glsl file. */
 export function insertionsOf(file: string): readonly Insertion[] {
   const [, ...parts] = file.split(DECLARED);
   const pairs = Array.from({ length: parts.length / 2 }, (_, i) => parts.slice(2 * i, 2 * i + 2));

@@ -34,7 +34,6 @@ export class RunningMean {
     return this.target.textures;
   }
 
-  /** Adds both textures of a target to the means. */
   add({ textures, width, height }: WebGLRenderTarget): void {
     const { uFirst, uSecond } = this.pass.uniforms;
     [uFirst.value, uSecond.value] = textures;

@@ -35,12 +35,10 @@ export type RaySample = Readonly<{
 type Spent = Readonly<{
   direction: Vec3;
   target: string | null;
-  /** Whether the target itself has fired. */
   hasFired: boolean;
 }>;
 
 export type Dwell = Readonly<{
-  /** The sample of the previous frame, or null. */
   sample: RaySample | null;
   elapsed_s: number;
   /**

@@ -15,7 +15,6 @@ import {
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
-/** Degrees. Diameter of the ring. */
 const DIAMETER_DEG = 1.5;
 /** Degrees. Diameter of the dot in its middle. */
 const DOT_DEG = 0.3;

@@ -63,7 +63,6 @@ export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
   private readonly views: NamedViews;
-  /** The view to which `reset` returns. */
   private home: NamedView = "opening";
   /** The current named view; null after the user has moved. */
   private shownView: NamedView | null = "opening";
@@ -98,7 +97,6 @@ export class Navigation {
     this.camera.updateMatrixWorld();
   }
 
-  /** Sets the window's shape. */
   fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
     this.views.fit(aspect, covered);
     this.camera.aspect = aspect;

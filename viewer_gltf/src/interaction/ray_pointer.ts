@@ -95,7 +95,6 @@ function sampleOf(
 }
 
 export class Pointer {
-  /** The hit of the gaze. */
   gaze: TargetHit | null = null;
   /** The hit of each hand's ray, in the order given. */
   hands: readonly (TargetHit | null)[] = [];

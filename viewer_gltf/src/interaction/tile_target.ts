@@ -41,7 +41,6 @@ export class TileTarget implements Target {
     ) => Readonly<{ id: string; distance: number }> | null = () => null,
   ) {}
 
-  /** The tiles that are shown. */
   set tiles(tiles: readonly BoxedTile[]) {
     if (tiles === this.shown) return;
     this.shown = tiles;

@@ -11,7 +11,6 @@ export function centerOf({ min, max }: Box): Vec3 {
   return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2];
 }
 
-/** The eight corners. */
 export function cornersOf({ min, max }: Box): readonly Vec3[] {
   const at = (corner: number, axis: 0 | 1 | 2) => ((corner >> axis) & 1 ? max : min)[axis];
   return Array.from({ length: 8 }, (_, i) => [at(i, 0), at(i, 1), at(i, 2)]);

@@ -64,7 +64,6 @@ function cornerExit(from: number, ray: Ray, corner: readonly ClipPlane[]): numbe
   return Math.max(from, Math.min(...exits));
 }
 
-/** Whether a point is kept. */
 export function isKept(point: Vec3, { box, plane, corner }: Clip): boolean {
   const isInBox =
     box === null || AXES.every((i) => point[i] >= box.min[i] && point[i] <= box.max[i]);

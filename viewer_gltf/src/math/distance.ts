@@ -1,4 +1,3 @@
-/** Distance between two points. */
 import type { Vec3 } from "./vec3";
 
 export function distanceBetween(a: Vec3, b: Vec3): number {

@@ -9,7 +9,6 @@ import { linearTarget } from "../gpu/linear_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import { KEEP_FRAGMENT } from "../gpu/shaders/sources";
 
-/** Duration of a fade, s. */
 const FADE_S = 0.25;
 
 export class CrossFade {
@@ -32,7 +31,6 @@ export class CrossFade {
     this.isAskedFor = true;
   }
 
-  /** Advances a fade. */
   advance(dt_s: number): void {
     this.left_s = Math.max(0, this.left_s - dt_s);
     if (this.left_s === 0) this.kept.setSize(1, 1); // frees its memory: it is as large as the frame

@@ -22,9 +22,7 @@ import { drawAllEyes } from "../gpu/offscreen_target";
 import { depthMaterial, PANES } from "./blend_material";
 
 export class DepthPass {
-  /** Depth of opaque surfaces. */
   private readonly solid = depthTarget();
-  /** Depth of translucent surfaces. */
   private readonly panes = depthTarget();
   private readonly material: Material;
 

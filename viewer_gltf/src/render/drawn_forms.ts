@@ -43,7 +43,6 @@ export type VolumeStatus = Readonly<{
   level: number | null;
 }>;
 
-/** The ray-marched volumes. */
 export interface MarchedVolumes {
   readonly marches: DrawnMarches;
   /** A text that changes when a march would look different. */
@@ -87,7 +86,6 @@ export type TracePace = Readonly<{
   standIn: MarchedFrame | null;
 }>;
 
-/** The path-traced volumes. */
 export interface TracedVolumes {
   /** Whether there is anything to draw. */
   readonly isShown: boolean;

@@ -35,7 +35,6 @@ export type Drawn = Readonly<{
   volumes: MarchedVolumes | null;
   /** Null if no part traces paths. */
   traced: TracedVolumes | null;
-  /** Surfaces that are not opaque now. */
   panes: readonly BlendedScene[];
   /** Other objects that are not opaque, besides those of the scene itself. */
   overlays: readonly Object3D[];
@@ -77,7 +76,6 @@ const GOLDEN = (Math.sqrt(5) - 1) / 2;
 const MIXED_PX = 2;
 
 export class FrameRenderer {
-  /** The eyes of this frame. */
   readonly eyes = new Eyes();
   private readonly both = new BothEyes();
   private readonly cuts = new Cuts();
@@ -100,7 +98,6 @@ export class FrameRenderer {
   private readonly encode = new EncodePass();
   /** Fades from the frame before a jump to the frame after it. */
   readonly fade: CrossFade;
-  /** Target of the last frame. */
   private last: WebGLRenderTarget | null = null;
   /** Frame and march inside the disc, used if a channel is also a volume beyond the disc. */
   private readonly within: WebGLRenderTarget;

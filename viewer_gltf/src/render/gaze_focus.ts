@@ -51,7 +51,6 @@ export class GazeFocus {
     return this.rested_s >= REFINE_S;
   }
 
-  /** Cosines of the inner and outer radius. */
   get cosines(): readonly [number, number] {
     return [Math.cos(INNER * this.outer_rad), Math.cos(this.outer_rad)];
   }

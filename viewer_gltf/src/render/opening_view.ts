@@ -24,7 +24,6 @@ export type Direction = Readonly<{ aside_rad: number; above_rad: number }>;
 export type Lens = Readonly<{
   /** Vertical field of view. */
   fov_rad: number;
-  /** Width of the image divided by its height. */
   aspect: number;
 }>;
 

@@ -17,7 +17,6 @@ export class Specimen {
   /** Its children are in um, world. */
   readonly group = new Group();
   pose: SpecimenPose;
-  /** Whether hands have moved it. */
   isMoved = false;
   private goal: SpecimenPose;
   private start: SpecimenPose;

@@ -1,4 +1,3 @@
-/** The keys of stereo. */
 import { type Key, type KeyGroup, key, keysOf, neighbour, no } from "../panel/key";
 import { LENSES } from "../panel/lenses";
 import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";

@@ -141,7 +141,6 @@ class StereoPart implements Part, StereoFinder {
     });
   }
 
-  /** Applies a lens profile that was chosen in stereo. */
   private changeLenses(lenses: Lenses): void {
     this.host.panel.change({ panel: "lenses", lenses });
     this.withProfile((profile) => this.host.stereo.setLenses(profile));

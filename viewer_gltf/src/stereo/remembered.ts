@@ -42,7 +42,6 @@ export function rememberScreen(perInch: number): void {
   store(SCREEN_KEY, String(perInch));
 }
 
-/** The settings for the eyes. */
 export function rememberedEyes(): readonly Action[] {
   const texts = (stored(EYES_KEY) ?? "").split(",");
   return EYE_ROWS.flatMap((row, i) => {

@@ -110,7 +110,6 @@ export class SurfaceSet implements Surfaces {
     );
   }
 
-  /** All loaded surfaces of a channel. */
   of(channel: string): readonly Surface[] {
     return [...(this.tilesets.get(channel)?.surfaces.values() ?? [])];
   }
@@ -129,7 +128,6 @@ export class SurfaceSet implements Surfaces {
     return found;
   }
 
-  /** Calls back when a surface is loaded. */
   onLoaded(listener: (channel: string, surface: LoadedSurface) => void): void {
     this.loaded.subscribe(({ channel, surface }) => listener(channel, surface));
   }

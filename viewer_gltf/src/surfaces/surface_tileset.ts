@@ -176,7 +176,6 @@ export class SurfaceTileset {
     );
   }
 
-  /** The surfaces on screen. */
   get drawn(): readonly Surface[] {
     return [...this.surfaces.values()].filter(
       ({ scene }) => scene.visible && this.tiles.group.children.includes(scene),

@@ -149,7 +149,6 @@ function isRest(extent: Box3, face: Face): boolean {
   });
 }
 
-/** Whether a box touches a face of its tile. */
 function touches(box: Box3, { axis, isUpper, tile }: Face): boolean {
   const near = TOUCHING * (tile.max[axis] - tile.min[axis]);
   return isUpper

@@ -33,7 +33,6 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  /** The marches that draw the volumes. */
   readonly marches: Marches;
   readonly appearances: ChannelAppearances;
   private state: ViewerState | null = null;
@@ -309,7 +308,6 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
-  /** Updates the march of a tile's loaded volumes. */
   private march(tile: string): void {
     const { state } = this;
     const resident = this.residents.get(tile);

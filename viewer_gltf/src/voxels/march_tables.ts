@@ -13,12 +13,10 @@ import type { Rgb } from "../math/color";
 import { ENTRIES, edgeContrast, opacities } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** The appearance of one channel of a tile. */
 export type Appearance = Readonly<{
   color: Rgb;
   /** 256 RGBA entries from `lookUpTable`; with a 2D table, the visible part at any gradient. */
   table: Uint8Array;
-  /** A two-dimensional transfer function. */
   table2d?: TransferTable2d | null;
   /** Range of the intensities, 0 to 1, that is shown from dark to bright; absent: all. */
   window?: readonly [number, number];

@@ -9,7 +9,6 @@ import { texels } from "./mip_levels";
 import type { VolumeSource } from "./volume_source";
 import { stride, volumeTexture } from "./volume_texture";
 
-/** Seconds in which a finer level fades in. */
 export const LEVEL_FADE_S = 0.2;
 
 /** The loaded part: the texture's channels, in its order, and their bricks. */

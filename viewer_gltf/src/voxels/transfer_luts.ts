@@ -55,7 +55,6 @@ export function lookUpTable(
   return table;
 }
 
-/** The opacities of a table, 0 to 255. */
 export function opacities(table: Uint8Array): Uint8Array<ArrayBuffer> {
   return Uint8Array.from({ length: ENTRIES }, (_, i) => table[4 * i + 3]);
 }

@@ -31,7 +31,6 @@ export class VolumeSource {
     readonly volume: TileVolume,
   ) {}
 
-  /** Whether a level is loaded. */
   has(index: number): boolean {
     return this.levels.has(index);
   }

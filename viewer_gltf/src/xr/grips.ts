@@ -80,7 +80,6 @@ export class Grips {
   private touched: { hit: TargetHit | null; isUsed: boolean; elapsed_s: number } | null = null;
   /** Set while the head holds the specimen because a button is held. */
   headHold: HeadHold | null = null;
-  /** The control that repeats now. */
   private repeating: Repeating | null = null;
   private readonly mover: SpecimenMover;
   private readonly pointer: Pointer;
@@ -94,7 +93,6 @@ export class Grips {
     return this.held.size > 0;
   }
 
-  /** Whether a control is repeating its command. */
   get isRepeating(): boolean {
     return this.repeating !== null;
   }
@@ -112,7 +110,6 @@ export class Grips {
     if (hit.repeats !== undefined) this.repeating = { hit, source: null, elapsed_s: 0 };
   }
 
-  /** Releases everything. */
   drop(): void {
     this.presses.clear();
     this.held.clear();

@@ -1,4 +1,3 @@
-/** Options of the hands in stereo. */
 import type { Scene, WebXRManager } from "three";
 import type { Target } from "../interaction/ray_pointer";
 import type { BoxedTile } from "../math/pick";
@@ -27,7 +26,6 @@ export type HandsOptions = Readonly<{
    * if there are no objects.
    */
   objectAlong?: (ray: Ray) => Readonly<{ id: string; distance: number }> | null;
-  /** Called when the user asks to leave stereo. */
   onLeave: () => void;
   /** Called when the user chooses another lens profile. */
   onLenses?: (lenses: Lenses) => void;

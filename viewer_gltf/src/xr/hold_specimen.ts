@@ -40,7 +40,6 @@ const FARTHEST_M = 5;
 const STEEPEST_RAD = MathUtils.degToRad(5);
 /** Radians of tilt by which a head halves or doubles the distance of the specimen that it holds. */
 const HALF_NEARER_RAD = MathUtils.degToRad(12);
-/** Steps per second of a command that repeats. */
 export const STEPS_PER_S = 3;
 
 /** Pose of each holder, or null where tracking is lost. At most two holders count. */

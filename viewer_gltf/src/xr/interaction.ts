@@ -108,7 +108,6 @@ export class Hands {
     return [controllers.group, panel.group, ring.group, notice.mesh, ground.lines];
   }
 
-  /** The ring that fills during a dwell. */
   get ring(): Ring {
     return this.light.ring;
   }
@@ -121,7 +120,6 @@ export class Hands {
     return this.pointer.leading?.key ?? null;
   }
 
-  /** Progress of the dwell, 0 to 1. */
   get progress(): number {
     return this.pointer.progress;
   }
@@ -187,7 +185,6 @@ export class Hands {
     this.taps.push(time_ms);
   }
 
-  /** Adds a gesture of fingers on the split screen. */
   touch(gesture: Gesture, time_ms = this.now_ms()): void {
     this.gestures.push([gesture, time_ms]);
   }

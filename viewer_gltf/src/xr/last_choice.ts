@@ -14,7 +14,6 @@ export class LastChoice {
   private before: Moment | null = null;
   private left_s = 0;
 
-  /** Stores the moment before a choice. */
   remember(now: Moment): void {
     this.before = now;
     this.left_s = UNDO_S;

@@ -53,7 +53,6 @@ export class SpecimenMover {
     return true;
   }
 
-  /** Scales the specimen by a factor about its middle. */
   resize(factor: number, state: ViewerState, eye: Vector3): void {
     this.specimen.moveTo(zoomAbout(this.pose, this.middle(state), factor), eye);
   }

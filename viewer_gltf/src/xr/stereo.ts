@@ -44,7 +44,6 @@ export class Stereo {
   /** The choices on the page, passed to the headset panel when it is loaded. */
   private choices: Partial<PanelView> = {};
   private readonly split: LaterSplit;
-  /** Stereo on the page's own screen. */
   readonly screen: LaterScreen;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   private readonly between = new Matrix4();
@@ -113,7 +112,6 @@ export class Stereo {
     this.screen.follow(eyes, camera, focus, this.eyes.distance_m * this.eyes.strength);
   }
 
-  /** Takes over the user's settings for the eyes. */
   setEyes(eyes: EyeSettings): void {
     const isSame = JSON.stringify(eyes) === JSON.stringify(this.eyes);
     this.eyes = eyes;
@@ -249,7 +247,6 @@ export class Stereo {
     this.hands?.announce(text);
   }
 
-  /** Whether the headset panel is open. */
   get isPanelOpen(): boolean {
     return this.hands?.panel.isOpen ?? false;
   }

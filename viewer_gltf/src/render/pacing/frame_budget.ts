@@ -23,7 +23,6 @@ export class FrameBudget {
   frame_ms = 0;
   /** Whether the frames of a moving view come later than the display could show them. */
   isLate = false;
-  /** The settings of the last frame. */
   settings: QualitySettings;
   private readonly timer: GpuTimer | null;
   private quality: Quality;

@@ -34,7 +34,6 @@ export class RedrawAtRest {
     return this.fence === null && now_ms >= this.due_ms;
   }
 
-  /** Marks that an image at rest was requested. */
   submit(now_ms: number): void {
     this.began_ms = now_ms;
     if (this.fence !== null) this.gl.deleteSync(this.fence);

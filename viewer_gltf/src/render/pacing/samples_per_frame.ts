@@ -39,7 +39,6 @@ export class SamplesPerFrame {
     return true;
   }
 
-  /** Marks that a frame at rest was requested. */
   submit(now_ms: number): void {
     this.began_ms = now_ms;
     if (this.fence !== null) this.gl.deleteSync(this.fence);

@@ -30,7 +30,6 @@ export class CoarseTexels {
     return null;
   }
 
-  /** Forgets all other sources. */
   keep(sources: ReadonlySet<VolumeSource>): void {
     for (const source of this.kept.keys()) if (!sources.has(source)) this.kept.delete(source);
   }

@@ -3,7 +3,6 @@ import type { Vec3 } from "../../math/vec3";
 import { type Cut, type Grid, type TileMatter, throughCells } from "./coarse_matter";
 import { asTexels, lampLight, openness } from "./shading";
 
-/** The matter to be lit. */
 export type Matter = Readonly<{
   grid: Grid;
   tiles: readonly TileMatter[];

@@ -34,7 +34,6 @@ type Tree = {
   present: Uint8Array;
   /** Slot of each loaded node. */
   readonly slots: Map<number, number>;
-  /** Bricks that arrived before the atlas was made. */
   waiting: Brick[];
 };
 

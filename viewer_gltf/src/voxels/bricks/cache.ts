@@ -69,7 +69,6 @@ export class BrickCache {
     });
   }
 
-  /** The bricks of a table. */
   async bricks(table: string): Promise<readonly KeptBrick[]> {
     return this.safely([], (database) => {
       const bricks = database.transaction("bricks").objectStore("bricks");

@@ -55,7 +55,6 @@ export class BrickLink {
   /** Whether the host does not answer now. Loaded bricks stay, and nothing is waited for. */
   isAway = false;
 
-  /** @param address of the websocket */
   constructor(
     address: string,
     private readonly onDone: () => void,

@@ -10,7 +10,6 @@ import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 
 /** Bricks in one write to the cache. */
 const BATCH = 64;
-/** Largest number of volumes in one message. */
 const MAX_AT_ONCE = 64;
 /** Milliseconds before each attempt to connect again. */
 const RETRY_MS = [500, 1000, 2000, 5000, 10_000];
@@ -183,7 +182,6 @@ async function begin(number: number, tree: Tree): Promise<void> {
 
 type Kept = Readonly<{ node: number; bytes: Uint8Array }>;
 
-/** Unpacks bricks and sends them to the main thread. */
 function sendBricks({ tile, channel, name }: Tree, bricks: readonly Kept[]): void {
   const nodes = new Uint32Array(bricks.length);
   const texels = new Uint8Array(bricks.length * STORED_BYTES);

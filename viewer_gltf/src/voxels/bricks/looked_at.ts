@@ -6,7 +6,6 @@ import { type BrickView, TEXEL_PX } from "./protocol";
 export type CoarseTile = Readonly<{
   id: string;
   bounds_um: Bounds;
-  /** Longest edge of a texel, um. */
   texel_um: number;
 }>;
 

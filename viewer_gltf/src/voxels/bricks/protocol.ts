@@ -21,7 +21,6 @@ export type BrickView = Readonly<{
 type Part = Readonly<{ tree: number; at: number; bytes: Uint8Array<ArrayBuffer> }>;
 export type Frame = Readonly<{ kind: number; sequence: number; parts: readonly Part[] }>;
 
-/** The server's text messages. */
 export type ServerMessage =
   | Readonly<{ type: "welcome" }>
   | Readonly<{

@@ -43,7 +43,6 @@ export class SharpenedTile {
     return this.coarse.isLoading || this.isSharpening;
   }
 
-  /** Whether finer volumes are being loaded. */
   get isSharpening(): boolean {
     return this.finer?.isLoading === true;
   }
@@ -93,7 +92,6 @@ export class SharpenedTile {
     this.coarse.want(sources, levels, finest);
   }
 
-  /** Requests the finer volumes. */
   sharpen(): void {
     this.finer = this.make(() => this.showCoarse());
     if (this.finer === null) this.isRefused = true;

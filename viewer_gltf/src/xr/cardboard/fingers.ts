@@ -33,7 +33,6 @@ export class Fingers {
     return this.leaveRest();
   }
 
-  /** @param height_px of the screen */
   move(id: number, to: Place, height_px: number): readonly Gesture[] {
     const from = this.at.get(id);
     if (from === undefined) return []; // a mouse that moves without a button

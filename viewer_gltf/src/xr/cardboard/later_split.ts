@@ -67,7 +67,6 @@ export class LaterSplit {
     this.session?.set(options);
   }
 
-  /** Changes the lens profile. */
   setProfile(profile: Profile): void {
     this.session?.setProfile(profile);
   }

@@ -67,7 +67,6 @@ export class SplitSession {
     this.target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   }
 
-  /** Changes the lens profile. */
   setProfile(profile: Profile): void {
     this.profile = profile;
     this.layout = "";

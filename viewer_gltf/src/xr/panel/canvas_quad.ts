@@ -19,7 +19,6 @@ import { holds, type Mark, type Rect } from "../../panel/canvas/draw_list";
 import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
 
-/** Colour of the light on a target. */
 const LIT = 0xffffff;
 /**
  * Opacity of the light on a target. Light is blended linearly, so 0.04 looks like a fifth of white.

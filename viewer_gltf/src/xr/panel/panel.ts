@@ -46,7 +46,6 @@ export type HeadsetPanelOptions = Readonly<{
   onLenses: (lenses: Lenses) => void;
   /** Called with the reason why a request can't be carried out. */
   onAnnounce: (text: string) => void;
-  /** Called to undo the last choice. */
   onUndo: () => void;
   /**
    * Called when the gaze picks up the specimen along a ray, and then with each ray that carries it.
@@ -77,7 +76,6 @@ export class HeadsetPanel {
   /** The last request as JSON, so that a held button does not repeat it. */
   private dragged = "";
   private lastMode = START_VOLUMES.mode;
-  /** Whether the bar offers to undo the last choice. */
   canUndo = false;
   /** True while the specimen is carried, which hides the bar. */
   isCarrying = false;

@@ -55,7 +55,6 @@ export class PanelSurface implements Target {
     return this.quad.show(shown.marks);
   }
 
-  /** Lights up the control that is pointed at. */
   light(id: string | null): void {
     this.quad.light(this.shown.regions.find((region) => region.id === id)?.rect ?? null);
   }

@@ -53,7 +53,6 @@ export class ScreenPictures {
     eyes.follow(this.eyes.pairs);
   }
 
-  /** Draws a frame as an anaglyph. */
   present(draw: () => void): void {
     const { renderer } = this;
     renderer.setRenderTarget(this.target);
