@@ -151,7 +151,7 @@ export class Navigation {
     return this.swayed_s !== null;
   }
 
-  /** The camera; null while it shows the opening, which follows the window's shape. */
+  /** The camera; null while it shows the opening at rest, which follows the window's shape. */
   get look(): CameraPose | null {
     return this.shownView === "opening" && !this.isTurning ? null : this.cameraPose;
   }

@@ -87,7 +87,7 @@ describeInChromium("the shader chunks", () => {
     expect(between[2]).toBeGreaterThan(0);
   });
 
-  it("weight channels outside the disc mode by 1, and others by the cube of the disc's weight", async () => {
+  it("weight channels that are not limited to the disc fully, others by the cube of the disc's weight", async () => {
     const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
       const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5; const bool uIsCrossing = false;
       const bvec4 uInDisc = bvec4(true, false, true, false);`;
