@@ -28,9 +28,9 @@ export const LAST = 1000;
 export const VOLUME_DRAWN = 1;
 
 /** Uniforms of `chunks/marched_light`, shared by reference. */
-export function marchedUniforms(picture: Texture, uSceneDepth: { value: Texture }) {
+export function marchedUniforms(image: Texture, uSceneDepth: { value: Texture }) {
   return {
-    uMarched: { value: picture },
+    uMarched: { value: image },
     uSceneDepth,
     uEyes: { value: [new Vector4(), new Vector4()] },
     uParts: { value: [new Vector4(), new Vector4()] },
@@ -67,13 +67,13 @@ export class Overlay {
     uEyeAt: { value: [new Vector3(), new Vector3()] },
   };
 
-  /** @param picture premultiplied */
+  /** @param image premultiplied */
   constructor(
-    picture: Texture,
+    image: Texture,
     uSceneDepth: { value: Texture },
     { order, isEncoded = false, disc }: OverlayOptions,
   ) {
-    this.uniforms = marchedUniforms(picture, uSceneDepth);
+    this.uniforms = marchedUniforms(image, uSceneDepth);
     const triangle = new BufferGeometry();
     const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
     triangle.setAttribute("position", new BufferAttribute(corners, 3));

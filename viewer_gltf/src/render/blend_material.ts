@@ -47,12 +47,12 @@ export type SurfaceFrame = Readonly<{
 
 export function makeSurfaceFrame(
   { uDisc, uApex, uAxis }: Disc,
-  picture: MarchedUniforms,
+  marched: MarchedUniforms,
   { uCuts, uCutCount, uOpen }: Pick<Cuts, "uCuts" | "uCutCount" | "uOpen">,
   both: BothEyes,
 ): SurfaceFrame {
   const shared = { uDisc, uApex, uAxis, uCuts, uCutCount, uOpen };
-  return { uniforms: { ...shared, ...picture, ...both.uniforms }, both };
+  return { uniforms: { ...shared, ...marched, ...both.uniforms }, both };
 }
 
 /**

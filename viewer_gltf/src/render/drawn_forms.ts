@@ -70,7 +70,7 @@ export type TraceScene = Readonly<{
 
 /** A ray-marched frame of the same view, linear and premultiplied. */
 export type MarchedFrame = Readonly<{
-  picture: Texture;
+  image: Texture;
   /** Its pixels per pixel of the frame buffer. */
   scale: number;
 }>;

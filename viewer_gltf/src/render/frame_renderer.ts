@@ -122,7 +122,7 @@ export class FrameRenderer {
     const { uDisc, uIsCrossing } = this.marchFrame;
     const disc = { ...this.cone, uDisc, uIsCrossing };
     this.march = new MarchPass(renderer, this.marchFrame, disc);
-    this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts, this.both);
+    this.surfaceFrame = makeSurfaceFrame(disc, this.march.uniforms, this.cuts, this.both);
     this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.draft = linearTarget(renderer, { hasDepth: true });
     this.fade = new CrossFade(renderer);

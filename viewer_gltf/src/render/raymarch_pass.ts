@@ -39,8 +39,8 @@ export class MarchPass {
   }
 
   /** The last marched image, and its pixels per pixel of the frame buffer. */
-  get marched(): Readonly<{ picture: Texture; scale: number }> {
-    return { picture: this.front.uniforms.uMarched.value, scale: this.scale };
+  get marched(): Readonly<{ image: Texture; scale: number }> {
+    return { image: this.front.uniforms.uMarched.value, scale: this.scale };
   }
 
   get isShown(): boolean {
@@ -48,7 +48,7 @@ export class MarchPass {
   }
 
   /** Uniforms with the marched image, for surfaces that it replaces. */
-  get picture(): MarchedUniforms {
+  get uniforms(): MarchedUniforms {
     return this.front.uniforms;
   }
 

@@ -92,7 +92,7 @@ export class DistortionPass {
 function meshOf(profile: Profile, screen: Screen): BufferGeometry {
   const positions: number[] = [];
   const uvs: number[] = [];
-  const pictures: number[] = [];
+  const images: number[] = [];
   const indices: number[] = [];
   SIDES.forEach((side, eye) => {
     const { left, right, bottom, top } = eyeTangents(profile, screen, side);
@@ -106,7 +106,7 @@ function meshOf(profile: Profile, screen: Screen): BufferGeometry {
         const [across, along] = toScreen(profile, screen, side, x, y);
         positions.push(2 * across - 1, 2 * along - 1, 0);
         uvs.push((eye + u) / 2, v);
-        pictures.push(u, v);
+        images.push(u, v);
         if (row === CELLS || column === CELLS) continue;
         const at = first + row * (CELLS + 1) + column;
         const above = at + CELLS + 1;
@@ -117,7 +117,7 @@ function meshOf(profile: Profile, screen: Screen): BufferGeometry {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
   geometry.setAttribute("uv", new Float32BufferAttribute(uvs, 2));
-  geometry.setAttribute("aPicture", new Float32BufferAttribute(pictures, 2));
+  geometry.setAttribute("aImage", new Float32BufferAttribute(images, 2));
   geometry.setIndex(indices);
   return geometry;
 }

@@ -52,7 +52,7 @@ export class TurnSign {
     more.style.fontSize = "1rem";
     Object.assign(this.root.style, COVER);
     Object.assign(leave.style, BUTTON);
-    this.root.append(picture(), words, more, leave);
+    this.root.append(image(), words, more, leave);
     const { signal } = this.stopped;
     leave.addEventListener("click", onLeave, { signal });
     upright().addEventListener("change", () => this.update(), { signal });
@@ -81,7 +81,7 @@ export class TurnSign {
   }
 }
 
-function picture(): SVGElement {
+function image(): SVGElement {
   const svg = document.createElementNS(SVG, "svg");
   const frame = { viewBox: "0 0 146 112", width: "180", "aria-hidden": "true", fill: "none" };
   const line = { stroke: "#5aa9ff", "stroke-width": "4", "stroke-linecap": "round" };

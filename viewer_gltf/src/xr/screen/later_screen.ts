@@ -3,7 +3,7 @@ import type { PerspectiveCamera, Vector3, WebGLRenderer } from "three";
 import { BundleError } from "../../bundle/errors";
 import type { Eyes } from "../../gpu/eyes";
 import type { ScreenStereo } from "../../state/parameters/tools";
-import type { ScreenPictures } from "./screen_stereo";
+import type { ScreenImages } from "./screen_stereo";
 
 const NOT_LOADED =
   "The part of the page that shows stereo could not be loaded. Check the connection, load " +
@@ -16,7 +16,7 @@ export function notLoaded(cause: unknown): never {
 
 export class LaterScreen {
   /** The images for two eyes; null until stereo is first shown on the screen. */
-  private pictures: ScreenPictures | null = null;
+  private images: ScreenImages | null = null;
   private kind: ScreenStereo = "off";
 
   constructor(private readonly renderer: WebGLRenderer) {}
@@ -24,9 +24,9 @@ export class LaterScreen {
   /** Shows or stops stereo. Rejects with BundleError if its code can't be loaded. */
   async show(kind: ScreenStereo): Promise<void> {
     this.kind = kind;
-    if (kind === "off" || this.pictures !== null) return;
-    const { ScreenPictures } = await import("./screen_stereo").catch(notLoaded);
-    this.pictures ??= new ScreenPictures(this.renderer);
+    if (kind === "off" || this.images !== null) return;
+    const { ScreenImages } = await import("./screen_stereo").catch(notLoaded);
+    this.images ??= new ScreenImages(this.renderer);
   }
 
   /**
@@ -34,18 +34,18 @@ export class LaterScreen {
    * otherwise one.
    */
   follow(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3, pupils_m: number): void {
-    const { pictures, kind } = this;
-    if (pictures === null || kind === "off") eyes.followScreen(this.renderer, camera);
-    else pictures.follow(eyes, camera, focus, pupils_m, kind);
+    const { images, kind } = this;
+    if (images === null || kind === "off") eyes.followScreen(this.renderer, camera);
+    else images.follow(eyes, camera, focus, pupils_m, kind);
   }
 
   /** Draws a frame, as an anaglyph if that is chosen. */
   present(draw: () => void): void {
-    if (this.kind === "anaglyph" && this.pictures !== null) this.pictures.present(draw);
+    if (this.kind === "anaglyph" && this.images !== null) this.images.present(draw);
     else draw();
   }
 
   dispose(): void {
-    this.pictures?.dispose();
+    this.images?.dispose();
   }
 }

@@ -22,7 +22,7 @@ const matrixOf = (projection: Projection) => ({
   value: new Matrix3().fromArray(projection.flat()).transpose(),
 });
 
-export class ScreenPictures {
+export class ScreenImages {
   private readonly eyes = new ScreenEyes();
   /**
    * Images of both eyes for an anaglyph, the left eye's on the left, with colours encoded like the
