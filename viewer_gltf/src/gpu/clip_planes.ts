@@ -69,7 +69,6 @@ export class Cuts {
   }
 }
 
-/** The planes of a box's faces, with outward normals. */
 function facesOf({ min, max }: Box): readonly ClipPlane[] {
   return AXES.flatMap((axis) => [
     { normal: withPart([0, 0, 0], axis, -1), offset_um: -min[axis] },

@@ -50,7 +50,6 @@ export type Disc = Readonly<{
 }>;
 
 export type OverlayOptions = Readonly<{
-  /** Draw order. */
   order: number;
   /**
    * Whether the image's colours are encoded before premultiplication; otherwise they are linear.

@@ -40,7 +40,6 @@ export class Eyes {
     this.follow(renderer.xr.getCamera().cameras.map((each) => [each, each.viewport]));
   }
 
-  /** Uses the given eyes, each with its viewport. */
   follow(eyes: readonly (readonly [PerspectiveCamera, Vector4 | undefined])[]): void {
     this.count = 0;
     this.width_px = 1;

@@ -18,7 +18,6 @@ import {
 const EXACT = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
 const ANY_CAMERA = new Camera();
 
-/** A uniform without a texture yet. */
 export function nothing(): { value: Texture | null } {
   return { value: null };
 }

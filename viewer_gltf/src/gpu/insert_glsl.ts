@@ -11,7 +11,6 @@
  * Lines before the first `#insert` are comments.
  */
 
-/** A piece of GLSL and its declared place. */
 export type Insertion = Readonly<{ place: string; text: string }>;
 
 const DECLARED = /^[ \t]*#insert (.+)$/m;

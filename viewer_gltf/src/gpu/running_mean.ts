@@ -14,7 +14,6 @@ import { ScreenPass } from "./screen_pass";
 import { COPY_FRAGMENT } from "./shaders/sources";
 
 export class RunningMean {
-  /** Number of images in the mean. */
   count = 0;
   readonly target: WebGLRenderTarget;
   private readonly pass = new ScreenPass(COPY_FRAGMENT, { uFirst: nothing(), uSecond: nothing() });

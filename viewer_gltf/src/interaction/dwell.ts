@@ -31,7 +31,6 @@ export type RaySample = Readonly<{
   isGradual: boolean;
 }>;
 
-/** Where the gaze was when its dwell was spent. */
 type Spent = Readonly<{
   direction: Vec3;
   target: string | null;

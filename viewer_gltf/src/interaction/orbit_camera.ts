@@ -42,7 +42,6 @@ export function isSameCameraPose(
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
-/** The camera's action for each command. */
 const ACTS: Readonly<Partial<Record<Command, (navigation: Navigation) => void>>> = {
   front: (navigation) => navigation.showStill("front"),
   side: (navigation) => navigation.showStill("side"),

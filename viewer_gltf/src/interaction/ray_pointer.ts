@@ -53,7 +53,6 @@ export interface Target {
   drag?(key: string, ray: SceneRay): void;
 }
 
-/** A hit together with its target and the ray. */
 export type TargetHit = Hit & Readonly<{ target: Target; ray: SceneRay }>;
 
 /** The ray from the eyes straight ahead of the head. */
@@ -156,7 +155,6 @@ export class Pointer {
   }
 }
 
-/** The point where a ray hits a target. */
 export function pointOn({ ray, distance_m }: Pick<TargetHit, "ray" | "distance_m">): Vector3 {
   return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
 }

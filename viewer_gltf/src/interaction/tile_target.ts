@@ -11,7 +11,6 @@ import type { Hit, SceneRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
 export const TILE = "tile:";
-/** Separates the tile and the object in a key. */
 const OF = "/";
 
 export class TileTarget implements Target {

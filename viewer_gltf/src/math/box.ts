@@ -16,7 +16,6 @@ export function cornersOf({ min, max }: Box): readonly Vec3[] {
   return Array.from({ length: 8 }, (_, i) => [at(i, 0), at(i, 1), at(i, 2)]);
 }
 
-/** The box around points. */
 export function around(points: readonly Vec3[]): Box {
   const all = AXES.map((axis) => points.map((point) => point[axis]));
   const [x0, y0, z0] = all.map((values) => Math.min(...values));

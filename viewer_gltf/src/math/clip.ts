@@ -115,7 +115,6 @@ export function isCutAway(of: Box, { box, plane }: Clip): boolean {
   return deepest >= offset_um;
 }
 
-/** A handle in the middle of each face. */
 export function boxHandles(box: Box): readonly BoxHandle[] {
   const middle = centerOf(box);
   return AXES.flatMap((axis) =>

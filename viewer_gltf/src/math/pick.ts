@@ -1,4 +1,3 @@
-/** The first tile that a ray hits. */
 import { AHEAD, type Box, boxSpan } from "./box";
 import { type Clip, clipSpan } from "./clip";
 import type { Ray } from "./vec3";

@@ -77,7 +77,6 @@ export type SurfacePart = Readonly<{
   chunks: Readonly<Record<PartChunk, string>>;
 }>;
 
-/** How much of a surface is drawn. */
 export type Share = Readonly<{
   opacity: number;
   /** Share that its volume takes, 0 to 1: in the disc, or everywhere. */
@@ -221,7 +220,6 @@ export class BlendedSurface {
     material.customProgramCacheKey = () => `blended ${this.part?.key}`;
   }
 
-  /** Adds a part's shader code and uniforms. */
   setPart(part: SurfacePart): void {
     this.part = part;
     const { depth } = this;

@@ -24,7 +24,6 @@ export type MarchView = Readonly<{
 /** The ray marches of the tiles that are on screen. */
 export interface DrawnMarches {
   readonly scene: Scene;
-  /** Whether there is nothing to march. */
   readonly isEmpty: boolean;
   /** Whether all marched volumes show only inside the disc. */
   readonly isInDisc: boolean;
@@ -49,7 +48,6 @@ export interface MarchedVolumes {
   readonly marchKey: string;
   /** Bytes on the GPU. */
   readonly bytes: number;
-  /** Called before every frame with the new view. */
   aim(view: MarchView): void;
   /** Whether all wanted volumes of a tile are loaded, at some level. */
   isReady(tile: string): boolean;
@@ -87,7 +85,6 @@ export type TracePace = Readonly<{
 }>;
 
 export interface TracedVolumes {
-  /** Whether there is anything to draw. */
   readonly isShown: boolean;
   /** Whether a view at rest still gathers samples. */
   readonly isGathering: boolean;

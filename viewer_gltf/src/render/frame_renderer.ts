@@ -29,7 +29,6 @@ import type { GazeFocus } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
 import type { Room } from "./scene";
 
-/** Everything that a frame draws. */
 export type Drawn = Readonly<{
   /** Null if no part draws volumes. */
   volumes: MarchedVolumes | null;
@@ -104,7 +103,6 @@ export class FrameRenderer {
   private readonly marchWithin: MarchPass;
   private readonly overWithin: Overlay;
   private readonly mixed = new Scene();
-  /** Number of frames of moving views. */
   private moved = 0;
   /** Key of the stand-in march; "" if it must be drawn. */
   private standInKey = "";
@@ -260,7 +258,6 @@ export class FrameRenderer {
     uPhase.value = (turns * GOLDEN) % 1;
   }
 
-  /** Points the disc's cone along the gaze. */
   private aim({ min, max }: Bounds, resolution: number): void {
     const { gazeFocus, cone, marchFrame, room } = this;
     cone.uApex.value.copy(gazeFocus.apex);
@@ -318,7 +315,6 @@ export class FrameRenderer {
     return this.marchFrame.uSceneDepth;
   }
 
-  /** Adds an object that is drawn over the scene. */
   add(overlay: Object3D): void {
     this.room.scene.add(overlay);
   }

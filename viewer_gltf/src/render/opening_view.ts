@@ -22,7 +22,6 @@ const GOOD_ENOUGH = 0.88;
 export type Direction = Readonly<{ aside_rad: number; above_rad: number }>;
 
 export type Lens = Readonly<{
-  /** Vertical field of view. */
   fov_rad: number;
   aspect: number;
 }>;
@@ -38,7 +37,6 @@ function axesOf({ aside_rad, above_rad }: Direction): readonly [Vec3, Vec3, Vec3
   ];
 }
 
-/** Unit vector from the middle to the eye. */
 export function towardsEye(direction: Direction): Vec3 {
   return axesOf(direction)[2];
 }

@@ -38,7 +38,6 @@ export type Placement = Readonly<{
   size: Vec3;
 }>;
 
-/** Scales the specimen for the scene. */
 export function place(bounds: Bounds): Placement {
   const edge = (i: number) => bounds.max[i] - bounds.min[i];
   const longest = Math.max(edge(0), edge(1), edge(2));

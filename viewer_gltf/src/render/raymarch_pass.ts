@@ -81,7 +81,6 @@ export class MarchPass {
     if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
   }
 
-  /** Hides the image, if there is nothing to march. */
   hide(): void {
     this.front.hide();
     this.behind.hide();

@@ -1,4 +1,3 @@
-/** The order in which translucent channels are drawn. */
 import type { Vec3 } from "../math/vec3";
 
 /**

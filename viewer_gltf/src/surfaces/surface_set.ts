@@ -101,7 +101,6 @@ export class SurfaceSet implements Surfaces {
     this.errorTarget_px = pixels;
   }
 
-  /** The surfaces that are not opaque now. */
   get blended(): readonly BlendedScene[] {
     return this.shown().flatMap(([, { surfaces }]) =>
       [...surfaces.values()].flatMap(({ scene, blend: { isBlended, isPane, isSolid } }) =>
@@ -172,7 +171,6 @@ export class SurfaceSet implements Surfaces {
     this.order(camera);
   }
 
-  /** Draws translucent channels from the farthest to the nearest. */
   private order(camera: Camera): void {
     const blended = this.shown().filter(([, { surfaces }]) =>
       [...surfaces.values()].some(({ blend }) => blend.isTranslucent),

@@ -182,7 +182,6 @@ export class SurfaceTileset {
     );
   }
 
-  /** Number of triangles on screen. */
   get triangles(): number {
     return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }

@@ -5,7 +5,6 @@ import { loadTransferFunctions, type TransferFunction } from "../voxels/transfer
 import { VolumeSource } from "../voxels/volume_source";
 
 export type ChannelVolumes = Readonly<{
-  /** By tile. */
   sources: ReadonlyMap<string, VolumeSource>;
   transferFunctions: ReadonlyMap<string, TransferFunction>;
 }>;
@@ -27,7 +26,6 @@ export class ChannelLists {
     return this.underWay.size > 0;
   }
 
-  /** Undefined while the list is not loaded. */
   get(channel: string): ChannelVolumes | undefined {
     return this.loaded.get(channel);
   }

@@ -1,4 +1,3 @@
-/** The keys that control where volumes are shown. */
 import { type KeyGroup, keysOf } from "../panel/key";
 import { VOLUMES } from "../state/parameters/volumes";
 

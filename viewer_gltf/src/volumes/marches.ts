@@ -27,7 +27,6 @@ export class Marches implements DrawnMarches {
   private readonly group = new Group();
   private readonly occupancy = new OccupancyClient();
   private readonly shading: LaterShading;
-  /** Number of empty-space tables that are being computed. */
   private skipsUnderWay = 0;
 
   constructor(
@@ -46,7 +45,6 @@ export class Marches implements DrawnMarches {
     return this.skipsUnderWay > 0 || this.shading.isLoading;
   }
 
-  /** Whether there is nothing to march. */
   get isEmpty(): boolean {
     return !this.group.children.some(({ visible }) => visible);
   }
@@ -67,7 +65,6 @@ export class Marches implements DrawnMarches {
     for (const { march } of this.drawn) march.endAtDisc(ends);
   }
 
-  /** The marches on screen. */
   get drawn(): readonly Marched[] {
     return this.residents.all.flatMap((resident) => {
       const { march, packed } = resident;

@@ -79,7 +79,6 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     });
   }
 
-  /** Whether all marched volumes show only inside the disc. */
   get isInDisc(): boolean {
     return this.marches.isInDisc;
   }
@@ -137,7 +136,6 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return this.source(tile, channel);
   }
 
-  /** The channels of the tiles that are on screen. */
   shown(): readonly ShownVolume[] {
     return this.state === null ? [] : this.marches.shown(this.state);
   }

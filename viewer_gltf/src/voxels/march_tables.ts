@@ -61,11 +61,9 @@ export class MarchTables {
   private tables2d: DataArrayTexture | null = null;
   /** The content of each layer; null for a table without gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
-  /** Whether each channel is shown only in the disc. */
   private inDisc: readonly boolean[] = [];
   /** Whether any channel has a table of value and gradient. */
   isTwoD = false;
-  /** Counts the changes of the tables. */
   changes = 0;
 
   constructor(private readonly channelCount: number) {
@@ -75,12 +73,10 @@ export class MarchTables {
     this.uniforms = makeUniforms(channelCount, this.lut);
   }
 
-  /** Whether all channels are shown only in the disc. */
   get isInDisc(): boolean {
     return this.inDisc.length > 0 && this.inDisc.every((is) => is);
   }
 
-  /** Whether any channel is shown only in the disc. */
   get isPartlyInDisc(): boolean {
     return this.inDisc.includes(true);
   }

@@ -24,7 +24,6 @@ export type TransferTable2d = Readonly<{
 
 export const NO_ENTRIES = new Uint8Array(ROW);
 
-/** One component for each channel. */
 export function tableUniforms() {
   return { uGradientMax: { value: new Vector4(1, 1, 1, 1) } };
 }

@@ -58,7 +58,6 @@ export class VolumeSource {
     return bytes;
   }
 
-  /** Forgets everything that was fetched. */
   release(): void {
     this.levels.clear();
     this.ranges = null;

@@ -1,4 +1,3 @@
-/** Up to four channels' texels as one 3D texture. */
 import {
   ClampToEdgeWrapping,
   Data3DTexture,

@@ -34,7 +34,6 @@ const HOLD_M = 0.02;
  */
 const HEAD_HOLD_S = 0.6;
 
-/** A trigger that is held down. */
 type Press = {
   /** The target at which it was pressed, and the place of the hand. */
   readonly hit: TargetHit | null;

@@ -27,7 +27,6 @@ export type HandsOptions = Readonly<{
    */
   objectAlong?: (ray: Ray) => Readonly<{ id: string; distance: number }> | null;
   onLeave: () => void;
-  /** Called when the user chooses another lens profile. */
   onLenses?: (lenses: Lenses) => void;
   /** False: panel and notices are not drawn, as in tests without a screen. Absent: true. */
   isPainted?: boolean;

@@ -80,7 +80,6 @@ export function moveByStick(
   return zoomAbout(turnAbout(pose, turn, pivot), pivot, ZOOM_PER_S ** (-y * dt_s));
 }
 
-/** Turns that make the named side face the user. */
 const FACING: Readonly<Partial<Record<Command, Quaternion>>> = {
   front: new Quaternion(),
   side: about(UP, -Math.PI / 2),

@@ -42,7 +42,6 @@ const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
 const KEEPS_GAZE = "Switch this off with a button: the gaze could not switch it on again.";
 
 const CARRY = "The specimen moves with your gaze. Rest your gaze to put it down.";
-/** The bar's button that undoes the last choice. */
 const UNDO = `${PANEL}undo-choice`;
 /** The bar's button with which the gaze picks up the specimen. */
 const CARRY_BUTTON = `${PANEL}bar-move`;
@@ -149,7 +148,6 @@ export class Hands {
     if (isIntroductionDue()) this.announce(howItWorks(setting));
   }
 
-  /** The panel's controls by their direction from the head. */
   menuFrom(head: Matrix4): readonly MenuEntry[] {
     return menuEntries(this.panel.places, head);
   }

@@ -7,7 +7,6 @@ import type { ViewerState } from "../state/viewer_state";
 /** Seconds after a choice during which it can be undone. */
 const UNDO_S = 4;
 
-/** Everything that a choice can change. */
 export type Moment = Readonly<{ state: ViewerState; pose: SpecimenPose }>;
 
 export class LastChoice {

@@ -41,7 +41,6 @@ export class XrSession {
     return this.session !== null;
   }
 
-  /** The running session, for its input sources. */
   get current(): XRSession | null {
     return this.session;
   }

@@ -12,7 +12,6 @@ import type { ViewerState } from "../state/viewer_state";
 import { type HeadHold, isFacing, moveByCommand, moveByFingers } from "./hold_specimen";
 import { hullOf, middleOf } from "./shown_hull";
 
-/** A gesture that moves something. */
 type Move = Parameters<typeof moveByFingers>[1];
 
 export class SpecimenMover {

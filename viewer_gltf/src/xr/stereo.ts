@@ -237,7 +237,6 @@ export class Stereo {
     this.hands?.update(dt_s, head, state, read_s);
   }
 
-  /** The notices that are shown now. */
   get notices(): readonly string[] {
     return this.hands?.notice.texts ?? [];
   }
@@ -251,7 +250,6 @@ export class Stereo {
     return this.hands?.panel.isOpen ?? false;
   }
 
-  /** The controls of the headset panel and its bar. */
   get menu(): readonly MenuEntry[] {
     const { head, hands } = this;
     if (head === null || hands === null) return [];

@@ -26,7 +26,6 @@ export class SamplesPerFrame {
 
   constructor(private readonly gl: FencedContext) {}
 
-  /** Whether the last frame is done. */
   isReady(now_ms: number): boolean {
     const { fence, gl } = this;
     if (fence === null) return true;

@@ -238,7 +238,6 @@ function nextDimming(table: Float32Array): Uint16Array {
   return next;
 }
 
-/** Makes clipped cells transparent. */
 function clear(through: Float32Array, { low, edge, size: [nx, ny, nz] }: Grid, cut: Cut): void {
   const { min, max } = cut.box;
   for (let z = 0, at = 0; z < nz; z++) {

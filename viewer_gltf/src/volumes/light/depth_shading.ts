@@ -36,7 +36,6 @@ const REACH_VOXELS = 8;
 /** Steps of the lamp's direction from the middle of a cube's face to its edge: 2 degrees each. */
 const LAMP_STEPS = 24;
 
-/** A tile that is marched. */
 export type Marched = Readonly<{ march: TileMarch; packed: Packed; resident: Resident }>;
 
 export class DepthShading {
@@ -187,7 +186,6 @@ function shadingTexture(texels: Uint8Array<ArrayBuffer>, { size }: Grid): Data3D
   return texture;
 }
 
-/** The grid around the boxes of all tiles. */
 function gridOver(marched: readonly Marched[]): Grid {
   const [min, max] = [new Vector3().setScalar(1e30), new Vector3().setScalar(-1e30)];
   for (const { march } of marched) march.growBox(min, max);

@@ -32,12 +32,10 @@ type Tree = {
   readonly receiver: BrickReceiver;
   table: Table | null;
   present: Uint8Array;
-  /** Slot of each loaded node. */
   readonly slots: Map<number, number>;
   waiting: Brick[];
 };
 
-/** Copies a brick into an atlas, on the GPU. */
 export type Uploader = (atlas: Data3DTexture, slot: readonly number[], texels: Uint8Array) => void;
 
 export class BrickTile {

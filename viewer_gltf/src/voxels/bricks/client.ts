@@ -7,7 +7,6 @@ import { parseTable, STORED_BYTES, type Table } from "./tree";
 export type LinkRequest =
   | Readonly<{ type: "connect"; address: string }>
   | Readonly<{ type: "open"; tile: string; channel: string; source: string }>
-  /** This volume is no longer wanted. */
   | Readonly<{ type: "close"; tile: string; channel: string }>
   | (Readonly<{ type: "view"; texel_px: number; budget: number }> & BrickView);
 
@@ -27,7 +26,6 @@ export type LinkMessage =
   | Readonly<{ type: "fault"; text: string }>
   /** The host does not answer and is tried again, or it answers again. */
   | Readonly<{ type: "away"; isAway: boolean }>
-  /** The connection is lost for good. */
   | Readonly<{ type: "lost"; reason: string }>;
 
 export type Brick = Readonly<{ node: number; texels: Uint8Array<ArrayBuffer> }>;

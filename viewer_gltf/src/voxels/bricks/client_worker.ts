@@ -18,7 +18,6 @@ type Tree = {
   readonly name: string;
   readonly tile: string;
   readonly channel: string;
-  /** Its key in the cache. */
   readonly volume: string;
   readonly hash: string;
   readonly raw: Uint8Array<ArrayBuffer>;

@@ -9,7 +9,6 @@ import type { BrickTile } from "./brick_atlas";
 
 export class SharpenedTile {
   private finer: BrickTile | null = null;
-  /** Whether the finer volumes are drawn. */
   private isSharp = false;
   private isRefused = false;
 

@@ -5,7 +5,6 @@
 export type Fields = Readonly<{
   /** Floats of a field, packed or single; empty if the field is absent. */
   floats: (field: number) => readonly number[];
-  /** The last integer of a field. */
   whole: (field: number) => number | undefined;
   text: (field: number) => string;
 }>;

@@ -44,7 +44,6 @@ export class TurnSign {
   private readonly root = element("div", { role: "status" });
   private readonly stopped = new AbortController();
 
-  /** @param onLeave called when the user cancels stereo */
   constructor(stage: HTMLElement, onLeave: () => void) {
     const words = element("div", {}, {}, WORDS);
     const more = element("div", {}, {}, MORE);

@@ -52,7 +52,6 @@ export class StereoNotice {
     return this.quad.mesh;
   }
 
-  /** The texts that are shown now. */
   get texts(): readonly string[] {
     return this.announcements.texts;
   }

@@ -42,7 +42,6 @@ export type HeadsetPanelOptions = Readonly<{
   layOut: (view: PanelView) => Layout;
   onRequest: (request: Action | Command) => void;
   onLeave: () => void;
-  /** Called when the user chooses another lens profile. */
   onLenses: (lenses: Lenses) => void;
   /** Called with the reason why a request can't be carried out. */
   onAnnounce: (text: string) => void;
@@ -177,7 +176,6 @@ export class HeadsetPanel {
     return isMenuNew || isBarNew || isChanged;
   }
 
-  /** Lights up the control that is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
     this.pages.fan.point(id);

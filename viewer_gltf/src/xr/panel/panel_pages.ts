@@ -16,7 +16,6 @@ export class PanelPages {
     return this.shown;
   }
 
-  /** Opens the section with which the panel begins. */
   begin(): void {
     this.go(START_CANVAS);
   }
