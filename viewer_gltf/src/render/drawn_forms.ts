@@ -88,7 +88,7 @@ export interface TracedVolumes {
   readonly isShown: boolean;
   /** Whether a view at rest still gathers samples. */
   readonly isGathering: boolean;
-  /** Whether the last frame has drawn it. */
+  /** Whether the last frame has drawn a path-traced volume. */
   readonly isOnScreen: boolean;
   /** Whether path tracing alone was shown, without the ray march. */
   readonly standsAlone: boolean;
