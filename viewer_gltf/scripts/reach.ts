@@ -11,7 +11,7 @@ const MOST_DOTS = 2;
 const PLAIN: ReadonlySet<string> = new Set([
   ...["bundle", "focus", "state"], // of the host
   ...["facts", "ranges", "view"], // of the panel
-  ...["cameraView", "lookNow"], // of the viewpoint
+  ...["cameraView", "cameraPose"], // of the viewpoint
 ]);
 /** Types of the host as a parameter has them. */
 const HOSTS: ReadonlySet<string> = new Set(["PartHost", "Host"]);

@@ -129,7 +129,8 @@ def appearance_of(plan: Plan, channel: Channel, chosen: Chosen) -> Appearance:
         statistics=replace(found.window.statistics, background=found.background),
         level=_surface_level(plan, chosen),
         confidence=confidence,
-        why_unclear=found.reason or explain_uncertainty(found, chosen.index, list(chosen.iso.values())),
+        why_unclear=found.reason
+        or explain_uncertainty(found, chosen.index, list(chosen.iso.values())),
         modality=SEGMENTATION if channel.source else plan.modality,
         is_hounsfield=plan.is_hounsfield,
         unevenness=max(plan.spacing_um) / min(plan.spacing_um),

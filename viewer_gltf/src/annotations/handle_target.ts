@@ -1,6 +1,6 @@
 /** The handles as what a ray of the gaze or of a hand meets and carries in the room. */
 import { Matrix4, Vector3 } from "three";
-import type { Hit, RoomRay, Target } from "../interaction/ray_pointer";
+import type { Hit, SceneRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
 import { placeText } from "../interaction/tile_target";
 import { type Handle, type HandleId, pickHandle } from "../marks/clip_handles";
@@ -33,7 +33,7 @@ export class HandleTarget implements Target {
     private readonly onDrag: (id: HandleId, ray: ReturnType<typeof rayAlong>) => void,
   ) {}
 
-  meet(ray: RoomRay): Hit | null {
+  intersect(ray: SceneRay): Hit | null {
     if (this.handles.length === 0) return null;
     const id = pickHandle(this.into(ray), this.handles, this.tolerance_rad);
     const handle = this.handles.find((each) => each.id === id);
@@ -50,7 +50,7 @@ export class HandleTarget implements Target {
     // it is dragged from now on, by the pointer that holds it
   }
 
-  drag(key: string, ray: RoomRay): void {
+  drag(key: string, ray: SceneRay): void {
     const handle = this.handles.find(({ id }) => HANDLE + id === key);
     if (handle === undefined) return; // the cut or the lamp was turned off meanwhile
     this.seen = handle.id;
@@ -64,7 +64,7 @@ export class HandleTarget implements Target {
     return seen;
   }
 
-  private into(ray: RoomRay) {
+  private into(ray: SceneRay) {
     return rayAlong(ray, this.toSpecimen.copy(this.specimen).invert());
   }
 }

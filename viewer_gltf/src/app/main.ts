@@ -15,7 +15,7 @@ import { type Bundle, loadBundle } from "../bundle/load";
 import { watchWaiting } from "../bundle/retry";
 import { element } from "../dom/element";
 import { Host } from "../host/host";
-import { leaveWheelToHolder } from "../interaction/frame_wheel";
+import { leaveWheelToOuterPage } from "../interaction/frame_wheel";
 import { isReading, whileReading } from "../live/reading";
 import { sizeText } from "../math/length_text";
 import { showFatal } from "../panel/html/overlays";
@@ -176,7 +176,7 @@ function makeHost(parent: HTMLElement, bundle: Bundle): Host {
   stage.role = "group"; // the role "image" would hide the buttons in it from screen readers
   const view = element("main", { className: "view" }, {}, stage);
   parent.replaceChildren(view);
-  if (window.parent !== window) leaveWheelToHolder(stage);
+  if (window.parent !== window) leaveWheelToOuterPage(stage);
   return new Host(bundle, stage, view, Object.values(parts));
 }
 

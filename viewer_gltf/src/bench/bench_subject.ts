@@ -47,7 +47,7 @@ export function subjectOf(host: PartHost): Subject {
       const isFlat = stereo.kind === null;
       return { eye, middle: isFlat ? [0, 0, 0] : ahead(head, XR_DISTANCE_M).toArray() };
     },
-    fly: (specimen) => viewpoint.lookFrom({ ...viewpoint.lookNow, specimen }),
+    fly: (specimen) => viewpoint.lookFrom({ ...viewpoint.cameraPose, specimen }),
     nextFrame: () => display.nextFrame(),
     cost: () => {
       const { drawCalls, triangles, volumeBytes } = display.snapshot();

@@ -139,7 +139,7 @@ class CapturePart implements Part, PosterMaker {
   private keep(): boolean {
     const { state, isInRoom, viewpoint } = this.host;
     if (isInRoom) return false;
-    this.setViews([...state.keptViews, viewpoint.lookNow]);
+    this.setViews([...state.keptViews, viewpoint.cameraPose]);
     return true;
   }
 
@@ -163,7 +163,7 @@ class CapturePart implements Part, PosterMaker {
     const { keptViews } = state;
     if (isInRoom || keptViews.length === 0) return false;
     undo.noteCameraMove();
-    const before = viewpoint.lookNow;
+    const before = viewpoint.cameraPose;
     const { name, ...look } = keptViews[this.nextView++ % keptViews.length];
     viewpoint.lookFlatFrom(look);
     if (name !== undefined) this.host.announce(`View: ${name}`);

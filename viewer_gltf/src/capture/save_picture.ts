@@ -180,7 +180,7 @@ export function saveVideo(
   const path =
     views.length > 1
       ? pathThrough(views, LEG_S * FRAMES_PER_S * (views.length - 1) + 1)
-      : turntable(navigation.lookNow, ROUND_S * FRAMES_PER_S);
+      : turntable(navigation.cameraPose, ROUND_S * FRAMES_PER_S);
   const { width, height } = renderer.domElement;
   const shrink = Math.min(1, LONGEST_FRAME_PX / Math.max(width, height));
   const even = (edge: number) => Math.max(2, 2 * Math.floor((shrink * edge) / 2));

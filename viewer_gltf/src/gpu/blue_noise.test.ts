@@ -6,8 +6,8 @@ import { blueNoise, NOISE_SIZE } from "./blue_noise";
 const N = NOISE_SIZE;
 
 /**
- * Mean power at the frequencies below a share of Nyquist's, without the mean itself, over the mean
- * power of all. Of white noise that is 1.
+ * Mean power at frequencies below a share of the Nyquist frequency, without the mean, divided by
+ * the mean power of all. White noise gives 1.
  */
 function lowPower(texels: ArrayLike<number>, share: number): number {
   const cosine = Array.from({ length: N }, (_, i) => Math.cos((2 * Math.PI * i) / N));
@@ -34,7 +34,7 @@ function lowPower(texels: ArrayLike<number>, share: number): number {
   return power / count / all;
 }
 
-describe("the tile of blue noise", () => {
+describe("the blue-noise tile", () => {
   const texels = blueNoise();
 
   it("has every value equally often", () => {
@@ -44,7 +44,7 @@ describe("the tile of blue noise", () => {
     expect(new Set(counts)).toEqual(new Set([16]));
   });
 
-  it("has hardly any power at low frequencies, where white noise has its share", () => {
+  it("has hardly any power at low frequencies, unlike white noise", () => {
     const random = seeded(11);
     const white = Uint8Array.from(texels, () => 256 * random());
     expect(lowPower(white, 0.25)).toBeGreaterThan(0.7);
@@ -67,8 +67,9 @@ describe("the tile of blue noise", () => {
     expect(Math.abs(seam / (2 * N) / (inside / (2 * N * (N - 1))) - 1)).toBeLessThan(0.15);
   });
 
-  it("keeps the darkest texels apart, across the edges too", () => {
-    const dark = [...texels.keys()].filter((i) => texels[i] < 16); // one in 16: 4 texels apart
+  it("keeps the darkest texels apart, also across the edges", () => {
+    // One texel in 16 is dark: 4 texels apart.
+    const dark = [...texels.keys()].filter((i) => texels[i] < 16);
     const apart = (a: number, b: number) => {
       const wrap = (d: number) => Math.min(d, N - d);
       const dx = wrap(Math.abs((a % N) - (b % N)));
@@ -80,11 +81,11 @@ describe("the tile of blue noise", () => {
     expect(Math.min(...nearest)).toBeGreaterThan(2);
   });
 
-  it("is what the script makes", () => {
+  it("equals the result of the script", () => {
     expect(blueNoiseTexels()).toEqual(texels);
   });
 
-  it("is ranked without a gap at any size and seed", () => {
+  it("has ranks without gaps at any size and seed", () => {
     const ranks = [...voidAndCluster(12, 5)].sort((a, b) => a - b);
     expect(ranks).toEqual(Array.from({ length: 144 }, (_, i) => i));
   });

@@ -1,4 +1,4 @@
-/** A tile of blue noise, made by scripts/blue_noise.ts: don't edit. */
+/** A blue-noise tile, made by scripts/blue_noise.ts. Do not edit. */
 
 /** Texels along each edge; the tile repeats without a seam. */
 export const NOISE_SIZE = 64;
@@ -69,7 +69,7 @@ const BASE64 = [
   "kKxrng==",
 ].join("");
 
-/** Its texels, x fastest; each of the 256 values 16 times. */
+/** The texels of the tile, x fastest; each of the 256 values occurs 16 times. */
 export function blueNoise(): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(atob(BASE64), (byte) => byte.charCodeAt(0));
 }

@@ -1,8 +1,9 @@
 /**
- * What is in the room is drawn once for both eyes: as two instances, of which each is put into its eye's
- * half of the picture. So a thing costs one draw call in stereo too, on any WebGL 2: multiview does
- * the same, but three has it only where it draws straight into a headset's layer, and this picture is
- * one of linear light that is encoded at the end.
+ * Draws a scene once for both eyes, as two instances, each in its eye's half of the frame.
+ *
+ * So each object costs one draw call in stereo too, on any WebGL 2. Multiview would do the same,
+ * but three.js supports it only when it draws straight into a headset's layer. These frames are
+ * drawn in linear light and encoded at the end.
  */
 import {
   ArrayCamera,
@@ -34,12 +35,16 @@ const CHUNKS = {
 const VERTEX = insertionsOf(includeChunks(vertexInsertions, CHUNKS));
 const FRAGMENT = insertionsOf(includeChunks(fragmentInsertions, CHUNKS));
 
-/** The layer of what is drawn so; no other camera sees it. WebXR has 1 and 2. */
+/**
+ * Layer of the objects that are drawn for both eyes; other cameras do not see it. WebXR uses 1 and
+ * 2.
+ */
 const BOTH = 4;
 
 /**
- * By reference. `uEyeClip`: from what is seen between the eyes to the clip space of the whole picture, in
- * which each eye has its part. `uMiddle`: where the right eye's part begins, pixels.
+ * Shared by reference. The matrices `uEyeClip` transform from the space between the eyes to the
+ * clip space of the whole frame, in which each eye has its part. The number `uMiddle` is where the
+ * right eye's part begins, pixels.
  */
 function makeUniforms() {
   return {
@@ -50,10 +55,13 @@ function makeUniforms() {
 }
 export type BothEyesUniforms = ReturnType<typeof makeUniforms>;
 
-/** Made of each geometry, also of one that many share. */
+/** Instanced copy of each geometry, made once even if many objects share it. */
 const made = new WeakMap<BufferGeometry, InstancedBufferGeometry>();
 
-/** A geometry that is drawn as often as there are eyes; it shares what it is made of, and goes with it. */
+/**
+ * A geometry that is drawn once for each eye. It shares the attributes of the original, and is
+ * disposed with it.
+ */
 function forBoth(geometry: BufferGeometry): InstancedBufferGeometry {
   if (geometry instanceof InstancedBufferGeometry) return geometry;
   const found = made.get(geometry);
@@ -75,7 +83,7 @@ function isDrawn(object: Object3D): object is Drawn {
 export class BothEyes {
   readonly uniforms = makeUniforms();
   private readonly camera = new ArrayCamera();
-  /** Sees for all eyes, from between them. */
+  /** Camera between the eyes that sees what either eye sees. */
   private readonly between = new PerspectiveCamera();
   private readonly adopted = new WeakSet<Material>();
   private isStereo = false;
@@ -90,8 +98,11 @@ export class BothEyes {
     }
   }
 
-  /** From now on all that is in a scene is drawn so: to be called before each frame, for what is new. */
-  takeIn(scene: Object3D): void {
+  /**
+   * Makes all objects of a scene be drawn for both eyes. Call it before each frame, to include new
+   * objects.
+   */
+  prepare(scene: Object3D): void {
     scene.traverse((object) => {
       if (!isDrawn(object)) return;
       object.layers.disable(0);
@@ -99,7 +110,8 @@ export class BothEyes {
       const { material } = object;
       if (!(material instanceof Material)) throw new TypeError(`${object.name} has many materials`);
       if (!this.adopted.has(material)) {
-        if (material instanceof ShaderMaterial) return; // it covers the picture, whoever looks
+        // The material covers the whole frame for any eye.
+        if (material instanceof ShaderMaterial) return;
         this.patch(material);
         this.adopt(material);
       }
@@ -107,7 +119,7 @@ export class BothEyes {
     });
   }
 
-  /** A material of three's own. */
+  /** Inserts the chunks of both eyes into a material of three.js's own. */
   private patch(material: Material): void {
     const { uniforms } = this;
     material.onBeforeCompile = (shader) => {
@@ -117,7 +129,10 @@ export class BothEyes {
     };
   }
 
-  /** A material whose shaders have the chunks of both eyes draws for whom the camera is. */
+  /**
+   * Registers a material whose shaders have the chunks of both eyes, so that it draws for the
+   * current camera's eyes.
+   */
   adopt(material: Material): void {
     this.adopted.add(material);
     const { uIsForBoth } = this.uniforms;
@@ -129,12 +144,12 @@ export class BothEyes {
     };
   }
 
-  /** All of a frame's eyes in one; what is in another layer alone is not seen. */
+  /** One camera for all eyes of a frame; it sees only objects in `layer`. */
   cameraOf(eyes: Eyes, layer = BOTH): ArrayCamera {
     const { camera, between, uniforms } = this;
     const { all, width_px, height_px } = eyes;
     camera.layers.set(layer);
-    camera.layers.enable(0); // the lights'
+    camera.layers.enable(0); // the layer of the lights
     between.layers.set(layer);
     camera.cameras = [];
     const [first, second] = all;

@@ -1,4 +1,7 @@
-/** The cuts of clip box and plane for the surfaces' shaders: planes in the room, by reference. */
+/**
+ * The clip box and clip plane as uniforms for the surfaces' shaders: planes in the scene, shared by
+ * reference.
+ */
 import { type Matrix4, Vector3, Vector4 } from "three";
 import type { Box } from "../math/box";
 import type { Clip, ClipPlane } from "../math/clip";
@@ -6,23 +9,23 @@ import { AXES, type Vec3, withPart } from "../math/vec3";
 import { CORNER_PLANES, type MarchClip, noCorner } from "./clip_uniforms";
 
 const MAX_PLANES = 7; // six faces of the box, and the plane
-/** um; beyond any specimen, within the precision of floats. */
+/** um. Farther than any specimen, but within the precision of floats. */
 const FAR = 1e9;
-/** A plane beyond which nothing lies. */
+/** A plane that removes nothing. */
 const NOWHERE: ClipPlane = { normal: [0, 0, 0], offset_um: 1 };
 
 export class Cuts {
   /**
-   * xyz unit normal, w offset, metres of the room: gone is where dot(xyz, p) > w; after these the planes of
-   * the corner.
+   * xyz unit normal, w offset in metres of the scene; points with dot(xyz, p) > w are removed. The
+   * planes of the corner follow at the end.
    */
   readonly uCuts = {
     value: Array.from({ length: MAX_PLANES + CORNER_PLANES }, () => new Vector4()),
   };
   readonly uCutCount = { value: 0 };
-  /** The tile that is drawn as a volume among surfaces; all zeros: there is none. */
+  /** Faces of the tile that is drawn as a volume among surfaces; all zeros if there is none. */
   readonly uOpen = { value: Array.from({ length: 6 }, () => new Vector4()) };
-  /** The same for the march, um. */
+  /** The same clip for the ray march, um. */
   readonly march: MarchClip = {
     min: new Vector3(),
     max: new Vector3(),
@@ -55,7 +58,7 @@ export class Cuts {
     });
   }
 
-  /** @param tile the one that is drawn as a volume among surfaces, um; null: there is none */
+  /** @param tile the tile that is drawn as a volume among surfaces, um, or null */
   open(tile: Box | null, specimen: Matrix4): void {
     if (tile === null) for (const plane of this.uOpen.value) plane.set(0, 0, 0, 0);
     else {
@@ -66,7 +69,6 @@ export class Cuts {
   }
 }
 
-/** The planes of a box's faces, with the normals outwards. */
 function facesOf({ min, max }: Box): readonly ClipPlane[] {
   return AXES.flatMap((axis) => [
     { normal: withPart([0, 0, 0], axis, -1), offset_um: -min[axis] },
@@ -74,7 +76,7 @@ function facesOf({ min, max }: Box): readonly ClipPlane[] {
   ]);
 }
 
-/** Set a plane of the room, m, to one of the specimen, um. */
+/** Converts a plane of the specimen, um, to a plane of the scene, metres. */
 function setPlane(plane: Vector4, normal: Vec3, offset_um: number, specimen: Matrix4): void {
   const along = new Vector3(...normal).transformDirection(specimen);
   const on = new Vector3(...normal).multiplyScalar(offset_um).applyMatrix4(specimen);

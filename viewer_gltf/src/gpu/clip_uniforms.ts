@@ -1,12 +1,12 @@
-/** The specimen after the cuts, in the space of one box of texels. */
+/** The clip of the specimen, in the space of one box of texels. */
 import { Matrix4, Vector3, Vector4 } from "three";
 
-/** The planes that bound the corner before the slices. */
+/** The number of planes that bound the corner in front of the slices. */
 export const CORNER_PLANES = 3;
 
 /**
- * Of the specimen, um: what is left of it. `plane`: unit normal and offset. `corner`: as many such planes as
- * bound one; what lies beyond all of them is gone.
+ * The kept part of the specimen, um. `plane`: unit normal and offset. `corner`: planes; points
+ * beyond all of them are removed.
  */
 export type MarchClip = Readonly<{
   min: Vector3;
@@ -15,7 +15,7 @@ export type MarchClip = Readonly<{
   corner: readonly Vector4[];
 }>;
 
-/** Planes beyond which nothing lies: three begins with 0, 0, 0, 1. */
+/** Planes that remove nothing: three.js initialises them to 0, 0, 0, 1. */
 export function noCorner(): Vector4[] {
   return Array.from({ length: CORNER_PLANES }, () => new Vector4());
 }
@@ -31,7 +31,7 @@ export type ClipUniforms = Readonly<{
 const vertex = new Vector3();
 const transposed = new Matrix4();
 
-/** The box, of another space, round one of the world. */
+/** The box, in another space, around a box of the world. */
 export function boxAround(
   min: Vector3,
   max: Vector3,
@@ -49,7 +49,7 @@ export function boxAround(
   }
 }
 
-/** @param toWorld from the box to the specimen's world; `toBox` is its inverse */
+/** @param toWorld transform from the box to the specimen's world; `toBox` is its inverse */
 export function clipInto(
   { min, max, plane, corner }: MarchClip,
   toWorld: Matrix4,
@@ -64,7 +64,7 @@ export function clipInto(
   });
 }
 
-/** A plane n . p <= w of the world is n' . p' <= w' of the box. */
+/** Transforms a plane n . p <= w of the world into n' . p' <= w' of the box. */
 function planeInto({ x, y, z, w }: Vector4, into: Vector4): void {
   into.set(x, y, z, -w).applyMatrix4(transposed);
   into.w *= -1;

@@ -1,4 +1,4 @@
-/** Lays a picture, which was drawn at fewer pixels or as many, over the scene, eye by eye. */
+/** Composites an image, drawn with as many or fewer pixels, over the scene, eye by eye. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -19,16 +19,18 @@ import type { Eyes } from "./eyes";
 import { partOf } from "./offscreen_target";
 import { COMPOSITE_FRAGMENT, COMPOSITE_VERTEX } from "./shaders/sources";
 
-/** Render order of the pass: first among all that is blended. */
+/** Draw orders: first and last among all blended objects. */
 export const FIRST = -1000;
 export const LAST = 1000;
-/** The stencil where a surface has laid the volume of its place over the scene already. */
-export const LAID = 1;
+/**
+ * Stencil value of pixels at which a surface has already composited the volume that replaces it.
+ */
+export const VOLUME_DRAWN = 1;
 
-/** What `chunks/marched_light` reads, by reference. */
-export function marchedUniforms(picture: Texture, uSceneDepth: { value: Texture }) {
+/** Uniforms of `chunks/marched_light`, shared by reference. */
+export function marchedUniforms(image: Texture, uSceneDepth: { value: Texture }) {
   return {
-    uMarched: { value: picture },
+    uMarched: { value: image },
     uSceneDepth,
     uEyes: { value: [new Vector4(), new Vector4()] },
     uParts: { value: [new Vector4(), new Vector4()] },
@@ -37,20 +39,21 @@ export function marchedUniforms(picture: Texture, uSceneDepth: { value: Texture 
 }
 export type MarchedUniforms = ReturnType<typeof marchedUniforms>;
 
-/** The disc in the room, by reference: within it the picture takes the place of surfaces. */
+/** The focus disc in the scene, shared by reference; inside it the image replaces surfaces. */
 export type Disc = Readonly<{
   uIsCrossing: { value: boolean };
   uApex: { value: Vector3 };
   uAxis: { value: Vector3 };
   uDisc: { value: Vector2 };
-  /** m */
+  /** Distance of the rim, metres. */
   uRim: { value: number };
 }>;
 
 export type OverlayOptions = Readonly<{
-  /** Render order. */
   order: number;
-  /** The picture's colours are encoded, each before its opacity; else it is linear. */
+  /**
+   * Whether the image's colours are encoded before premultiplication; otherwise they are linear.
+   */
   isEncoded?: boolean;
   disc?: Disc;
 }>;
@@ -63,13 +66,13 @@ export class Overlay {
     uEyeAt: { value: [new Vector3(), new Vector3()] },
   };
 
-  /** @param picture premultiplied */
+  /** @param image premultiplied */
   constructor(
-    picture: Texture,
+    image: Texture,
     uSceneDepth: { value: Texture },
     { order, isEncoded = false, disc }: OverlayOptions,
   ) {
-    this.uniforms = marchedUniforms(picture, uSceneDepth);
+    this.uniforms = marchedUniforms(image, uSceneDepth);
     const triangle = new BufferGeometry();
     const corners = new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]);
     triangle.setAttribute("position", new BufferAttribute(corners, 3));
@@ -84,9 +87,9 @@ export class Overlay {
       blending: CustomBlending,
       blendSrc: OneFactor,
       blendDst: OneMinusSrcAlphaFactor,
-      stencilWrite: disc !== undefined, // it is three's switch of the test
+      stencilWrite: disc !== undefined, // switches on the stencil test in three.js
       stencilWriteMask: 0,
-      stencilRef: LAID,
+      stencilRef: VOLUME_DRAWN,
       stencilFunc: NotEqualStencilFunc,
       uniforms: { ...this.uniforms, ...this.rays, ...disc },
     });
@@ -97,7 +100,7 @@ export class Overlay {
     this.mesh.visible = false;
   }
 
-  /** Show what was drawn for these eyes, at `scale` pixels to one of theirs. */
+  /** Shows the image drawn for these eyes, with `scale` pixels per pixel of the frame. */
   show(eyes: Eyes, scale: number): void {
     const { uEyes, uParts, uEyeCount } = this.uniforms;
     const { uToRoom, uEyeAt } = this.rays;

@@ -1,12 +1,12 @@
 /**
- * The eyes of a frame: one on a flat screen, two in a headset or in a phone's viewer. Passes that
- * draw into textures go through them one by one, as three draws all eyes of a headset only into
- * the headset's own frame buffer.
+ * The eyes of a frame: one on a flat screen, two in a headset or in a Cardboard viewer. Passes that
+ * draw into textures loop over the eyes, because three.js draws all eyes of a headset only into the
+ * headset's own frame buffer.
  */
 import { PerspectiveCamera, Vector4, type WebGLRenderer } from "three";
 
 export type Eye = Readonly<{
-  /** Its matrices are set from outside and hold for the frame. */
+  /** Its matrices are set by the caller and hold for the frame. */
   camera: PerspectiveCamera;
   /** x, y, width, height in pixels of the frame buffer, from its lower left corner. */
   viewport: Vector4;
@@ -15,7 +15,7 @@ export type Eye = Readonly<{
 export class Eyes {
   private readonly pool: Eye[] = [];
   private count = 0;
-  /** Of the frame buffer, pixels. */
+  /** Size of the frame buffer, pixels. */
   width_px = 1;
   height_px = 1;
 
@@ -23,7 +23,7 @@ export class Eyes {
     return this.pool.slice(0, this.count);
   }
 
-  /** One eye that sees the whole canvas. */
+  /** Uses one eye that sees the whole canvas. */
   followScreen(renderer: WebGLRenderer, camera: PerspectiveCamera): void {
     const gl = renderer.getContext();
     this.count = 0;
@@ -32,13 +32,14 @@ export class Eyes {
     this.add(camera).viewport.set(0, 0, this.width_px, this.height_px);
   }
 
-  /** The eyes of the running session; `camera` is the one that three moves with the head. */
+  /**
+   * Uses the eyes of the running session; `camera` is the one that three.js moves with the head.
+   */
   followHeadset(renderer: WebGLRenderer, camera: PerspectiveCamera): void {
     renderer.xr.updateCamera(camera);
     this.follow(renderer.xr.getCamera().cameras.map((each) => [each, each.viewport]));
   }
 
-  /** Eyes that are given, each with its viewport. */
   follow(eyes: readonly (readonly [PerspectiveCamera, Vector4 | undefined])[]): void {
     this.count = 0;
     this.width_px = 1;
@@ -46,7 +47,7 @@ export class Eyes {
     for (const [camera, viewport] of eyes) {
       if (viewport === undefined) continue;
       this.add(camera).viewport.copy(viewport);
-      // A frame buffer is as large as its eyes' viewports reach, whatever the canvas is.
+      // The frame buffer is as large as the eyes' viewports reach, independent of the canvas.
       this.width_px = Math.max(this.width_px, viewport.x + viewport.z);
       this.height_px = Math.max(this.height_px, viewport.y + viewport.w);
     }

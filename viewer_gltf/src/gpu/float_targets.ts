@@ -1,4 +1,4 @@
-/** Textures and targets of floats, which are read texel by texel. */
+/** Textures and render targets of floats, read texel by texel. */
 import {
   Camera,
   Data3DTexture,
@@ -16,14 +16,13 @@ import {
 } from "three";
 
 const EXACT = { minFilter: NearestFilter, magFilter: NearestFilter } as const;
-const NOBODY = new Camera();
+const ANY_CAMERA = new Camera();
 
-/** A uniform that holds no texture yet. */
 export function nothing(): { value: Texture | null } {
   return { value: null };
 }
 
-/** @param count textures that are drawn at once */
+/** @param count number of textures that are drawn at once */
 export function floatTarget(count: number, type: typeof FloatType | typeof HalfFloatType) {
   return new WebGLRenderTarget(1, 1, { count, type, depthBuffer: false, ...EXACT });
 }
@@ -56,7 +55,7 @@ export function float3D(data: Float32Array<ArrayBuffer>, size: readonly [number,
   return texture;
 }
 
-/** Draw over a target that becomes so large. */
+/** Draws over a whole target after setting its size. */
 export function drawWhole(
   renderer: WebGLRenderer,
   scene: Scene,
@@ -70,7 +69,7 @@ export function drawWhole(
   target.setSize(width, height);
   target.viewport.set(0, 0, width, height);
   renderer.setRenderTarget(target);
-  renderer.render(scene, NOBODY);
+  renderer.render(scene, ANY_CAMERA);
   renderer.setRenderTarget(before);
   renderer.xr.enabled = enabled;
 }

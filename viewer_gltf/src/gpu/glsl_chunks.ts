@@ -1,4 +1,4 @@
-/** The text of the shader chunks, by the name that `#include` has. */
+/** The text of the shader chunks, by the name used in `#include`. */
 
 /** @param files by path below this folder */
 export function byName(files: Record<string, string>): Readonly<Record<string, string>> {
@@ -7,7 +7,10 @@ export function byName(files: Record<string, string>): Readonly<Record<string, s
   );
 }
 
-/** Those of what is marched and laid over the scene: not the path tracer's, which come with it. */
+/**
+ * Chunks for ray marching and compositing. The path tracer's chunks are loaded with the path
+ * tracer.
+ */
 export const CHUNKS = byName(
   import.meta.glob(
     [

@@ -42,12 +42,12 @@ function frame(timer: GpuTimer | null): void {
   timer?.end();
 }
 
-describe("the GPU's time", () => {
-  it("is unknown where the extension is absent", () => {
+describe("the GPU time", () => {
+  it("is unknown without the extension", () => {
     expect(GpuTimer.create(standIn(false).gl)).toBeNull();
   });
 
-  it("is that of the newest frame answered, in ms, once", () => {
+  it("is that of the newest answered frame, in ms, and is reported once", () => {
     const { gl, answer } = standIn();
     const timer = GpuTimer.create(gl);
     for (let i = 0; i < 3; i++) frame(timer);
@@ -60,7 +60,7 @@ describe("the GPU's time", () => {
     expect(timer?.poll()).toBe(9);
   });
 
-  it("takes no more queries than a driver can leave unanswered", () => {
+  it("uses a limited number of queries if the driver never answers", () => {
     const { gl, answer, queries } = standIn();
     const timer = GpuTimer.create(gl);
     for (let i = 0; i < 100; i++) frame(timer);
@@ -75,7 +75,7 @@ describe("the GPU's time", () => {
     expect(queries.deleted).toBe(8);
   });
 
-  it("is not read from a broken clock", () => {
+  it("is not read after the clock was interrupted", () => {
     const { gl, answer, queries } = standIn();
     const timer = GpuTimer.create(gl);
     frame(timer);
@@ -89,7 +89,7 @@ describe("the GPU's time", () => {
     expect(timer?.poll()).toBe(4);
   });
 
-  it("needs begin and end only in pairs that make sense", () => {
+  it("ignores a begin or an end without its counterpart", () => {
     const { gl } = standIn();
     const timer = GpuTimer.create(gl);
     timer?.end();

@@ -1,12 +1,12 @@
 /**
- * How long the GPU works on a frame, by EXT_disjoint_timer_query_webgl2. Answers come a few frames
- * late and are never waited for.
+ * Measures how long the GPU works on a frame, with EXT_disjoint_timer_query_webgl2. Answers arrive
+ * a few frames late and are never waited for.
  */
 
-/** From the extension's registry entry; TypeScript's DOM types leave it out. */
+/** From the extension's registry entry; TypeScript's DOM types lack it. */
 const TIME_ELAPSED = 0x88bf;
 const GPU_DISJOINT = 0x8fbb;
-/** Most queries without an answer: a driver may never answer. */
+/** Largest number of queries without an answer, since a driver may never answer. */
 const MAX_PENDING = 8;
 
 export type TimedContext = Pick<
@@ -29,12 +29,12 @@ export class GpuTimer {
 
   private constructor(private readonly gl: TimedContext) {}
 
-  /** null where the extension is absent: then only the time between frames is known. */
+  /** Returns null without the extension; then only the time between frames is known. */
   static create(gl: TimedContext): GpuTimer | null {
     return gl.getExtension("EXT_disjoint_timer_query_webgl2") === null ? null : new GpuTimer(gl);
   }
 
-  /** Before the frame's first draw call. */
+  /** Call it before the frame's first draw call. */
   begin(): void {
     if (this.current !== null || this.pending.length >= MAX_PENDING) return;
     const query = this.free.pop() ?? this.gl.createQuery();
@@ -43,7 +43,7 @@ export class GpuTimer {
     this.current = query;
   }
 
-  /** After its last. */
+  /** Call it after the frame's last draw call. */
   end(): void {
     if (this.current === null) return;
     this.gl.endQuery(TIME_ELAPSED);
@@ -51,10 +51,11 @@ export class GpuTimer {
     this.current = null;
   }
 
-  /** The time of the newest frame that has been answered since the last call, or null. */
+  /** Returns the time of the newest frame answered since the last call, ms, or null. */
   poll(): number | null {
     const { gl } = this;
-    // The clock broke (the GPU changed its rate, the laptop slept): nothing pending can be trusted.
+    // The clock was interrupted (the GPU changed its rate, the laptop slept), so pending queries
+    // are invalid.
     if (gl.getParameter(GPU_DISJOINT) === true) {
       this.free.push(...this.pending.splice(0));
       return null;

@@ -9,8 +9,8 @@ const linesOf = (text: string) =>
     .map((line) => line.trim())
     .filter((line) => line !== "");
 
-describe("pieces of GLSL", () => {
-  it("go to the places that their file declares", () => {
+describe("inserted GLSL", () => {
+  it("goes to the places that its file declares", () => {
     const file = [
       "// What the pieces are for.",
       ...["#insert start", "one();"],
@@ -26,18 +26,18 @@ describe("pieces of GLSL", () => {
     ]);
   });
 
-  it("are refused by a shader that has no such place", () => {
+  it("is rejected by a shader without such a place", () => {
     const insertions = insertionsOf("#insert after <second>\nnever();");
     expect(() => insertInto(SHADER, insertions)).toThrow('no place "after <second>"');
     expect(() => insertInto("", insertionsOf("#insert main_end\nnever();"))).toThrow("main_end");
   });
 
-  it("have no dollar or number that means something else", () => {
+  it("is inserted literally, even with dollar signs", () => {
     const insertions = insertionsOf("#insert main_start\nfloat b = a; // $& $1\n");
     expect(insertInto(SHADER, insertions)).toContain("float b = a; // $& $1");
   });
 
-  it("find a place in each of three's own shaders that they are for", () => {
+  it("finds its places in each of three's own shaders that need it", () => {
     const both = insertionsOf(
       "#insert start\na();\n#insert main_start\nb();\n#insert main_end\nc();",
     );

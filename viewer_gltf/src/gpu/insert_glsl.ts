@@ -1,30 +1,31 @@
 /**
- * Puts pieces of GLSL into a shader that another library wrote, as three's materials are. A .glsl file has the pieces,
- * each under a line that declares where it goes:
+ * Inserts pieces of GLSL into a shader of another library, such as three.js's materials. A .glsl
+ * file has the pieces, each under a line that declares its place:
  *
- *   #insert start                 before all of the shader
+ *   #insert start                 before the whole shader
  *   #insert main_start            at the start of `main`
  *   #insert main_end              at the end of `main`
  *   #insert before <chunk>        before a line `#include <chunk>` of the shader
- *   #insert after <chunk>         after it
+ *   #insert after <chunk>         after that line
  *
- * Lines before the first of these are comments. Pure.
+ * Lines before the first `#insert` are comments.
  */
 
-/** A piece of GLSL, and the declared place where it goes. */
 export type Insertion = Readonly<{ place: string; text: string }>;
 
 const DECLARED = /^[ \t]*#insert (.+)$/m;
 const MAIN_START = "void main() {";
 
-/** Reads the pieces of a .glsl file. */
 export function insertionsOf(file: string): readonly Insertion[] {
   const [, ...parts] = file.split(DECLARED);
   const pairs = Array.from({ length: parts.length / 2 }, (_, i) => parts.slice(2 * i, 2 * i + 2));
   return pairs.map(([place, text]) => ({ place: place.trim(), text: `${text.trim()}\n` }));
 }
 
-/** Returns a shader with all pieces in it. Throws Error if the shader lacks the place of one. */
+/**
+ * Returns the shader with all pieces inserted. Throws Error if the shader lacks the place of a
+ * piece.
+ */
 export function insertInto(shader: string, insertions: readonly Insertion[]): string {
   return insertions.reduce((source, { place, text }) => insert(source, place, text), shader);
 }
@@ -38,7 +39,7 @@ function insert(source: string, place: string, text: string): string {
   return `${source.slice(0, cut)}\n${text}${source.slice(cut)}`;
 }
 
-/** Where the landmark of a place begins, and how long it is. */
+/** Where the text that marks a place begins, and how long it is. */
 function placeIn(source: string, place: string): readonly [at: number, length: number] {
   if (place === "main_start") return [source.indexOf(MAIN_START), MAIN_START.length];
   if (place === "main_end") return [source.lastIndexOf("}"), 1];

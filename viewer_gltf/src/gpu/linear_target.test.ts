@@ -14,12 +14,12 @@ function context(extensions: readonly string[], samples: readonly number[]): Lin
   } as LinearContext;
 }
 
-it("takes half floats where either extension lets them be drawn into", () => {
+it("uses half floats if either extension allows drawing into them", () => {
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], [8, 4, 2]))).toBe(true);
   expect(hasHalfFloats(context(["EXT_color_buffer_half_float"], [4]))).toBe(true);
 });
 
-it("does without them where they can't be drawn into or multisampled", () => {
+it("does not use them if they can't be drawn into or multisampled", () => {
   expect(hasHalfFloats(context([], [4]))).toBe(false);
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], []))).toBe(false);
   expect(hasHalfFloats(context(["EXT_color_buffer_float"], [2]))).toBe(false);

@@ -1,7 +1,8 @@
 /**
- * Targets of linear light: whatever is blended there adds up as light does, at a tile's border as
- * within a tile. Half floats where the device draws and multisamples them; elsewhere eight bits that
- * the GPU itself encodes and decodes, which every WebGL 2 has: the same picture, cut off at white.
+ * Render targets of linear light. Blending in them adds up like light, at a tile's border as well
+ * as inside a tile. They have half floats if the device can draw into and multisample them.
+ * Otherwise they have eight bits that the GPU itself encodes and decodes, which every WebGL 2 has;
+ * the image is then the same but clipped at white.
  */
 import {
   HalfFloatType,
@@ -13,16 +14,16 @@ import {
   WebGLRenderTarget,
 } from "three";
 
-/** Samples of a pixel: as many as the browser's own anti-aliasing has. */
+/** Samples per pixel: as many as the browser's own anti-aliasing uses. */
 const SAMPLES = 4;
 
-/** The part of a context that is asked, so that tests need none. */
+/** The part of a context that is used, so that tests need no GPU. */
 export type LinearContext = Pick<
   WebGL2RenderingContext,
   "getExtension" | "getInternalformatParameter" | "RENDERBUFFER" | "RGBA16F" | "SAMPLES"
 >;
 
-/** Whether half floats can be drawn into, blended, and multisampled. */
+/** Whether half floats can be drawn into, blended and multisampled. */
 export function hasHalfFloats(gl: LinearContext): boolean {
   const isDrawable =
     gl.getExtension("EXT_color_buffer_float") ?? gl.getExtension("EXT_color_buffer_half_float");
@@ -31,7 +32,7 @@ export function hasHalfFloats(gl: LinearContext): boolean {
   return Array.from((samples ?? []) as Int32Array).some((count) => count >= SAMPLES);
 }
 
-/** @param count textures that are drawn at once */
+/** @param count number of textures that are drawn at once */
 export function linearTarget(
   renderer: WebGLRenderer,
   options: Readonly<{ hasDepth?: boolean; isMultisampled?: boolean; count?: number }> = {},

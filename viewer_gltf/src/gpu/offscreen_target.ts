@@ -1,4 +1,4 @@
-/** Draw a scene into a texture, for each eye in its part of it. */
+/** Draws a scene into a texture, each eye in its part of the texture. */
 import {
   type ArrayCamera,
   type Scene,
@@ -8,14 +8,17 @@ import {
 } from "three";
 import type { Eye, Eyes } from "./eyes";
 
-/** An eye's part of a target that is `scale` times as large as the frame buffer: whole pixels. */
+/**
+ * An eye's part, in whole pixels, of a target that is `scale` times as large as the frame buffer.
+ */
 export function partOf({ viewport }: Eye, scale: number, into = new Vector4()): Vector4 {
   into.copy(viewport).multiplyScalar(scale).round();
   return into.setZ(Math.max(1, into.z)).setW(Math.max(1, into.w));
 }
 
 /**
- * `target` becomes as large as the frame buffer times `scale`, and is cleared.
+ * Draws each eye with its own camera. `target` is resized to the frame buffer times `scale`, and
+ * cleared.
  *
  * @param onEye called before each eye is drawn, with its part of the target
  */
@@ -37,7 +40,7 @@ export function drawEyes(
   });
 }
 
-/** The same at the frame buffer's size, by a camera that has all eyes. */
+/** Draws all eyes at once at the frame buffer's size, with one camera for all. */
 export function drawAllEyes(
   renderer: WebGLRenderer,
   scene: Scene,
@@ -57,7 +60,7 @@ function drawInto(
 ): void {
   const before = renderer.getRenderTarget();
   const { autoClear } = renderer;
-  const { enabled } = renderer.xr; // else three would draw the headset's eyes by itself
+  const { enabled } = renderer.xr; // otherwise three.js would draw the headset's eyes itself
   const width = Math.max(1, Math.ceil(width_px * scale));
   const height = Math.max(1, Math.ceil(height_px * scale));
   target.setSize(width, height);

@@ -1,4 +1,7 @@
-/** The text of the shader chunks that the path tracer alone needs: apart, as it is. */
+/**
+ * The text of the shader chunks that only the path tracer needs, in a file of their own because
+ * they are loaded later.
+ */
 import { byName } from "./glsl_chunks";
 
 export const PATH_TRACE_CHUNKS = byName(

@@ -1,4 +1,4 @@
-/** What an eye that looks through a lens sees beside the lens's middle: marched at fewer pixels, and filled. */
+/** The periphery of an eye that looks through a lens: marched at fewer pixels, then filled. */
 import type { Vector4, WebGLRenderer, WebGLRenderTarget } from "three";
 import type { Eye, Eyes } from "./eyes";
 import { nothing } from "./float_targets";
@@ -7,7 +7,10 @@ import { drawEyes } from "./offscreen_target";
 import { ScreenPass } from "./screen_pass";
 import { FILL_FRAGMENT } from "./shaders/sources";
 
-/** The uniform of `chunks/periphery` for an eye; `isWorn`: there is a lens before it. */
+/**
+ * Sets the uniform of `chunks/periphery` for an eye.
+ * @param isWorn whether the eye looks through a lens
+ */
 export function aimLens({ camera }: Eye, isWorn: boolean, uLens: Vector4): void {
   const { elements: p } = camera.projectionMatrix;
   const [x, y] = isWorn ? [1 / p[0], 1 / p[5]] : [0, 0];
@@ -26,7 +29,7 @@ export class FilledPeriphery {
     this.pass = new ScreenPass(FILL_FRAGMENT, { uFirst: nothing(), uSecond: nothing(), uLens });
   }
 
-  /** Both textures of what was marched, at `scale` pixels to one of the frame buffer. */
+  /** Fills both textures of the march, which has `scale` pixels per pixel of the frame buffer. */
   render({ textures }: WebGLRenderTarget, eyes: Eyes, scale: number): void {
     const { renderer, pass, target } = this;
     const { uFirst, uSecond } = pass.uniforms;

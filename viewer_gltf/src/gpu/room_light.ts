@@ -1,14 +1,14 @@
 /**
- * The light of the room, the same for surfaces and for volumes: two lamps and a sky. Each as the light that a white
- * surface sends on where it faces the lamp: linear RGB. Pure.
+ * The light of the scene, the same for surfaces and volumes: two lamps and a sky. Each is given as
+ * the light that a white surface facing it reflects, in linear RGB.
  */
 import type { Rgb } from "../math/color";
 import type { Vec3 } from "../math/vec3";
 
-/** A lamp that is far away. */
+/** A lamp at infinite distance. */
 export type FarLamp = Readonly<{
   light: Rgb;
-  /** The direction to it, of any length. */
+  /** The direction towards the lamp, of any length. */
   towards: Vec3;
 }>;
 
@@ -16,13 +16,18 @@ export type RoomLight = Readonly<{
   key: FarLamp;
   fill: FarLamp;
   sky: Rgb;
-  /** Light from below: a dark room's floor still keeps a colour from turning black. */
+  /** Light from below, which keeps downward faces from turning black. */
   ground: Rgb;
-  /** The directions to the lamps are in the axes of the eye, over whose shoulder they hang, or of the specimen. */
+  /**
+   * Whether the lamps' directions are in the axes of the eye, over whose shoulders they hang, or of
+   * the specimen.
+   */
   standsWith: "eye" | "specimen";
 }>;
 
-/** The viewer's own light: a lamp over the viewer's left shoulder, and a weaker one from the right. */
+/**
+ * The viewer's own light: a lamp over the user's left shoulder, and a weaker one from the right.
+ */
 export const OWN_LIGHT: RoomLight = {
   key: { light: [0.66, 0.62, 0.56], towards: [-1.2, 1.6, 2.5] },
   fill: { light: [0.08, 0.1, 0.14], towards: [1.8, -0.4, 1.8] },
@@ -31,10 +36,16 @@ export const OWN_LIGHT: RoomLight = {
   standsWith: "eye",
 };
 
-/** The most of the lamp's light that a boundary in a volume throws back: as surfaces of roughness 0.5 do. */
+/**
+ * Largest share of the key light that a boundary in a volume reflects: like surfaces of roughness
+ * 0.5.
+ */
 export const GLOSS = 0.1;
 
-/** Lamps as one, from where most of their light comes; dark where there are none. */
+/**
+ * Combines lamps into one, in the direction from which most of their light comes; dark without
+ * lamps.
+ */
 export function asOneLamp(
   lamps: readonly Readonly<{ color: Rgb; strength: number; towards: Vec3 }>[],
 ): FarLamp {

@@ -1,4 +1,4 @@
-/** The mean of pictures that come one by one: what differs from one to the next, as noise does, goes. */
+/** The running mean of images, which removes differences between them, such as noise. */
 import {
   AddEquation,
   ConstantAlphaFactor,
@@ -14,7 +14,6 @@ import { ScreenPass } from "./screen_pass";
 import { COPY_FRAGMENT } from "./shaders/sources";
 
 export class RunningMean {
-  /** Of so many pictures. */
   count = 0;
   readonly target: WebGLRenderTarget;
   private readonly pass = new ScreenPass(COPY_FRAGMENT, { uFirst: nothing(), uSecond: nothing() });
@@ -34,7 +33,6 @@ export class RunningMean {
     return this.target.textures;
   }
 
-  /** Take in both textures of a target. */
   add({ textures, width, height }: WebGLRenderTarget): void {
     const { uFirst, uSecond } = this.pass.uniforms;
     [uFirst.value, uSecond.value] = textures;

@@ -1,4 +1,4 @@
-/** A fragment shader over a whole target, or over each eye's part of one. */
+/** A fragment shader over a whole target, or over each eye's part of it. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -18,7 +18,7 @@ export class ScreenPass<U extends Record<string, IUniform>> {
   readonly scene = new Scene();
   readonly material: ShaderMaterial;
   private readonly triangle = new BufferGeometry();
-  /** The part of the target that is drawn now. */
+  /** The part of the target that is being drawn. */
   readonly uPart = { value: new Vector4() };
 
   constructor(
@@ -45,7 +45,7 @@ export class ScreenPass<U extends Record<string, IUniform>> {
     this.scene.add(mesh);
   }
 
-  /** @param value null: it is not defined */
+  /** @param value null: removes the define */
   define(name: string, value: number | null): void {
     const { defines } = this.material;
     if ((defines[name] ?? null) === value) return;

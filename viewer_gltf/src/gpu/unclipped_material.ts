@@ -1,6 +1,7 @@
 /**
- * The pass for the depth draws all that is opaque in one material, which is cut as the specimen is.
- * What is no part of the specimen must stay whole there, or a volume behind it would show through.
+ * Keeps objects that are not part of the specimen from being clipped in the depth pass. The depth
+ * pass draws everything opaque with one material, which is clipped like the specimen. An unclipped
+ * object that was clipped there would let a volume behind it show through.
  */
 import { type Material, type Mesh, ShaderMaterial } from "three";
 
@@ -11,7 +12,7 @@ function countOf(material: Material): Count | null {
   return (material.uniforms.uCutCount as Count | undefined) ?? null;
 }
 
-export function leaveUncut(mesh: Mesh): void {
+export function keepUnclipped(mesh: Mesh): void {
   let count = 0;
   mesh.onBeforeRender = (_renderer, _scene, _camera, _geometry, material) => {
     const uniform = countOf(material);
@@ -25,7 +26,10 @@ export function leaveUncut(mesh: Mesh): void {
   };
 }
 
-/** three uploads a material's uniforms once for all its objects, unless the caller forces it. */
+/**
+ * three.js uploads a material's uniforms once for all its objects, unless `uniformsNeedUpdate` is
+ * set.
+ */
 function setCount(material: Material, uniform: Count, value: number): void {
   if (uniform.value === value) return;
   uniform.value = value;

@@ -18,7 +18,7 @@ export class Background {
    */
   setTheme(theme: Theme, isPlain: boolean): void {
     const use = (backdrop: Backdrop | null) => {
-      this.room.dress(theme, backdrop);
+      this.room.setTheme(theme, backdrop);
       this.onChange();
     };
     use(null);

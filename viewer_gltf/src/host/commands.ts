@@ -27,7 +27,7 @@ export class Commands {
   run(command: Command, isOnPage: boolean): boolean {
     const { host, parts } = this.options;
     const { state, viewpoint } = host;
-    const before = host.isInRoom ? null : viewpoint.lookNow;
+    const before = host.isInRoom ? null : viewpoint.cameraPose;
     if (parts.run(command, isOnPage)) return true;
     if (CAMERA_COMMANDS.has(command)) host.undo.noteCameraMove();
     if (!this.runOwn(command)) {

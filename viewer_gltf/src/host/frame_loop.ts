@@ -1,8 +1,8 @@
 /** Draws frames only when something has changed, each as fine as its time budget allows. */
 import type { Camera } from "three";
-import { Pace } from "../render/pacing/frame_budget";
-import { RestPace } from "../render/pacing/redraw_at_rest";
-import { GatherPace } from "../render/pacing/samples_per_frame";
+import { FrameBudget } from "../render/pacing/frame_budget";
+import { RedrawAtRest } from "../render/pacing/redraw_at_rest";
+import { SamplesPerFrame } from "../render/pacing/samples_per_frame";
 import { isTraced } from "../state/parameters/volumes";
 import type { QualityLevel, QualitySettings } from "../state/quality_controller";
 import type { ViewerState } from "../state/viewer_state";
@@ -40,9 +40,9 @@ export class FrameLoop {
   /** Frames drawn so far. */
   frames = 0;
   private readonly gl: WebGL2RenderingContext;
-  private pace: Pace;
-  private readonly gathering: GatherPace;
-  private readonly resting: RestPace;
+  private pace: FrameBudget;
+  private readonly gathering: SamplesPerFrame;
+  private readonly resting: RedrawAtRest;
   private last_ms = 0;
   /** Whether the scene or the camera has changed since the last frame. */
   private isStale = true;
@@ -68,9 +68,9 @@ export class FrameLoop {
         this.redraw();
       },
     });
-    this.pace = new Pace(this.gl);
-    this.gathering = new GatherPace(this.gl);
-    this.resting = new RestPace(this.gl);
+    this.pace = new FrameBudget(this.gl);
+    this.gathering = new SamplesPerFrame(this.gl);
+    this.resting = new RedrawAtRest(this.gl);
   }
 
   start(): void {
@@ -131,7 +131,7 @@ export class FrameLoop {
 
   /** Makes new GPU timers after the graphics context was restored. */
   renew(): void {
-    this.pace = new Pace(this.gl);
+    this.pace = new FrameBudget(this.gl);
   }
 
   private get isLoading(): boolean {

@@ -5,7 +5,7 @@ import { ValuesHost } from "../bundle/values_host";
 import { shownBox } from "../math/pick";
 import { Reading } from "../probe/probe_reader";
 import type { FrameRenderer } from "../render/frame_renderer";
-import { Hybrid } from "../render/gaze_focus";
+import { GazeFocus } from "../render/gaze_focus";
 import { Room } from "../render/scene";
 import type { Action } from "../state/actions";
 import { setTo } from "../state/parameters/kinds";
@@ -51,7 +51,7 @@ export class GpuDisplay implements Display {
   readonly stereo: Stereo;
   readonly background: Background;
   private readonly room: Room;
-  private readonly hybrid: Hybrid;
+  private readonly hybrid: GazeFocus;
   private readonly loop: FrameLoop;
   private readonly canvas: CanvasFit;
   /** CSS pixels per inch of this screen; null: estimated from the name of the browser. */
@@ -63,7 +63,7 @@ export class GpuDisplay implements Display {
     const { bounds_um: bounds } = manifest.specimen;
     this.renderer = renderer;
     this.room = new Room(manifest);
-    this.hybrid = new Hybrid(manifest);
+    this.hybrid = new GazeFocus(manifest);
     const onChange = () => this.redraw();
     this.viewpoint = new Viewpoint({
       ...{ canvas: renderer.domElement, bounds, specimen: this.room.specimen, onChange },

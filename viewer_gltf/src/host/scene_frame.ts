@@ -5,7 +5,7 @@ import { rayAhead } from "../interaction/rays";
 import { sightOf } from "../marks/sight";
 import type { Vec3 } from "../math/vec3";
 import { type FramePace, FrameRenderer } from "../render/frame_renderer";
-import type { Hybrid } from "../render/gaze_focus";
+import type { GazeFocus } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { marchedTile } from "../state/representation";
 import type { ViewerState } from "../state/viewer_state";
@@ -19,7 +19,7 @@ export type SceneFrameOptions = Readonly<{
   renderer: WebGLRenderer;
   stage: HTMLElement;
   room: Room;
-  hybrid: Hybrid;
+  hybrid: GazeFocus;
   /** Box of the specimen, um. */
   bounds: Bounds;
   /** Content of the frames. It is made after the renderer of frames, whose uniforms its shaders use. */
@@ -50,9 +50,9 @@ export class SceneFrame {
     const { viewpoint, forms, state } = this.options.shown();
     const { navigation } = viewpoint;
     const outline = forms.outline(state);
-    if (outline !== null) navigation.surround(outline);
+    if (outline !== null) navigation.setOccupied(outline);
     const shown = forms.shownPoints(state);
-    if (shown !== null) this.options.room.standUnder(navigation.inRoom(shown));
+    if (shown !== null) this.options.room.fitBackdrop(navigation.inRoom(shown));
     navigation.update(dt_s);
     this.followScreen();
     return navigation.camera;

@@ -1,8 +1,8 @@
 /** The viewer in numbers, for automation, the panel and the benchmark. */
 import type { WebGLRenderer } from "three";
-import type { Look } from "../interaction/named_views";
+import type { CameraPose } from "../interaction/named_views";
 import type { VolumeStatus } from "../render/drawn_forms";
-import type { Hybrid } from "../render/gaze_focus";
+import type { GazeFocus } from "../render/gaze_focus";
 import type { Room } from "../render/scene";
 import { discLimit } from "../state/focus_tiles";
 import type { Progress } from "../state/overview_progress";
@@ -16,7 +16,7 @@ import type { Viewpoint } from "./viewpoint";
 export type Snapshot = Readonly<{
   state: ViewerState;
   /** Pose of the flat camera, in metres of the scene. */
-  look: Look;
+  look: CameraPose;
   /** Whether all tiles of the first channel are shown. */
   hasFirstPicture: boolean;
   /** Loading progress of the overviews of all shown channels. */
@@ -60,7 +60,7 @@ export type SnapshotSource = Readonly<{
   state: ViewerState;
   renderer: WebGLRenderer;
   room: Room;
-  hybrid: Hybrid;
+  hybrid: GazeFocus;
   forms: Forms;
   stereo: Stereo;
   viewpoint: Viewpoint;
@@ -75,7 +75,7 @@ export function snapshotOf(source: SnapshotSource): Snapshot {
   const { memory, render, programs } = renderer.info;
   return {
     state,
-    look: viewpoint.navigation.lookNow,
+    look: viewpoint.navigation.cameraPose,
     hasFirstPicture: forms.hasFirst,
     overview: forms.overview,
     isLoading: source.isLoading,

@@ -60,7 +60,7 @@ export class StereoTransition {
   /** The view of the specimen; null: the opening view. */
   get cameraView(): CameraView | null {
     const { navigation, poseOnScreen: pose } = this;
-    const eye = pose === null ? navigation.look : navigation.lookNow;
+    const eye = pose === null ? navigation.look : navigation.cameraPose;
     if (eye === null || pose === null) return eye && { ...eye, specimen: null };
     const { position, orientation, scale } = pose;
     const specimen = { position: position.toArray(), orientation: orientation.toArray(), scale };

@@ -1,6 +1,6 @@
 /** Undo and redo of the user's steps, and the return from a single change. */
-import type { Look } from "../interaction/named_views";
-import { isSameLook } from "../interaction/orbit_camera";
+import type { CameraPose } from "../interaction/named_views";
+import { isSameCameraPose } from "../interaction/orbit_camera";
 import type { Action } from "../state/actions";
 import type { CameraView } from "../state/camera_view";
 import { isSameView, keyOfChange, nameOfChange } from "../state/history";
@@ -13,7 +13,7 @@ import type { Viewpoint } from "./viewpoint";
 export type Mark = Readonly<{
   state: ViewerState;
   camera: CameraView | null;
-  look: Look;
+  look: CameraPose;
   newest: object | null;
 }>;
 
@@ -78,13 +78,13 @@ export class Undo {
   get mark(): Mark {
     const { viewpoint, state } = this.options;
     const { cameraView: camera, navigation } = viewpoint;
-    return { state: state(), camera, look: navigation.lookNow, newest: this.steps.newest };
+    return { state: state(), camera, look: navigation.cameraPose, newest: this.steps.newest };
   }
 
   /** Returns whether the user would see a difference since a mark. */
   hasChangedSince({ state, look }: Mark): boolean {
     const { viewpoint, state: now } = this.options;
-    return !isSameView(state, now()) || !isSameLook(look, viewpoint.navigation);
+    return !isSameView(state, now()) || !isSameCameraPose(look, viewpoint.navigation);
   }
 
   /** The newest step of the history, which marks a place in it. */

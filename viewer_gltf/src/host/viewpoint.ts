@@ -1,8 +1,8 @@
 /** The viewpoint: the flat camera, the head in stereo, and the pose of the specimen. */
 import { type Matrix4, Quaternion, type Vector2, Vector3 } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
-import type { Look, Stand } from "../interaction/named_views";
-import { isSameLook, Navigation } from "../interaction/orbit_camera";
+import type { CameraPose, NamedView } from "../interaction/named_views";
+import { isSameCameraPose, Navigation } from "../interaction/orbit_camera";
 import { rayAhead, rayUnder } from "../interaction/rays";
 import { type Box, centerOf } from "../math/box";
 import { type HandPose, zoomAbout } from "../math/grab";
@@ -70,7 +70,7 @@ export class Viewpoint {
 
   /** The present view of the specimen, also if it is the opening view. */
   get viewNow(): CameraView {
-    return this.cameraView ?? { ...this.navigation.lookNow, specimen: null };
+    return this.cameraView ?? { ...this.navigation.cameraPose, specimen: null };
   }
 
   lookFrom(view: CameraView): void {
@@ -79,24 +79,24 @@ export class Viewpoint {
   }
 
   /** Pose of the flat camera, in metres of the scene. */
-  get lookNow(): Look {
-    return this.navigation.lookNow;
+  get cameraPose(): CameraPose {
+    return this.navigation.cameraPose;
   }
 
   /** Places the flat camera without moving the specimen. */
-  lookFlatFrom(look: Look): void {
+  lookFlatFrom(look: CameraPose): void {
     this.navigation.lookFrom(look);
     this.options.onChange();
   }
 
   /** Returns whether the flat camera has a pose. */
-  isAt(look: Look): boolean {
-    return isSameLook(look, this.navigation);
+  isAt(look: CameraPose): boolean {
+    return isSameCameraPose(look, this.navigation);
   }
 
   /** The present named view; null: the user has moved the camera. */
-  get standing(): Stand | null {
-    return this.navigation.standing;
+  get standing(): NamedView | null {
+    return this.navigation.namedView;
   }
 
   /** Distance from the eye to the middle of the specimen in the opening view, m. */
@@ -133,7 +133,7 @@ export class Viewpoint {
   }
 
   /** Opens with a named view, or with the opening view of the specimen. */
-  openAt(stand: Stand): void {
+  openAt(stand: NamedView): void {
     this.navigation.openAt(stand);
     this.options.onChange();
   }
@@ -216,7 +216,7 @@ export class Viewpoint {
 
   private flyOnScreen(middle: Vector3, edge_m: number, isSeen: (eye: Vec3) => boolean): boolean {
     const toSpecimen = this.specimen.clone().invert();
-    const { position, target } = this.navigation.lookNow;
+    const { position, target } = this.navigation.cameraPose;
     const distance_m = Math.max(NEAREST_OBJECT * edge_m, NEAREST_OBJECT_M);
     const now = new Vector3(...position).sub(new Vector3(...target));
     const eyes = [now, ...VIEW_DIRECTIONS.map((way) => new Vector3(...way))].map((way) =>

@@ -10,7 +10,7 @@ const SAMPLE: RaySample = {
   direction: [0, 0, -1],
   isGradual: false,
 };
-/** @param right_deg where the ray points */
+/** @param right_deg direction of the ray, degrees to the right */
 function pressed(
   time_ms: number,
   more: Partial<RaySample> = {},
@@ -25,21 +25,22 @@ function pressed(
 describe("the second of two quick presses", () => {
   const first = pressed(1000);
 
-  it("does nothing on the same control", () => {
+  it("is ignored on the same control", () => {
     expect(isSecondPress(first, pressed(1150))).toBe(true);
-    expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true); // a trigger shakes the hand
+    // Pressing a trigger shakes the hand.
+    expect(isSecondPress(first, pressed(1150, {}, false, 3))).toBe(true);
   });
 
-  it("counts if the first one was long ago, or if there was none", () => {
+  it("counts if the first press was long ago or there was none", () => {
     expect(isSecondPress(first, pressed(1001 + DOUBLE_MS))).toBe(false);
     expect(isSecondPress(null, pressed(1000))).toBe(false);
   });
 
-  it("counts on a control that moves on by steps", () => {
+  it("counts on a control that advances by steps", () => {
     expect(isSecondPress(pressed(1000, {}, true), pressed(1150, {}, true))).toBe(false);
   });
 
-  it("does nothing on a control that has come under the ray meanwhile, steps or not", () => {
+  it("is ignored on a control that has moved under the ray meanwhile, even one with steps", () => {
     const other = { target: "b", layout: "after", layouts: ["after"] };
     expect(isSecondPress(first, pressed(1150, other))).toBe(true);
     expect(isSecondPress(first, pressed(1150, other, true))).toBe(true);

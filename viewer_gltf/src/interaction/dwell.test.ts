@@ -11,10 +11,10 @@ import {
 } from "./dwell";
 
 const FRAME_S = 1 / 64; // exact in binary: 1.5 s is 96 frames
-/** Degrees to the right at which each target's middle is. */
+/** Degrees to the right of each target's middle. */
 const MIDDLES: Readonly<Record<string, number>> = { a: 0, b: 2, far: 20 };
 
-/** @param at_deg to the right */
+/** @param at_deg direction of the gaze, degrees to the right */
 function seen(target: string | null, more: Partial<RaySample> = {}, at_deg?: number): RaySample {
   const angle = ((at_deg ?? (target === null ? 10 : MIDDLES[target])) * Math.PI) / 180;
   const direction = [Math.sin(angle), 0, -Math.cos(angle)] as const;
@@ -23,7 +23,7 @@ function seen(target: string | null, more: Partial<RaySample> = {}, at_deg?: num
   return { ...own, ...more };
 }
 
-/** Look at each sample for so many seconds; the targets that fired, in order. */
+/** Looks at each sample for the given seconds. Returns the targets that fired, in order. */
 function watch(
   gazes: readonly (readonly [RaySample | string | null, number])[],
   isOn = true,
@@ -34,7 +34,7 @@ function watch(
   const progress: number[] = [];
   for (const [at, seconds] of gazes) {
     const sample = at === null || typeof at === "string" ? seen(at) : at;
-    // The frame on which a target is first seen starts its clock and adds nothing to it.
+    // The frame in which a target is first seen starts its clock but adds no time.
     for (let i = 0; i <= Math.round(seconds / FRAME_S); i++) {
       const [next, fires] = advanceDwell(dwell, sample, FRAME_S, isOn);
       dwell = next;
@@ -45,13 +45,13 @@ function watch(
   return { fired, progress, dwell };
 }
 
-describe("gaze that lasts", () => {
-  it("fires after 1.5 s and not a frame earlier", () => {
+describe("a lasting gaze", () => {
+  it("fires after 1.5 s and not one frame earlier", () => {
     expect(watch([["a", DWELL_S - FRAME_S]]).fired).toEqual([]);
     expect(watch([["a", DWELL_S]]).fired).toEqual(["a"]);
   });
 
-  it("fires nowhere while it wanders over a large target, and once it rests there", () => {
+  it("does not fire while it wanders over a large target, and fires once when it rests there", () => {
     const wander = Array.from({ length: 40 }, (_, i) => [seen("far", {}, 2.4 * i), 0.2] as const);
     expect(watch(wander).fired).toEqual([]);
     expect(watch([...wander, [seen("far", {}, 97), DWELL_S]]).fired).toEqual(["far"]);
@@ -62,7 +62,7 @@ describe("gaze that lasts", () => {
     expect(watch(tremble).fired).toEqual(["far"]);
   });
 
-  it("fires once, however long it lasts, and again after the target was left", () => {
+  it("fires once even if it lasts longer, and again after leaving the target", () => {
     expect(watch([["a", 10]]).fired).toEqual(["a"]);
     const gazes = [
       ["a", 3],
@@ -74,7 +74,7 @@ describe("gaze that lasts", () => {
     expect(watch(gazes).fired).toEqual(["a", "a", "b", "a"]);
   });
 
-  it("is cancelled by leaving: two short gazes do not add up", () => {
+  it("is cancelled by leaving, so two short gazes do not add up", () => {
     const gazes = [
       ["a", 1.4],
       ["b", 0.1],
@@ -85,10 +85,10 @@ describe("gaze that lasts", () => {
     expect(watch(gazes).fired).toEqual([]);
   });
 
-  it("fills a ring evenly, which vanishes when it fires", () => {
+  it("fills a ring evenly, and the ring disappears when it fires", () => {
     const { progress } = watch([["a", DWELL_S]]);
     expect(progress[0]).toBe(0);
-    expect(progress[Math.floor(RING_S / FRAME_S)]).toBe(0); // a gaze that passes by
+    expect(progress[Math.floor(RING_S / FRAME_S)]).toBe(0); // a passing gaze shows no ring
     const middle = (48 * FRAME_S - RING_S) / (DWELL_S - RING_S);
     expect(progress[48]).toBeCloseTo(middle);
     expect(progress[95]).toBeGreaterThan(0.98);
@@ -96,12 +96,12 @@ describe("gaze that lasts", () => {
     expect(dwellProgress(NO_DWELL)).toBe(0);
   });
 
-  it("fires at nothing never", () => {
+  it("never fires without a target", () => {
     expect(watch([[null, 5]]).fired).toEqual([]);
     expect(spend(NO_DWELL)).toEqual(NO_DWELL);
   });
 
-  it("can be turned off, also half-way", () => {
+  it("can be switched off, even half-way", () => {
     const { fired, progress } = watch([["a", 5]], false);
     expect(fired).toEqual([]);
     expect(Math.max(...progress)).toBe(0);
@@ -110,22 +110,22 @@ describe("gaze that lasts", () => {
     expect(dwellProgress(off)).toBe(0);
   });
 
-  it("is not made by a stall of the page", () => {
+  it("is not completed by a stall of the page", () => {
     const { dwell } = watch([["a", 0]]);
     expect(advanceDwell(dwell, seen("a"), 60)[1]).toBe(false);
   });
 });
 
-describe("a gaze that rests where it has chosen", () => {
-  it("chooses nothing more, though it trembles across the border of the next control", () => {
-    // from .4 degrees inside of one control to .5 degrees inside of the next one, and back
+describe("a gaze that rests on the target that it has chosen", () => {
+  it("chooses nothing else, even if it trembles across the border to the next control", () => {
+    // from 0.4 degrees inside one control to 0.5 degrees inside the next one, and back
     const gazes = Array.from({ length: 8 }, (_, i) =>
       i % 2 === 0 ? ([seen("a", {}, 0.6), 2] as const) : ([seen("b", {}, 1.5), 2] as const),
     );
     expect(watch(gazes).fired).toEqual(["a"]);
   });
 
-  it("chooses again by a slider, a little further along it, and not by a switch", () => {
+  it("chooses again a little further along a slider, but not on a switch", () => {
     const slider = { isGradual: true };
     const along = (more: Partial<RaySample>, by_deg: number) =>
       watch([
@@ -137,14 +137,14 @@ describe("a gaze that rests where it has chosen", () => {
   });
 });
 
-describe("a layout that changes under the gaze", () => {
+describe("a layout change under the gaze", () => {
   const before = { layout: "before", place: "upper" };
   const after = { layout: "after", place: "upper" };
 
   it.each([
-    ["another control takes the place", seen("b", after, 0)],
-    ["the control is elsewhere, and still under the gaze", seen("a", { ...after, place: "lower" })],
-  ])("chooses nothing until the gaze has moved: %s", (_, next) => {
+    ["another control moves there", seen("b", after, 0)],
+    ["the control moves, and is still under the gaze", seen("a", { ...after, place: "lower" })],
+  ])("prevents a choice until the gaze has moved: %s", (_, next) => {
     const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
     const arrived = watch([[seen("a", before), 1]], true, dwell);
     expect(dwellProgress(arrived.dwell)).toBeGreaterThan(0.5);
@@ -160,7 +160,7 @@ describe("a layout that changes under the gaze", () => {
     expect(watch([[moved, 6]], true, rested.dwell).fired).toEqual([next.target]);
   });
 
-  it("lets the time count on if nothing changes under the gaze itself", () => {
+  it("does not stop the time if nothing changes under the gaze itself", () => {
     const { dwell } = watch([
       [seen("far", { ...before, place: "aside" }), 0],
       [seen("a", before), 1],
@@ -168,17 +168,17 @@ describe("a layout that changes under the gaze", () => {
     expect(watch([[seen("a", after), 1]], true, dwell).fired).toEqual(["a"]);
   });
 
-  it("does not stop a gaze that moves to another control by itself", () => {
+  it("does not prevent a choice after the gaze itself moves to another control", () => {
     const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
     expect(watch([[seen("b", before), 2]], true, dwell).fired).toEqual(["b"]);
   });
 
-  it("is assumed at the first frame for a control, and not for a tile", () => {
+  it("is assumed in the first frame for a control, but not for a tile", () => {
     expect(watch([[seen("a", before), 6]]).fired).toEqual([]);
     expect(watch([[seen("a", { ...before, place: null }), 6]]).fired).toEqual(["a"]);
   });
 
-  it("does not let a control fire again that has fired and comes back under the gaze", () => {
+  it("does not let a control fire again when it comes back under the gaze", () => {
     const { dwell } = watch([[seen("far", { ...before, place: "aside" }), 0]]);
     const slid = seen("b", { layout: "then", place: "upper" }, 0);
     const gazes = [
@@ -190,8 +190,8 @@ describe("a layout that changes under the gaze", () => {
   });
 });
 
-describe("the button", () => {
-  it("takes the dwell's turn: the same target does not fire late as well", () => {
+describe("a button press", () => {
+  it("spends the dwell, so the same target does not fire again", () => {
     const dwell = spend(watch([["a", 1]]).dwell);
     expect(watch([["a", 5]], true, dwell).fired).toEqual([]);
   });

@@ -1,64 +1,74 @@
 /**
- * How long one target (a tile or a control) has been gazed at. Plain data, so that tests need no
+ * How long a target (a tile or a control) has been gazed at, as plain data, so that tests need no
  * headset.
  *
- * A dwell fires once and is spent. It is spent as well when the layout under a resting gaze changes:
- * the user did not look for a control that slides or opens under the gaze. A spent dwell fires nothing
- * until the gaze moves on. The tremble of a resting head is no such move.
+ * A dwell fires once and is then spent. It is also spent when the layout under a resting gaze
+ * changes, since the user did not look for a control that moves or opens under the gaze. A spent
+ * dwell does not fire until the gaze moves on. The tremble of a resting head does not count as
+ * moving on.
  *
- * A gaze that wanders over a large target, as over a tile or a long row, does not rest: its time begins again.
+ * A gaze that wanders over a large target, such as a tile or a long row, is not at rest, so its
+ * time starts again.
  */
 import { dot, type Vec3 } from "../math/vec3";
 
-/** The target that a ray meets in one frame, and its place. */
+/** The target that a ray hits in one frame, and its place. */
 export type RaySample = Readonly<{
-  /** The key of the target; null: nothing that can be chosen. */
+  /** Key of the target; null if there is none that can be chosen. */
   target: string | null;
-  /** Where the target lies in its layout; null: it belongs to no layout. */
+  /** Place of the target in its layout; null if it belongs to no layout. */
   place: string | null;
-  /** The layout that the target belongs to: another text whenever a part of it comes, goes or moves. */
+  /**
+   * Layout of the target: a text that changes when a part of the layout appears, disappears or
+   * moves.
+   */
   layout: string;
-  /** All layouts, among them that of the target. */
+  /** All layouts, including that of the target. */
   layouts: readonly string[];
-  /** Direction of the ray, of unit length. */
+  /** Unit direction of the ray. */
   direction: Vec3;
-  /** Each point of the target chooses another value, as on a slider. */
+  /** Whether each point of the target chooses another value, as on a slider. */
   isGradual: boolean;
 }>;
 
-/** Where the gaze was when its dwell was spent. */
 type Spent = Readonly<{
   direction: Vec3;
   target: string | null;
-  /** Whether the target itself has fired. */
   hasFired: boolean;
 }>;
 
 export type Dwell = Readonly<{
-  /** The sample of the previous frame; null: there was none. */
   sample: RaySample | null;
   elapsed_s: number;
-  /** Direction of the gaze when its time last began; null: the dwell is spent, or nothing was seen yet. */
+  /**
+   * Direction of the gaze when its time last started; null if the dwell is spent or nothing was
+   * seen yet.
+   */
   began: Vec3 | null;
-  /** null: the time counts. */
+  /** Null while the time counts. */
   spent: Spent | null;
 }>;
 
+/** Seconds that a gaze must rest until it chooses. */
 export const DWELL_S = 1.5;
-/** Time after which the ring shows, s: a gaze that passes by starts no ring. */
+/** Seconds until the ring is shown, so that a passing gaze shows no ring. */
 export const RING_S = 0.4;
-/** Longest time that a frame counts, s: a stall of the page is no gaze. */
+/**
+ * Seconds. Longest time that one frame counts, so that a stall of the page is not taken for a gaze.
+ */
 const LONGEST_FRAME_S = 0.1;
-/** Largest turn of a resting head, radians, from one of its directions to another. */
+/** Radians. Largest angle between two directions of a resting head. */
 export const TREMBLE_RAD = (1 * Math.PI) / 180;
-/** Largest turn of a gaze that rests, radians, from where its rest began: the height of a large button. */
+/**
+ * Radians. Largest angle of a resting gaze from where its rest began: the height of a large button.
+ */
 const REST_RAD = (5 * Math.PI) / 180;
-/** Turn that is a move of its own, also within one control, radians. */
+/** Radians. A turn by this angle is intended, even within one control. */
 const MOVE_RAD = (1.5 * Math.PI) / 180;
 
 export const NO_DWELL: Dwell = { sample: null, elapsed_s: 0, began: null, spent: null };
 
-/** The next state, and whether this frame is the one on which the dwell fires. */
+/** Returns the next state, and whether the dwell fires in this frame. */
 export function advanceDwell(
   dwell: Dwell,
   sample: RaySample,
@@ -87,7 +97,9 @@ export function advanceDwell(
   return elapsed_s < DWELL_S ? [next, false] : [spend(next), true];
 }
 
-/** The dwell after the gaze or a button has chosen: the gaze chooses nothing more until it moves on. */
+/**
+ * The dwell after the gaze or a button has chosen: the gaze chooses nothing else until it moves on.
+ */
 export function spend(dwell: Dwell): Dwell {
   const { sample } = dwell;
   if (sample === null) return dwell;
@@ -95,19 +107,22 @@ export function spend(dwell: Dwell): Dwell {
   return { sample, elapsed_s: 0, began: null, spent: { direction, target, hasFired: true } };
 }
 
-/** Share of the ring that is filled, 0..1; 0 before the ring shows, and while the dwell is spent. */
+/**
+ * Share of the ring that is filled, 0 to 1; 0 before the ring is shown and while the dwell is
+ * spent.
+ */
 export function dwellProgress({ elapsed_s }: Dwell): number {
   return Math.min(1, Math.max(0, (elapsed_s - RING_S) / (DWELL_S - RING_S)));
 }
 
-/** The angle between two directions of unit length, radians. */
+/** The angle between two unit vectors, radians. */
 export function angleBetween(a: Vec3, b: Vec3): number {
   return Math.acos(Math.min(1, Math.max(-1, dot(a, b))));
 }
 
 /**
- * Whether another target is under the gaze because its layout, or that of the target before, has changed, and
- * not because the gaze has moved. At the first sample this is so for each target of a layout.
+ * Whether another target is under the gaze because a layout has changed, and not because the gaze
+ * has moved. For the first sample this is true for each target in a layout.
  */
 function hasLayoutChanged(before: RaySample | null, now: RaySample): boolean {
   if (before === null) return now.place !== null;

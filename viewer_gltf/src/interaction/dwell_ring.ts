@@ -1,7 +1,7 @@
 /**
- * The ring where a ray ends: it fills clockwise from the top while a dwell goes on. Of constant
- * size to the eye, over everything, and as far away as what is pointed at, so that both eyes see it
- * there and not twice.
+ * The ring at the end of a ray, which fills clockwise from the top during a dwell. It has a
+ * constant size to the eye and is drawn over everything. It is as far away as the target, so that
+ * both eyes see it there and not double.
  */
 import {
   type BufferGeometry,
@@ -16,10 +16,13 @@ import {
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
 const DIAMETER_DEG = 1.5;
+/** Degrees. Diameter of the dot in its middle. */
 const DOT_DEG = 0.3;
-/** Inner radius as a share of the outer. */
-const HOLE = 0.72;
-/** Width of the dark rim, as a share of the radius: it makes white visible on anything. */
+/** Inner radius as a share of the outer radius. */
+const INNER_RADIUS = 0.72;
+/**
+ * Width of the dark rim, as a share of the radius; the rim makes white visible on any background.
+ */
 const RIM = 0.1;
 const WHITE = 0xffffff;
 const DARK = 0x0b0d12;
@@ -27,23 +30,26 @@ const PARTS = 72;
 const INDICES_PER_PART = 6;
 const DOT_PARTS = 24;
 const DOT_INDICES = 3 * DOT_PARTS;
-/** Render order: after the volumes' picture, which covers all that is drawn before it. */
+/** Draw order: after the volumes' image, which covers everything drawn before it. */
 const OVER_ALL = 2000;
 const RADIANS = Math.PI / 180;
 
 export class Ring {
   readonly group = new Group();
-  /** Dot and ring of each colour are one thing to draw: the dot first, of the ring as much as shows. */
+  /**
+   * Dot and ring of one colour are one mesh: the dot's triangles come first, then the filled part
+   * of the ring.
+   */
   private readonly dark = flat(
     new CircleGeometry(DOT_DEG / DIAMETER_DEG + RIM, DOT_PARTS),
-    new RingGeometry(HOLE - RIM, 1 + RIM, PARTS),
+    new RingGeometry(INNER_RADIUS - RIM, 1 + RIM, PARTS),
     DARK,
     0.6,
   );
-  /** Clockwise from the top, as a clock fills. */
+  /** Clockwise from the top, like a clock. */
   private readonly light = flat(
     new CircleGeometry(DOT_DEG / DIAMETER_DEG, DOT_PARTS),
-    new RingGeometry(HOLE, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
+    new RingGeometry(INNER_RADIUS, 1, PARTS, 1, Math.PI / 2, -2 * Math.PI),
     WHITE,
     1,
   );
@@ -51,7 +57,7 @@ export class Ring {
   constructor() {
     this.group.name = "ring";
     this.group.add(...this.parts);
-    // the dark one first: they lie in one plane, so that nothing else gives their order
+    // the dark part first: both lie in one plane, so only the render order separates them
     this.parts.forEach((part, i) => {
       part.renderOrder = OVER_ALL + i;
     });
@@ -66,7 +72,7 @@ export class Ring {
     return this.group.visible;
   }
 
-  /** @param progress 0..1; at 0 there is the dot alone */
+  /** @param progress 0 to 1; at 0 only the dot is shown */
   show(at: Vector3, eye: Vector3, progress: number): void {
     const radius_m = at.distanceTo(eye) * Math.tan((DIAMETER_DEG / 2) * RADIANS);
     this.group.position.copy(at);

@@ -1,10 +1,10 @@
-/** The wheel in a page that another one holds in a frame. */
+/** The mouse wheel on a page that another page embeds in a frame. */
 
 /**
- * Until somebody has clicked here the wheel scrolls the page around, as it does over any picture; with Ctrl, and by
- * a pinch on a trackpad, it zooms at once.
+ * Lets the wheel scroll the outer page until the user has clicked on the canvas. With Ctrl, or by a
+ * pinch on a trackpad, it zooms at once.
  */
-export function leaveWheelToHolder(stage: HTMLElement): void {
+export function leaveWheelToOuterPage(stage: HTMLElement): void {
   stage.addEventListener(
     "wheel",
     (event) => {

@@ -1,4 +1,4 @@
-/** The views of a specimen that have a name, as a flat screen frames them. Lengths are metres of the scene. */
+/** The named views of a specimen on a flat screen. Lengths are metres of the scene. */
 import { Vector3 } from "three";
 import { around, cornersOf } from "../math/box";
 import type { Vec3 } from "../math/vec3";
@@ -7,34 +7,34 @@ import { framingDistance, type Placement } from "../render/placement";
 
 export const FIELD_OF_VIEW_DEG = 40;
 export const FARTHEST_M = 8;
-/** The turn that a specimen opens with: so far to either side, and the time to and fro, s. */
+/** Radians of the slow turn at the opening to either side, and seconds of one full swing. */
 const SWAY_RAD = Math.PI / 10;
 const SWAY_S = 30;
-/** Parts of it at which the eye may be farthest. */
+/** Parts of a swing at which the eye may be farthest from the specimen. */
 const TURNED = [-0.25, -0.125, 0, 0.125, 0.25];
 
-/** A view that has a name: it follows the window's shape as long as nobody moves. */
-export const STANDS = ["opening", "front", "side", "top"] as const;
-export type Stand = (typeof STANDS)[number];
+/** The named views. A named view follows the window's shape until the user moves. */
+export const NAMED_VIEWS = ["opening", "front", "side", "top"] as const;
+export type NamedView = (typeof NAMED_VIEWS)[number];
 
-/** Metres of the room. */
-export type Look = Readonly<{
+/** Position of the camera and of the point that it looks at, metres of the scene. */
+export type CameraPose = Readonly<{
   position: readonly [number, number, number];
   target: readonly [number, number, number];
 }>;
 
-/** Shares of the picture's height, at its edges, that something lies over. */
+/** Shares of the image's height, at its top and bottom, that are covered by other elements. */
 export type Covered = Readonly<{ top: number; bottom: number }>;
 
-/** Most that is left out of the picture's height when the opening is framed. */
+/** Largest share of the image's height that is left out when the opening is framed. */
 const MOST_COVERED = 0.6;
 
 export class NamedViews {
-  /** Half of the specimen's edges. */
+  /** Half of the specimen's edges, metres. */
   readonly reach: Vector3;
-  /** Outermost points of what is there of the specimen: the opening is framed on them. */
+  /** Outermost points of the occupied part of the specimen, on which the opening is framed. */
   private occupied: readonly Vec3[];
-  /** The opening is framed on what is free of the picture. */
+  /** The opening is framed in the uncovered part of the image. */
   private covered: Covered = { top: 0, bottom: 0 };
   private aspect = 1;
 
@@ -44,40 +44,40 @@ export class NamedViews {
     this.occupied = cornersOf({ min: [-x, -y, -z], max: [x, y, z] });
   }
 
-  /** The picture has this shape, and something lies over its edges. */
+  /** Sets the shape of the image, and the parts of it that are covered. */
   fit(aspect: number, covered: Covered): void {
-    // buttons and words may be higher than a very low picture
+    // buttons and texts may be higher than a very low image
     const share = Math.min(1, MOST_COVERED / (covered.top + covered.bottom || 1));
     this.covered = { top: share * covered.top, bottom: share * covered.bottom };
     this.aspect = aspect;
   }
 
-  /** Outermost points of what is there of the specimen, um. */
-  surround(points: readonly Vec3[]): void {
+  /** Sets the outermost points of the occupied part of the specimen, um. */
+  setOccupied(points: readonly Vec3[]): void {
     this.occupied = this.inRoom(points);
   }
 
-  /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
+  /** Converts points of the specimen, um, to the scene, metres, as a flat screen shows it. */
   inRoom(points: readonly Vec3[]): readonly Vec3[] {
     const { center, scale } = this.placement;
     const [cx, cy, cz] = center;
     return points.map(([x, y, z]) => [(x - cx) * scale, (y - cy) * scale, (z - cz) * scale]);
   }
 
-  /** The whole specimen: x to the right and y up from the front. */
-  lookAt(stand: Stand, swayed_s: number): Look {
+  /** The camera of a named view of the whole specimen: x to the right and y up from the front. */
+  lookAt(view: NamedView, swayed_s: number): CameraPose {
     const target = [0, 0, 0] as const;
-    if (stand === "opening") return this.lookAround(swayed_s);
-    if (stand === "front") return { position: [0, 0, this.framing(2)], target };
-    if (stand === "side") return { position: [this.framing(0), 0, 0], target };
+    if (view === "opening") return this.lookAround(swayed_s);
+    if (view === "front") return { position: [0, 0, this.framing(2)], target };
+    if (view === "side") return { position: [this.framing(0), 0, 0], target };
     return { position: [0, this.framing(1), 1e-4], target };
   }
 
-  /** The opening after so much of its turn. */
-  private lookAround(swayed_s: number): Look {
+  /** The camera of the opening after `swayed_s` seconds of its slow turn. */
+  private lookAround(swayed_s: number): CameraPose {
     const { top, bottom } = this.covered;
     const free = 1 - top - bottom;
-    const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // of the picture, a metre away
+    const half = Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360); // half the image's height, at 1 m
     const lens = { fov_rad: 2 * Math.atan(free * half), aspect: this.aspect / free };
     const still = openingView(around(this.occupied), lens);
     const sway_rad = SWAY_RAD * Math.sin((2 * Math.PI * swayed_s) / SWAY_S);
@@ -89,7 +89,7 @@ export class NamedViews {
     return { position: eye.toArray(), target: target.toArray() };
   }
 
-  /** Farthest distance of the eye from the middle during the opening's turn. */
+  /** Largest distance of the eye from the middle during the opening's slow turn. */
   get openingDistance_m(): number {
     const looks = TURNED.map((part) => this.lookAround(part * SWAY_S));
     return Math.max(

@@ -19,12 +19,12 @@ const azimuth = ({ camera, controls }: Navigation) =>
   new Spherical().setFromVector3(new Vector3().subVectors(camera.position, controls.target)).theta;
 
 describe("a glide", () => {
-  it("takes as long at few frames a second as at many, and ends at the same place", () => {
+  it("takes the same time at low and high frame rates, and ends at the same place", () => {
     const ways = [60, 10, 5].map((frames) => {
       const navigation = start();
       navigation.openAt("front");
       navigation.update(1 / frames);
-      navigation.controls.rotateLeft(0.6); // moves by its own share of a frame at once
+      navigation.controls.rotateLeft(0.6); // moves by its share of a frame at once
       const first = azimuth(navigation);
       const after: number[] = [];
       for (const seconds of [0.2, 0.4, 3]) {
@@ -47,7 +47,7 @@ describe("a glide", () => {
 const eye = ({ camera }: Navigation) => camera.position.toArray().map((v) => Number(v.toFixed(6)));
 
 describe("the opening", () => {
-  it("is framed in what is free of the picture, and in the middle of that", () => {
+  it("is framed in the middle of the uncovered part of the image", () => {
     const [min, max] = [
       [-0.6, -0.45, -0.225],
       [0.6, 0.45, 0.225],
@@ -60,7 +60,7 @@ describe("the opening", () => {
       const navigation = start();
       navigation.fit(aspect, { top, bottom });
       navigation.camera.updateMatrixWorld();
-      // from the left and from the upper edge of the picture, 0..1
+      // from the left and from the upper edge of the image, 0 to 1
       const corners = Array.from({ length: 8 }, (_, i) => {
         const corner = [0, 1, 2].map((axis) => ((i >> axis) & 1 ? max : min)[axis]);
         const { x, y } = new Vector3(...corner).project(navigation.camera);
@@ -77,7 +77,7 @@ describe("the opening", () => {
     }
   });
 
-  it("stands somewhere in a picture that is lower than what lies over it", () => {
+  it("is inside the image even if the covering elements are higher than the image", () => {
     for (const covered of [
       { top: 0.7, bottom: 0.3 },
       { top: 2, bottom: 1 },
@@ -85,14 +85,14 @@ describe("the opening", () => {
       const navigation = start();
       navigation.fit(8, covered);
       navigation.reset();
-      const { position, target } = navigation.lookNow;
+      const { position, target } = navigation.cameraPose;
       const away_m = Math.hypot(...position.map((v, i) => v - target[i]));
       expect(away_m).toBeGreaterThan(0.1);
       expect(away_m).toBeLessThan(20);
     }
   });
 
-  it("turns slowly to and fro until someone moves, and stays where it is then", () => {
+  it("swings slowly until the user moves, and then stays where it is", () => {
     const navigation = start();
     const still = azimuth(navigation);
     navigation.turnSlowly();
@@ -108,7 +108,7 @@ describe("the opening", () => {
     expect(navigation.openingDistance_m).toBeLessThan(Math.max(...away) + 0.01);
     navigation.update(3);
     const before = eye(navigation);
-    expect(navigation.look).not.toBeNull(); // a link has to say where it is
+    expect(navigation.look).not.toBeNull(); // a link has to contain the camera
     navigation.stopTurning();
     navigation.update(5);
     expect(eye(navigation)).toEqual(before);
@@ -118,10 +118,11 @@ describe("the opening", () => {
     expect(navigation.look).toBeNull();
   });
 
-  it("is framed on what there is of the specimen, and follows the window's shape", () => {
+  it("is framed on the occupied part of the specimen, and follows the window's shape", () => {
     const navigation = start();
     const far = navigation.camera.position.length();
-    navigation.surround(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] })); // a corner, a third as large
+    // One corner of the specimen, a third as large.
+    navigation.setOccupied(cornersOf({ min: [0, -16, 0], max: [16, 0, 8] }));
     const { target } = navigation.controls;
     expect(target.x).toBeLessThan(0);
     expect(target.y).toBeGreaterThan(0);
@@ -131,10 +132,10 @@ describe("the opening", () => {
     expect(navigation.camera.position.distanceTo(target)).toBeGreaterThan(1.2 * near);
   });
 
-  it("is never cut off by its turn, and stays as large as fits", () => {
+  it("is not cut off by its slow turn, and stays as large as fits", () => {
     const navigation = start();
     const stick = [0, 1].map((i) => [64 * i, -48 * i, 24 * i] as const); // from corner to corner
-    navigation.surround(stick);
+    navigation.setOccupied(stick);
     navigation.turnSlowly();
     const { center, scale } = place({ min: [0, -48, 0], max: [64, 0, 24] });
     for (let k = 0; k < 60; k++) {
@@ -149,16 +150,17 @@ describe("the opening", () => {
     }
   });
 
-  it("may be another view, which is then the one to return to", () => {
+  it("may be another view, and reset then returns to it", () => {
     const navigation = start();
     navigation.openAt("front");
     navigation.turnSlowly();
     navigation.update(4);
     expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);
-    expect(navigation.look).not.toBeNull(); // a link does not say that the address did
+    // A link must contain the camera, since it does not contain the opening of the address.
+    expect(navigation.look).not.toBeNull();
     expect(navigation.run("side")).toBe(true);
     expect(navigation.look).not.toBeNull();
-    navigation.fit(0.5); // it follows the window's shape, too
+    navigation.fit(0.5); // the view follows the window's shape, too
     expect(eye(navigation)[0]).toBeGreaterThan(1);
     navigation.reset();
     expect(eye(navigation).slice(0, 2)).toEqual([0, 0]);

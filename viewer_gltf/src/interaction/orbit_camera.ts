@@ -1,8 +1,8 @@
 /**
- * The mono camera: it goes round the specimen by mouse, touch and key. One finger or the left button
- * turns, two fingers or the wheel zoom about the point that is looked at, two fingers or the right
- * button move. Nobody loses the specimen: the point that is looked at stays in its box, the eye
- * within limits of it.
+ * The camera of a flat screen, which orbits the specimen by mouse, touch and keys. One finger or
+ * the left button turns. Two fingers or the wheel zoom about the point that is looked at. Two
+ * fingers or the right button move. The specimen cannot get lost: the point that is looked at stays
+ * in its box, and the eye stays within limits around it.
  */
 import { PerspectiveCamera, Spherical, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -10,39 +10,42 @@ import type { Vec3 } from "../math/vec3";
 import { distanceToSee, type Placement } from "../render/placement";
 import type { Command } from "../state/commands";
 import {
+  type CameraPose,
   type Covered,
   FARTHEST_M,
   FIELD_OF_VIEW_DEG,
-  type Look,
+  type NamedView,
   NamedViews,
-  type Stand,
 } from "./named_views";
 
 const NEAREST_M = 0.05;
-/** Share of a glide that is left a second after the hand let go. */
+/** Share of a glide that is left one second after the hand has let go. */
 const LEFT_AFTER_A_SECOND = 0.88 ** 60;
-/** Turn by one key press, radians. */
+/** Radians that one key press turns. */
 const TURN_RAD = Math.PI / 12;
+/** Factor of the distance for one key press. */
 const ZOOM = 0.8;
-/** Time of a flight to a place, s. */
+/** Seconds of a flight to a point. */
 const FLIGHT_S = 0.4;
-/** Move by one key press, as a share of the picture's height. */
+/** Motion by one key press, as a share of the image's height. */
 const PAN = 0.1;
 
-/** Largest difference of two numbers of a look that is the same, m. */
+/** Metres. Largest difference between numbers of two cameras that count as equal. */
 const SAME_M = 1e-4;
 
-/** Whether nothing has moved since the look was taken. */
-export function isSameLook(look: Look, { lookNow }: Pick<Navigation, "lookNow">): boolean {
-  const [was, is] = [look, lookNow].map(({ position, target }) => [...position, ...target]);
+/** Whether the camera has not moved since `look` was read. */
+export function isSameCameraPose(
+  look: CameraPose,
+  { cameraPose }: Pick<Navigation, "cameraPose">,
+): boolean {
+  const [was, is] = [look, cameraPose].map(({ position, target }) => [...position, ...target]);
   return was.every((v, i) => Math.abs(v - is[i]) < SAME_M);
 }
 
-/** The acts of the camera, by command. */
 const ACTS: Readonly<Partial<Record<Command, (navigation: Navigation) => void>>> = {
-  front: (navigation) => navigation.standStill("front"),
-  side: (navigation) => navigation.standStill("side"),
-  top: (navigation) => navigation.standStill("top"),
+  front: (navigation) => navigation.showStill("front"),
+  side: (navigation) => navigation.showStill("side"),
+  top: (navigation) => navigation.showStill("top"),
   "zoom-in": (navigation) => navigation.move(0, 0, ZOOM),
   "zoom-out": (navigation) => navigation.move(0, 0, 1 / ZOOM),
   "turn-left": (navigation) => navigation.move(-TURN_RAD, 0, 1),
@@ -59,13 +62,12 @@ export class Navigation {
   readonly camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 20);
   readonly controls: OrbitControls;
   private readonly views: NamedViews;
-  /** The view that `reset` returns to. */
-  private home: Stand = "opening";
-  /** The view that still holds; null: someone has moved. */
-  private stand: Stand | null = "opening";
-  /** Since the turn of the opening began, s; null: there is none. */
+  private home: NamedView = "opening";
+  /** The current named view; null after the user has moved. */
+  private shownView: NamedView | null = "opening";
+  /** Seconds since the opening's slow turn began; null if it does not turn. */
   private swayed_s: number | null = null;
-  private flight: Readonly<{ from: Look; to: Look; elapsed_s: number }> | null = null;
+  private flight: Readonly<{ from: CameraPose; to: CameraPose; elapsed_s: number }> | null = null;
   constructor(canvas: HTMLElement, placement: Placement, onChange: () => void) {
     this.views = new NamedViews(placement);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -77,111 +79,113 @@ export class Navigation {
       onChange();
     });
     this.controls.addEventListener("start", () => {
-      this.stand = null;
+      this.shownView = null;
       this.flight = null;
     });
   }
 
-  /** Go on with a glide, as long in seconds however few the frames; after so many of them. */
+  /** Advances glides, flights and the slow turn; they take the same time at any frame rate. */
   update(dt_s: number): void {
     this.fly(dt_s);
     if (this.swayed_s !== null) {
       this.swayed_s += dt_s;
-      this.standAt("opening");
+      this.showNamedView("opening");
     }
     this.controls.dampingFactor = 1 - LEFT_AFTER_A_SECOND ** dt_s;
     this.controls.update();
     this.camera.updateMatrixWorld();
   }
 
-  /** The window has this shape now. */
   fit(aspect: number, covered: Covered = { top: 0, bottom: 0 }): void {
     this.views.fit(aspect, covered);
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
-    if (this.stand !== null) this.standAt(this.stand);
+    if (this.shownView !== null) this.showNamedView(this.shownView);
   }
 
-  /** The whole specimen as it opens. */
+  /** Shows the whole specimen as in the opening. */
   reset(): void {
     this.stopTurning();
-    this.standAt(this.home);
+    this.showNamedView(this.home);
   }
 
-  /** Open with another view than the usual one. */
-  openAt(stand: Stand): void {
-    this.home = stand;
+  /** Opens with another view than the default. */
+  openAt(view: NamedView): void {
+    this.home = view;
     this.reset();
   }
 
-  /** Outermost points of what is there of the specimen, um: the opening is framed on them. */
-  surround(points: readonly Vec3[]): void {
-    this.views.surround(points);
-    if (this.stand !== null) this.standAt(this.stand);
+  /**
+   * Sets the outermost points of the occupied part of the specimen, um, on which the opening is
+   * framed.
+   */
+  setOccupied(points: readonly Vec3[]): void {
+    this.views.setOccupied(points);
+    if (this.shownView !== null) this.showNamedView(this.shownView);
   }
 
-  /** Points of the specimen (um) in the room (m), as a flat screen shows it. */
+  /** Converts points of the specimen, um, to the scene, metres, as a flat screen shows it. */
   inRoom(points: readonly Vec3[]): readonly Vec3[] {
     return this.views.inRoom(points);
   }
 
-  /** Farthest distance of the eye from the middle during the opening's turn. */
+  /** Largest distance of the eye from the middle during the opening's slow turn. */
   get openingDistance_m(): number {
     return this.views.openingDistance_m;
   }
 
-  /** Turn slowly to and fro, as long as nobody moves and the opening holds. */
+  /** Swings slowly until the user moves, if the opening is shown. */
   turnSlowly(): void {
-    if (this.stand === "opening") this.swayed_s = 0;
+    if (this.shownView === "opening") this.swayed_s = 0;
   }
 
-  /** The view stays where the turn has brought it. */
+  /** Stops the slow turn and keeps the view where it is. */
   stopTurning(): void {
     if (this.swayed_s === null) return;
     this.swayed_s = null;
-    this.stand = null;
+    this.shownView = null;
   }
 
   get isTurning(): boolean {
     return this.swayed_s !== null;
   }
 
-  /** null: as a bundle opens, which follows the window's shape. */
-  get look(): Look | null {
-    return this.stand === "opening" && !this.isTurning ? null : this.lookNow;
+  /** The camera; null while it shows the opening at rest, which follows the window's shape. */
+  get look(): CameraPose | null {
+    return this.shownView === "opening" && !this.isTurning ? null : this.cameraPose;
   }
 
-  /** The named view that still holds; null: someone has moved. */
-  get standing(): Stand | null {
-    return this.stand;
+  /** The current named view; null after the user has moved. */
+  get namedView(): NamedView | null {
+    return this.shownView;
   }
 
-  /** Whether the specimen is seen as a room has it that nobody has turned. */
+  /** Whether the specimen is seen straight from the front. */
   get isStraight(): boolean {
-    return this.stand === "front";
+    return this.shownView === "front";
   }
 
-  get lookNow(): Look {
+  get cameraPose(): CameraPose {
     return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
   }
 
-  lookFrom({ position, target }: Look): void {
-    this.stand = null;
+  lookFrom({ position, target }: CameraPose): void {
+    this.shownView = null;
     this.swayed_s = null;
     this.flight = null;
     this.place({ position, target });
   }
 
-  /** Towards a point of the room, half of the way, so that it comes into the middle. */
+  /** Flies half-way towards a point of the scene, so that it comes into the middle. */
   flyTowards(point: Vector3): void {
     const { position } = this.camera;
     const away = position.clone().sub(point);
     const eye = away.setLength(Math.max(NEAREST_M, away.length() / 2)).add(point);
     const to = { position: eye.toArray(), target: point.toArray() };
     this.stopTurning();
-    this.stand = null;
+    this.shownView = null;
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) this.place(to);
-    else this.flight = { from: this.lookNow, to, elapsed_s: 0 };
+    else this.flight = { from: this.cameraPose, to, elapsed_s: 0 };
   }
 
   private fly(dt_s: number): void {
@@ -189,7 +193,7 @@ export class Navigation {
     const { from, to } = this.flight;
     const elapsed_s = this.flight.elapsed_s + dt_s;
     const part = Math.min(1, elapsed_s / FLIGHT_S);
-    const share = part * part * (3 - 2 * part); // it begins and ends slowly
+    const share = part * part * (3 - 2 * part); // eases in and out
     const between = (a: Vec3, b: Vec3) =>
       new Vector3(...a).lerp(new Vector3(...b), share).toArray() as Vec3;
     this.place({
@@ -203,7 +207,7 @@ export class Navigation {
     return this.flight !== null;
   }
 
-  private place({ position, target }: Look): void {
+  private place({ position, target }: CameraPose): void {
     this.controls.target
       .fromArray(target)
       .clamp(this.views.reach.clone().negate(), this.views.reach);
@@ -212,7 +216,7 @@ export class Navigation {
     this.controls.update();
   }
 
-  /** Go straight back, as far as there is need, until these points of the room are in sight. */
+  /** Moves straight back as far as needed until these points of the scene are in view. */
   stepBackFor(points: readonly Vector3[]): void {
     const { target } = this.controls;
     const { position, quaternion, aspect } = this.camera;
@@ -225,14 +229,17 @@ export class Navigation {
     this.lookFrom({ position: eye.toArray(), target: target.toArray() });
   }
 
-  /** Return whether the command was one of the camera's. */
+  /** Runs a command. Returns false if it is not one of the camera's. */
   run(command: Command): boolean {
     const act = ACTS[command];
     act?.(this);
     return act !== undefined;
   }
 
-  /** Bring the point that is looked at back into its box, and the eye along: the view is not turned. */
+  /**
+   * Moves the point that is looked at back into its box, and the eye by the same vector, so that
+   * the view does not turn.
+   */
   private stayWithin(): void {
     const { target } = this.controls;
     const beyond = target.clone();
@@ -240,18 +247,18 @@ export class Navigation {
     this.camera.position.add(target).sub(beyond);
   }
 
-  /** See the specimen from a named view that does not turn. */
-  standStill(stand: Stand): void {
+  /** Shows the specimen from a named view without the slow turn. */
+  showStill(view: NamedView): void {
     this.swayed_s = null;
-    this.standAt(stand);
+    this.showNamedView(view);
   }
 
-  private standAt(stand: Stand): void {
-    this.place(this.views.lookAt(stand, this.swayed_s ?? 0));
-    this.stand = stand;
+  private showNamedView(view: NamedView): void {
+    this.place(this.views.lookAt(view, this.swayed_s ?? 0));
+    this.shownView = view;
   }
 
-  /** Turn about the point that is looked at, and change the distance from it by a factor. */
+  /** Turns about the point that is looked at, and multiplies the distance from it by `zoom`. */
   move(turn_rad: number, tilt_rad: number, zoom: number): void {
     const { target } = this.controls;
     const offset = this.camera.position.clone().sub(target);
@@ -266,7 +273,7 @@ export class Navigation {
     });
   }
 
-  /** Steps to the right and up, as far as the point that is looked at may go. */
+  /** Shifts by steps to the right and up, as far as the point that is looked at may go. */
   pan(right: number, up: number): void {
     const { target } = this.controls;
     const { position, quaternion } = this.camera;

@@ -1,16 +1,17 @@
-/** For how long a ray has stayed where it is, apart from a hand's or a head's tremble. Pure. */
+/** How long a ray has stayed in place, apart from the tremble of a hand or a head. */
 import { Vector3 } from "three";
 import type { Ray } from "../math/vec3";
 
-/** Largest turn of a ray at rest, radians. */
+/** Radians. Largest turn of a ray at rest. */
 const TREMBLE_RAD = (1.2 * Math.PI) / 180;
 
 export type Rest = Readonly<{ ray: Ray; elapsed_s: number }>;
 
 /**
- * The next state. Measured against where the rest began, so that a slow drift is a move as well.
+ * Returns the next state. The ray is compared with where the rest began, so that a slow drift
+ * counts as a move.
  *
- * @param tremble_um the ray's origin may move by so much
+ * @param tremble_um distance that the ray's origin may move
  */
 export function advanceRest(rest: Rest | null, ray: Ray, tremble_um: number, dt_s: number): Rest {
   if (rest === null) return { ray, elapsed_s: 0 };

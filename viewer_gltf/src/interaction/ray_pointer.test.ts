@@ -1,32 +1,32 @@
 import { Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { gazeOf, type Hit, meetFirst, Pointer, type RoomRay, type Target } from "./ray_pointer";
+import { firstHit, gazeOf, type Hit, Pointer, type SceneRay, type Target } from "./ray_pointer";
 
-const AHEAD: RoomRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
+const AHEAD: SceneRay = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
 const FRAME_S = 1 / 60;
 
 function target(key: string | null, distance_m: number | null, isOnTop = false): Target {
-  const meet = (): Hit | null => (distance_m === null ? null : { key, distance_m });
-  return { isOnTop, meet, choose: () => undefined };
+  const intersect = (): Hit | null => (distance_m === null ? null : { key, distance_m });
+  return { isOnTop, intersect, choose: () => undefined };
 }
 
-describe("what a ray meets", () => {
-  it("is the nearest target, whatever their order", () => {
+describe("the first hit of a ray", () => {
+  it("is the nearest target, in any order of the targets", () => {
     const [near, far] = [target("near", 1), target("far", 2)];
-    expect(meetFirst(AHEAD, [far, near])?.key).toBe("near");
-    expect(meetFirst(AHEAD, [near, far])?.key).toBe("near");
+    expect(firstHit(AHEAD, [far, near])?.key).toBe("near");
+    expect(firstHit(AHEAD, [near, far])?.key).toBe("near");
   });
 
-  it("is what is drawn on top, though something is nearer", () => {
+  it("is a target that is drawn on top, even if another is nearer", () => {
     const handle = target("handle", 3, true);
-    expect(meetFirst(AHEAD, [target("panel", 1), handle, target("tile", 2)])?.key).toBe("handle");
+    expect(firstHit(AHEAD, [target("panel", 1), handle, target("tile", 2)])?.key).toBe("handle");
   });
 
-  it("is nothing if every target is missed", () => {
-    expect(meetFirst(AHEAD, [target("a", null), target("b", null, true)])).toBeNull();
+  it("is null if the ray misses all targets", () => {
+    expect(firstHit(AHEAD, [target("a", null), target("b", null, true)])).toBeNull();
   });
 
-  it("starts at the eye and leads ahead of the head", () => {
+  it("is on a ray from the eye straight ahead of the head", () => {
     const head = new Matrix4().makeRotationY(Math.PI / 2).setPosition(1, 2, 3);
     const { origin, direction } = gazeOf(head);
     expect(origin.toArray()).toEqual([1, 2, 3]);
@@ -36,9 +36,9 @@ describe("what a ray meets", () => {
 
 describe("the gaze", () => {
   const tile = target("tile", 1.5);
-  /** Seconds of looking until the first choice; null: none within 4 s. */
+  /** Seconds of looking until the first choice; null if there is none within 4 s. */
   const untilChosen = (
-    hands: readonly (RoomRay | null)[],
+    hands: readonly (SceneRay | null)[],
     targets: readonly Target[],
     isDwellOn = true,
   ) => {
@@ -53,20 +53,20 @@ describe("the gaze", () => {
     expect(untilChosen([], [tile])).toBeCloseTo(1.5, 1);
   });
 
-  it("chooses nothing with dwell off, nor what can't be chosen", () => {
+  it("chooses nothing with dwell off, or if the target can't be chosen", () => {
     expect(untilChosen([], [tile], false)).toBeNull();
     expect(untilChosen([], [target(null, 1)])).toBeNull();
   });
 
-  it("chooses nothing while a hand points at something, but does beside an idle hand", () => {
+  it("chooses nothing while a hand points at a target, but chooses beside an idle hand", () => {
     expect(untilChosen([AHEAD], [tile])).toBeNull();
     expect(untilChosen([null], [tile])).not.toBeNull();
   });
 
-  it("does not choose again what the button has chosen", () => {
+  it("does not choose again the target that a button has chosen", () => {
     const pointer = new Pointer();
     pointer.advance(AHEAD, [], [tile], FRAME_S, true);
-    if (pointer.gaze === null) throw new Error("nothing is met");
+    if (pointer.gaze === null) throw new Error("nothing is hit");
     expect(pointer.press(pointer.gaze, [tile], 0)).toBe(true);
     for (let i = 0; i < 240; i++) {
       expect(pointer.advance(AHEAD, [], [tile], FRAME_S, true)).toBeNull();
@@ -74,13 +74,13 @@ describe("the gaze", () => {
     expect(pointer.progress).toBe(0);
   });
 
-  it("chooses nothing after a hand has chosen, until it has moved", () => {
+  it("chooses nothing after a hand has chosen until the gaze has moved", () => {
     const pointer = new Pointer();
     const hand = { ...AHEAD, origin: new Vector3(0.2, 0, 0) };
     pointer.advance(AHEAD, [hand], [tile], FRAME_S, true);
-    const [met] = pointer.hands;
-    if (met === null) throw new Error("nothing is met");
-    pointer.press(met, [tile], 0);
+    const [hit] = pointer.hands;
+    if (hit === null) throw new Error("nothing is hit");
+    pointer.press(hit, [tile], 0);
     for (let i = 0; i < 240; i++) {
       expect(pointer.advance(AHEAD, [null], [tile], FRAME_S, true)).toBeNull();
     }

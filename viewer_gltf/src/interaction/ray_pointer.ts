@@ -1,6 +1,6 @@
 /**
- * What a ray of the gaze or of a hand meets in the room, and what looking at it for long chooses.
- * Metres of the room.
+ * Finds the target that a ray of the gaze or of a hand hits, and chooses by button or by dwell.
+ * Metres of the scene.
  */
 import { type Matrix4, Vector3 } from "three";
 import type { Command } from "../state/commands";
@@ -8,58 +8,67 @@ import { isSecondPress, type TimedPress } from "./double_press";
 import { advanceDwell, type Dwell, dwellProgress, NO_DWELL, type RaySample, spend } from "./dwell";
 
 /** `direction` has unit length. */
-export type RoomRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
+export type SceneRay = Readonly<{ origin: Vector3; direction: Vector3 }>;
 
 export type Hit = Readonly<{
-  /** The name of the hit, unique among all targets; null: nothing that can be chosen. */
+  /** Key of the hit, unique among all targets; null if it cannot be chosen. */
   key: string | null;
   distance_m: number;
   /**
-   * What holding the button does: `slide` follows the ray as long as it is held; `carry` does so
-   * too, and where there is no button to hold, from one choice to the next.
+   * Effect of holding the button: `slide` follows the ray until the button is released. `carry`
+   * does too. Without a button to hold, `carry` follows the ray from one choice to the next.
    */
   hold?: "slide" | "carry";
-  /** Goes on, little by little, while the button is held or the gaze stays. */
+  /** Command that repeats in small steps while the button is held or the gaze stays. */
   repeats?: Command;
-  /** The hit's place in its target's layout; absent: it belongs to no layout. */
+  /** Place of the hit in its target's layout; absent if it belongs to no layout. */
   place?: string;
-  /** Each press moves on by a step, so quick presses all count. */
+  /** Whether each press advances by a step, so that quick presses all count. */
   isStep?: boolean;
-  /** A gaze that rests on it chooses nothing: what it shows comes by itself. */
+  /** Whether a resting gaze chooses nothing here, because it opens by itself under the gaze. */
   isGlance?: boolean;
-  /** Each point of it chooses something else, as on a slider. */
+  /** Whether each point chooses another value, as on a slider. */
   isGradual?: boolean;
 }>;
 
-/** Something that rays meet: the panel, handles, the specimen's tiles. */
+/** Something that rays can hit: the panel, handles, the specimen's tiles. */
 export interface Target {
-  /** Drawn over what is nearer, so that it is met before it. */
+  /** Whether it is drawn over nearer targets, so that it is hit before them. */
   readonly isOnTop: boolean;
-  /** Changes whenever a control of the target appears, disappears or moves; absent: it has none. */
+  /**
+   * A text that changes when a control of the target appears, disappears or moves; absent if it has
+   * none.
+   */
   readonly layout?: string;
-  meet(ray: RoomRay): Hit | null;
-  /** Chosen by dwell (`isByGaze`) or button; what holds on to the ray is chosen before it is dragged. */
-  choose(hit: Hit, ray: RoomRay, isByGaze: boolean): void;
-  /** What holds on to the ray follows it, frame by frame; `key` is the hit's that was chosen. */
-  drag?(key: string, ray: RoomRay): void;
+  /** Returns where the ray hits the target, or null. */
+  intersect(ray: SceneRay): Hit | null;
+  /**
+   * Called when a hit is chosen by dwell (`isByGaze`) or button; a hit with `hold` is chosen before
+   * it is dragged.
+   */
+  choose(hit: Hit, ray: SceneRay, isByGaze: boolean): void;
+  /**
+   * Called in each frame while a hit with `hold` follows the ray; `key` is that of the chosen hit.
+   */
+  drag?(key: string, ray: SceneRay): void;
 }
 
-export type Met = Hit & Readonly<{ target: Target; ray: RoomRay }>;
+export type TargetHit = Hit & Readonly<{ target: Target; ray: SceneRay }>;
 
-/** Straight ahead of the head. */
-export function gazeOf(head: Matrix4): RoomRay {
+/** The ray from the eyes straight ahead of the head. */
+export function gazeOf(head: Matrix4): SceneRay {
   return {
     origin: new Vector3().setFromMatrixPosition(head),
     direction: new Vector3(0, 0, -1).transformDirection(head),
   };
 }
 
-/** The nearest of the targets; of those on top, the first. */
-export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null {
-  let first: Met | null = null;
+/** The hit of the first target that is drawn on top, or else the nearest hit. */
+export function firstHit(ray: SceneRay, targets: readonly Target[]): TargetHit | null {
+  let first: TargetHit | null = null;
   for (const target of targets) {
     if (first?.target.isOnTop) break;
-    const hit = target.meet(ray);
+    const hit = target.intersect(ray);
     if (hit === null || !(hit.distance_m < (first?.distance_m ?? Infinity) || target.isOnTop)) {
       continue;
     }
@@ -68,47 +77,54 @@ export function meetFirst(ray: RoomRay, targets: readonly Target[]): Met | null 
   return first;
 }
 
-/** @param met null: nothing can be chosen */
-function sampleOf({ direction }: RoomRay, met: Met | null, targets: readonly Target[]): RaySample {
+/** @param hit null: nothing can be chosen */
+function sampleOf(
+  { direction }: SceneRay,
+  hit: TargetHit | null,
+  targets: readonly Target[],
+): RaySample {
   return {
-    target: met?.isGlance ? null : (met?.key ?? null),
-    place: met?.place ?? null,
-    layout: met?.target.layout ?? "",
+    target: hit?.isGlance ? null : (hit?.key ?? null),
+    place: hit?.place ?? null,
+    layout: hit?.target.layout ?? "",
     layouts: ["", ...targets.map(({ layout = "" }) => layout)],
     direction: direction.toArray(),
-    isGradual: met?.isGradual === true || met?.hold === "slide",
+    isGradual: hit?.isGradual === true || hit?.hold === "slide",
   };
 }
 
 export class Pointer {
-  /** The hit of the gaze. */
-  gaze: Met | null = null;
+  gaze: TargetHit | null = null;
   /** The hit of each hand's ray, in the order given. */
-  hands: readonly (Met | null)[] = [];
+  hands: readonly (TargetHit | null)[] = [];
   private dwell: Dwell = NO_DWELL;
   private lastPress: TimedPress | null = null;
 
-  /** Of the dwell, 0..1. */
+  /** Progress of the dwell, 0 to 1. */
   get progress(): number {
     return dwellProgress(this.dwell);
   }
 
-  /** Where the ring is: at what a hand points at; if none does, at what is gazed at. */
-  get leading(): Met | null {
-    return this.hands.find((met) => met !== null) ?? this.gaze;
+  /** The hit at which the ring is drawn: that of a hand, or else that of the gaze. */
+  get leading(): TargetHit | null {
+    return this.hands.find((hit) => hit !== null) ?? this.gaze;
   }
 
-  /** @returns what the dwell chooses in this frame; the gaze chooses nothing while a hand points */
+  /**
+   * Advances by one frame.
+   * @returns the hit that the dwell chooses in this frame; the gaze chooses nothing while a hand
+   *   points
+   */
   advance(
-    gaze: RoomRay,
-    hands: readonly (RoomRay | null)[],
+    gaze: SceneRay,
+    hands: readonly (SceneRay | null)[],
     targets: readonly Target[],
     dt_s: number,
     isDwellOn: boolean,
-  ): Met | null {
-    this.gaze = meetFirst(gaze, targets);
-    this.hands = hands.map((ray) => ray && meetFirst(ray, targets));
-    const isGazing = this.hands.every((met) => met === null);
+  ): TargetHit | null {
+    this.gaze = firstHit(gaze, targets);
+    this.hands = hands.map((ray) => ray && firstHit(ray, targets));
+    const isGazing = this.hands.every((hit) => hit === null);
     const sample = sampleOf(gaze, isGazing ? this.gaze : null, targets);
     const [dwell, fires] = advanceDwell(this.dwell, sample, dt_s, isDwellOn);
     this.dwell = dwell;
@@ -116,15 +132,15 @@ export class Pointer {
   }
 
   /**
-   * Choose a hit, by a button or by the dwell. A gaze that stays chooses nothing more.
+   * Chooses a hit by a button or by the dwell. A resting gaze then chooses nothing else.
    *
    * @returns whether the press counts; the second press of a double press does not
    */
-  press(met: Met, targets: readonly Target[], time_ms: number): boolean {
+  press(hit: TargetHit, targets: readonly Target[], time_ms: number): boolean {
     this.dwell = spend(this.dwell);
-    const sample = sampleOf(met.ray, met, targets);
-    // The second press on a tile isolates it, and a slider may be taken again, however soon.
-    const isStep = met.isStep === true || met.hold !== undefined;
+    const sample = sampleOf(hit.ray, hit, targets);
+    // The second press on a tile isolates it, and a slider may be picked up again at once.
+    const isStep = hit.isStep === true || hit.hold !== undefined;
     const press = { time_ms, sample, isStep };
     const isSecond = isSecondPress(this.lastPress, press);
     this.lastPress = press;
@@ -139,7 +155,6 @@ export class Pointer {
   }
 }
 
-/** The place where a ray meets a target. */
-export function pointOn({ ray, distance_m }: Pick<Met, "ray" | "distance_m">): Vector3 {
+export function pointOn({ ray, distance_m }: Pick<TargetHit, "ray" | "distance_m">): Vector3 {
   return ray.direction.clone().multiplyScalar(distance_m).add(ray.origin);
 }

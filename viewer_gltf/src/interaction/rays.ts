@@ -1,16 +1,22 @@
-/** Rays into the specimen: from a click on the picture, or from the head. */
+/** Rays into the specimen: from a click on the canvas, or from the head. */
 import { Matrix4, type Object3D, type PerspectiveCamera, Vector2, Vector3 } from "three";
 import type { Ray } from "../math/vec3";
-import type { RoomRay } from "./ray_pointer";
+import type { SceneRay } from "./ray_pointer";
 
-/** Longest time and way between the clicks of a double click or the taps of a double tap. */
+/**
+ * Milliseconds and pixels. Longest time and distance between the two clicks or taps of a double
+ * click.
+ */
 const DOUBLE_MS = 400;
 const DOUBLE_PX = 24;
-/** Most px between down and up of a click; a pointer that moves further orbits. A finger rolls as it taps. */
+/**
+ * Pixels. Longest distance between down and up of a click or a tap; a pointer that moves further
+ * orbits. A finger rolls as it taps.
+ */
 const CLICK_PX = 5;
 const TAP_PX = 14;
 
-/** The ray from `eye` through `towards` (room) in the specimen's own space (um, world). */
+/** The ray from `eye` through `towards` (scene) in the specimen's own space (um, world). */
 function rayInto(specimen: Object3D, eye: Vector3, towards: Vector3): Ray {
   const toSpecimen = new Matrix4().copy(specimen.matrixWorld).invert();
   const origin = eye.applyMatrix4(toSpecimen);
@@ -18,31 +24,34 @@ function rayInto(specimen: Object3D, eye: Vector3, towards: Vector3): Ray {
   return { origin: origin.toArray(), direction: direction.toArray() };
 }
 
-/** The ray under a point of the picture, given in -1..1 with y up. */
+/** The ray under a point of the image, given in -1 to 1 with y up. */
 export function rayUnder(point: Vector2, camera: PerspectiveCamera, specimen: Object3D): Ray {
   camera.updateMatrixWorld();
   const towards = new Vector3(point.x, point.y, 0.5).unproject(camera);
   return rayInto(specimen, camera.position.clone(), towards);
 }
 
-/** The ray straight ahead of the head. `head` is the head's pose in the room. */
+/** The ray straight ahead of the head. `head` is the head's pose in the scene. */
 export function rayAhead(head: Matrix4, specimen: Object3D): Ray {
   const eye = new Vector3().setFromMatrixPosition(head);
   return rayInto(specimen, eye, new Vector3(0, 0, -1).applyMatrix4(head));
 }
 
-/** A ray of the room in the specimen's own space; its direction stays one metre long. */
-export function rayAlong({ origin, direction }: RoomRay, toSpecimen: Matrix4): Ray {
+/**
+ * Converts a ray of the scene into the specimen's own space; its direction keeps a length of one
+ * metre.
+ */
+export function rayAlong({ origin, direction }: SceneRay, toSpecimen: Matrix4): Ray {
   const from = origin.clone().applyMatrix4(toSpecimen);
   const to = origin.clone().add(direction).applyMatrix4(toSpecimen);
   return { origin: from.toArray(), direction: to.sub(from).toArray() };
 }
 
 /**
- * Calls `onClick` with the place in -1..1, y up, of every click or tap that does not drag. Two
- * fingers zoom and move: neither taps.
+ * Calls `onClick` with the position, in -1 to 1 with y up, of every click or tap that does not
+ * drag. Two fingers zoom and move, so they do not tap.
  *
- * @param onDouble the second of two quick clicks on one place, which is no click then
+ * @param onDouble called for the second of two quick clicks in one place, instead of `onClick`
  */
 export function listenForClicks(
   canvas: HTMLCanvasElement,

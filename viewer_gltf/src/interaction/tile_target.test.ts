@@ -9,7 +9,7 @@ const TILES: readonly BoxedTile[] = [
 ];
 
 describe("the tile along a ray", () => {
-  it("is chosen with a ray in um, and its distance is in metres", () => {
+  it("is chosen with a ray in um, and returns its distance in metres", () => {
     const specimen = new Group();
     specimen.matrixAutoUpdate = false;
     specimen.matrixWorld.makeScale(0.01, 0.01, 0.01).setPosition(-0.05, -0.05, -2);
@@ -17,7 +17,7 @@ describe("the tile along a ray", () => {
     const target = new TileTarget(specimen, (...given) => chosen.push(given));
     target.tiles = TILES;
     const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
-    const hit = target.meet(ray);
+    const hit = target.intersect(ray);
     expect(hit?.key).toBe("tile:near");
     expect(hit?.distance_m).toBeCloseTo(1.8, 12);
     if (hit !== null) target.choose(hit, ray, true);
@@ -30,7 +30,7 @@ describe("the tile along a ray", () => {
   });
 });
 
-it("an object in a tile is met before its tile, and is of that tile", () => {
+it("an object in a tile is hit instead of the tile, and names that tile", () => {
   const specimen = new Group();
   const chosen: unknown[][] = [];
   let hasObject = true;
@@ -41,9 +41,9 @@ it("an object in a tile is met before its tile, and is of that tile", () => {
   );
   target.tiles = [{ id: "r0_c0", bounds_um: { min: [-1, -1, -2], max: [1, 1, -1] } }];
   const ray = { origin: new Vector3(), direction: new Vector3(0, 0, -1) };
-  expect(target.meet(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
+  expect(target.intersect(ray)).toMatchObject({ key: "tile:r0_c0/cells/7", distance_m: 1.5 });
   target.choose({ key: "tile:r0_c0/cells/7", distance_m: 1.5 }, ray, true);
   expect(chosen.map(([, tile, isByGaze]) => [tile, isByGaze])).toEqual([["r0_c0", true]]);
   hasObject = false;
-  expect(target.meet(ray)?.key).toBe("tile:r0_c0");
+  expect(target.intersect(ray)?.key).toBe("tile:r0_c0");
 });

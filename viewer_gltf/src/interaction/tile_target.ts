@@ -1,17 +1,16 @@
 /**
- * The specimen's tiles as what a ray meets: the boxes of those that are shown, as far as cut; and the objects in
- * them, so that the gaze rests on one of them and not on its tile.
+ * The specimen's tiles as a target: the boxes of the shown tiles, as far as they are not clipped.
+ * The objects in them are targets too, so that the gaze rests on an object and not on its tile.
  */
 import { Matrix4, type Object3D } from "three";
 import { type Clip, WHOLE } from "../math/clip";
 import { type BoxedTile, pickTile } from "../math/pick";
 import type { Ray } from "../math/vec3";
 import type { ViewerState } from "../state/viewer_state";
-import type { Hit, RoomRay, Target } from "./ray_pointer";
+import type { Hit, SceneRay, Target } from "./ray_pointer";
 import { rayAlong } from "./rays";
 
 export const TILE = "tile:";
-/** Between a tile and an object in it. */
 const OF = "/";
 
 export class TileTarget implements Target {
@@ -19,16 +18,19 @@ export class TileTarget implements Target {
   private names = "";
   private shown: readonly BoxedTile[] = [];
   private clip: Clip = WHOLE;
-  /** The state that decides which objects show in the tiles, and how often it has changed. */
+  /**
+   * The parts of the state that decide which objects are shown in the tiles, and how often they
+   * have changed.
+   */
   private content: readonly unknown[] = [];
   private changes = 0;
-  /** Points are measured, so that each point of a tile is another choice. */
+  /** While points are measured, each point of a tile is another choice. */
   private isMeasuring = false;
   private readonly toSpecimen = new Matrix4();
 
   /**
-   * @param onChoose the ray is in um of the specimen
-   * @param objectAlong finds the object along a ray, in um of the specimen: its name, and where; null: none
+   * @param onChoose called with the ray in um of the specimen
+   * @param objectAlong returns name and distance of the object along a ray in um, or null
    */
   constructor(
     private readonly specimen: Object3D,
@@ -38,14 +40,13 @@ export class TileTarget implements Target {
     ) => Readonly<{ id: string; distance: number }> | null = () => null,
   ) {}
 
-  /** The tiles that are shown. */
   set tiles(tiles: readonly BoxedTile[]) {
     if (tiles === this.shown) return;
     this.shown = tiles;
     this.names = tiles.map(({ id }) => id).join();
   }
 
-  /** Takes over which objects show, and which part of the specimen is cut away. */
+  /** Takes over which objects are shown and which part of the specimen is clipped. */
   follow({ objects, clip, channels, tool }: ViewerState): void {
     const content = [objects, clip, channels];
     if (content.some((each, i) => each !== this.content[i])) this.changes++;
@@ -55,33 +56,33 @@ export class TileTarget implements Target {
   }
 
   /**
-   * The tiles that are shown, where they are, and what shows within: what comes under a resting gaze was not
-   * looked for.
+   * Changes with the shown tiles, their pose and the objects in them, since a target that moves
+   * under a resting gaze was not looked for.
    */
   get layout(): string {
     return `tiles ${this.names} ${this.changes} ${placeText(this.specimen.matrixWorld)}`;
   }
 
-  meet(ray: RoomRay): Hit | null {
+  intersect(ray: SceneRay): Hit | null {
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     const inside = rayAlong(ray, this.toSpecimen);
-    const met = pickTile(inside, this.shown, this.clip);
-    const object = met && this.objectAlong(inside);
-    if (met === null) return null;
-    const key = TILE + (object ? `${met.id}${OF}${object.id}` : met.id);
-    // The ray's direction is one metre long, whatever it is in um.
-    const { distance } = object ?? met;
+    const tileHit = pickTile(inside, this.shown, this.clip);
+    const object = tileHit && this.objectAlong(inside);
+    if (tileHit === null) return null;
+    const key = TILE + (object ? `${tileHit.id}${OF}${object.id}` : tileHit.id);
+    // The ray's direction is one metre long, also when expressed in um.
+    const { distance } = object ?? tileHit;
     return { key, place: key, distance_m: distance, isStep: true, isGradual: this.isMeasuring };
   }
 
-  choose({ key }: Hit, ray: RoomRay, isByGaze: boolean): void {
+  choose({ key }: Hit, ray: SceneRay, isByGaze: boolean): void {
     if (key === null) return;
     this.toSpecimen.copy(this.specimen.matrixWorld).invert();
     this.onChoose(rayAlong(ray, this.toSpecimen), key.slice(TILE.length).split(OF)[0], isByGaze);
   }
 }
 
-/** A pose as text, to a tenth of a millimetre. */
+/** A pose as text, with five significant digits. */
 export function placeText({ elements }: Matrix4): string {
   return elements.map((each) => each.toPrecision(5)).join(" ");
 }

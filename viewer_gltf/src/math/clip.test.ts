@@ -26,10 +26,10 @@ function unit(v: Vec3): Vec3 {
   return [v[0] / length, v[1] / length, v[2] / length];
 }
 
-describe("what a plane leaves of a body", () => {
+describe("the points that a clip plane leaves", () => {
   const plane = { normal: [1, 0, 0], offset_um: 2 } as const;
 
-  it("lies within the body's points, of which none is beyond the plane", () => {
+  it("are on the kept side of the plane, and within the original points", () => {
     const corners: Vec3[] = [
       [0, 0, 0],
       [6, 0, 0],
@@ -46,7 +46,7 @@ describe("what a plane leaves of a body", () => {
 });
 
 describe("a ray's span", () => {
-  it("is cut by the box and by the plane", () => {
+  it("is clipped by the box and by the plane", () => {
     const box: Box = { min: [10, -20, 10], max: [90, 0, 40] };
     const plane = { normal: [0, 0, -1], offset_um: -25 } as const; // keeps z >= 25
     const span = [150, 200] as const;
@@ -56,7 +56,7 @@ describe("a ray's span", () => {
     expect(clipSpan(span, FRONT, { box, plane })).toEqual([160, 175]);
   });
 
-  it("is nothing where the ray misses what is kept", () => {
+  it("is null if the ray misses the kept part", () => {
     const aside: Box = { min: [60, -20, 0], max: [100, 0, 50] };
     const behind = { normal: [0, 0, 1], offset_um: -10 } as const; // keeps z <= -10
     expect(clipSpan([150, 200], FRONT, { box: aside, plane: null })).toBeNull();
@@ -65,7 +65,7 @@ describe("a ray's span", () => {
     expect(clipSpan([150, 200], FRONT, { box: null, plane: side })).toBeNull();
   });
 
-  it("holds just the points that are kept, for any ray, box and plane", () => {
+  it("contains exactly the kept points, for any ray, box and plane", () => {
     const random = seeded(8);
     const anywhere = (): Vec3 => [140 * random() - 20, 60 * random() - 40, 90 * random() - 20];
     let wrong = 0;
@@ -95,7 +95,7 @@ describe("a ray's span", () => {
   });
 });
 
-describe("a ray that begins in a corner that is gone", () => {
+describe("a ray that begins in a removed corner", () => {
   const corner = [
     { normal: [1, 0, 0], offset_um: 10 },
     { normal: [0, 1, 0], offset_um: 20 },
@@ -103,23 +103,23 @@ describe("a ray that begins in a corner that is gone", () => {
   ] as const;
   const clip = { box: null, plane: null, corner };
 
-  it("meets what is kept from where it leaves the corner on", () => {
+  it("sees the kept part from where it leaves the corner", () => {
     const ahead = (origin: Vec3, direction: Vec3) =>
       clipSpan([0, 100], { origin, direction }, clip);
     expect(ahead([50, 50, 50], [0, 0, -1])).toEqual([20, 100]);
     expect(ahead([50, 50, 50], [-1, -1, 0])).toEqual([30, 100]); // by y, before x
-    expect(ahead([50, 50, 50], [0, 0, 1])).toBeNull(); // never leaves it
-    expect(ahead([50, 10, 50], [0, 0, -1])).toEqual([0, 100]); // beside it
+    expect(ahead([50, 50, 50], [0, 0, 1])).toBeNull(); // never leaves the corner
+    expect(ahead([50, 10, 50], [0, 0, -1])).toEqual([0, 100]); // passes beside the corner
     expect(isKept([11, 21, 31], clip)).toBe(false);
     expect(isKept([11, 21, 29], clip)).toBe(true);
   });
 });
 
-describe("a box that is cut away", () => {
+describe("a box that is clipped away", () => {
   const TILE: Box = { min: [10, -20, 0], max: [20, 0, 50] };
 
-  it("is one of which neither box nor plane leaves anything", () => {
-    const beside: Box = { min: [20, -20, 0], max: [100, 0, 50] }; // they share a face
+  it("is one of which nothing is left by box and plane", () => {
+    const beside: Box = { min: [20, -20, 0], max: [100, 0, 50] }; // the boxes share a face
     const across: Box = { min: [19, -20, 0], max: [100, 0, 50] };
     const plane = { normal: [1, 0, 0], offset_um: 18 } as const;
     expect(isCutAway(TILE, { box: null, plane: null })).toBe(false);
@@ -132,7 +132,7 @@ describe("a box that is cut away", () => {
     expect(isCutAway(flat, { box: flat, plane: null })).toBe(false);
   });
 
-  it("has no point that is kept, for any box and plane", () => {
+  it("has no kept point, for any box and plane", () => {
     const random = seeded(11);
     let [gone, wrong] = [0, 0];
     const between = (low: number, high: number) => low + (high - low) * random();
@@ -154,13 +154,13 @@ describe("a box that is cut away", () => {
   });
 });
 
-describe("the point of a line that a ray comes closest to", () => {
-  it("is where they meet, if they do", () => {
+describe("the point of a line that is closest to a ray", () => {
+  it("is the intersection, if there is one", () => {
     const ray: Ray = { origin: [7, 5, 9], direction: [0, -3, -6] }; // meets x = 7 at y = 0.5, z = 0
     expect(closestOnLine([0, 0.5, 0], [1, 0, 0], ray)).toBeCloseTo(7);
   });
 
-  it("has the shortest distance of all points", () => {
+  it("has the shortest distance of all points of the line", () => {
     const ray: Ray = { origin: [3, 8, 20], direction: unit([0.2, -0.1, -1]) };
     const direction = unit([1, 2, 0.5]);
     const best = closestOnLine([1, 1, 1], direction, ray) ?? Number.NaN;
@@ -174,14 +174,14 @@ describe("the point of a line that a ray comes closest to", () => {
     }
   });
 
-  it("is none for a parallel ray, and not behind the ray's origin", () => {
+  it("is null for a parallel ray, and is not sought behind the ray's origin", () => {
     expect(closestOnLine([0, 0, 0], [0, 0, 1], FRONT)).toBeNull();
     const away: Ray = { origin: [5, 0, 9], direction: [1, 0, 1] };
     expect(closestOnLine([0, 0, 0], [1, 0, 0], away)).toBeCloseTo(5);
   });
 });
 
-describe("the box's handles", () => {
+describe("the clip box's handles", () => {
   it("are in the middles of the six faces", () => {
     const handles = boxHandles(SPECIMEN);
     expect(handles.map(({ position }) => position)).toEqual([
@@ -206,11 +206,11 @@ describe("the box's handles", () => {
     expect(dragBox(SPECIMEN, { axis: 0, side: "max" }, ray, SPECIMEN).max).toEqual([30, 0, 50]);
   });
 
-  it("stay where they are if the ray runs along their axis", () => {
+  it("stay in place if the ray runs along their axis", () => {
     expect(dragBox(SPECIMEN, { axis: 2, side: "max" }, FRONT, SPECIMEN)).toBe(SPECIMEN);
   });
 
-  it("never leave the specimen nor pass each other, whatever the rays are", () => {
+  it("never leave the specimen or pass each other, for any rays", () => {
     const random = seeded(9);
     let box = SPECIMEN;
     let isSound = true;
@@ -232,7 +232,7 @@ describe("the box's handles", () => {
   });
 });
 
-describe("the plane's handles", () => {
+describe("the clip plane's handles", () => {
   const plane = { normal: [1, 0, 0], offset_um: 30 } as const;
   const offsets = (normal: Vec3) =>
     [0, 1, 2, 3, 4, 5, 6, 7].map(
@@ -242,22 +242,22 @@ describe("the plane's handles", () => {
         normal[2] * (c & 4 ? 50 : 0),
     );
 
-  it("are on it in front of the specimen's centre, and along its normal", () => {
+  it("are on the plane in front of the specimen's centre, and along its normal", () => {
     expect(planeHandles(plane, SPECIMEN, 15)).toEqual({
       middle: [30, -10, 25],
       tip: [45, -10, 25],
     });
   });
 
-  it("slide it to the ray, and no further than the specimen reaches", () => {
+  it("slide the plane to the ray, but not beyond the specimen", () => {
     const ray = (x: number): Ray => ({ origin: [x, -10, 200], direction: [0, 0, -1] });
     expect(slidePlane(plane, ray(70), SPECIMEN)).toEqual({ normal: [1, 0, 0], offset_um: 70 });
     expect(slidePlane(plane, ray(170), SPECIMEN).offset_um).toBe(100);
     expect(slidePlane(plane, ray(-70), SPECIMEN).offset_um).toBe(0);
   });
 
-  it("turn it about its middle to where the ray meets the tip's sphere", () => {
-    // From the front, above the middle: the tip goes to (30, -10 + 9, 25 + 12).
+  it("turn the plane about its middle to where the ray hits the tip's sphere", () => {
+    // A ray from the front, above the middle: the tip goes to (30, -10 + 9, 25 + 12).
     const ray: Ray = { origin: [30, -1, 200], direction: [0, 0, -1] };
     const tilted = turnPlane(plane, ray, SPECIMEN, 15);
     expect(tilted.normal[1]).toBeCloseTo(0.6);
@@ -266,7 +266,7 @@ describe("the plane's handles", () => {
     expect(turnPlane(plane, beside, SPECIMEN, 15).normal[1]).toBeCloseTo(1);
   });
 
-  it("stay where they are while the ray stays on them", () => {
+  it("stay in place while the ray stays on them", () => {
     const { tip } = planeHandles(plane, SPECIMEN, 15);
     const ray: Ray = { origin: [tip[0] + 5, tip[1] + 3, 200], direction: [-5, -3, tip[2] - 200] };
     const turned = turnPlane(plane, ray, SPECIMEN, 15);
@@ -274,7 +274,7 @@ describe("the plane's handles", () => {
     expect(turned.offset_um).toBeCloseTo(30);
   });
 
-  it("keep it a plane through the specimen, whatever the rays are", () => {
+  it("keep the plane in the specimen, for any rays", () => {
     const random = seeded(10);
     let current: { normal: Vec3; offset_um: number } = plane;
     let isSound = true;
@@ -297,7 +297,7 @@ describe("the plane's handles", () => {
   });
 });
 
-describe("the points of what is kept", () => {
+describe("the points of the kept part", () => {
   const within: Box = { min: [0, 0, 0], max: [4, 4, 4] };
   const points = [
     [-1, 1, 9],
@@ -312,7 +312,7 @@ describe("the points of what is kept", () => {
     ]);
   });
 
-  it("are inside the cut's box and behind its plane, too", () => {
+  it("are also inside the clip box and behind the clip plane", () => {
     const box: Box = { min: [1, 0, 0], max: [9, 9, 3] };
     const plane = { normal: [1, 0, 0], offset_um: 2 } as const;
     const kept = keptPoints(points, { box, plane }, within);

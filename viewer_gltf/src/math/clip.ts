@@ -1,45 +1,49 @@
-/**
- * Cutting the specimen open: a box and a free plane, and the handles that drag them. um, world.
- * Pure.
- */
+/** Clipping the specimen with a box and a free plane, and the handles that drag them. um, world. */
 import { Vector3 } from "three";
 import { type Box, boxSpan, centerOf, type Span } from "./box";
 import { AXES, along, dot, type Ray, type Vec3, withPart } from "./vec3";
 
-/** Kept is where normal · p <= offset_um; the normal, of unit length, leads to what is cut away. */
+/**
+ * A clip plane keeps the points with normal · p <= offset_um. The normal has unit length and points
+ * to the removed side.
+ */
 export type ClipPlane = Readonly<{ normal: Vec3; offset_um: number }>;
-/** The kept part. null: not cut. `corner`: what lies beyond all of these planes is gone. */
+/** The kept part; null: not clipped. `corner`: points beyond all of these planes are removed. */
 export type Clip = Readonly<{
   box: Box | null;
   plane: ClipPlane | null;
   corner?: readonly ClipPlane[];
 }>;
-/** Nothing is cut. */
+/** Nothing is clipped. */
 export const WHOLE: Clip = { box: null, plane: null };
 
 export type Side = "min" | "max";
-/** One face of the box; `direction` leads out of it. */
+/** Handle of one face of the box; `direction` points out of the box. */
 export type BoxHandle = Readonly<{
   axis: (typeof AXES)[number];
   side: Side;
   position: Vec3;
   direction: Vec3;
 }>;
-/** `middle` moves the plane along its normal, `tip` turns it about the middle. */
+/** `middle` moves the plane along its normal; `tip` turns it about the middle. */
 export type PlaneHandles = Readonly<{ middle: Vec3; tip: Vec3 }>;
 
 /** Least thickness of the box, as a share of the specimen's edge. */
 const THINNEST = 0.01;
-/** Least sine squared of the angle between a ray and a handle's axis that gives a place. */
+/**
+ * Least squared sine of the angle between a ray and a handle's axis; a ray closer to parallel does
+ * not move the handle.
+ */
 const PARALLEL = 1e-6;
 
-/** The part of a ray's span inside box and plane; null: nothing. */
+/** The part of a ray's span inside box and plane, or null. */
 export function clipSpan(span: Span, ray: Ray, { box, plane, corner }: Clip): Span | null {
   const inBox = box === null ? span : boxSpan(span, ray, box);
   if (inBox === null) return null;
   let [from, to] = inBox;
   if (plane !== null) {
-    const depth = plane.offset_um - dot(plane.normal, ray.origin); // that of what is kept
+    // Depth inside the plane at which the ray begins.
+    const depth = plane.offset_um - dot(plane.normal, ray.origin);
     const rate = dot(plane.normal, ray.direction);
     if (rate > 0) to = Math.min(to, depth / rate);
     else if (rate < 0) from = Math.max(from, depth / rate);
@@ -49,7 +53,7 @@ export function clipSpan(span: Span, ray: Ray, { box, plane, corner }: Clip): Sp
   return from < to ? [from, to] : null;
 }
 
-/** Where a ray that begins in a corner leaves it, if later than `from`; else `from`. */
+/** Where a ray that begins in a removed corner leaves it; at least `from`. */
 function cornerExit(from: number, ray: Ray, corner: readonly ClipPlane[]): number {
   const exits = corner.map(({ normal, offset_um }) => {
     const depth = offset_um - dot(normal, ray.origin);
@@ -60,7 +64,6 @@ function cornerExit(from: number, ray: Ray, corner: readonly ClipPlane[]): numbe
   return Math.max(from, Math.min(...exits));
 }
 
-/** Whether a point is kept. */
 export function isKept(point: Vec3, { box, plane, corner }: Clip): boolean {
   const isInBox =
     box === null || AXES.every((i) => point[i] >= box.min[i] && point[i] <= box.max[i]);
@@ -69,8 +72,7 @@ export function isKept(point: Vec3, { box, plane, corner }: Clip): boolean {
 }
 
 /**
- * Points of a body of which those beyond a plane are brought straight onto it: what the plane leaves of the body lies
- * within them.
+ * Moves the points beyond a plane straight onto it. The kept part of a body lies within the result.
  */
 export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly Vec3[] {
   return points.map((point) => {
@@ -79,7 +81,7 @@ export function behindPlane(points: readonly Vec3[], plane: ClipPlane): readonly
   });
 }
 
-/** The points as a cut and a box leave them: points outside move to the nearest place of what is kept. */
+/** Moves points that are outside clip and box to the nearest kept place. */
 export function keptPoints(
   points: readonly Vec3[],
   { box, plane }: Clip,
@@ -113,7 +115,6 @@ export function isCutAway(of: Box, { box, plane }: Clip): boolean {
   return deepest >= offset_um;
 }
 
-/** A handle in the middle of each face. */
 export function boxHandles(box: Box): readonly BoxHandle[] {
   const middle = centerOf(box);
   return AXES.flatMap((axis) =>
@@ -126,7 +127,7 @@ export function boxHandles(box: Box): readonly BoxHandle[] {
   );
 }
 
-/** The box after its face was dragged to where the ray comes closest to the handle's axis. */
+/** Drags a face of the box to where the ray is closest to the handle's axis. */
 export function dragBox(
   box: Box,
   handle: Pick<BoxHandle, "axis" | "side">,
@@ -139,7 +140,7 @@ export function dragBox(
   return along === null ? box : moveFace(box, handle, along, specimen);
 }
 
-/** The box after its face has gone along the axis; it stays in the specimen, and a box. */
+/** Moves a face along its axis; the box stays in the specimen and keeps its least thickness. */
 export function moveFace(
   box: Box,
   { axis, side }: Pick<BoxHandle, "axis" | "side">,
@@ -154,8 +155,8 @@ export function moveFace(
 }
 
 /**
- * The handles of the plane: `middle` on it, nearest to the specimen's centre, `tip` so far along
- * its normal.
+ * The handles of the plane: `middle` on it, nearest to the specimen's centre, and `tip` at a
+ * distance along its normal.
  */
 export function planeHandles(plane: ClipPlane, specimen: Box, arm_um: number): PlaneHandles {
   const center = centerOf(specimen);
@@ -163,23 +164,23 @@ export function planeHandles(plane: ClipPlane, specimen: Box, arm_um: number): P
   return { middle, tip: along(middle, plane.normal, arm_um) };
 }
 
-/** The plane after its middle was dragged along its normal. */
+/** Drags the plane's middle along its normal. */
 export function slidePlane(plane: ClipPlane, ray: Ray, specimen: Box): ClipPlane {
   const { middle } = planeHandles(plane, specimen, 0);
   const by = closestOnLine(middle, plane.normal, ray);
   return by === null ? plane : movePlane(plane, by, specimen);
 }
 
-/** The plane after it has gone along its normal; it never leaves the specimen. */
+/** Moves the plane along its normal; it stays in the specimen. */
 export function movePlane(plane: ClipPlane, by_um: number, specimen: Box): ClipPlane {
   const moved = withinSpecimen(plane.normal, plane.offset_um + by_um, specimen);
   return moved.offset_um === plane.offset_um ? plane : moved;
 }
 
 /**
- * The plane after its tip was dragged: it turns about its middle. Of the two places at which a ray
- * meets the sphere around the middle the one nearer to the tip counts; beside the sphere, the
- * place nearest to the ray.
+ * Drags the plane's tip, which turns the plane about its middle. The tip goes to the intersection
+ * of the ray and the sphere around the middle that is nearer to the tip. If the ray misses the
+ * sphere, the tip goes to the place nearest to the ray.
  */
 export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: number): ClipPlane {
   const { middle, tip } = planeHandles(plane, specimen, arm_um);
@@ -196,11 +197,12 @@ export function turnPlane(plane: ClipPlane, ray: Ray, specimen: Box, arm_um: num
   const handle = new Vector3(...tip);
   ends.sort((a, b) => a.distanceToSquared(handle) - b.distanceToSquared(handle));
   const normal = (ends[0] ?? foot).sub(center);
-  if (!(normal.length() > 0)) return plane; // through the middle itself: no direction
+  // The ray passes through the middle itself, so there is no direction.
+  if (!(normal.length() > 0)) return plane;
   return aboutMiddle(plane, normal.normalize().toArray(), specimen);
 }
 
-/** The plane after it was turned about an axis through its middle, counter-clockwise. */
+/** Turns the plane about an axis through its middle, counterclockwise. */
 export function spinPlane(
   plane: ClipPlane,
   axis: (typeof AXES)[number],
@@ -212,13 +214,13 @@ export function spinPlane(
   return aboutMiddle(plane, normal.normalize().toArray(), specimen);
 }
 
-/** The plane through the same middle that faces another way. */
+/** The plane through the same middle with another normal. */
 function aboutMiddle(plane: ClipPlane, normal: Vec3, specimen: Box): ClipPlane {
   const { middle } = planeHandles(plane, specimen, 0);
   return withinSpecimen(normal, dot(normal, middle), specimen);
 }
 
-/** The plane, its offset no less and no more than the specimen's corners have. */
+/** The plane with its offset limited to the range of the specimen's corners. */
 export function withinSpecimen(normal: Vec3, offset_um: number, specimen: Box): ClipPlane {
   const center = dot(normal, centerOf(specimen));
   const reach = AXES.reduce<number>(
@@ -229,8 +231,8 @@ export function withinSpecimen(normal: Vec3, offset_um: number, specimen: Box): 
 }
 
 /**
- * How far along a line (unit direction, from `point`) the ray comes closest to it; null if they
- * are parallel. What lies behind the ray's origin does not count.
+ * Returns how far along a line (unit direction, from `point`) the ray comes closest to it, or null
+ * if both are parallel. Places behind the ray's origin do not count.
  */
 export function closestOnLine(point: Vec3, direction: Vec3, ray: Ray): number | null {
   const line = new Vector3(...direction);

@@ -7,13 +7,13 @@ describe("colours", () => {
     expect(toHex([1, 0.2158605, 0])).toBe("#ff8000");
   });
 
-  it("come back from hex unchanged", () => {
+  it("are unchanged after conversion from hex and back", () => {
     for (const hex of ["#000000", "#010203", "#7f80fe", "#ffffff"])
       expect(toHex(fromHex(hex))).toBe(hex);
   });
 
-  it("refuse what is no colour", () => {
-    expect(() => fromHex("red")).toThrow("expected #rrggbb, found red");
+  it("reject text that is not a colour", () => {
+    expect(() => fromHex("red")).toThrow("colour is red; expected #rrggbb");
   });
 
   it("keep the artist's colour of a tile until the user recolours the channel", () => {

@@ -1,4 +1,4 @@
-/** Colours are linear RGB everywhere but in the panel's inputs, which speak sRGB hex. */
+/** Colours are linear RGB everywhere except in the panel's inputs, which use sRGB hex. */
 export type Rgb = readonly [number, number, number];
 
 function encode(linear: number): number {
@@ -9,7 +9,9 @@ function decode(srgb: number): number {
   return srgb <= 0.04045 ? srgb / 12.92 : ((srgb + 0.055) / 1.055) ** 2.4;
 }
 
-/** `#rrggbb`, sRGB (IEC 61966-2-1), of a linear colour; parts outside 0..1 are clipped. */
+/**
+ * Converts a linear colour to `#rrggbb`, sRGB (IEC 61966-2-1); parts outside 0 to 1 are clipped.
+ */
 export function toHex(color: Rgb): string {
   const byte = (v: number) =>
     Math.round(255 * encode(Math.min(1, Math.max(0, v))))
@@ -18,22 +20,25 @@ export function toHex(color: Rgb): string {
   return `#${color.map(byte).join("")}`;
 }
 
-/** The linear colour of `#rrggbb`. Throws RangeError on anything else. */
+/** Converts `#rrggbb` to a linear colour. Throws RangeError for other text. */
 export function fromHex(hex: string): Rgb {
-  if (!/^#[0-9a-f]{6}$/i.test(hex)) throw new RangeError(`expected #rrggbb, found ${hex}`);
+  if (!/^#[0-9a-f]{6}$/i.test(hex)) throw new RangeError(`colour is ${hex}; expected #rrggbb`);
   const part = (i: number) => decode(Number.parseInt(hex.slice(i, i + 2), 16) / 255);
   return [part(1), part(3), part(5)];
 }
 
 /**
- * The colour to draw a surface in. A glb may carry an artist's colour for its own tile: it stays
- * until the user chooses a colour for the channel.
+ * The colour in which to draw a surface. A glb may have an artist's colour for its own tile. It
+ * stays until the user chooses a colour for the channel.
  */
 export function surfaceColor(glb: Rgb, original: Rgb, chosen: Rgb): Rgb {
   return chosen.every((v, i) => v === original[i]) ? glb : chosen;
 }
 
-/** Lightness and two axes of hue, of Ottosson, "A perceptual color space for image processing", 2020. */
+/**
+ * Lightness and two axes of hue, after Ottosson, "A perceptual color space for image processing",
+ * 2020.
+ */
 export function toOklab([r, g, b]: Rgb): Rgb {
   const [l, m, s] = [
     0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b,

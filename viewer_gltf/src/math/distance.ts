@@ -1,4 +1,3 @@
-/** Between two points. Pure. */
 import type { Vec3 } from "./vec3";
 
 export function distanceBetween(a: Vec3, b: Vec3): number {

@@ -4,7 +4,7 @@ import { extremePoints } from "./extreme_points";
 import { dot, type Vec3 } from "./vec3";
 
 describe("the extreme points of a cloud", () => {
-  it("reach as far as all of it, in any direction", () => {
+  it("reach as far as the whole cloud, in any direction", () => {
     const some = seeded(3);
     const unit = (): Vec3 => {
       const y = 2 * some() - 1;
@@ -21,7 +21,7 @@ describe("the extreme points of a cloud", () => {
     }
   });
 
-  it("are the corners of a box, and nothing within it", () => {
+  it("are the corners of a box, without inner points", () => {
     const grid = [-1, -0.5, 0, 0.5, 1];
     const filled = grid.flatMap((x) => grid.flatMap((y) => grid.map((z): Vec3 => [x, y, z])));
     const found = extremePoints(filled);
@@ -29,7 +29,7 @@ describe("the extreme points of a cloud", () => {
     for (const point of found) for (const part of point) expect(Math.abs(part)).toBe(1);
   });
 
-  it("of nothing are none", () => {
+  it("are empty for an empty cloud", () => {
     expect(extremePoints([])).toEqual([]);
   });
 });

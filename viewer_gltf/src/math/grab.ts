@@ -1,14 +1,17 @@
 /**
- * Moving the specimen by hand: one hand holds it as a thing is held, two hands carry, turn and
- * stretch it about the point between them. Pure; arguments are never changed.
+ * Moves the specimen by hand. One hand holds it like an object; two hands carry, turn and stretch
+ * it about the point between them. Arguments are not changed.
  */
 import { MathUtils, Matrix4, Quaternion, Vector3 } from "three";
 
-/** Where a hand (a controller) is, room, m. */
+/** Pose of a hand or controller in the scene, metres. */
 export type HandPose = Readonly<{ position: Vector3; orientation: Quaternion }>;
 export type Hands = readonly [HandPose, HandPose];
 
-/** Where the specimen is: its centre in the room, m, and its size as a multiple of the start's. */
+/**
+ * Pose of the specimen: its centre in the scene, metres, and its size as a multiple of the initial
+ * size.
+ */
 export type SpecimenPose = Readonly<{
   position: Vector3;
   orientation: Quaternion;
@@ -17,7 +20,7 @@ export type SpecimenPose = Readonly<{
 
 export const SMALLEST_SCALE = 0.05;
 export const LARGEST_SCALE = 50;
-/** Least distance of the hands, m: closer ones give no direction and no size. */
+/** Metres. Hands closer than this give no direction and no change of size. */
 const NEAR_M = 0.01;
 
 export function poseMatrix(pose: SpecimenPose): Matrix4 {
@@ -25,15 +28,16 @@ export function poseMatrix(pose: SpecimenPose): Matrix4 {
   return new Matrix4().compose(pose.position, pose.orientation, scale);
 }
 
-/** The specimen stays where it is in the hand. */
+/** Moves the specimen with one hand, so that it stays in place in the hand. */
 export function moveByOneHand(pose: SpecimenPose, before: HandPose, after: HandPose): SpecimenPose {
   const turn = after.orientation.clone().multiply(before.orientation.clone().invert());
   return moved(pose, before.position, after.position, turn, 1);
 }
 
 /**
- * The similarity that brings the line between the hands from before to after: its middle, its
- * direction and its length; about the line itself the specimen turns as the hands do on average.
+ * Moves the specimen by the similarity that takes the line between the hands from before to after:
+ * its middle, direction and length. About that line the specimen turns by the mean roll of both
+ * hands.
  */
 export function moveByTwoHands(pose: SpecimenPose, before: Hands, after: Hands): SpecimenPose {
   const [from, to] = [between(before), between(after)];
@@ -43,14 +47,14 @@ export function moveByTwoHands(pose: SpecimenPose, before: Hands, after: Hands):
   return moved(pose, middle(before), middle(after), turn, factor);
 }
 
-/** Zoom that leaves `pivot` (room, m; the point gazed at) where it is. */
+/** Scales about `pivot`, a point of the scene in metres, which stays in place. */
 export function zoomAbout(pose: SpecimenPose, pivot: Vector3, factor: number): SpecimenPose {
   return moved(pose, pivot, pivot, new Quaternion(), factor);
 }
 
 /**
- * Nobody loses the specimen: its scale stays within limits, its centre within `farthest_m` of the
- * viewer. A pose that is no pose (a controller lost its tracking) becomes `home`.
+ * Keeps the specimen near the user: its scale within limits, its centre within `farthest_m` of the
+ * user. A pose with NaN, from a controller that lost its tracking, is replaced by `home`.
  */
 export function limitPlacement(
   pose: SpecimenPose,
@@ -71,7 +75,10 @@ function limitScale(scale: number): number {
   return MathUtils.clamp(scale, SMALLEST_SCALE, LARGEST_SCALE);
 }
 
-/** Turn and scale about `from`, then bring it to `to`. At the limit of the scale nothing drifts. */
+/**
+ * Turns and scales about `from`, then moves `from` to `to`. At the limit of the scale nothing
+ * drifts.
+ */
 function moved(
   pose: SpecimenPose,
   from: Vector3,
@@ -99,7 +106,7 @@ function middle([left, right]: Hands): Vector3 {
   return left.position.clone().add(right.position).multiplyScalar(0.5);
 }
 
-/** The shortest turn of the line between the hands, after their own turn about the line. */
+/** The shortest turn of the line between the hands, after the hands' own roll about it. */
 function turnBetween(from: Vector3, to: Vector3, before: Hands, after: Hands): Quaternion {
   const axis = from.clone().normalize();
   const swing = new Quaternion().setFromUnitVectors(axis, to.clone().normalize());
@@ -111,7 +118,7 @@ function turnBetween(from: Vector3, to: Vector3, before: Hands, after: Hands): Q
   return swing.multiply(roll);
 }
 
-/** The part of a turn that is about the axis (swing-twist decomposition), -pi..pi. */
+/** The part of a turn about an axis (swing-twist decomposition), -pi to pi. */
 function rollAbout(axis: Vector3, turn: Quaternion): number {
   const along = axis.dot(new Vector3(turn.x, turn.y, turn.z));
   const angle = 2 * Math.atan2(along, turn.w);

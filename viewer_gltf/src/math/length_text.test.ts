@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { distanceText, sizeText } from "./length_text";
 
 describe("a distance", () => {
-  it("is written with three digits in the unit that keeps it short", () => {
+  it("is written with three digits in the unit that gives the shortest text", () => {
     const said = [0, 0.0123, 0.4567, 0.9996, 1, 9.996, 12.34, 123.4, 999.4, 999.9, 12345, 1.5e6];
     expect(said.map(distanceText)).toEqual([
       "0 µm",

@@ -1,4 +1,4 @@
-/** Lengths for people: in nm, um or mm. Pure. */
+/** Lengths as text, in nm, um or mm. */
 const DIGITS = 3;
 
 /** mm from 1000 um on, nm below 1 um. */
@@ -6,7 +6,7 @@ function lengthUnitOf(rounded_um: number): readonly [string, number] {
   return rounded_um >= 1000 ? ["mm", 1e-3] : rounded_um < 1 ? ["nm", 1e3] : ["µm", 1];
 }
 
-/** Edges in the unit of the longest: `231 × 215 × 255 mm`. */
+/** Edges in the unit of the longest one: `231 × 215 × 255 mm`. */
 export function sizeText(edges_um: readonly number[]): string {
   const rounded = edges_um.map((edge) => Number(edge.toPrecision(DIGITS)));
   const [unit, factor] = lengthUnitOf(Math.max(...rounded));
@@ -14,9 +14,9 @@ export function sizeText(edges_um: readonly number[]): string {
   return `${texts.join(" × ")} ${unit}`;
 }
 
-/** Three digits are more than a hand can point. */
+/** A distance with three digits, which is more than a hand can point at. */
 export function distanceText(distance_um: number): string {
-  const rounded = Number(distance_um.toPrecision(DIGITS)); // so that 999.9 um is 1.00 mm
+  const rounded = Number(distance_um.toPrecision(DIGITS)); // so 999.9 um becomes 1.00 mm
   if (rounded === 0) return "0 µm";
   const [unit, factor] = lengthUnitOf(rounded);
   const value = distance_um * factor;

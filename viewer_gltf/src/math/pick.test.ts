@@ -14,59 +14,59 @@ const ACROSS: Ray = { origin: [-100, -5, 2], direction: [1, 0, 0] };
 const pick = (origin: Vec3, direction: Vec3, clip = WHOLE) =>
   pickTile({ origin, direction }, TILES, clip)?.id ?? null;
 
-describe("the tile that is looked at", () => {
-  it("is the first along the ray", () => {
+describe("the tile under the gaze", () => {
+  it("is the first tile along the ray", () => {
     expect(pick([15, -5, 100], [0, 0, -1])).toBe("right");
     expect(pick([-100, -5, 2], [1, 0, 0])).toBe("left");
     expect(pick([100, -5, 2], [-1, 0, 0])).toBe("right");
   });
 
-  it("is none if the ray misses or looks away", () => {
+  it("is null if the ray misses or points away", () => {
     expect(pick([15, 5, 100], [0, 0, -1])).toBeNull();
     expect(pick([15, -5, 100], [0, 0, 1])).toBeNull();
   });
 
-  it("is at the distance of its near face, or at 0 inside, in lengths of the direction", () => {
+  it("is at the distance of its near face, or at 0 inside, in multiples of the direction", () => {
     expect(pickTile(AHEAD_LEFT, TILES, WHOLE)?.distance).toBe(50);
     expect(pickTile({ ...AHEAD_LEFT, origin: [5, -5, 2] }, TILES, WHOLE)?.distance).toBe(0);
   });
 
-  it("may be flat", () => {
+  it("can be flat", () => {
     const flat: BoxedTile = { id: "flat", bounds_um: { min: [0, -10, 3], max: [10, 0, 3] } };
     expect(pickTile(AHEAD_LEFT, [flat], WHOLE)).toEqual({ id: "flat", distance: 51 });
     const before = { box: null, plane: { normal: [0, 0, 1], offset_um: 2 } } as const;
     expect(pickTile(AHEAD_LEFT, [flat], before)).toBeNull();
   });
 
-  it("is one of those that are shown", () => {
+  it("is one of the shown tiles", () => {
     expect(shownTiles(TILES, null)).toBe(TILES);
     expect(pickTile(ACROSS, shownTiles(TILES, "right"), WHOLE)?.id).toBe("right");
   });
 });
 
-describe("of a specimen that is cut, the tile", () => {
+describe("the tile under the gaze in a clipped specimen", () => {
   const planeAt = (x: number): Clip => ({
     box: null,
-    plane: { normal: [-1, 0, 0], offset_um: -x }, // keeps what lies to the right
+    plane: { normal: [-1, 0, 0], offset_um: -x }, // keeps the right side
   });
 
-  it("begins where it is cut", () => {
+  it("begins at the clip plane", () => {
     expect(pickTile(ACROSS, TILES, planeAt(4))).toEqual({ id: "left", distance: 104 });
   });
 
-  it("is the one behind, where the first is cut away, also along its very face", () => {
+  it("is the next tile if the first is clipped away, even exactly at its face", () => {
     expect(pickTile(ACROSS, TILES, planeAt(12))).toEqual({ id: "right", distance: 112 });
     expect(pickTile(ACROSS, TILES, planeAt(10))).toEqual({ id: "right", distance: 110 });
     expect(pickTile(ACROSS, TILES.slice(0, 1), planeAt(10))).toBeNull();
   });
 
-  it("is none where nothing is left along the ray", () => {
+  it("is null if nothing is left along the ray", () => {
     expect(pickTile(ACROSS, TILES, planeAt(20))).toBeNull();
     const aside: Clip = { box: { min: [0, -3, 0], max: [20, 0, 5] }, plane: null };
     expect(pickTile(ACROSS, TILES, aside)).toBeNull();
   });
 
-  it("is met at its first point that is kept, for any ray, box and plane", () => {
+  it("is hit at its first kept point, for any ray, box and plane", () => {
     const random = seeded(11);
     const part = (low: number, high: number) => low + (high - low) * random();
     const anywhere = (): Vec3 => [part(-5, 25), part(-15, 5), part(-5, 10)];
@@ -94,7 +94,7 @@ describe("of a specimen that is cut, the tile", () => {
         ];
         if (isKept(p, clip) && TILES.some((tile) => isWithin(p, tile))) first = t;
       }
-      if (first === null) continue; // less than a step of it is left, or nothing
+      if (first === null) continue; // less than one step of the tile is left, or nothing
       met++;
       expect(Math.abs((found?.distance ?? Number.NaN) - first)).toBeLessThan(2 * step);
     }

@@ -21,7 +21,7 @@ function area(corners: readonly Vec3[], normal: Vec3): number {
   return sum;
 }
 
-it("cuts a cube in a square, a triangle, and a regular hexagon", () => {
+it("is a square, a triangle or a regular hexagon in a cube", () => {
   expect(area(planeSection({ normal: [0, 0, 1], offset_um: 0.5 }, CUBE), [0, 0, 1])).toBeCloseTo(4);
   const n = 1 / Math.sqrt(3);
   const normal: Vec3 = [n, n, n];
@@ -33,7 +33,7 @@ it("cuts a cube in a square, a triangle, and a regular hexagon", () => {
   expect(area(hexagon, normal)).toBeCloseTo(3 * Math.sqrt(3)); // edges of length sqrt(2)
 });
 
-it("is nothing where the plane passes the box by", () => {
+it("is empty if the plane misses the box", () => {
   expect(planeSection({ normal: [1, 0, 0], offset_um: 2.1 }, CUBE)).toEqual([]);
   expect(planeSection({ normal: [1, 0, 0], offset_um: -0.1 }, CUBE)).toEqual([]);
 });

@@ -1,15 +1,15 @@
-/** The polygon in which a plane cuts a box: what of the clip plane is worth showing. Pure. */
+/** The polygon in which a plane cuts a box, which is the visible part of a clip plane. */
 import { Vector3 } from "three";
 import type { Box } from "./box";
 import type { ClipPlane } from "./clip";
 import type { Vec3 } from "./vec3";
 
-/** Most corners of a plane's cut through a box. */
+/** Largest number of corners of a plane's section through a box. */
 export const MAX_CORNERS = 6;
-/** Least distance of two corners, as a share of the box's diagonal: nearer ones are one. */
+/** Least distance of two corners, as a share of the box's diagonal; closer ones are merged. */
 const SAME = 1e-9;
 
-/** Corners in order round the plane's normal; fewer than three where the plane passes the box by. */
+/** Corners in order around the plane's normal; fewer than three if the plane misses the box. */
 export function planeSection({ normal, offset_um }: ClipPlane, { min, max }: Box): readonly Vec3[] {
   const n = new Vector3(...normal);
   const corners = Array.from(

@@ -15,7 +15,7 @@ describe("the scale bar", () => {
     }
   });
 
-  it("writes its length in the unit that keeps the number short", () => {
+  it("has a label in the unit that gives the shortest number", () => {
     const labels = [0.0001, 0.004, 0.00625, 0.1, 1, 6.2, 6.25, 20, 100].map(
       (um_per_px) => chooseScaleBar(um_per_px)?.label,
     );
@@ -32,14 +32,14 @@ describe("the scale bar", () => {
     ]);
   });
 
-  it("is none where a pixel has no size", () => {
+  it("is null if a pixel has no size", () => {
     for (const nonsense of [0, -1, Number.NaN, Number.POSITIVE_INFINITY]) {
       expect(chooseScaleBar(nonsense)).toBeNull();
     }
   });
 
-  it("follows from the field of view: at 90 deg the picture is twice as high as it is far", () => {
-    // 1 m away, 2 m of the room on 1000 px, a metre is 1000 um of the specimen.
+  it("follows from the field of view: at 90 degrees the image is twice as high as it is far away", () => {
+    // at 1 m, 1000 px show 2 m of the scene, and a metre is 1000 um of the specimen
     expect(umPerPixel(1, Math.PI / 2, 1000, 0.001)).toBeCloseTo(2);
   });
 });

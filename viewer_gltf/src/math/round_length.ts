@@ -1,15 +1,18 @@
-/** A scale bar: a round length that is neither too short nor too long on the screen. Pure. */
+/** A scale bar: a round length that is neither too short nor too long on the screen. */
 
-/** Longest bar, px. The shortest is 0.4 of it: 2 to 5 is the largest step of round lengths. */
+/**
+ * Pixels. Longest bar; the shortest is 0.4 of it, since 2 to 5 is the largest step of round
+ * lengths.
+ */
 export const LONGEST_PX = 160;
 
 export type ScaleBar = Readonly<{ length_um: number; length_px: number; label: string }>;
 
 /**
- * How much of the specimen one pixel shows at a distance from the eye, straight ahead.
+ * Length of the specimen, um, that one pixel shows at a distance straight ahead of the eye.
  *
  * @param fov_rad vertical field of view
- * @param m_per_um metres of the room per um of the specimen
+ * @param m_per_um metres of the scene per um of the specimen
  */
 export function umPerPixel(
   distance_m: number,
@@ -20,11 +23,14 @@ export function umPerPixel(
   return (2 * distance_m * Math.tan(fov_rad / 2)) / height_px / m_per_um;
 }
 
-/** 1, 2 or 5 times a power of ten; null if the size of a pixel makes no sense (eye at the point). */
+/**
+ * Chooses a length of 1, 2 or 5 times a power of ten. Returns null if the pixel size is not
+ * positive and finite, as with the eye at the point itself.
+ */
 export function chooseScaleBar(um_per_px: number): ScaleBar | null {
   if (!(um_per_px > 0) || !Number.isFinite(um_per_px)) return null;
   const longest_um = LONGEST_PX * um_per_px;
-  // A tie, such as 1000 um at 6.25 um a pixel, must not be lost to rounding.
+  // The factor keeps exact ties, such as 1000 um at 6.25 um per pixel, from being lost to rounding.
   const fits = (length_um: number) => length_um <= longest_um * (1 + 1e-9);
   let exponent = Math.floor(Math.log10(longest_um));
   while (fits(tenTo(exponent + 1))) exponent++;
@@ -34,7 +40,7 @@ export function chooseScaleBar(um_per_px: number): ScaleBar | null {
   return { length_um, length_px: length_um / um_per_px, label: labelOf(mantissa, exponent) };
 }
 
-/** 10 ** -3 is not the double nearest to 0.001, 1 / 1000 is. */
+/** 1 / 1000 is the double nearest to 0.001, but 10 ** -3 is not. */
 function tenTo(exponent: number): number {
   return exponent < 0 ? 1 / 10 ** -exponent : 10 ** exponent;
 }

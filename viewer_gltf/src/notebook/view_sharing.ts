@@ -146,7 +146,7 @@ export class ViewSharing {
   private get shared(): Shared {
     const { host, ranges } = this;
     const { viewpoint } = host;
-    const { position, target } = viewpoint.lookNow;
+    const { position, target } = viewpoint.cameraPose;
     const [eye_um, target_um] = [position, target].map((place) => {
       const [x, y, z] = viewpoint.toSpecimen(place).map(rounded);
       return [x, y, z] as const;

@@ -155,7 +155,7 @@ export class Objects {
   adopt(
     scene: Object3D,
     tile: string,
-    blend: Readonly<{ wear: (part: ObjectMaterial["part"]) => void }>,
+    blend: Readonly<{ setPart: (part: ObjectMaterial["part"]) => void }>,
   ): void {
     if (this.adopted.has(scene)) return;
     this.adopted.add(scene);
@@ -168,7 +168,7 @@ export class Objects {
       if (this.stageColors.length === 0) this.stageColors = stageColors(object.geometry);
       hasObjects = this.material.adopt(object, rowOf) || hasObjects;
     });
-    if (hasObjects) blend.wear(this.material.part);
+    if (hasObjects) blend.setPart(this.material.part);
   }
 
   /** Bring the textures to the view. What has not come yet is drawn when it has. */

@@ -3,7 +3,7 @@ import "./lost_context.css";
 import { element } from "../dom/element";
 import { DROPPED } from "../host/faults";
 import type { PartHost } from "../host/part";
-import { takeFewerPixels } from "../render/pixel_share";
+import { halvePixelShare } from "../render/pixel_share";
 
 /** Milliseconds until the page offers a reload. Most drivers restore the context within a second. */
 const PATIENCE_MS = 5000;
@@ -18,7 +18,7 @@ const OFFER = "Reload with fewer pixels";
 export function offerReload(host: PartHost, beforeReload: () => void): void {
   const reload = () => {
     beforeReload();
-    takeFewerPixels();
+    halvePixelShare();
     location.reload();
   };
   const card = element(

@@ -157,7 +157,7 @@ export class DenoiseAndTone {
     }
     uniforms.uGuide.value = this.mean.textures[1];
     uniforms.uRounds.value = standIn?.rounds ?? 0;
-    uniforms.uMarched.value = standIn?.picture ?? null;
+    uniforms.uMarched.value = standIn?.image ?? null;
     uniforms.uTracedLight.value = this.probe.light.traced;
     uniforms.uMarchedLight.value = this.probe.light.marched;
     drawEyes(renderer, showPass.scene, eyes, this.picture, this.scale, (eye, part) => {

@@ -267,9 +267,9 @@ export class Tracer {
     eyes: Eyes,
     views: readonly TraceView[],
     { isPostOn, occlusion }: TraceSettings,
-    { picture }: MarchedFrame,
+    { image }: MarchedFrame,
   ): void {
-    this.probe.measure(renderer, eyes, picture, isPostOn ? occlusion : 0, (target, scale) => {
+    this.probe.measure(renderer, eyes, image, isPostOn ? occlusion : 0, (target, scale) => {
       const { uniforms } = this.pathPass;
       uniforms.uCalm.value = 0;
       uniforms.uTurn.value.set(0, 1);

@@ -1,7 +1,7 @@
 /**
- * The place that a flat screen gives the specimen: a gentle gradient, a pool of light on the ground, and a soft
- * shadow under the specimen. It is drawn behind all else, and covers nothing. Stereo has a dark room with a
- * grid on the ground, and the user's own room has a ground.
+ * The backdrop of the specimen on a flat screen: a gentle gradient, a pool of light on the ground,
+ * and a soft shadow under the specimen. It is drawn behind everything. In stereo the scene is dark
+ * with a grid on the ground, or the user's own room.
  */
 import {
   BufferAttribute,
@@ -19,13 +19,15 @@ import { around } from "../math/box";
 import type { Vec3 } from "../math/vec3";
 import { FAR, type Theme } from "./theme";
 
-/** Share of a room's height by which the ground lies under the specimen: it stands on its shadow. */
+/** Distance of the ground below the specimen, as a share of the specimen's height. */
 const GAP = 0.02;
-/** The backdrop is drawn before everything else. */
+/** Draw order: before everything else. */
 const RENDER_ORDER = -2;
 
-/** Colours (sRGB) high up and beside the specimen, and the share of the light that the shadow takes. */
-const LOOKS = {
+/**
+ * sRGB colours high up and beside the specimen, and the share of the light that the shadow takes.
+ */
+const THEMES = {
   dark: [0x171c26, 0x1f2632, 0.7],
   light: [0xfafbfd, 0xffffff, 0.3],
 } as const;
@@ -51,9 +53,9 @@ export class Backdrop {
     }),
   );
 
-  /** Share of the light that a shadow takes. */
+  /** Share of the light that the shadow takes, 0 to 1. */
   private shade = 0;
-  /** Whether nothing is shown. */
+  /** True if nothing is shown, so that there is no shadow. */
   private isEmpty = false;
 
   constructor() {
@@ -63,8 +65,8 @@ export class Backdrop {
     this.mesh.renderOrder = RENDER_ORDER;
   }
 
-  dress(theme: Theme): void {
-    const [high, pool, shade] = LOOKS[theme];
+  setTheme(theme: Theme): void {
+    const [high, pool, shade] = THEMES[theme];
     const { uFar, uHigh, uPool, uShade } = this.uniforms;
     uFar.value.copy(srgb(FAR[theme]));
     uHigh.value.copy(srgb(high));
@@ -73,8 +75,11 @@ export class Backdrop {
     uShade.value = this.isEmpty ? 0 : shade;
   }
 
-  /** @param points outermost ones of what is shown, in the room, m; none: nothing throws a shadow */
-  standUnder(points: readonly Vec3[]): void {
+  /**
+   * Fits ground and shadow to the specimen.
+   * @param points outermost points of the shown part, in the scene, metres; empty: no shadow
+   */
+  fitTo(points: readonly Vec3[]): void {
     this.isEmpty = points.length === 0;
     this.uniforms.uShade.value = this.isEmpty ? 0 : this.shade;
     if (this.isEmpty) return;

@@ -1,9 +1,11 @@
 /**
- * This file blends surfaces that give way to their volume, inside the disc or as a whole, and surfaces that are
- * made translucent. A first pass writes the depth without colour, so that only the front of a translucent surface
- * shows. Each translucent channel has a depth of its own. The channels are drawn from the farthest to the nearest, so
- * that they show through one another. Where a solid is cut open, or ends at the tile that is a volume, its inside
- * is drawn as the plane there: flat, and lit as that.
+ * Blends surfaces with the volumes that replace them, inside the focus disc or everywhere, and
+ * draws translucent surfaces.
+ *
+ * A first pass writes depth without colour, so that only the front of a translucent surface shows.
+ * Each translucent channel has a depth pass of its own. Channels are drawn from the farthest to the
+ * nearest, so that they show through one another. Where a solid is cut open, or ends at a tile that
+ * is shown as a volume, its inside is drawn as a flat section.
  */
 import {
   AlwaysStencilFunc,
@@ -21,7 +23,7 @@ import {
 } from "three";
 import type { BothEyes, BothEyesUniforms } from "../gpu/both_eyes";
 import type { Cuts } from "../gpu/clip_planes";
-import { type Disc, LAID, type MarchedUniforms } from "../gpu/composite_pass";
+import { type Disc, type MarchedUniforms, VOLUME_DRAWN } from "../gpu/composite_pass";
 import { CHUNKS } from "../gpu/glsl_chunks";
 import { includeChunks } from "../gpu/glsl_include";
 import { insertInto, insertionsOf } from "../gpu/insert_glsl";
@@ -32,8 +34,8 @@ import depthFragment from "./shaders/surface_depth.frag.glsl?raw";
 import depthVertex from "./shaders/surface_depth.vert.glsl?raw";
 
 /**
- * What all surfaces share, by reference: the disc's cone and the cuts in the room, metres, and the
- * volumes' picture, which takes their place in the disc.
+ * Uniforms that all surfaces share: the disc's cone and the clip planes in the scene, metres, and
+ * the image of the volumes, which replaces surfaces in the disc.
  */
 export type SurfaceFrame = Readonly<{
   uniforms: Pick<Disc, "uDisc" | "uApex" | "uAxis"> &
@@ -45,51 +47,56 @@ export type SurfaceFrame = Readonly<{
 
 export function makeSurfaceFrame(
   { uDisc, uApex, uAxis }: Disc,
-  picture: MarchedUniforms,
+  marched: MarchedUniforms,
   { uCuts, uCutCount, uOpen }: Pick<Cuts, "uCuts" | "uCutCount" | "uOpen">,
   both: BothEyes,
 ): SurfaceFrame {
   const shared = { uDisc, uApex, uAxis, uCuts, uCutCount, uOpen };
-  return { uniforms: { ...shared, ...picture, ...both.uniforms }, both };
+  return { uniforms: { ...shared, ...marched, ...both.uniforms }, both };
 }
 
 /**
- * A surface that is not opaque now; a pane: the march has to know what lies behind it. `isSolid`: but for
- * what its volume takes in the disc it is opaque.
+ * A surface that is not opaque now.
+ * `isPane`: the ray march needs its depth. `isSolid`: it is opaque outside the disc.
  */
 export type BlendedScene = Readonly<{ scene: Object3D; isPane: boolean; isSolid: boolean }>;
 
-/** What the shaders of surfaces include of a part: see insertions/surface.vert.glsl and surface.frag.glsl. */
+/**
+ * GLSL chunks by which a part extends the surface shaders; see insertions/surface.vert.glsl and
+ * surface.frag.glsl.
+ */
 type PartChunk =
   | `part/vertex_${"declared" | "place" | "end"}`
   | `part/fragment_${"declared" | "color"}`;
 
-/** What some surfaces have beside all others. */
+/** Shader code and uniforms that a part adds to some surfaces. */
 export type SurfacePart = Readonly<{
-  /** Of the text: the same for the same one. */
+  /** Cache key of the shader text: equal texts have equal keys. */
   key: string;
   uniforms: Readonly<Record<string, { value: unknown }>>;
   chunks: Readonly<Record<PartChunk, string>>;
 }>;
 
-/** How much of a surface is left. */
 export type Share = Readonly<{
   opacity: number;
-  /** What its volume takes, 0..1: in the disc, or everywhere. */
+  /** Share that its volume takes, 0 to 1: in the disc, or everywhere. */
   taken: number;
   isInDisc: boolean;
-  /** Whether the volumes' picture is mixed with the surfaces' in the disc. */
+  /** Whether surfaces and volumes are mixed across the disc's rim. */
   isCrossing: boolean;
-  /** Of the shown channels: where two surfaces lie in one place, as where the data end, the first shows. */
+  /**
+   * Order among the shown channels: if two surfaces lie in one place, as at the end of the data,
+   * the lower rank shows.
+   */
   rank: number;
 }>;
 
 /**
- * Of depth, between one channel and the next: more than coordinates differ by that are quantized apart; about
- * a millimetre of a specimen that is 1.2 m long in the room.
+ * Depth units between one channel and the next: more than the error of quantized coordinates; about
+ * a millimetre for a specimen 1.2 m long.
  */
 const UNITS_APART = 32;
-/** Units of depth between a translucent surface's colour and the pass that writes its depth before. */
+/** Depth units between a translucent surface's colour and its depth pass. */
 const UNITS_BEHIND = 2;
 
 const NO_PART: Pick<SurfacePart, "uniforms" | "chunks"> = {
@@ -104,10 +111,10 @@ const SURFACE = includeChunks(surfaceFragment, CHUNKS);
 const DEPTH_FRAGMENT = includeChunks(depthFragment, CHUNKS);
 
 /**
- * Writes depth alone, cut as the surfaces are.
+ * Makes the material that writes depth only, clipped like the surfaces.
  *
- * @param uniforms with those of `both`
- * @param isShared whether nothing is written where a volume has taken all of the surface
+ * @param uniforms include those of `both`
+ * @param isShared whether nothing is written where a volume has replaced all of the surface
  */
 export function depthMaterial(
   uniforms: Record<string, { value: unknown }>,
@@ -127,17 +134,17 @@ export function depthMaterial(
   return material;
 }
 
-/** This step of the render order lies between the depth of a channel's surfaces and their colour. */
+/** Step of the draw order by which a channel's depth pass precedes its colour. */
 const DEPTH_AHEAD = 0.5;
 
-/** The layer in which only what writes the depth of translucent surfaces is; WebXR has 1 and 2. */
+/** Layer that holds only the depth passes of translucent surfaces; WebXR uses 1 and 2. */
 export const PANES = 3;
 
-/** Blending of light that has its opacity already, and the mark of it. */
-const LAID_OVER = {
+/** Blending of premultiplied colours, and the stencil value that marks their pixels. */
+const PREMULTIPLIED = {
   blendSrc: OneFactor,
   blendDst: OneMinusSrcAlphaFactor,
-  stencilRef: LAID,
+  stencilRef: VOLUME_DRAWN,
   stencilFunc: AlwaysStencilFunc,
   stencilZPass: ReplaceStencilOp,
 } as const;
@@ -146,8 +153,10 @@ export class BlendedSurface {
   private readonly uniforms;
   private readonly depth: ShaderMaterial;
   private readonly meshes: readonly Mesh[];
-  private readonly twins: readonly Mesh[];
-  /** The opacity that the stage gives the surface, 0..1; each surface of a bundle has one material. */
+  private readonly depthMeshes: readonly Mesh[];
+  /**
+   * Opacity that the stage gives the surface, 0 to 1; each surface of a bundle has one material.
+   */
   private readonly ownOpacity: number;
   private part: SurfacePart | null = null;
   isBlended = false;
@@ -169,16 +178,17 @@ export class BlendedSurface {
     for (const material of materials) {
       this.patch(material);
       both.adopt(material);
-      material.forceSinglePass = true; // the depth that is written first sorts both sides
-      Object.assign(material, LAID_OVER);
-      // the loader leaves the depth of translucent materials out; here it is written first
+      material.forceSinglePass = true; // the depth pass already sorts front and back
+      Object.assign(material, PREMULTIPLIED);
+      // the loader turns depth off for translucent materials; here a depth pass precedes them
       material.transparent = false;
       material.depthWrite = true;
     }
     this.ownOpacity = materials[0]?.opacity ?? 1;
     this.depth = depthMaterial(this.uniforms, both, true);
-    // A hair behind the colour that follows, whatever its rounding; not by slope, which would let
-    // what lies behind a rim through.
+    // The depth pass lies slightly behind the colour, beyond its rounding error. The offset does
+    // not depend on the slope, because a slope-dependent offset would let things behind a rim
+    // through.
     for (const material of [...materials, this.depth]) {
       material.polygonOffset = true;
       material.polygonOffsetFactor = 0;
@@ -188,13 +198,13 @@ export class BlendedSurface {
       if (object instanceof Mesh) meshes.push(object);
     });
     this.meshes = meshes;
-    this.depth.transparent = true; // in one order with the colours
-    this.twins = meshes.map((mesh) => {
-      const twin = new Mesh(mesh.geometry, this.depth);
-      twin.renderOrder = -DEPTH_AHEAD;
-      twin.visible = false;
-      mesh.add(twin);
-      return twin;
+    this.depth.transparent = true; // drawn in one order with the colours
+    this.depthMeshes = meshes.map((mesh) => {
+      const depthMesh = new Mesh(mesh.geometry, this.depth);
+      depthMesh.renderOrder = -DEPTH_AHEAD;
+      depthMesh.visible = false;
+      mesh.add(depthMesh);
+      return depthMesh;
     });
   }
 
@@ -210,14 +220,13 @@ export class BlendedSurface {
     material.customProgramCacheKey = () => `blended ${this.part?.key}`;
   }
 
-  /** Have a part from now on. */
-  wear(part: SurfacePart): void {
+  setPart(part: SurfacePart): void {
     this.part = part;
     const { depth } = this;
     Object.assign(depth.uniforms, part.uniforms);
     depth.vertexShader = includeChunks(depthVertex, { ...CHUNKS, ...part.chunks });
     for (const material of [...this.materials, depth]) material.needsUpdate = true;
-    // in the pass for the depth, too, what is gone is not there
+    // the depth pass discards the same fragments
     for (const material of this.materials) material.allowOverride = false;
   }
 
@@ -231,7 +240,7 @@ export class BlendedSurface {
     this.isBlended = own < 1 || taken > 0;
     this.isPane = this.isBlended && !crosses;
     this.isSolid = isInDisc && own === 1;
-    if (!this.isTranslucent) this.take(0);
+    if (!this.isTranslucent) this.setTurn(0);
     this.scene.visible = own > 0 && (taken < 1 || isInDisc);
     this.depth.polygonOffsetUnits = rank * UNITS_APART + UNITS_BEHIND;
     for (const material of this.materials) {
@@ -240,25 +249,25 @@ export class BlendedSurface {
       if (material.transparent === this.isBlended) continue;
       material.transparent = this.isBlended;
       material.blending = this.isBlended ? CustomBlending : NormalBlending;
-      material.needsUpdate = true; // an opaque surface's shader leaves its alpha out
+      material.needsUpdate = true; // the shader of an opaque surface leaves alpha out
     }
-    for (const twin of this.twins) {
-      twin.visible = this.isBlended;
-      if (this.isPane) twin.layers.enable(PANES);
-      else twin.layers.disable(PANES);
+    for (const depthMesh of this.depthMeshes) {
+      depthMesh.visible = this.isBlended;
+      if (this.isPane) depthMesh.layers.enable(PANES);
+      else depthMesh.layers.disable(PANES);
     }
   }
 
-  /** Whether other translucent surfaces show through it, and not only a volume in its place. */
+  /** Whether other translucent surfaces show through it, not only the volume that replaces it. */
   get isTranslucent(): boolean {
     return this.isBlended && this.uniforms.uOpacity.value * this.ownOpacity < 1;
   }
 
-  /** Place a translucent surface among all others: the lowest turn is drawn first. */
-  take(turn: number): void {
+  /** Sets the place of a translucent surface in the draw order: the lowest turn is drawn first. */
+  setTurn(turn: number): void {
     const order = this.isTranslucent ? 1 + turn : 0;
     for (const mesh of this.meshes) mesh.renderOrder = order;
-    for (const twin of this.twins) twin.renderOrder = order - DEPTH_AHEAD;
+    for (const depthMesh of this.depthMeshes) depthMesh.renderOrder = order - DEPTH_AHEAD;
   }
 
   dispose(): void {

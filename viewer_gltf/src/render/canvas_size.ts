@@ -1,4 +1,6 @@
-/** Calls back when the stage has another size, or its window another pixel ratio. */
+/**
+ * Calls back when the canvas's container changes its size, or its window changes its pixel ratio.
+ */
 export class StageSize {
   private readonly observer: ResizeObserver;
   private readonly disposed = new AbortController();
@@ -12,7 +14,10 @@ export class StageSize {
     this.listen();
   }
 
-  /** A window may go to another screen, or be zoomed, at the same size. */
+  /**
+   * The pixel ratio can change without the size: when the window moves to another screen or is
+   * zoomed.
+   */
   private listen(): void {
     matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener(
       "change",

@@ -1,6 +1,7 @@
 /**
- * The picture from before a jump of the specimen, which fades into the picture after it. In stereo nothing
- * moves before the eyes that neither a head nor a hand has moved.
+ * The frame from before a jump of the specimen, which fades into the frame after it. In stereo the
+ * specimen jumps and fades, so that nothing moves in front of the eyes unless a head or a hand
+ * moves it.
  */
 import { MathUtils, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import { drawWhole, nothing } from "../gpu/float_targets";
@@ -8,11 +9,10 @@ import { linearTarget } from "../gpu/linear_target";
 import { ScreenPass } from "../gpu/screen_pass";
 import { KEEP_FRAGMENT } from "../gpu/shaders/sources";
 
-/** Length of a fade, s. */
 const FADE_S = 0.25;
 
 export class CrossFade {
-  /** Linear light of the picture from before the jump. */
+  /** The frame from before the jump, in linear light. */
   private readonly kept: WebGLRenderTarget;
   private readonly pass = new ScreenPass(KEEP_FRAGMENT, { uLight: nothing() });
   private isAskedFor = false;
@@ -26,18 +26,17 @@ export class CrossFade {
     return this.kept.texture;
   }
 
-  /** Fade from the last picture to the next one. */
+  /** Starts a fade from the last frame to the next one. */
   begin(): void {
     this.isAskedFor = true;
   }
 
-  /** Go on with a fade. */
   advance(dt_s: number): void {
     this.left_s = Math.max(0, this.left_s - dt_s);
-    if (this.left_s === 0) this.kept.setSize(1, 1); // it is as large as the picture
+    if (this.left_s === 0) this.kept.setSize(1, 1); // frees its memory: it is as large as the frame
   }
 
-  /** Keep the last picture, if a fade was asked for. To be called before the next one is drawn. */
+  /** Stores the last frame if a fade was started. Call it before the next frame is drawn. */
   keep(last: WebGLRenderTarget | null): void {
     const isWanted = this.isAskedFor && last !== null;
     this.isAskedFor = false;
@@ -47,7 +46,7 @@ export class CrossFade {
     this.left_s = FADE_S;
   }
 
-  /** Share of the picture from before, 0..1. A picture of another size is no picture from before. */
+  /** Share of the earlier frame in this one, 0 to 1; 0 if its size differs. */
   shareIn({ width, height }: WebGLRenderTarget): number {
     const { kept } = this;
     if (kept.width !== width || kept.height !== height) return 0;

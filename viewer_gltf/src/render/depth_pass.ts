@@ -1,8 +1,9 @@
 /**
- * Depth of the surfaces, of opaque and of translucent ones apart, which the ray-march needs as
- * textures. The surfaces are drawn a second time for it, into a target as large as the picture (both eyes in a headset), only while
- * a volume is on screen: the picture itself keeps the browser's own anti-aliasing, and in WebXR
- * its frame buffer can't be read.
+ * Depth of the surfaces as textures for the ray march, opaque and translucent ones separately.
+ *
+ * The surfaces are drawn a second time, into a target as large as the frame (both eyes in a
+ * headset), and only while a volume is on screen. The frame itself keeps the browser's
+ * anti-aliasing, and in WebXR its frame buffer can't be read.
  */
 import {
   DepthTexture,
@@ -21,9 +22,7 @@ import { drawAllEyes } from "../gpu/offscreen_target";
 import { depthMaterial, PANES } from "./blend_material";
 
 export class DepthPass {
-  /** Of what is opaque. */
   private readonly solid = depthTarget();
-  /** Of what is translucent. */
   private readonly panes = depthTarget();
   private readonly material: Material;
 
@@ -42,7 +41,10 @@ export class DepthPass {
     return this.panes.depthTexture;
   }
 
-  /** `hidden` are the objects that are not opaque. */
+  /**
+   * Draws the depth of opaque surfaces.
+   * @param hidden the objects that are not opaque
+   */
   render(renderer: WebGLRenderer, scene: Scene, eyes: Eyes, hidden: readonly Object3D[]): void {
     const visibility = hidden.map((object) => object.visible);
     for (const object of hidden) object.visible = false;
@@ -56,7 +58,7 @@ export class DepthPass {
     });
   }
 
-  /** Of translucent surfaces: they have their own way to write depth alone. */
+  /** Draws the depth of translucent surfaces, which have depth materials of their own. */
   renderPanes(renderer: WebGLRenderer, scene: Scene, eyes: Eyes): void {
     withoutBackground(scene, () =>
       drawAllEyes(renderer, scene, eyes, this.both.cameraOf(eyes, PANES), this.panes),

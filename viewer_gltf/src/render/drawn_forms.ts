@@ -1,4 +1,7 @@
-/** The ways to draw the specimen that a frame puts together with its surfaces, as the frame sees them. */
+/**
+ * Interfaces of the drawings that a frame combines with its surfaces: ray-marched and path-traced
+ * volumes.
+ */
 import type { Matrix4, Scene, Texture, Vector3, WebGLRenderer } from "three";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { MarchClip } from "../gpu/clip_uniforms";
@@ -6,7 +9,10 @@ import type { Eyes } from "../gpu/eyes";
 import type { ShownVolume } from "../state/on_screen";
 import type { MarchLight } from "../voxels/march_frame";
 
-/** Where a frame is seen from: um, world. The disc's cone has an apex and an axis; `lamp` is the direction towards it. */
+/**
+ * Where a frame is seen from, in um of the world: the apex and axis of the disc's cone, and `lamp`,
+ * the direction towards the light.
+ */
 export type MarchView = Readonly<{
   eye: Vector3;
   apex: Vector3;
@@ -15,87 +21,82 @@ export type MarchView = Readonly<{
   lamp: Vector3;
 }>;
 
-/** The marches of the tiles that are on screen. */
+/** The ray marches of the tiles that are on screen. */
 export interface DrawnMarches {
   readonly scene: Scene;
-  /** Whether anything is to be marched. */
   readonly isEmpty: boolean;
-  /** Whether all that is marched shows in the disc alone. */
+  /** Whether all marched volumes show only inside the disc. */
   readonly isInDisc: boolean;
-  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
+  /** Whether some marched volumes show only inside the disc and others everywhere. */
   readonly isPartlyInDisc: boolean;
-  /** Marches what lies in the disc's cone alone, whatever the channels; false: as each shows. */
+  /** Restricts all marches to the disc's cone, or lets each channel show where it should. */
   endAtDisc(ends: boolean): void;
-  /** The volumes lie in the specimen's world; `specimen` is its pose in the scene. */
+  /** Sets the pose of the specimen in the scene; the volumes lie in the specimen's world. */
   placeAs(specimen: Matrix4): void;
 }
 
 export type VolumeStatus = Readonly<{
   tile: string;
   channel: string;
-  /** Mip level on screen, 0 is the finest; null: none yet. */
+  /** Mip level on screen, 0 is the finest; null before any is loaded. */
   level: number | null;
 }>;
 
-/** The volumes that are marched. */
 export interface MarchedVolumes {
   readonly marches: DrawnMarches;
-  /** A text that changes with what a march would draw. */
+  /** A text that changes when a march would look different. */
   readonly marchKey: string;
   /** Bytes on the GPU. */
   readonly bytes: number;
-  /** Called before every frame. */
   aim(view: MarchView): void;
-  /** Whether all that is wanted of a tile is there, at some level. */
+  /** Whether all wanted volumes of a tile are loaded, at some level. */
   isReady(tile: string): boolean;
   shown(): readonly ShownVolume[];
   status(): readonly VolumeStatus[];
 }
 
-/** What is traced, besides the medium. */
+/** The scene around the traced medium. */
 export type TraceScene = Readonly<{
-  /** From um of the bundle's world, before tiles' matrices, to the room. */
+  /** From um of the bundle's world, before the tiles' matrices, to the scene. */
   specimen: Matrix4;
   clip: MarchClip;
-  /** A number that changes with what is opaque in the room. */
+  /** A number that changes when the opaque objects change. */
   solids: number;
-  /** The specimen's box, um: lamps are placed by it. */
+  /** The specimen's box, um; lamps are placed relative to it. */
   bounds: Bounds;
 }>;
 
-/** A marched frame of the same view, linear and premultiplied. */
+/** A ray-marched frame of the same view, linear and premultiplied. */
 export type MarchedFrame = Readonly<{
-  picture: Texture;
-  /** Its pixels to one of the frame buffer. */
+  image: Texture;
+  /** Its pixels per pixel of the frame buffer. */
   scale: number;
 }>;
 
-/** How a frame is traced. */
+/** How much work the path tracing of a frame may take. */
 export type TracePace = Readonly<{
-  /** Share of the pixels that the frame's budget allows, 0..1. */
+  /** Share of the pixels that the frame's budget allows, 0 to 1. */
   resolution: number;
   isMoving: boolean;
-  /** Samples of every pixel. */
+  /** Samples per pixel. */
   passes: number;
-  /** The march of the same view; null: there is none. */
+  /** The ray march of the same view, shown until path tracing has an image; null: none. */
   standIn: MarchedFrame | null;
 }>;
 
-/** The volumes that are drawn by paths of light. */
 export interface TracedVolumes {
-  /** Whether there is anything to draw. */
   readonly isShown: boolean;
   /** Whether a view at rest still gathers samples. */
   readonly isGathering: boolean;
-  /** Whether the last frame has drawn it. */
+  /** Whether the last frame has drawn a path-traced volume. */
   readonly isOnScreen: boolean;
-  /** Whether it was shown alone: nothing was seen of the march. */
+  /** Whether path tracing alone was shown, without the ray march. */
   readonly standsAlone: boolean;
-  /** Lights the march that stands in as paths of light do. */
+  /** Lights the stand-in ray march like the path tracing. */
   lightMarch(march: MarchLight, specimen: Matrix4, head: Matrix4): void;
   render(renderer: WebGLRenderer, eyes: Eyes, scene: TraceScene, pace: TracePace): void;
   hide(): void;
   shown(): readonly ShownVolume[];
-  /** Samples of a pixel, and the mip level; null: nothing is traced. */
+  /** Samples per pixel, and the mip level; null: nothing is traced. */
   status(): Readonly<{ samples: number; level: number | null }>;
 }

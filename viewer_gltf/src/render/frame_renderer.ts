@@ -1,6 +1,6 @@
 /**
- * One frame: depth of the surfaces, volumes marched up to it, the scene, the volumes over it. All of
- * it is linear light until the end, when it is encoded once.
+ * Draws one frame: depth of the surfaces, volumes marched up to it, the scene, and the volumes over
+ * it. Light is linear until the end, when it is encoded once.
  */
 import {
   Matrix4,
@@ -25,84 +25,87 @@ import { type BlendedScene, makeSurfaceFrame, type SurfaceFrame } from "./blend_
 import { CrossFade } from "./cross_fade";
 import { DepthPass } from "./depth_pass";
 import type { MarchedVolumes, TracedVolumes } from "./drawn_forms";
-import type { Hybrid } from "./gaze_focus";
+import type { GazeFocus } from "./gaze_focus";
 import { MarchPass } from "./raymarch_pass";
 import type { Room } from "./scene";
 
-/** The things to draw. */
 export type Drawn = Readonly<{
-  /** null: no part draws volumes. */
+  /** Null if no part draws volumes. */
   volumes: MarchedVolumes | null;
-  /** null: no part traces paths of light. */
+  /** Null if no part traces paths. */
   traced: TracedVolumes | null;
-  /** Surfaces that are not opaque now. */
   panes: readonly BlendedScene[];
   /** Other objects that are not opaque, besides those of the scene itself. */
   overlays: readonly Object3D[];
   /** The box of the specimen, um. */
   bounds: Bounds;
-  /** The tile that is drawn as a volume among surfaces, um; null: there is none. */
+  /** The tile that is drawn as a volume among surfaces, um, or null. */
   openTile: Bounds | null;
-  /** A number that changes with the opaque surfaces. */
+  /** A number that changes when the opaque surfaces change. */
   solids: number;
 }>;
 
-/** Pixels of the volumes to one of the picture, 0..1; samples of each that are traced. */
+/** Pixels of the volumes per pixel of the frame, 0 to 1, and traced samples per pixel. */
 export type FramePace = Readonly<{
   resolution: number;
   isMoving: boolean;
   passes: number;
-  /** Whether edges are smoothed: it costs a third of a frame of surfaces where software draws. */
+  /**
+   * Whether edges are anti-aliased, which takes a third of a frame of surfaces on a software
+   * renderer.
+   */
   isSmooth: boolean;
-  /** Whether nothing has changed since the last frame: the march is averaged with those before. */
+  /**
+   * Whether nothing has changed since the last frame, so that the march is averaged with earlier
+   * ones.
+   */
   gathers: boolean;
 }>;
 
-/** Cosines of a disc that is all of the picture, and of one that is nowhere. */
+/**
+ * Cosines of the inner and outer radius of a disc that covers the whole view, and of an empty disc.
+ */
 const EVERYWHERE = [-2, -3] as const;
 const NOWHERE = [3, 2] as const;
-/** Most frames of a view at rest that are averaged. */
+/** Largest number of frames of a view at rest that are averaged. */
 const MAX_GATHERED = 64;
-/** Multiples of it fill 0..1 evenly, however many there are. */
+/** Golden ratio: any number of its multiples, modulo 1, fill 0 to 1 evenly. */
 const GOLDEN = (Math.sqrt(5) - 1) / 2;
-/** Pixels of the march beyond the disc that those within it mix. */
+/** Pixels beyond the disc's rim that the march inside it must cover for mixing. */
 const MIXED_PX = 2;
 
 export class FrameRenderer {
-  /** Where they are in this frame. */
   readonly eyes = new Eyes();
   private readonly both = new BothEyes();
   private readonly cuts = new Cuts();
   private readonly depth = new DepthPass(this.cuts, this.both);
-  /** The part of a frame that all volumes share. */
+  /** Uniforms that all volumes share. */
   readonly marchFrame = makeFrame(this.depth.texture, this.depth.paneTexture);
-  /** The part of a frame that all surfaces share. */
+  /** Uniforms that all surfaces share. */
   readonly surfaceFrame: SurfaceFrame;
   private readonly march: MarchPass;
-  /** The disc's cone in the room, m. */
+  /** The disc's cone in the scene, metres. */
   private readonly cone = {
     uApex: { value: new Vector3() },
     uAxis: { value: new Vector3(0, 0, -1) },
     uRim: { value: 1 },
   };
-  /** All that is drawn, before it is encoded. */
+  /** Target of the whole frame in linear light, before it is encoded. */
   private readonly light: WebGLRenderTarget;
-  /** The same where edges aren't smoothed. */
+  /** Target without anti-aliasing. */
   private readonly draft: WebGLRenderTarget;
   private readonly encode = new EncodePass();
-  /** Fades from the picture before a jump to the one after it. */
+  /** Fades from the frame before a jump to the frame after it. */
   readonly fade: CrossFade;
-  /** The target of the last picture. */
   private last: WebGLRenderTarget | null = null;
-  /** Where a channel is a volume beyond the disc too: the picture within it, and its march. */
+  /** Frame and march inside the disc, used if a channel is also a volume beyond the disc. */
   private readonly within: WebGLRenderTarget;
   private readonly marchWithin: MarchPass;
   private readonly overWithin: Overlay;
   private readonly mixed = new Scene();
-  /** Frames of moving views. */
   private moved = 0;
-  /** The volumes of the march that stands in for what is traced; "": it has to be made. */
-  private stoodIn = "";
+  /** Key of the stand-in march; "" if it must be drawn. */
+  private standInKey = "";
   private readonly point = new Vector3();
   private readonly lamp = new Vector3();
   private readonly corner = new Vector3();
@@ -112,12 +115,12 @@ export class FrameRenderer {
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly room: Room,
-    private readonly hybrid: Hybrid,
+    private readonly gazeFocus: GazeFocus,
   ) {
     const { uDisc, uIsCrossing } = this.marchFrame;
     const disc = { ...this.cone, uDisc, uIsCrossing };
     this.march = new MarchPass(renderer, this.marchFrame, disc);
-    this.surfaceFrame = makeSurfaceFrame(disc, this.march.picture, this.cuts, this.both);
+    this.surfaceFrame = makeSurfaceFrame(disc, this.march.uniforms, this.cuts, this.both);
     this.light = linearTarget(renderer, { hasDepth: true, isMultisampled: true });
     this.draft = linearTarget(renderer, { hasDepth: true });
     this.fade = new CrossFade(renderer);
@@ -131,8 +134,10 @@ export class FrameRenderer {
   }
 
   /**
-   * @param head its pose in the room
-   * @param clip what is cut away
+   * Draws a frame.
+   *
+   * @param head its pose in the scene
+   * @param clip the clip planes and box
    * @param pace how much the frame's budget allows
    */
   draw(
@@ -141,14 +146,14 @@ export class FrameRenderer {
     clip: Clip,
     { resolution, isMoving, passes, isSmooth, gathers }: FramePace,
   ): void {
-    const { renderer, room, hybrid } = this;
+    const { renderer, room, gazeFocus } = this;
     const { volumes, traced, panes, overlays, bounds, solids } = drawn;
     const marches = volumes?.marches ?? null;
     const specimen = room.specimen.group.matrixWorld;
     renderer.info.reset();
     room.aimLamps(head);
     room.isFlat = this.eyes.all.length === 1;
-    this.both.takeIn(room.scene);
+    this.both.prepare(room.scene);
     this.cuts.follow(clip, specimen);
     this.cuts.open(drawn.openTile, specimen);
     this.aim(bounds, resolution);
@@ -165,8 +170,9 @@ export class FrameRenderer {
     const tracer = traced?.isShown ? traced : null;
     const hasMarches = marches !== null && !marches.isEmpty;
     if (tracer !== null || hasMarches) opaque();
-    const isMarched = hasMarches && !this.needsNoMarch(drawn, clip, isMoving);
-    const isMixed = isMarched && tracer === null && hybrid.outer_rad > 0 && marches.isPartlyInDisc;
+    const isMarched = hasMarches && !this.canSkipMarch(drawn, clip, isMoving);
+    const isMixed =
+      isMarched && tracer === null && gazeFocus.outer_rad > 0 && marches.isPartlyInDisc;
     if (isMarched) {
       const toSpecimen = this.toSpecimen.copy(specimen).invert();
       const eye = this.point.setFromMatrixPosition(head).applyMatrix4(toSpecimen);
@@ -177,7 +183,7 @@ export class FrameRenderer {
       const toEye = this.toEye.copy(head).invert().multiply(axes);
       if (tracer === null) lightByRoom(this.marchFrame, room.light, toEye);
       else tracer.lightMarch(this.marchFrame, specimen, head);
-      const { apex_um: apex, axis_um: axis } = hybrid;
+      const { apex_um: apex, axis_um: axis } = gazeFocus;
       volumes?.aim({ eye, apex, axis, clip: this.cuts.march, lamp });
       this.shiftNoise(isMoving, gathers);
       const marchBy = (pass: MarchPass, blended = panes) => {
@@ -195,51 +201,55 @@ export class FrameRenderer {
         marches.endAtDisc(false);
         this.marchFrame.uDisc.value.set(...NOWHERE);
         const translucent = panes.filter(({ isSolid }) => !isSolid);
-        opaque(translucent); // beyond the disc the others are whole
+        opaque(translucent); // beyond the disc the other surfaces are opaque
         marchBy(this.march, translucent);
       } else {
-        this.within.setSize(1, 1); // it is as large as the picture
+        this.within.setSize(1, 1); // frees its memory: it is as large as the frame
         marchBy(this.march);
       }
     }
     if (tracer !== null) {
       const scene = { specimen, clip: this.cuts.march, bounds, solids };
-      const standIn = isMarched || this.stoodIn !== "" ? this.march.marched : null;
+      const standIn = isMarched || this.standInKey !== "" ? this.march.marched : null;
       tracer.render(renderer, this.eyes, scene, { resolution, isMoving, passes, standIn });
       if (tracer.isOnScreen) this.march.hide();
     }
     this.show(isSmooth ? this.light : this.draft, isMixed);
   }
 
-  /** Whether the user's own room shows behind. */
+  /** Whether the user's own room is visible behind the specimen. */
   set isSeeThrough(is: boolean) {
     this.room.isSeeThrough = is;
     this.encode.isSeeThrough = is;
   }
 
-  /** Whether another frame of the view at rest would make the march's picture better. */
+  /** Whether another frame of the view at rest would improve the march's image. */
   get canGather(): boolean {
     return this.march.isShown && this.march.gathered < MAX_GATHERED;
   }
 
   /**
-   * Whether the march need not stand in for what is traced, or what was marched last still does: the view is
-   * at rest. Before a head, which never rests, it does until the first traced picture.
+   * Whether the stand-in march for the path tracing can be skipped, because the view is at rest and
+   * the last march is still valid. In a headset, whose view never rests, a march is drawn until the
+   * path tracing has its first image.
    */
-  private needsNoMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
+  private canSkipMarch({ volumes, traced, solids }: Drawn, clip: Clip, isMoving: boolean): boolean {
     if (!traced?.isShown) return false;
     const isWorn = this.eyes.all.length > 1;
     if (isWorn && traced.standsAlone) {
-      this.stoodIn = "";
+      this.standInKey = "";
       return true;
     }
-    const stoodIn = isMoving ? "" : JSON.stringify([volumes?.marchKey, clip, solids]);
-    const isSame = stoodIn !== "" && stoodIn === this.stoodIn;
-    this.stoodIn = stoodIn;
+    const standInKey = isMoving ? "" : JSON.stringify([volumes?.marchKey, clip, solids]);
+    const isSame = standInKey !== "" && standInKey === this.standInKey;
+    this.standInKey = standInKey;
     return isSame;
   }
 
-  /** The grain of the march differs from frame to frame; at rest frames begin with the same. */
+  /**
+   * Shifts the noise of the march from frame to frame; at rest the sequence starts from the same
+   * value.
+   */
   private shiftNoise(isMoving: boolean, gathers: boolean): void {
     const { uPhase, uSteps } = this.marchFrame;
     if (gathers) uSteps.value = REST_STEPS;
@@ -248,31 +258,35 @@ export class FrameRenderer {
     uPhase.value = (turns * GOLDEN) % 1;
   }
 
-  /** Bring the disc's cone to the gaze. */
   private aim({ min, max }: Bounds, resolution: number): void {
-    const { hybrid, cone, marchFrame, room } = this;
-    cone.uApex.value.copy(hybrid.apex);
-    cone.uAxis.value.copy(hybrid.axis);
+    const { gazeFocus, cone, marchFrame, room } = this;
+    cone.uApex.value.copy(gazeFocus.apex);
+    cone.uAxis.value.copy(gazeFocus.axis);
     const middle = this.point
       .set(...max)
       .add(this.corner.set(...min))
       .multiplyScalar(0.5);
-    cone.uRim.value = middle.applyMatrix4(room.specimen.group.matrixWorld).distanceTo(hybrid.apex);
-    marchFrame.uDisc.value.set(...hybrid.cosines);
+    cone.uRim.value = middle
+      .applyMatrix4(room.specimen.group.matrixWorld)
+      .distanceTo(gazeFocus.apex);
+    marchFrame.uDisc.value.set(...gazeFocus.cosines);
     const [eye] = this.eyes.all;
     const pixel_rad =
       eye === undefined ? 0 : 2 / (eye.camera.projectionMatrix.elements[5] * eye.viewport.w);
-    marchFrame.uReach.value = hybrid.reach((MIXED_PX * pixel_rad) / resolution);
+    marchFrame.uReach.value = gazeFocus.reach((MIXED_PX * pixel_rad) / resolution);
   }
 
-  /** Draw the room's light, and encode it for the present target; `isMixed`: with that within the disc. */
+  /**
+   * Draws the scene's light and encodes it for the current target.
+   * @param isMixed whether the frame inside the disc is mixed in
+   */
   private show(light: WebGLRenderTarget, isMixed: boolean): void {
-    const { renderer, eyes, hybrid, marchFrame, fade } = this;
+    const { renderer, eyes, gazeFocus, marchFrame, fade } = this;
     fade.keep(this.last);
     this.last = light;
     const before = this.drawInto(light);
     if (isMixed) {
-      marchFrame.uDisc.value.set(...hybrid.cosines);
+      marchFrame.uDisc.value.set(...gazeFocus.cosines);
       this.overWithin.show(eyes, 1);
       const { autoClear } = renderer;
       renderer.autoClear = false;
@@ -283,11 +297,11 @@ export class FrameRenderer {
     this.encode.render(renderer, light, before);
   }
 
-  /** Draw the room's light; the target before. */
+  /** Draws the scene's light. Returns the render target that was set before. */
   private drawInto(light: WebGLRenderTarget): WebGLRenderTarget | null {
     const { renderer, eyes, both } = this;
     const before = renderer.getRenderTarget();
-    const { enabled } = renderer.xr; // else three would draw the headset's eyes by itself
+    const { enabled } = renderer.xr; // otherwise three.js would draw the headset's eyes itself
     light.setSize(eyes.width_px, eyes.height_px);
     renderer.xr.enabled = false;
     renderer.setRenderTarget(light);
@@ -296,12 +310,11 @@ export class FrameRenderer {
     return before;
   }
 
-  /** Depth of what is opaque in this frame. */
+  /** Depth of the opaque objects in this frame. */
   get sceneDepth(): { value: Texture } {
     return this.marchFrame.uSceneDepth;
   }
 
-  /** What is laid over the scene. */
   add(overlay: Object3D): void {
     this.room.scene.add(overlay);
   }

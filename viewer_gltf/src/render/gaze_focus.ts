@@ -1,4 +1,6 @@
-/** What the gaze makes of the state, frame by frame: which volumes are wanted, and where they show. */
+/**
+ * Follows the gaze frame by frame: which volumes are wanted, and how far the focus disc is open.
+ */
 import { Matrix4, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import { shownTiles } from "../math/pick";
@@ -11,31 +13,33 @@ import {
 } from "../state/focus_tiles";
 import type { ViewerState } from "../state/viewer_state";
 
-/** Time in which the disc opens once its volumes are there, s. */
+/** Seconds in which the disc opens once its volumes are loaded. */
 const OPENING_S = 0.4;
-/** Share of the outer radius within which there is no surface any more. */
+/** Share of the outer radius within which no surface is drawn. */
 const INNER = 0.6;
-/** Time that the gaze stays on the same tiles before finer levels are fetched, s. */
+/** Seconds that the gaze must stay on the same tiles before finer levels are fetched. */
 const REFINE_S = 0.25;
 
-/** Widest angle of a cone that is marched. */
+/** Radians. Largest half angle of a cone that is marched. */
 const WIDEST_RAD = 1.5;
 
 const RADIANS = Math.PI / 180;
 
-export class Hybrid {
+export class GazeFocus {
   focusTiles: FocusState = FAR_AWAY;
-  /** Share of the set radius that the frame's budget allows, 0..1. */
+  /** Share of the set radius that the frame's budget allows, 0 to 1. */
   radiusShare = 1;
-  /** Of the disc, radians: 0 is closed. */
+  /** Outer radius of the disc, radians; 0: closed. */
   outer_rad = 0;
-  /** Head in the room: where the disc's cone comes from, and where to. */
+  /** Apex and axis of the disc's cone in the scene. */
   readonly apex = new Vector3();
   readonly axis = new Vector3(0, 0, -1);
-  /** The same in the specimen, um. */
+  /** Apex and axis of the disc's cone in the specimen, um. */
   readonly apex_um = new Vector3();
   readonly axis_um = new Vector3(0, 0, -1);
-  /** How far the disc has opened, and how far it can; a frame's budget may show less of it. */
+  /**
+   * How far the disc has opened, and how far it may open, radians; a frame's budget may show less.
+   */
   private opened_rad = 0;
   private reach_rad = 0;
   private rested_s = 0;
@@ -47,18 +51,18 @@ export class Hybrid {
     return this.rested_s >= REFINE_S;
   }
 
-  /** Cosines of the inner and outer radius. */
   get cosines(): readonly [number, number] {
     return [Math.cos(INNER * this.outer_rad), Math.cos(this.outer_rad)];
   }
 
-  /** Cosine of the outer radius and `more_rad`; 1: the disc is closed. */
+  /** Cosine of the outer radius plus `more_rad`; 1 if the disc is closed. */
   reach(more_rad: number): number {
     return this.outer_rad === 0 ? 1 : Math.cos(Math.min(WIDEST_RAD, this.outer_rad + more_rad));
   }
 
   /**
-   * Look along the head's own -z. True if other volumes may be wanted now than before.
+   * Updates the focus for a gaze along the head's -z axis. Returns whether other volumes may be
+   * wanted than before.
    */
   look(
     state: ViewerState,
@@ -80,7 +84,8 @@ export class Hybrid {
       tiles: shownTiles(this.manifest.tiles, state.isolated),
       clip: state.clip,
       switchDistance_um: state.switchDistance_m / specimen.getMaxScaleOnAxis(),
-      discRadius_rad: set_rad, // a tile does not come and go with the frame's budget
+      // The set radius is used, so that tiles do not come and go with the frame's budget.
+      discRadius_rad: set_rad,
       dt_s,
     });
     const isSame =
@@ -94,7 +99,7 @@ export class Hybrid {
     return !isSame || couldRefine !== this.mayRefine;
   }
 
-  /** Whether the next frame differs though nothing moves. */
+  /** Whether the next frame looks different although nothing moves. */
   isChanging(state: ViewerState): boolean {
     const isOpening = state.mode === "disc" && this.opened_rad < this.reach_rad;
     return isOpening || !this.mayRefine || isWaiting(this.focusTiles);

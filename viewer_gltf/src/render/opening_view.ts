@@ -1,31 +1,32 @@
 /**
- * From where a specimen is seen at first: three quarters from the front, a little from above, so near
- * that it fills the picture. Of such views one is taken in which it covers much: a long specimen lies
- * across a wide picture, and goes into the depth of a narrow one. Pure.
+ * Chooses the opening view of a specimen: three-quarter from the front, a little from above, as
+ * near as fits. Among these views it takes one in which the specimen covers much of the image. A
+ * long specimen lies across a wide image, and goes into the depth of a narrow one.
  */
 import { around, type Box, centerOf, cornersOf } from "../math/box";
 import { along, dot, type Vec3 } from "../math/vec3";
 
-/** Share of the picture that the specimen may fill. */
+/** Share of the image's width and height that the specimen may fill. */
 const FILL = 0.94;
 const DEGREE = Math.PI / 180;
-/** Angles of the eye to the right of straight ahead, and above it. Viewers expect the first of each. */
+/**
+ * Degrees to the right of straight ahead, and above it, in order of preference: users expect the
+ * first of each.
+ */
 const ASIDE_DEG = [35, 30, 40, 25, 45, 50, 55, 60, 65, 70];
 const ABOVE_DEG = [25, 30, 20, 35, 40, 45, 50, 55];
-/** Share of the best view's coverage with which an earlier one of the lists will do. */
+/** Share of the best view's coverage at which an earlier view in the lists is preferred. */
 const GOOD_ENOUGH = 0.88;
 
-/** Where the eye is, about the middle of what it looks at. */
+/** Direction from the middle of the view to the eye. */
 export type Direction = Readonly<{ aside_rad: number; above_rad: number }>;
 
 export type Lens = Readonly<{
-  /** Vertical field of view. */
   fov_rad: number;
-  /** Width of the picture to its height. */
   aspect: number;
 }>;
 
-/** The eye's axes: right, up, and towards it. */
+/** The eye's axes: right, up, and backwards, from the middle to the eye. */
 function axesOf({ aside_rad, above_rad }: Direction): readonly [Vec3, Vec3, Vec3] {
   const [s, c] = [Math.sin(aside_rad), Math.cos(aside_rad)];
   const [u, v] = [Math.sin(above_rad), Math.cos(above_rad)];
@@ -36,12 +37,11 @@ function axesOf({ aside_rad, above_rad }: Direction): readonly [Vec3, Vec3, Vec3
   ];
 }
 
-/** Unit vector from the middle to the eye. */
 export function towardsEye(direction: Direction): Vec3 {
   return axesOf(direction)[2];
 }
 
-/** Points about another, along the eye's axes. */
+/** Points relative to a middle, along the eye's axes. */
 function seenFrom(points: readonly Vec3[], middle: Vec3, direction: Direction): readonly Vec3[] {
   const [right, up, back] = axesOf(direction);
   return points.map((point) => {
@@ -50,7 +50,10 @@ function seenFrom(points: readonly Vec3[], middle: Vec3, direction: Direction): 
   });
 }
 
-/** Distance of an eye at which all is in the picture; it looks so far right of the middle, and above it. */
+/**
+ * Distance of an eye at which all points are in the image. The eye looks `right` of the middle and
+ * `up` above it.
+ */
 function distanceTo(seen: readonly Vec3[], { fov_rad, aspect }: Lens, right = 0, up = 0): number {
   const half = FILL * Math.tan(fov_rad / 2);
   const needed = seen.map(
@@ -59,19 +62,19 @@ function distanceTo(seen: readonly Vec3[], { fov_rad, aspect }: Lens, right = 0,
   return Math.max(...needed);
 }
 
-/** Distance of the eye from the middle of points at which all of them are in the picture. */
+/** Distance from the middle of the points at which an eye sees all of them. */
 export function distanceToFrame(points: readonly Vec3[], direction: Direction, lens: Lens): number {
   return distanceTo(seenFrom(points, centerOf(around(points)), direction), lens);
 }
 
-/** Rounds in which middle and distance find each other. */
+/** Iterations in which the view's middle and its distance converge. */
 const ROUNDS = 5;
 
 /**
- * Where the eye looks, and from how far, so that points are seen as large as fits and in the middle: their own
- * middle is not there, since what is nearer is larger.
+ * Returns the point that the eye looks at and its distance, so that the points are centred and as
+ * large as fits. That point is not the middle of the points, because nearer ones look larger.
  *
- * @param up_tan how far above the picture's middle theirs is to be, a metre away
+ * @param up_tan tangent of the angle by which the points' middle lies above the image's middle
  */
 export function framePoints(
   points: readonly Vec3[],
@@ -94,7 +97,7 @@ export function framePoints(
   return { target, distance };
 }
 
-/** About the share of the picture that the box covers. */
+/** Estimates the share of the image that the box covers. */
 function coverage(box: Box, direction: Direction, lens: Lens): number {
   const [x, y, z] = box.max.map((v, i) => v - box.min[i]);
   const [dx, dy, dz] = towardsEye(direction).map(Math.abs);

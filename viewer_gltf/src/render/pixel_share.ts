@@ -1,7 +1,10 @@
-/** The share of a screen's pixels that are drawn, along an edge: fewer after a reload that the graphics driver needed. */
+/**
+ * Share of the screen's pixels that are drawn, along an edge. It shrinks after a reload that a
+ * failing graphics driver forced.
+ */
 import { store, stored } from "../dom/stored";
 
-/** The tab keeps it: a new tab begins with all pixels. */
+/** Key in the tab's storage, so a new tab begins with all pixels. */
 const KEY = "stereocell-pixels";
 const LEAST = 0.25;
 
@@ -10,7 +13,7 @@ export function pixelShare(): number {
   return share >= LEAST && share <= 1 ? share : 1;
 }
 
-/** From the next opening on, half as many pixels along an edge. */
-export function takeFewerPixels(): void {
+/** Halves the share for the next time that the page opens. */
+export function halvePixelShare(): void {
   store(KEY, String(Math.max(LEAST, pixelShare() / 2)), "in-tab");
 }

@@ -1,35 +1,43 @@
-/** Where the specimen and the eye are. Lengths of the room are metres. Pure. */
+/** Placement of the specimen and the eye. Lengths in the scene are metres. */
 import type { Manifest } from "../bundle/generated/bundle";
 
 type Bounds = Manifest["specimen"]["bounds_um"];
 type Vec3 = readonly [number, number, number];
 
-/** The specimen's longest edge in the room, m. */
+/** Metres. The specimen's longest edge in the scene. */
 export const LONGEST_EDGE_M = 1.2;
-/** From the eyes to the specimen's centre in a headset, m, at the eyes' height. */
+/** Metres. Distance from the eyes to the specimen's centre in a headset, at the eyes' height. */
 export const XR_DISTANCE_M = 1.1;
-/** In the user's own room: from the eyes, ahead, m; heights of its middle over the floor and under the eyes, m. */
+/**
+ * Metres, in the user's own room: distance ahead of the eyes; heights of the specimen's middle
+ * above the floor and below the eyes.
+ */
 export const ROOM_DISTANCE_M = 0.9;
 export const OVER_FLOOR_M = 0.95;
 export const UNDER_EYES_M = 0.5;
-/** Its size there, as a factor to that in a headset: on a table, not round the user. */
+/**
+ * Size in the user's own room as a factor of the size in a headset: it stands on a table, not
+ * around the user.
+ */
 export const ROOM_SIZE = 0.4;
 
-/** Share of the picture that the specimen may fill at the start. */
+/** Share of the image that the specimen may fill at the start. */
 const FILL = 0.88;
-/** Least distance of the eye, as a multiple of the seen points' distance from the turning point. */
+/**
+ * Least distance of the eye, as a multiple of the points' distance from the point about which the
+ * camera turns.
+ */
 const BEFORE = 1.25;
 
 export type Placement = Readonly<{
-  /** Metres of the room per um of the specimen. */
+  /** Metres of the scene per um of the specimen. */
   scale: number;
   /** The specimen's centre, um, world. */
   center: Vec3;
-  /** The specimen's edges in the room. */
+  /** The specimen's edges in the scene, metres. */
   size: Vec3;
 }>;
 
-/** How large the room shows the specimen. */
 export function place(bounds: Bounds): Placement {
   const edge = (i: number) => bounds.max[i] - bounds.min[i];
   const longest = Math.max(edge(0), edge(1), edge(2));
@@ -54,10 +62,11 @@ export function framingDistance(size: Vec3, fov_rad: number, aspect: number): nu
 }
 
 /**
- * Distance from the point that is looked at to an eye that sees other points as well, and has each
- * before it by a part of how far that is from there.
+ * Distance from the point that is looked at to an eye that also sees other points. The eye stays
+ * farther than each point by a margin.
  *
- * @param points about the one that is looked at, in the eye's axes: x right, y up, z towards the eye
+ * @param points relative to the point that is looked at, in the eye's axes: x right, y up, z
+ *   towards the eye
  * @param fov_rad vertical field of view
  */
 export function distanceToSee(points: readonly Vec3[], fov_rad: number, aspect: number): number {

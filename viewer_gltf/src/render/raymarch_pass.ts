@@ -1,7 +1,7 @@
 /**
- * The volumes' picture: marched into textures of its own, at as many pixels as the frame's budget
- * allows, and laid over the scene: what lies behind translucent surfaces before these are drawn,
- * the rest last of all.
+ * The ray-marched image of the volumes. It is drawn into textures of its own, with as many pixels
+ * as the frame's budget allows. The part behind translucent surfaces is composited before these are
+ * drawn, the rest at the end.
  */
 import type { Mesh, Scene, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { type Disc, FIRST, LAST, type MarchedUniforms, Overlay } from "../gpu/composite_pass";
@@ -33,34 +33,34 @@ export class MarchPass {
     this.behind = new Overlay(behind, frame.uSceneDepth, { order: FIRST, disc });
   }
 
-  /** They lay the marched pictures over what was drawn before. */
+  /** Meshes that composite the marched images over the frame. */
   get overlays(): readonly Mesh[] {
     return [this.front.mesh, this.behind.mesh];
   }
 
-  /** The last picture that was marched, and its pixels to one of the frame buffer. */
-  get marched(): Readonly<{ picture: Texture; scale: number }> {
-    return { picture: this.front.uniforms.uMarched.value, scale: this.scale };
+  /** The last marched image, and its pixels per pixel of the frame buffer. */
+  get marched(): Readonly<{ image: Texture; scale: number }> {
+    return { image: this.front.uniforms.uMarched.value, scale: this.scale };
   }
 
   get isShown(): boolean {
     return this.front.mesh.visible;
   }
 
-  /** For surfaces, which the picture takes the place of. */
-  get picture(): MarchedUniforms {
+  /** Uniforms with the marched image, for surfaces that it replaces. */
+  get uniforms(): MarchedUniforms {
     return this.front.uniforms;
   }
 
-  /** Pictures of a view at rest that have been gathered; 0: the last one stands alone. */
+  /** Number of images of a view at rest that are averaged; 0: the last image is shown alone. */
   get gathered(): number {
     return this.mean.count;
   }
 
   /**
-   * March what is in `scene`, at `scale` pixels to one of the picture, 0..1.
+   * Marches the volumes in `scene`, with `scale` pixels per pixel of the frame, 0 to 1.
    *
-   * @param gathers whether the picture is of the same view as the last one, and is averaged with it
+   * @param gathers whether the view is the same as in the last image, so that both are averaged
    */
   render(scene: Scene, eyes: Eyes, scale: number, gathers = false): void {
     const isWorn = eyes.all.length > 1;
@@ -81,7 +81,6 @@ export class MarchPass {
     if (this.frame.uHasPane.value) this.behind.show(eyes, scale);
   }
 
-  /** Nothing is marched. */
   hide(): void {
     this.front.hide();
     this.behind.hide();

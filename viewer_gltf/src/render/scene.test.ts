@@ -7,7 +7,7 @@ import { Room } from "./scene";
 describe("the outline of a chosen tile", () => {
   const outlineOf = (room: Room) => room.overlays[0];
 
-  it("shows which of several tiles is chosen, and goes again", () => {
+  it("shows which of several tiles is chosen, and disappears again", () => {
     const room = new Room(sampleManifest(1));
     room.mark("r0_c1");
     expect(outlineOf(room).visible).toBe(true);
@@ -15,7 +15,7 @@ describe("the outline of a chosen tile", () => {
     expect(outlineOf(room).visible).toBe(false);
   });
 
-  it("does not stand round a specimen of one tile, where it would tell nothing", () => {
+  it("is not drawn around a specimen of one tile", () => {
     const { tiles, ...manifest } = sampleManifest(1);
     const room = new Room({ ...manifest, tiles: [tiles[0]] });
     room.mark(tiles[0].id);
@@ -23,10 +23,10 @@ describe("the outline of a chosen tile", () => {
   });
 });
 
-describe("the room of a light page", () => {
+describe("the scene of a light page", () => {
   const room = new Room(sampleManifest(1));
   const backdrop = new Backdrop();
-  room.dress("light", backdrop);
+  room.setTheme("light", backdrop);
   const hexOf = () => (room.scene.background as Color | null)?.getHexString() ?? "none";
 
   it("is light on a flat screen, with the specimen's shadow", () => {
@@ -34,25 +34,25 @@ describe("the room of a light page", () => {
     expect([hexOf(), backdrop.mesh.visible]).toEqual(["e3e7ee", true]);
   });
 
-  it("is dark in stereo, where light lenses would glare", () => {
+  it("is dark in stereo, where a light background would glare", () => {
     room.isFlat = false;
     expect([hexOf(), backdrop.mesh.visible]).toEqual(["0b0d12", false]);
   });
 
-  it("is the user's own where the camera shows that", () => {
+  it("is empty if a camera shows the user's own room", () => {
     room.isSeeThrough = true;
-    room.isFlat = true; // a phone has one eye
+    room.isFlat = true; // a phone shows one image
     expect([hexOf(), backdrop.mesh.visible]).toEqual(["none", false]);
     room.isSeeThrough = false;
   });
 
-  it("has the shadow under what is shown, and keeps it in another theme", () => {
-    room.standUnder([
+  it("has the shadow below the shown part, also in another theme", () => {
+    room.fitBackdrop([
       [-1, -0.2, -0.5],
       [0.5, 0.3, 0.5],
     ]);
     const later = new Backdrop();
-    room.dress("dark", later);
+    room.setTheme("dark", later);
     expect(backdrop.mesh.parent).toBe(null);
     for (const each of [backdrop, later]) {
       const { uFoot, uGround } = each.mesh.material.uniforms;
@@ -68,11 +68,11 @@ describe("the room of a light page", () => {
       return uShade.value;
     };
     expect(shades()).toBeGreaterThan(0);
-    room.standUnder([]);
+    room.fitBackdrop([]);
     expect(shades()).toBe(0);
-    room.dress("light", new Backdrop());
+    room.setTheme("light", new Backdrop());
     expect(shades()).toBe(0);
-    room.standUnder([[0, 0, 0]]);
+    room.fitBackdrop([[0, 0, 0]]);
     expect(shades()).toBeGreaterThan(0);
   });
 });

@@ -1,4 +1,4 @@
-/** The scene: the specimen in a dark room, its light, and the outline of the chosen tile. */
+/** The scene: the specimen, its light, the background, and the outline of the chosen tile. */
 import {
   Box3,
   Box3Helper,
@@ -24,7 +24,7 @@ const OUTLINE = 0x5b6678;
 export class Room {
   readonly scene = new Scene();
   readonly specimen: Specimen;
-  /** The light of what paths of light do not draw. */
+  /** The light on everything that is not path-traced. */
   readonly light: RoomLight;
   private readonly key: DirectionalLight;
   private readonly fill: DirectionalLight;
@@ -33,7 +33,7 @@ export class Room {
   private readonly flat = new Color(FAR.dark);
   private isUsers = false;
   private backdrop: Backdrop | null = null;
-  /** Outermost points of what is shown, in the room, m. */
+  /** Outermost points of the shown part, in the scene, metres. */
   private outermost: readonly Vec3[] = [];
 
   constructor(private readonly manifest: Manifest) {
@@ -54,45 +54,49 @@ export class Room {
     group.add(this.outline);
   }
 
-  /** Whether it is the user's own room: nothing of ours is behind the specimen. */
+  /** Whether the user's own room is visible, so that nothing is drawn behind the specimen. */
   set isSeeThrough(is: boolean) {
     this.isUsers = is;
   }
 
-  /** Whether it is seen on a flat screen, and by one eye. */
+  /** Whether the scene is seen on a flat screen by one eye. */
   set isFlat(is: boolean) {
     const isFlat = is && !this.isUsers;
     this.scene.background = this.isUsers ? null : isFlat ? this.flat : this.dark;
     if (this.backdrop !== null) this.backdrop.mesh.visible = isFlat;
   }
 
-  /** @param backdrop null: the background of the flat picture has one colour */
-  dress(theme: Theme, backdrop: Backdrop | null): void {
+  /** @param backdrop null: the flat background has one colour */
+  setTheme(theme: Theme, backdrop: Backdrop | null): void {
     this.flat.set(FAR[theme]);
     this.backdrop?.dispose();
     this.backdrop = backdrop;
     if (backdrop === null) return;
-    backdrop.dress(theme);
-    backdrop.standUnder(this.outermost);
+    backdrop.setTheme(theme);
+    backdrop.fitTo(this.outermost);
     this.scene.add(backdrop.mesh);
   }
 
-  /** @param points outermost ones of what is shown, in the room, m */
-  standUnder(points: readonly Vec3[]): void {
+  /**
+   * Fits the backdrop to the specimen.
+   * @param points outermost points of the shown part, in the scene, metres
+   */
+  fitBackdrop(points: readonly Vec3[]): void {
     this.outermost = points;
-    this.backdrop?.standUnder(points);
+    this.backdrop?.fitTo(points);
   }
 
   /**
-   * The axes that the lamps' directions are in, in the room: the viewer's own lamps go wherever the viewer goes.
+   * Axes in which the lamps' directions are given, in the scene. Lamps that stand with the eye move
+   * with the user.
    *
-   * @param head the viewer's pose in the room
+   * @param head the user's pose in the scene
    */
   lampAxes(head: Matrix4): Matrix4 {
     return this.light.standsWith === "eye" ? head : this.specimen.group.matrixWorld;
   }
 
-  /** @param head the viewer's pose in the room */
+  /** @param head the user's pose in the scene */
   aimLamps(head: Matrix4): void {
     const axes = this.lampAxes(head);
     aim(this.key, axes, this.light.key);
@@ -104,7 +108,7 @@ export class Room {
     return this.manifest.tiles.find(({ id }) => id === tile)?.bounds_um ?? null;
   }
 
-  /** Outline a tile among others, or none. */
+  /** Outlines a tile if there are several; null: none. */
   mark(tile: string | null): void {
     const { tiles } = this.manifest;
     const found = tiles.length > 1 ? tiles.find(({ id }) => id === tile) : undefined;
@@ -114,18 +118,20 @@ export class Room {
     this.outline.box.max.set(...found.bounds_um.max);
   }
 
-  /** Everything but what is opaque, which the pass for the depth has to leave out. */
+  /** Objects that are not opaque, which the depth pass leaves out. */
   get overlays(): readonly Object3D[] {
     return this.backdrop === null ? [this.outline] : [this.outline, this.backdrop.mesh];
   }
 }
 
-/** A lamp's colour for three, whose white surface sends on a light's intensity over pi. */
+/** A lamp's colour for three.js, whose white surface reflects a light's intensity divided by pi. */
 function colorOf([r, g, b]: Rgb): Color {
   return new Color().setRGB(r, g, b);
 }
 
-/** A directional light shines from its place to its target, which stays in the room's middle. */
+/**
+ * A directional light shines from its position to its target, which stays at the scene's origin.
+ */
 function aim(light: DirectionalLight, axes: Matrix4, { towards }: FarLamp): void {
   light.position.set(...towards).transformDirection(axes);
 }

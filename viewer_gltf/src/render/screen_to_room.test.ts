@@ -21,8 +21,8 @@ function camera() {
 
 const points = [new Vector3(), new Vector3(0.5, 0, 0), new Vector3(-0.1, 0.3, 0.2)];
 
-describe("the specimen on its way between the screen and the room", () => {
-  it("lies before the head as before the camera, the camera's target straight ahead", () => {
+describe("the specimen moved between the screen and stereo", () => {
+  it("lies in front of the head as in front of the camera, with the camera's target straight ahead", () => {
     const { camera: eye, screen } = camera();
     const inRoom = intoRoom(POSE, screen, AHEAD);
     const toTarget = screen.position.clone().applyMatrix4(eye.matrixWorldInverse);
@@ -32,7 +32,7 @@ describe("the specimen on its way between the screen and the room", () => {
         .applyMatrix4(poseMatrix(POSE))
         .applyMatrix4(eye.matrixWorldInverse);
       const found = point.clone().applyMatrix4(poseMatrix(inRoom));
-      // seen from the target the same way
+      // seen from the target in the same direction
       expect(found.sub(AHEAD).distanceTo(seen.sub(toTarget))).toBeCloseTo(0, 9);
     }
   });
@@ -40,7 +40,7 @@ describe("the specimen on its way between the screen and the room", () => {
   it.each([
     ["there and back", intoRoom, ontoScreen],
     ["back and there", ontoScreen, intoRoom],
-  ])("is where it was, %s", (_, go, comeBack) => {
+  ])("has the same pose again, %s", (_, go, comeBack) => {
     const { screen } = camera();
     const again = comeBack(go(POSE, screen, AHEAD), screen, AHEAD);
     expect(again.scale).toBeCloseTo(POSE.scale, 12);

@@ -1,14 +1,16 @@
 /**
- * From the flat screen into the room and back: the point that the camera is turned about lies
- * straight ahead there, and the specimen turns the same side to the eyes. Pure.
+ * Converts the specimen's pose between the flat screen and stereo. The point about which the camera
+ * turns lies straight ahead in stereo, and the same side of the specimen faces the eyes.
  */
 import { Quaternion, type Vector3 } from "three";
 import { type HandPose, moveByOneHand, type SpecimenPose } from "../math/grab";
 
 /**
- * @param screen the point that the camera is turned about, and the camera's turn
- * @param ahead_m where that point comes to lie in the room
- * @param facing of the eyes that look at it there
+ * Converts a pose on the screen into stereo.
+ *
+ * @param screen the point about which the camera turns, and its orientation
+ * @param ahead_m where that point lies in stereo, metres
+ * @param facing orientation of the eyes
  */
 export function intoRoom(
   pose: SpecimenPose,
@@ -19,7 +21,7 @@ export function intoRoom(
   return moveByOneHand(pose, screen, { position: ahead_m, orientation: facing });
 }
 
-/** The inverse. */
+/** The inverse of `intoRoom`. */
 export function ontoScreen(
   pose: SpecimenPose,
   screen: HandPose,

@@ -9,19 +9,19 @@ const mutable = ({ min, max }: typeof WHOLE | typeof TILE) => ({
   max: [...max] as [number, number, number],
 });
 
-/** Where a point (um) is in the room. */
+/** Where a point, um, is in the scene, metres. */
 const at = (specimen: Specimen, x: number, y: number, z: number) =>
   new Vector3(x, y, z).applyMatrix4(specimen.group.matrixWorld);
 
-describe("the specimen in the room", () => {
-  it("has its centre where it is anchored, its longest edge 1.2 m long", () => {
+describe("the specimen in the scene", () => {
+  it("has its centre at the anchor and a longest edge of 1.2 m", () => {
     const specimen = new Specimen(mutable(WHOLE));
     specimen.anchorAt(new Vector3(0, 0, -1));
     expect(at(specimen, 50, -20, 10).distanceTo(new Vector3(0, 0, -1))).toBeCloseTo(0, 6);
     expect(at(specimen, 100, 0, 0).distanceTo(at(specimen, 0, 0, 0))).toBeCloseTo(1.2, 6);
   });
 
-  it("brings a tile to the middle, as large as fits where the whole was, and goes back", () => {
+  it("moves a tile to the middle, as large as fits in the whole specimen's place, and back", () => {
     const specimen = new Specimen(mutable(WHOLE));
     specimen.show(mutable(TILE));
     expect(specimen.advance(MOVE_S / 2)).toBe(true);
@@ -35,7 +35,7 @@ describe("the specimen in the room", () => {
     expect(specimen.isMoved).toBe(false);
   });
 
-  it("stays within the user's reach, and goes home", () => {
+  it("stays near the user, and returns to its home", () => {
     const specimen = new Specimen(mutable(WHOLE));
     const far = { ...specimen.pose, position: new Vector3(1000, 0, 0) };
     specimen.moveTo(far, new Vector3());
@@ -45,7 +45,7 @@ describe("the specimen in the room", () => {
     expect(at(specimen, 50, -20, 10).length()).toBeCloseTo(0, 6);
   });
 
-  it("jumps in stereo, where it would glide on a screen, and tells of each jump once", () => {
+  it("jumps in stereo where it would glide on a screen, and reports each jump once", () => {
     const specimen = new Specimen(mutable(WHOLE));
     specimen.takeJump();
     specimen.show(mutable(TILE));
@@ -64,6 +64,6 @@ describe("the specimen in the room", () => {
       expect([specimen.takeJump(), specimen.takeJump()]).toEqual([true, false]);
     }
     specimen.moveTo({ ...specimen.pose, scale: 1.5 }, new Vector3());
-    expect(specimen.takeJump()).toBe(false); // hands carry it
+    expect(specimen.takeJump()).toBe(false); // a hand carries it, so this is not a jump
   });
 });

@@ -1,4 +1,6 @@
-/** Where the specimen is in the room: at home, with one tile in the middle, or where hands put it. */
+/**
+ * Pose of the specimen in the scene: at home, with one tile in the middle, or where hands put it.
+ */
 import { Group, Matrix4, Quaternion, Vector3 } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
 import { limitPlacement, poseMatrix, type SpecimenPose } from "../math/grab";
@@ -6,26 +8,25 @@ import { LONGEST_EDGE_M, place } from "./placement";
 
 type Bounds = Manifest["specimen"]["bounds_um"];
 
-/** Length of a move that no hand makes, s: the user's eyes can follow it. */
+/** Seconds of a move that no hand makes, slow enough for the eyes to follow. */
 export const MOVE_S = 0.4;
-/** Farthest place of a carried specimen, m: it stays in sight. */
+/** Metres. Farthest distance of a carried specimen, so that it stays in view. */
 const FARTHEST_M = 5;
 
 export class Specimen {
   /** Its children are in um, world. */
   readonly group = new Group();
   pose: SpecimenPose;
-  /** Whether hands put it where it is. */
   isMoved = false;
   private goal: SpecimenPose;
   private start: SpecimenPose;
-  /** 0..1: of the way from start to goal. */
+  /** Progress from start to goal, 0 to 1. */
   private way = 1;
-  /** Where in the room the middle of what is shown is as long as nobody moves it. */
+  /** Where the middle of the shown part is in the scene until somebody moves it. */
   readonly anchor = new Vector3();
-  /** As a factor to how large it opens. */
+  /** Factor of its initial size. */
   size = 1;
-  /** Gliding makes people sick in stereo, so there the specimen jumps to another place, and the picture fades. */
+  /** Whether moves are jumps, as in stereo, where gliding causes sickness. The frame then fades. */
   isJumping = false;
   private hasJumped = false;
   private readonly facing = new Quaternion();
@@ -42,22 +43,22 @@ export class Specimen {
     this.apply();
   }
 
-  /** Its middle in the room, m. */
+  /** Middle of the specimen in the scene, metres. */
   get middle(): [number, number, number] {
     const [x, y, z] = place(this.bounds).center;
     return new Vector3(x, y, z).applyMatrix4(this.group.matrixWorld).toArray();
   }
 
-  /** Metres of the room per um. */
+  /** Metres of the scene per um. */
   get scale(): number {
     return this.group.matrixWorld.getMaxScaleOnAxis();
   }
 
   /**
-   * Put the middle of what is shown at a point of the room, at once.
+   * Puts the middle of the shown part at a point of the scene, at once.
    *
-   * @param size as a factor to how large it opens
-   * @param facing where its z points to
+   * @param size factor of its initial size
+   * @param facing orientation whose z axis the specimen's front points along
    */
   anchorAt(point: Vector3, size = 1, facing = new Quaternion()): void {
     this.anchor.copy(point);
@@ -66,7 +67,10 @@ export class Specimen {
     this.goHome();
   }
 
-  /** Bring a tile to the middle, as large as fits where the whole was; null: the whole again. */
+  /**
+   * Brings a tile to the middle, as large as fits in the whole specimen's place; null: the whole
+   * specimen again.
+   */
   show(tile: Bounds | null): void {
     if (tile === this.focus) return;
     this.focus = tile;
@@ -80,7 +84,7 @@ export class Specimen {
     this.way = 0;
   }
 
-  /** Where it is as long as nobody moves it. */
+  /** The pose that it has until somebody moves it. */
   get home(): SpecimenPose {
     const orientation = this.facing.clone();
     const { focus, size } = this;
@@ -101,27 +105,30 @@ export class Specimen {
     this.settle(this.home);
   }
 
-  /** To another place at once, where no hand carries it. */
+  /** Moves it to another pose at once, as a jump. */
   jumpTo(pose: SpecimenPose, viewer: Vector3): void {
     this.hasJumped = true;
     this.moveTo(pose, viewer);
   }
 
-  /** Whether it has jumped since this was asked last. */
+  /** Whether it has jumped since the last call. */
   takeJump(): boolean {
     const { hasJumped } = this;
     this.hasJumped = false;
     return hasJumped;
   }
 
-  /** Moved by hand; `viewer` is where the eyes are, room. */
+  /**
+   * Moves it by hand.
+   * @param viewer position of the eyes in the scene
+   */
   moveTo(pose: SpecimenPose, viewer: Vector3): void {
     const farthest_m = FARTHEST_M + (LONGEST_EDGE_M * pose.scale) / 2;
     this.settle(limitPlacement(pose, viewer, farthest_m, this.home));
     this.isMoved = true;
   }
 
-  /** Go on with a move; whether it is still under way. */
+  /** Advances a move. Returns whether it is still going on. */
   advance(dt_s: number): boolean {
     if (this.way === 1) return false;
     this.way = Math.min(1, this.way + dt_s / MOVE_S);

@@ -3,7 +3,7 @@
  * high), `switch` (metres of the room), `disc` (degrees), `stereo` (off, anaglyph, side-by-side), `view` (front,
  * side, top), `panel` (off), `theme` (light, dark), `backdrop` (plain). Pure.
  */
-import { STANDS, type Stand } from "../interaction/named_views";
+import { NAMED_VIEWS, type NamedView } from "../interaction/named_views";
 import type { Action } from "../state/actions";
 import { type Parameter, setTo, type Value } from "../state/parameters/kinds";
 import { parametersInAddress } from "../state/parameters/table";
@@ -16,9 +16,9 @@ export const settingNames = (): readonly string[] => [
 ];
 
 /** The view that the page opens with; null: the usual one. */
-export function standOf(search: string): Stand | null {
+export function standOf(search: string): NamedView | null {
   const asked = new URLSearchParams(search).get("view");
-  return STANDS.find((stand) => stand === asked) ?? null;
+  return NAMED_VIEWS.find((stand) => stand === asked) ?? null;
 }
 
 /** Whether the page has a panel: `panel=off` leaves it out, for a page that holds this one in a frame. */

@@ -13,7 +13,7 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import { leaveUncut } from "../gpu/unclipped_material";
+import { keepUnclipped } from "../gpu/unclipped_material";
 import { Label } from "../marks/label";
 import type { Sight } from "../marks/style";
 import { AHEAD, type Box, boxSpan } from "../math/box";
@@ -62,7 +62,7 @@ class Planes {
     });
     this.mesh = new Mesh(geometry, material);
     this.mesh.frustumCulled = false;
-    leaveUncut(this.mesh); // a cut lays it open
+    keepUnclipped(this.mesh); // a cut lays it open
   }
 
   place(frames: readonly SliceFrame[], box: Box): void {

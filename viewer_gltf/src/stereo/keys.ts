@@ -1,20 +1,19 @@
-/** The keys of stereo. Pure. */
 import { type Key, type KeyGroup, key, keysOf, neighbour, no } from "../panel/key";
 import { LENSES } from "../panel/lenses";
 import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";
 
 const KEYS: readonly Key[] = [
   key("V", "Enter stereo (VR), or leave it", "stereo"),
-  key("Home", "The specimen in your room (AR), or leave it", "room"),
+  key("Home", "Enter your room (AR), or leave it", "room"),
   key("L", "Next phone viewer", ({ view }) => {
     const lenses = neighbour(LENSES, view.lenses, 1);
     return lenses === null ? no("There is no phone viewer.") : { panel: "lenses", lenses };
   }),
   key("P", "Split screen for a phone viewer", "split"),
   key("K", "Scan the phone viewer's code", "scan"),
-  key(":", "Measure the screen by a card, for the split screen", "measure-screen"),
+  key(":", "Measure the screen with a card, for the split screen", "measure-screen"),
   ...[SCREEN_STEREO, ...STEREO_PARAMETERS].flatMap(keysOf),
 ];
 
-/** In the list of keys they follow those of the view on a screen. */
+/** In the list of keys these follow the keys of the flat view. */
 export const STEREO_KEYS: readonly KeyGroup[] = [{ name: "View", rank: 11, keys: KEYS }];

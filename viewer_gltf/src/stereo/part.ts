@@ -1,4 +1,7 @@
-/** The ways into stereo as a part of the viewer: headset, the user's own room, and the split screen of a phone. */
+/**
+ * The part of the viewer that starts stereo: in a headset, in the user's own room, or on a phone's
+ * split screen.
+ */
 
 import { BundleError } from "../bundle/errors";
 import { isTouch } from "../dom/is_touch";
@@ -33,9 +36,13 @@ import { stereoSections } from "./section";
 
 /** Stereo on a phone counts as available: the start itself reports what the phone lacks. */
 const SPLIT: XrSupport = { isAvailable: true, reason: "" };
-/** Time after the first picture until stereo is prepared, where the browser does not report idle time, ms. */
+/**
+ * Milliseconds from the first frame until stereo is loaded, in browsers that do not report idle
+ * time.
+ */
 const AFTER_PICTURE_MS = 2000;
-const NO_ROOM = "This browser can't show things in your room (WebXR's immersive-ar).";
+const NO_ROOM =
+  "This browser can't show the specimen in your room: it has no augmented reality (AR).";
 
 async function findSupport(): StereoFinder["found"] {
   const stereo = await findXrSupport(navigator.xr, isSecureContext);
@@ -71,11 +78,12 @@ class StereoPart implements Part, StereoFinder {
     this.host.panel.learn(await this.found);
   }
 
-  /** Loads the code of stereo where it may be wanted, once the page has nothing else to do. */
+  /** Loads the code of stereo while the page is idle, if stereo is available. */
   async afterOverview(): Promise<void> {
     const { stereo, hasRoom } = await this.found;
     if (wayToStereo(stereo, isTouch()) === null && !hasRoom) return;
-    const prepare = () => void this.host.stereo.prepare().catch(() => undefined); // a start reports it
+    // A start reports the failure.
+    const prepare = () => void this.host.stereo.prepare().catch(() => undefined);
     if (typeof requestIdleCallback === "function") requestIdleCallback(prepare);
     else setTimeout(prepare, AFTER_PICTURE_MS);
   }
@@ -112,7 +120,7 @@ class StereoPart implements Part, StereoFinder {
     else this.host.announce(NO_ROOM);
   }
 
-  /** Must be called from within a click or a key. */
+  /** Must be called from a click or a key. */
   private async enter(mode: ImmersiveMode): Promise<void> {
     if (navigator.xr === undefined) return;
     try {
@@ -133,7 +141,6 @@ class StereoPart implements Part, StereoFinder {
     });
   }
 
-  /** In stereo: the phone is in another viewer. */
   private changeLenses(lenses: Lenses): void {
     this.host.panel.change({ panel: "lenses", lenses });
     this.withProfile((profile) => this.host.stereo.setLenses(profile));
@@ -182,7 +189,7 @@ class StereoPart implements Part, StereoFinder {
       rememberScreen(perInch);
       display.setScreen(perInch);
       host.announce(
-        `The screen has ${perInch} pixels an inch: split the screen to see it in true size.`,
+        `The screen has ${perInch} pixels per inch. Split the screen to see it in true size.`,
       );
     });
     const { userAgent } = navigator;

@@ -1,4 +1,6 @@
-/** The user's phone viewer, screen and eyes, from the visit before. */
+/**
+ * The user's lens profile, screen size and eye settings, kept in the browser since the last visit.
+ */
 import { store, stored } from "../dom/stored";
 import type { PanelView } from "../panel/controls";
 import type { Action } from "../state/actions";
@@ -21,7 +23,7 @@ export function rememberedLens(): Partial<LensView> {
     const isKnown = lenses === "own" || lenses in BUILT_IN;
     return isKnown && typeof code === "string" ? { lenses, code } : {};
   } catch {
-    return {}; // another program has written other words there
+    return {}; // the stored text is not from this page
   }
 }
 
@@ -29,7 +31,7 @@ export function rememberLens({ lenses, code }: LensView): void {
   store(LENS_KEY, JSON.stringify({ lenses, code }));
 }
 
-/** CSS pixels in an inch of this screen, as it was measured; null: it was not. */
+/** CSS pixels per inch of this screen, if it was measured; otherwise null. */
 export function rememberedScreen(): number | null {
   const [least, most] = PER_INCH;
   const perInch = Number(stored(SCREEN_KEY));
@@ -40,7 +42,6 @@ export function rememberScreen(perInch: number): void {
   store(SCREEN_KEY, String(perInch));
 }
 
-/** The settings for the eyes. */
 export function rememberedEyes(): readonly Action[] {
   const texts = (stored(EYES_KEY) ?? "").split(",");
   return EYE_ROWS.flatMap((row, i) => {

@@ -1,4 +1,6 @@
-/** The panel's sections of stereo: a headset, or a phone in a viewer of lenses, and what the gaze does. Pure. */
+/**
+ * The panel's sections of stereo: headset, phone in a Cardboard viewer, and moving the specimen.
+ */
 
 import { command, controlOf, controlsOf, inline } from "../panel/control_templates";
 import type { Button, Control, PanelView, PartSection } from "../panel/controls";
@@ -8,7 +10,7 @@ import { SCREEN_STEREO, STEREO_PARAMETERS } from "../state/parameters/tools";
 import type { StereoSupport, XrSupport } from "../state/stereo";
 import type { ViewerState } from "../state/viewer_state";
 
-/** The stereo that there is, and whether the panel is in it. */
+/** The kinds of stereo that are available, and whether stereo is running. */
 export type StereoFacts = StereoSupport & Readonly<{ isStereo: boolean }>;
 
 export function stereoSections(
@@ -18,26 +20,28 @@ export function stereoSections(
 ): readonly PartSection[] {
   return [
     { rank: 80, id: "stereo", label: "Stereo", items: stereoItems(state, facts, view) },
-    // a screen has fingers, wheel and arrow keys for it
+    // on a screen, fingers, wheel and arrow keys move the specimen
     { rank: 20, id: "move", label: "Move", isDeeper: true, items: facts.isStereo ? MOVES : [] },
   ];
 }
 
-function onlyIf({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
-  return { refusal: isAvailable ? "" : reason || "It can't be had here.", showsReason: true };
+function availability({ isAvailable, reason }: XrSupport): Pick<Button, "refusal" | "showsReason"> {
+  return { refusal: isAvailable ? "" : reason || "This is not available here.", showsReason: true };
 }
 
 function stereoItems(state: ViewerState, facts: StereoFacts, view: PanelView): readonly Control[] {
   return [
     ...(facts.isStereo ? [] : [controlOf(SCREEN_STEREO, state)]),
-    { ...command("stereo", "Enter stereo (VR)"), ...onlyIf(facts.stereo), isPrimary: true },
+    { ...command("stereo", "Enter stereo (VR)"), ...availability(facts.stereo), isPrimary: true },
     ...(facts.hasRoom ? [command("room", "In your room (AR)")] : []),
     ...(facts.split === null ? [] : splitItems(facts.split, facts, view)),
     ...controlsOf(STEREO_PARAMETERS, state),
   ];
 }
 
-/** A phone in a viewer of lenses: which one, and the code of one that is not Google's. */
+/**
+ * Controls of the split screen: the lens profile, and the code of a viewer that is not Google's.
+ */
 function splitItems(
   split: XrSupport,
   { canScan, faultOfCode }: StereoSupport,
@@ -58,13 +62,13 @@ function splitItems(
     items.push({
       kind: "search",
       id: "lens-code",
-      label: "What the viewer's QR code says",
+      label: "Address in the viewer's QR code",
       value: code,
       to: (text) => ({ panel: "code", text }),
     });
     if (canScan) items.push(command("scan", "Scan the code"));
   }
   const support = split.isAvailable && fault !== "" ? { isAvailable: false, reason: fault } : split;
-  items.push(command("measure-screen", "Measure the screen by a card"));
-  return [...items, { ...command("split", "Split screen"), ...onlyIf(support) }];
+  items.push(command("measure-screen", "Measure the screen with a card"));
+  return [...items, { ...command("split", "Split screen"), ...availability(support) }];
 }

@@ -1,14 +1,14 @@
 /**
- * Textures in Basis Universal, by three's loader. Its own worker is made from text, and so falls
- * under the page's policy, which the transcoder's generated functions break; a worker from a file
- * does not. Imported when the first such texture comes.
+ * Loads Basis Universal textures with three.js's loader. Its own worker is made from text, so the
+ * page's content policy applies to it, and the transcoder's generated functions violate the policy.
+ * A worker from a file avoids this. Imported when the first such texture is loaded.
  */
 import type { WebGLRenderer } from "three";
 import binaryAddress from "three/examples/jsm/libs/basis/basis_transcoder.wasm?url";
 import { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
 import { TemporaryError } from "../bundle/errors";
 
-/** Throws TemporaryError if the transcoder can't be fetched. */
+/** Makes the loader. Throws TemporaryError if the transcoder can't be fetched. */
 export async function makeTextureLoader(renderer: WebGLRenderer): Promise<KTX2Loader> {
   const loader = new KTX2Loader().detectSupport(renderer);
   const binary = await fetchTranscoder();
@@ -20,7 +20,8 @@ export async function makeTextureLoader(renderer: WebGLRenderer): Promise<KTX2Lo
     return worker;
   });
   loader.transcoderBinary = binary;
-  loader.transcoderPending = Promise.resolve(); // three's loader then makes none of its own
+  // three.js's loader then does not load its own transcoder.
+  loader.transcoderPending = Promise.resolve();
   return loader;
 }
 

@@ -1,11 +1,11 @@
 /**
- * Transcodes Basis Universal textures. three's own worker function runs here, with what it expects
- * to find around it.
+ * Module worker that transcodes Basis Universal textures: three.js's own worker function, in the
+ * environment that it expects.
  */
 import BASIS from "three/examples/jsm/libs/basis/basis_transcoder.js";
 import { KTX2Loader } from "three/examples/jsm/loaders/KTX2Loader.js";
 
-/** Static parts of three's loader that its types leave out. */
+/** Static parts of three.js's loader that are missing in its types. */
 type WorkerParts = Readonly<{
   BasisWorker: () => void;
   EngineFormat: object;

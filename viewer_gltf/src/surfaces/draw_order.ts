@@ -1,11 +1,11 @@
-/** The order in which translucent channels are drawn. Pure. */
 import type { Vec3 } from "../math/vec3";
 
 /**
- * Orders channels by how far the nearest point of their boxes is, farthest first: of a channel inside another one the box
- * begins farther away. Where boxes begin equally far, the channel that comes first is drawn last, over the others.
+ * Orders channels by the distance of the nearest point of their boxes, farthest first. The box of a
+ * channel inside another one begins farther away. If boxes begin at the same distance, the first
+ * channel is drawn last, over the others.
  *
- * @param outlines points of each channel, of which the box is taken
+ * @param outlines points of each channel, from which its box is computed
  * @returns the turn of each channel, 0 for the one that is drawn first
  */
 export function turnsOf(eye: Vec3, outlines: readonly (readonly Vec3[])[]): readonly number[] {

@@ -3,7 +3,10 @@ import { type Branch, branchOf, leaveOut, putBack } from "./failed_branch";
 
 interface Tile extends Branch<Tile> {}
 
-/** A tile below another; `holds` an external tileset, and draws nothing. */
+/**
+ * A tile below another one; with `holds` "tileset", it contains an external tileset and draws
+ * nothing.
+ */
 function below(parent: Tile | null, holds: "surface" | "tileset" = "surface"): Tile {
   const tile = {
     parent,
@@ -14,18 +17,18 @@ function below(parent: Tile | null, holds: "surface" | "tileset" = "surface"): T
   return tile;
 }
 
-describe("a tile that has failed", () => {
+describe("a failed tile", () => {
   const coarsest = below(below(null));
   const holder = below(coarsest, "tileset");
   const first = below(holder);
   const finest = below(first);
 
-  it("is left out alone where its parent is a surface", () => {
+  it("is removed alone if its parent is a surface", () => {
     expect(branchOf(finest)).toBe(finest);
     expect(branchOf(holder)).toBe(holder);
   });
 
-  it("is left out with what holds it, so that the surface above has nothing to wait for", () => {
+  it("is removed together with its holder, so that the surface above does not wait for it", () => {
     expect(branchOf(first)).toBe(holder);
     leaveOut(branchOf(first));
     expect(coarsest.children).toEqual([]);

@@ -1,4 +1,6 @@
-/** What is left out of a tileset where a tile has failed, and put back when it is tried again. */
+/**
+ * The branch of a tileset that is removed when a tile fails, and put back when it is tried again.
+ */
 export type Branch<T> = {
   readonly parent: T | null;
   children?: T[];
@@ -6,9 +8,10 @@ export type Branch<T> = {
 };
 
 /**
- * The child of the next tile above that can draw something: the tile itself, or the holder of the
- * external tileset with this root. A holder draws nothing, and would be a hole without the root. It
- * comes anew once it was dropped from memory: nothing may be put back into it.
+ * Returns the child of the next tile above that can draw something: the tile itself, or the holder
+ * of the external tileset whose root it is. A holder draws nothing, so without its root it would be
+ * a hole. A holder that was dropped from memory is loaded again later, so nothing may be put back
+ * into it.
  */
 export function branchOf<T extends Branch<T>>(tile: T): T {
   let branch = tile;

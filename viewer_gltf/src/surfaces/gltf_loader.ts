@@ -19,7 +19,7 @@ class LazyGltfLoader extends GLTFLoader {
     onLoad: (gltf: GLTF) => void,
     onError?: (event: ErrorEvent) => void,
   ): void {
-    // three types what it hands on as an event; it is the Error itself
+    // three.js types this value as an event, but it is an Error
     const fail = (error: unknown) => onError?.(error as ErrorEvent);
     this.prepare(data).then(() => super.parse(data, path, onLoad, onError), fail);
   }
@@ -30,7 +30,7 @@ class LazyGltfLoader extends GLTFLoader {
       meshopt ? this.buffers() : null,
       basis ? this.textures() : null,
     ]);
-    // three's types ask for the whole decoder; its loader uses what this one has
+    // three.js's types require the whole decoder, but its loader uses only this part
     if (decoder !== null) this.setMeshoptDecoder(decoder as never);
     if (textures !== null) this.setKTX2Loader(textures);
   }
@@ -79,7 +79,7 @@ export class SurfaceLoader {
     void this.meshopt?.then((worker) => worker.dispose());
     this.ktx2?.then(
       (loader) => loader.dispose(),
-      () => undefined, // reported to the caller that wanted it
+      () => undefined, // reported to the caller that requested it
     );
   }
 }

@@ -1,6 +1,6 @@
 /**
- * meshopt's decoder beside the frame. Its own workers are made of a Blob, which the page's policy
- * forbids; this one is a file.
+ * meshopt's decoder in a worker. meshopt's own workers are made from a Blob, which the page's
+ * content policy forbids; this one is a file.
  */
 export type MeshoptRequest = Readonly<{
   id: number;
@@ -22,14 +22,14 @@ type Waiting = Readonly<{
   reject: (error: Error) => void;
 }>;
 
-/** The part of the decoder that three's loader uses. */
+/** The part of the decoder that three.js's loader uses. */
 export class MeshoptWorker {
   readonly supported = true;
   readonly ready = Promise.resolve();
   private readonly worker: Worker;
   private readonly waiting = new Map<number, Waiting>();
   private last = 0;
-  /** Why no answer comes any more: the worker's script did not load. */
+  /** The reason why no answers come any more: the worker's script did not load. */
   private fault: Error | null = null;
 
   constructor() {
@@ -56,7 +56,7 @@ export class MeshoptWorker {
   ): Promise<Uint8Array<ArrayBuffer>> {
     if (this.fault !== null) return Promise.reject(this.fault);
     const id = ++this.last;
-    // a copy of its part: posting the view would send the whole file along
+    // a copy of this part, because posting the view would send the whole file
     const request: MeshoptRequest = { id, count, stride, source: source.slice(), mode, filter };
     return new Promise((resolve, reject) => {
       this.waiting.set(id, { resolve, reject });
@@ -66,7 +66,8 @@ export class MeshoptWorker {
 
   dispose(): void {
     this.worker.terminate();
-    for (const { reject } of this.waiting.values()) reject(new Error("meshopt: no longer wanted"));
+    for (const { reject } of this.waiting.values())
+      reject(new Error("meshopt: the decoder was disposed"));
     this.waiting.clear();
   }
 }

@@ -1,4 +1,4 @@
-/** In a worker: decode buffers of EXT_meshopt_compression. */
+/** Module worker that decodes buffers of EXT_meshopt_compression. */
 import { MeshoptDecoder } from "three/examples/jsm/libs/meshopt_decoder.module.js";
 import type { MeshoptAnswer, MeshoptRequest } from "./meshopt_decoder";
 

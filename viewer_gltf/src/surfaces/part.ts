@@ -1,4 +1,4 @@
-/** The channels' surfaces as a part of the viewer. */
+/** The part of the viewer for the channels' surfaces. */
 import { memoryBudget } from "../gpu/memory_budget";
 import type { Form, StreamView } from "../host/form";
 import type { Part, PartDefinition, PartHost, PartScene } from "../host/part";
@@ -70,7 +70,7 @@ class SurfacesPart implements Part, Form {
   }
 
   dress(): void {
-    this.set.dressAll();
+    this.set.applyAllStyles();
   }
 
   retryFailed(): void {

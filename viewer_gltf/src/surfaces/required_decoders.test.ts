@@ -18,19 +18,19 @@ const PACKED = { bufferViews: [{}, { extensions: { EXT_meshopt_compression: { bu
 const MAPPED = { textures: [{ extensions: { KHR_texture_basisu: { source: 0 } } }] };
 
 describe("the decoders of a glTF file", () => {
-  it("are those that its buffers and textures use", () => {
+  it("are the ones that its buffers and textures use", () => {
     expect(needsOf(glb({}))).toEqual({ meshopt: false, basis: false });
     expect(needsOf(glb(PACKED))).toEqual({ meshopt: true, basis: false });
     expect(needsOf(glb({ ...PACKED, ...MAPPED }))).toEqual({ meshopt: true, basis: true });
     expect(needsOf(JSON.stringify(MAPPED))).toEqual({ meshopt: false, basis: true });
   });
 
-  it("are not those that it only names", () => {
+  it("do not include extensions that it only names", () => {
     const named = { extensionsUsed: ["KHR_texture_basisu"], textures: [{ source: 0 }] };
     expect(needsOf(glb(named)).basis).toBe(false);
   });
 
-  it("are unknown where it was cut short", () => {
+  it("are unknown if the file is truncated", () => {
     expect(() => needsOf(glb(PACKED).slice(0, 40))).toThrow();
     expect(() => needsOf(glb(PACKED).slice(0, 10))).toThrow();
   });

@@ -1,6 +1,8 @@
-/** Which decoders a glTF file needs, read from its JSON before it is parsed as a whole. */
+/** The decoders that a glTF file needs, read from its JSON before the whole file is parsed. */
 
-/** glTF 2.0, section 4.4: a glb is a header of 12 bytes, then chunks; the first one is the JSON. */
+/**
+ * glTF 2.0, section 4.4: a glb has a header of 12 bytes, then chunks; the first one is the JSON.
+ */
 const MAGIC = 0x46546c67;
 const JSON_LENGTH_AT = 12;
 const JSON_AT = 20;
@@ -10,7 +12,7 @@ export type Needs = Readonly<{ meshopt: boolean; basis: boolean }>;
 type Extended = Readonly<{ extensions?: Readonly<Record<string, unknown>> }>;
 type Document = Readonly<{ bufferViews?: readonly Extended[]; textures?: readonly Extended[] }>;
 
-/** Throws SyntaxError or RangeError where the JSON is broken or cut short. */
+/** Throws SyntaxError or RangeError if the JSON is damaged or truncated. */
 export function needsOf(data: ArrayBuffer | string): Needs {
   const document = JSON.parse(jsonOf(data)) as Document;
   const has = (list: readonly Extended[] | undefined, name: string) =>

@@ -1,4 +1,4 @@
-/** The surfaces of all shown channels: a tileset each, made when the channel is first shown. */
+/** The surfaces of all shown channels: one tileset each, made when the channel is first shown. */
 import { type Camera, Group, Matrix4, Mesh, ShaderMaterial, Vector3 } from "three";
 import type { Bundle } from "../bundle/load";
 import type { MemoryBudget } from "../gpu/memory_budget";
@@ -25,19 +25,19 @@ import { paint, type Surface, SurfaceTileset } from "./surface_tileset";
 import { type Face, faceTowards } from "./thin_rests";
 import { coarserFor, FINEST } from "./triangle_budget";
 
-/** The presence of a volume from which the thin rests beside it are left out, 0..1. */
-const RESTS_GO_AT = 0.5;
+/** Presence of a volume, 0 to 1, from which on the thin rests beside it are not drawn. */
+const REST_LIMIT = 0.5;
 
 const CLOSED = { tile: null, faces: new Map<string, Face>() };
 
 export type SurfaceOptions = Readonly<{
   loader: SurfaceLoader;
   frame: SurfaceFrame;
-  /** For all channels. */
+  /** For all channels together. */
   budget: Pick<MemoryBudget, "surfaces" | "triangles">;
-  /** How far the volume of a tile and channel has faded in, 0..1. */
+  /** How far the volume of a tile and channel has faded in, 0 to 1. */
   presence: (tile: string, channel: string) => number;
-  /** Whether all that is marched shows in the disc alone. */
+  /** Whether all marched volumes show only inside the disc. */
   isCrossing: () => boolean;
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -51,12 +51,14 @@ export class SurfaceSet implements Surfaces {
   private readonly eye = new Vector3();
   private state: ViewerState | null = null;
   private focusTiles: FocusTiles = NO_FOCUS;
-  /** The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour. */
+  /**
+   * The tile that is drawn as a volume, and the faces of its neighbours towards it, by neighbour.
+   */
   private open: Readonly<{ tile: string | null; faces: ReadonlyMap<string, Face> }> = CLOSED;
-  /** Whether the first picture is whole. */
+  /** Whether the overview was complete once. */
   private hasBegun = false;
   private errorTarget_px = ERROR_TARGET_PX;
-  /** Since a device draws no more triangles in time. */
+  /** How much coarser the surfaces are drawn, so that the device keeps its frame rate. */
   private coarser = FINEST;
   private readonly loaded = new Signal<Readonly<{ channel: string; surface: LoadedSurface }>>();
 
@@ -76,8 +78,8 @@ export class SurfaceSet implements Surfaces {
   }
 
   /**
-   * Outermost points of a channel's surfaces, um, world: those of the box round them, until all of the coarsest have
-   * come; null: not known yet.
+   * Outermost points of a channel's surfaces, um, world; null if unknown. Until all coarsest
+   * surfaces are loaded, they are the corners of the box around them.
    */
   outline(channel: string): readonly Vec3[] | null {
     return this.tilesets.get(channel)?.outline ?? null;
@@ -99,7 +101,6 @@ export class SurfaceSet implements Surfaces {
     this.errorTarget_px = pixels;
   }
 
-  /** Those that are not opaque now. */
   get blended(): readonly BlendedScene[] {
     return this.shown().flatMap(([, { surfaces }]) =>
       [...surfaces.values()].flatMap(({ scene, blend: { isBlended, isPane, isSolid } }) =>
@@ -108,12 +109,11 @@ export class SurfaceSet implements Surfaces {
     );
   }
 
-  /** All that have come of a channel. */
   of(channel: string): readonly Surface[] {
     return [...(this.tilesets.get(channel)?.surfaces.values() ?? [])];
   }
 
-  /** The meshes on screen, but for those that write depth alone. */
+  /** The meshes on screen, without those that write only depth. */
   get meshes(): readonly ShownSurface[] {
     const found: ShownSurface[] = [];
     for (const [channel, { drawn }] of this.shown()) {
@@ -127,15 +127,14 @@ export class SurfaceSet implements Surfaces {
     return found;
   }
 
-  /** Calls back when a surface has come. */
   onLoaded(listener: (channel: string, surface: LoadedSurface) => void): void {
     this.loaded.subscribe(({ channel, surface }) => listener(channel, surface));
   }
 
-  /** Volumes came, went, or fade. */
-  dressAll(): void {
+  /** Updates all surfaces after volumes appeared, disappeared or faded. */
+  applyAllStyles(): void {
     for (const [id, { surfaces }] of this.shown()) {
-      for (const surface of surfaces.values()) this.dress(id, surface);
+      for (const surface of surfaces.values()) this.applyStyle(id, surface);
     }
   }
 
@@ -149,7 +148,7 @@ export class SurfaceSet implements Surfaces {
       const tileset = this.tilesets.get(channel.id);
       if (tileset === undefined) continue;
       tileset.show(isWanted);
-      for (const surface of tileset.surfaces.values()) this.dress(channel.id, surface);
+      for (const surface of tileset.surfaces.values()) this.applyStyle(channel.id, surface);
     }
   }
 
@@ -165,14 +164,13 @@ export class SurfaceSet implements Surfaces {
     for (const [, tileset] of this.shown()) {
       if (isComplete) tileset.refine(this.errorTarget_px, this.coarser);
       tileset.update(camera, width_px, height_px);
-      // one channel after another: the first shows all tiles the sooner
+      // one channel after another, so that the first one shows all tiles sooner
       if (!this.hasBegun && !overview([tileset.progress]).isComplete) break;
     }
     this.hasBegun ||= isComplete;
     this.order(camera);
   }
 
-  /** Draw translucent channels from the farthest to the nearest. */
   private order(camera: Camera): void {
     const blended = this.shown().filter(([, { surfaces }]) =>
       [...surfaces.values()].some(({ blend }) => blend.isTranslucent),
@@ -183,7 +181,7 @@ export class SurfaceSet implements Surfaces {
     const outlines = blended.map(([, { outline }]) => outline ?? []);
     const turns = turnsOf([x, y, z], outlines);
     for (const [i, [, { surfaces }]] of blended.entries()) {
-      for (const { blend } of surfaces.values()) blend.take(turns[i]);
+      for (const { blend } of surfaces.values()) blend.setTurn(turns[i]);
     }
   }
 
@@ -202,7 +200,7 @@ export class SurfaceSet implements Surfaces {
       frame,
       budget.surfaces,
       (surface) => {
-        this.dress(id, surface);
+        this.applyStyle(id, surface);
         this.loaded.emit({ channel: id, surface });
       },
       onChange,
@@ -212,8 +210,8 @@ export class SurfaceSet implements Surfaces {
     this.group.add(tileset.group);
   }
 
-  /** Colour and visibility of one loaded surface, by the state. */
-  private dress(id: string, surface: Surface): void {
+  /** Sets colour and visibility of one loaded surface from the state. */
+  private applyStyle(id: string, surface: Surface): void {
     const { state } = this;
     const channel = state?.channels.find((c) => c.id === id);
     const tile = state?.tiles.find((each) => each.id === surface.tile);
@@ -229,7 +227,7 @@ export class SurfaceSet implements Surfaces {
     });
     paint(surface, (glb) => surfaceColor(glb, channel.original, channel.color));
     const { open } = this;
-    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= RESTS_GO_AT;
+    const isOpen = open.tile !== null && this.options.presence(open.tile, id) >= REST_LIMIT;
     surface.leaveRestsOut((isOpen && open.faces.get(tile.id)) || null);
   }
 

@@ -15,9 +15,9 @@ const level = (geometricError: number, children: readonly unknown[] = []) => ({
   children,
 });
 
-it("a channel's tiles in view are known by level, and refined as far as is asked for", () => {
+it("a channel's tiles in view are known by level, and are refined as far as requested", () => {
   const [channel] = sampleManifest(1).channels;
-  const triangles = [600, 200, 100]; // finest first, of both tiles
+  const triangles = [600, 200, 100]; // finest first, for both tiles
   const tileset = new SurfaceTileset(
     "http://host/bundle/",
     { ...channel, triangles },
@@ -51,7 +51,8 @@ it("a channel's tiles in view are known by level, and refined as far as is asked
   tileset.refine(2, FINEST);
   expect([tiles.maxDepth, tiles.errorTarget]).toEqual([Infinity, 2]);
   tileset.refine(2, { factor: 4, leftOut: 1 });
-  // as deep as the second level; the coarsest are at a depth of 1, and the renderer stops before its most
+  // As deep as the second level: the coarsest tiles are at depth 1, and the renderer stops before
+  // its maximum.
   expect([tiles.maxDepth, tiles.errorTarget]).toEqual([3, 8]);
   tileset.refine(2, { factor: 1, leftOut: 7 });
   expect(tiles.maxDepth).toBe(2);

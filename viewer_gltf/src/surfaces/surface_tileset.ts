@@ -1,9 +1,9 @@
 /**
  * The surfaces of one channel, streamed by 3d-tiles-renderer.
  *
- * The tileset is in metres and z-up (3D Tiles 1.1); 3d-tiles-renderer turns the glTF content, which
- * is y-up, into that space. `group` turns it back and into um, so that its parent is the stage's
- * world.
+ * The tileset is in metres and z-up (3D Tiles 1.1). The renderer turns the glTF content, which is
+ * y-up, into that space. The `group` turns it back and scales it to um, so its parent is the
+ * stage's world.
  */
 import { TilesRenderer } from "3d-tiles-renderer";
 import type { Tile } from "3d-tiles-renderer/core";
@@ -36,23 +36,23 @@ import { type Face, leaveRestsOut } from "./thin_rests";
 import type { Coarser, Levels } from "./triangle_budget";
 
 const UM_PER_METRE = 1e6;
-/** The root holds no content; below it lie the tiles' coarsest LODs. */
+/** Depth of the tiles' coarsest LODs; the root above them has no content. */
 const DEPTH_OF_COARSEST = 1;
-/** Most vertices of a mesh that are looked at for where it ends. */
+/** Largest number of vertices of a mesh that are tested for its outermost points. */
 const MAX_POINTS = 2000;
-/** Share of a full cache that stays after hidden surfaces were dropped. */
+/** Share of a full cache that is kept after hidden surfaces are dropped. */
 const KEPT_SHARE = 0.75;
 
 export type Surface = Readonly<{
   scene: Object3D;
   tile: string;
   materials: readonly MeshStandardMaterial[];
-  /** Linear, as the glb has it. */
+  /** Linear colours of the glb. */
   colors: readonly Rgb[];
-  /** The number of triangles that are drawn when the surface is on screen. */
+  /** Number of triangles drawn when the surface is on screen. */
   triangles: number;
   blend: BlendedSurface;
-  /** Leave the thin rests at a face out from now on; null: draw all. */
+  /** Stops drawing the thin rests at a face; null: draws all triangles. */
   leaveRestsOut: (face: Face | null) => void;
 }>;
 
@@ -63,10 +63,10 @@ export class SurfaceTileset {
   readonly surfaces = new Map<Object3D, Surface>();
   private readonly tiles: TilesRenderer;
   private total: number | null = null;
-  /** Coarsest tiles that have been loaded or given up. */
+  /** Coarsest tiles that are loaded or were abandoned. */
   private readonly done = new Set<Tile>();
   private readonly failed = new Set<Tile>();
-  /** Outermost points of the coarsest that have come, um, world. */
+  /** Outermost points of the loaded coarsest tiles, um, world. */
   private readonly outermost: Vec3[] = [];
 
   constructor(
@@ -89,7 +89,7 @@ export class SurfaceTileset {
     this.tiles.registerPlugin({
       name: "STEREOCELL_BUNDLE",
       fetchData: (url: string, { signal }: RequestInit) => files.fetch(url, signal),
-      // Before the renderer puts its own `tile` into every userData.
+      // before the renderer adds its own `tile` to each userData
       processTileModel: (scene: Object3D, tile: Tile) => this.adopt(scene, tile),
     });
     this.tiles.addEventListener("load-root-tileset", () => {
@@ -100,7 +100,7 @@ export class SurfaceTileset {
     this.tiles.addEventListener("load-model", ({ tile }) => this.count(tile));
     this.tiles.addEventListener("load-error", ({ tile, error, url }) => {
       if (tile === null) this.total = 0;
-      else this.giveUp(tile);
+      else this.abandon(tile);
       onError(
         error instanceof BundleError
           ? error
@@ -123,7 +123,10 @@ export class SurfaceTileset {
     this.group.add(this.tiles.group);
   }
 
-  /** Outermost points, um, world: of the box round all until the coarsest have come; null: not known yet. */
+  /**
+   * Outermost points, um, world: corners of the box around everything until the coarsest tiles are
+   * loaded; null if unknown.
+   */
   get outline(): readonly Vec3[] | null {
     if (this.done.size === this.total) return this.outermost;
     const box = new Box3();
@@ -132,7 +135,7 @@ export class SurfaceTileset {
     return cornersOf({ min: min.toArray(), max: max.toArray() });
   }
 
-  /** To um, world. */
+  /** Matrix to um, world. */
   private get matrix(): Matrix4 {
     this.tiles.group.updateMatrix();
     return this.tiles.group.matrix;
@@ -142,7 +145,10 @@ export class SurfaceTileset {
     return this.group.visible;
   }
 
-  /** A hidden tileset gives its memory up where another needs it; a shown one tries all again. */
+  /**
+   * Shows or hides the tileset. A hidden tileset releases its memory if another needs it; a shown
+   * one tries failed tiles again.
+   */
   show(isShown: boolean): void {
     if (isShown === this.group.visible) return;
     this.group.visible = isShown;
@@ -170,37 +176,37 @@ export class SurfaceTileset {
     );
   }
 
-  /** Those on screen. */
   get drawn(): readonly Surface[] {
     return [...this.surfaces.values()].filter(
       ({ scene }) => scene.visible && this.tiles.group.children.includes(scene),
     );
   }
 
-  /** Triangles on screen. */
   get triangles(): number {
     return this.drawn.reduce((sum, { triangles }) => sum + triangles, 0);
   }
 
-  /** The levels of each tile that was in view last, as far as they are known. */
+  /** The levels of each tile that was in view in the last frame, as far as they are known. */
   get inView(): readonly Levels[] {
     const { triangles } = this.channel;
     const coarsest = this.tiles.root?.children ?? [];
     return coarsest.flatMap((tile) => {
-      const { inFrustum = false, error = 0 } = tile.traversal ?? {}; // none before its first look
+      // The traversal is undefined before the tile's first update.
+      const { inFrustum = false, error = 0 } = tile.traversal ?? {};
       if (!inFrustum) return [];
       const px = error / tile.geometricError;
       const levels: { error_px: number; triangles: number }[] = [];
       for (let each: Tile | undefined = tile; each !== undefined; each = each.children?.[0]) {
         const all = triangles[triangles.length - 1 - levels.length] ?? 0;
-        const error_px = each.geometricError && px * each.geometricError; // 0 also at the eye
+        // The first operand keeps an error of 0 even at the eye, where px is infinite.
+        const error_px = each.geometricError && px * each.geometricError;
         levels.push({ error_px, triangles: all / coarsest.length });
       }
       return [levels];
     });
   }
 
-  /** Go on to finer LODs, by screen-space error: `errorTarget_px` pixels, or coarser. */
+  /** Sets how far LODs are refined, by screen-space error: `errorTarget_px` pixels, or coarser. */
   refine(errorTarget_px: number, { factor, leftOut }: Coarser): void {
     const levels = Math.max(1, this.channel.triangles.length - leftOut);
     this.tiles.maxDepth = leftOut === 0 ? Number.POSITIVE_INFINITY : DEPTH_OF_COARSEST + levels;
@@ -217,25 +223,26 @@ export class SurfaceTileset {
   }
 
   /**
-   * The renderer draws a failed tile as a hole in place of its parent: without the failed child the
-   * parent stays. The coarsest have no parent to show; their finer LODs may still come.
+   * Removes a failed tile. The renderer would draw it as a hole in place of its parent; without the
+   * failed child the parent stays. The coarsest tiles have no parent to show, and their finer LODs
+   * may still load.
    */
-  private giveUp(tile: Tile): void {
+  private abandon(tile: Tile): void {
     this.failed.add(tile);
     const branch = branchOf(tile);
     if (branch.internal.depth > DEPTH_OF_COARSEST) leaveOut(branch);
     this.count(tile);
   }
 
-  /** Loads failed tiles anew where they are needed. */
+  /** Lets failed tiles be loaded again where they are needed. */
   retryFailed(): void {
     if (this.tiles.root === null) this.total = null;
     for (const tile of this.failed) {
       putBack(branchOf(tile));
-      this.tiles.lruCache.remove(tile); // makes it a tile that was never loaded
+      this.tiles.lruCache.remove(tile); // afterwards the renderer treats the tile as never loaded
     }
     this.failed.clear();
-    this.tiles.resetFailedTiles(); // the root
+    this.tiles.resetFailedTiles(); // also resets the root
   }
 
   private count(tile: Tile): void {
@@ -254,9 +261,10 @@ export class SurfaceTileset {
       }
     });
     if (id === null) {
-      throw new BundleError(`${tile.content?.uri}: expected extras.tile with the tile's id`);
+      throw new BundleError(`${tile.content?.uri}: extras.tile is missing; expected the tile's id`);
     }
-    for (const material of materials) material.side = DoubleSide; // cut open at the tile's border
+    // Surfaces are open at the tile's border.
+    for (const material of materials) material.side = DoubleSide;
     const list = [...materials];
     const meshes = placedMeshes(scene, this.matrix);
     let shownFace: Face | null = null;
@@ -289,7 +297,7 @@ export class SurfaceTileset {
   }
 }
 
-/** The meshes of a scene that has no parent yet. */
+/** The meshes of a scene that has no parent yet, with their matrices. */
 function placedMeshes(scene: Object3D, toWorld: Matrix4): readonly PlacedMesh[] {
   const found: PlacedMesh[] = [];
   scene.updateMatrixWorld(true);
@@ -305,7 +313,7 @@ function drawnTriangles({ index, attributes: { position }, drawRange }: BufferGe
   return Math.min((index ?? position).count, drawRange.count) / 3;
 }
 
-/** Some of the vertices, um, world. */
+/** A sample of the vertices, um, world. */
 function somePoints(meshes: readonly PlacedMesh[]): readonly Vec3[] {
   return meshes.flatMap(({ geometry, toWorld }) => {
     const { position } = geometry.attributes;
@@ -319,7 +327,7 @@ function somePoints(meshes: readonly PlacedMesh[]): readonly Vec3[] {
   });
 }
 
-/** Paint a surface; the colour is linear. */
+/** Sets a surface's colours, in linear RGB. */
 export function paint(surface: Surface, colorOf: (glb: Rgb) => Rgb): void {
   surface.materials.forEach((material, i) => {
     material.color = new Color(...colorOf(surface.colors[i]));

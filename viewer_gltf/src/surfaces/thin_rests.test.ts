@@ -5,19 +5,19 @@ import type { Box } from "../math/box";
 import type { Vec3 } from "../math/vec3";
 import { type Face, faceTowards, leaveRestsOut } from "./thin_rests";
 
-/** Two tiles side by side, um; the left one is drawn as a volume. */
+/** Two adjacent tiles, um; the left one is drawn as a volume. */
 const LEFT: Box = { min: [0, 0, 0], max: [10, 10, 8] };
 const RIGHT: Box = { min: [10, 0, 0], max: [20, 10, 8] };
 
-/** A half of an ellipsoid of the right tile, um, that begins at `x`. */
+/** Half of an ellipsoid in the right tile, um, that begins at `x`. */
 function cap(x: number, depth: number, length: number, y = 5): BufferGeometry {
-  const half = new SphereGeometry(0.5, 24, 16, Math.PI / 2, Math.PI); // where x >= 0
+  const half = new SphereGeometry(0.5, 24, 16, Math.PI / 2, Math.PI); // the half with x >= 0
   return half.scale(2 * depth, length, length).translate(x, y, 4);
 }
 
 function faceOf(tile: Box, other: Box): Face {
   const face = faceTowards(tile, other);
-  if (face === null) throw new Error("the tiles are no neighbours");
+  if (face === null) throw new Error("the tiles are not neighbours");
   return face;
 }
 
@@ -38,14 +38,14 @@ function trianglesAfter(geometry: BufferGeometry, face: Face | null = faceOf(RIG
 }
 
 describe("beside an open tile", () => {
-  it("a flat rest that touches the face is left out, and comes back", () => {
+  it("a flat rest that touches the face is not drawn, and is drawn again later", () => {
     const rest = cap(10, 0.5, 4);
     const all = (rest.index?.count ?? 0) / 3;
     expect(trianglesAfter(rest)).toBe(0);
     expect(trianglesAfter(rest, null)).toBe(all);
   });
 
-  it("a needle along the end of the data that begins at the face is left out", () => {
+  it("a needle along the end of the data that begins at the face is not drawn", () => {
     expect(trianglesAfter(cap(10, 1.5, 0.4, 0.2))).toBe(0);
   });
 
@@ -55,12 +55,12 @@ describe("beside an open tile", () => {
     ["reaches far into the tile", cap(10, 1.6, 6)],
     ["doesn't touch the face", cap(10.1, 0.5, 4)],
     ["is a layer along the face", cap(10, 0.5, 7)],
-  ])("a component stays that %s", (_, component) => {
+  ])("a component stays if it %s", (_, component) => {
     const all = (component.index?.count ?? 0) / 3;
     expect(trianglesAfter(component)).toBe(all);
   });
 
-  it("only the rest is left out of a mesh of several components", () => {
+  it("only the rest is removed from a mesh of several components", () => {
     const [rest, other] = [cap(10, 0.4, 3, 2), cap(10, 3, 5, 6.5)];
     const both = mergeGeometries([rest, other]);
     const kept = drawnTriangles(other).length;
@@ -68,14 +68,14 @@ describe("beside an open tile", () => {
     expect(drawnTriangles(both).every(([, y]) => y > 3.9)).toBe(true);
   });
 
-  it("a component stays whole whose parts have vertices of their own where they meet", () => {
-    const [flat, deep] = [cap(10, 0.5, 4), cap(10, 2, 4)]; // one rim
+  it("a component stays whole even if its parts have separate vertices where they meet", () => {
+    const [flat, deep] = [cap(10, 0.5, 4), cap(10, 2, 4)]; // two caps that share one rim
     const both = mergeGeometries([flat, deep]);
     const all = (both.index?.count ?? 0) / 3;
     expect(trianglesAfter(both)).toBe(all);
   });
 
-  it("a mesh counts in the coordinates of the world", () => {
+  it("a mesh is measured in world coordinates", () => {
     const metres = cap(10, 0.5, 4).scale(1e-6, 1e-6, 1e-6);
     leaveRestsOut(metres, new Matrix4().makeScale(1e6, 1e6, 1e6), faceOf(RIGHT, LEFT));
     expect(drawnTriangles(metres)).toEqual([]);
@@ -83,16 +83,16 @@ describe("beside an open tile", () => {
 });
 
 describe("the face of a tile towards another one", () => {
-  it("is the one that both share", () => {
+  it("is the face that both share", () => {
     expect(faceTowards(RIGHT, LEFT)).toMatchObject({ axis: 0, isUpper: false });
     expect(faceTowards(LEFT, RIGHT)).toMatchObject({ axis: 0, isUpper: true });
   });
 
   it.each<[string, Box]>([
-    ["shares an edge alone", { min: [10, 10, 0], max: [20, 20, 8] }],
-    ["lies apart", { min: [12, 0, 0], max: [20, 10, 8] }],
+    ["only shares an edge", { min: [10, 10, 0], max: [20, 20, 8] }],
+    ["is separate", { min: [12, 0, 0], max: [20, 10, 8] }],
     ["is the tile itself", LEFT],
-  ])("is none where the other one %s", (_, other) => {
+  ])("is null if the other tile %s", (_, other) => {
     expect(faceTowards(LEFT, other)).toBeNull();
   });
 });

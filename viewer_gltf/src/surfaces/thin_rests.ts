@@ -1,10 +1,10 @@
 /**
- * Thin rests of objects beside an open tile.
+ * Finds thin rests of objects beside an open tile, which are not drawn while the tile is open.
  *
- * Where one tile is drawn as a volume, its neighbours are still drawn as surfaces. An object that reaches past
- * the shared face by a hair leaves a flat rest in the neighbour, which stands as an opaque lens beside the
- * translucent volume. An object that the end of the data cuts leaves a sliver there, which sticks out as a
- * needle. Both are left out for as long as the tile is open.
+ * If one tile is drawn as a volume, its neighbours are still drawn as surfaces. An object that extends
+ * slightly past the shared face leaves a flat rest in the neighbour, which looks like an opaque lens
+ * beside the translucent volume. An object that is cut by the end of the data leaves a sliver there,
+ * which sticks out like a needle.
  */
 import { Box3, type BufferGeometry, type Matrix4, Vector3 } from "three";
 import type { Box } from "../math/box";
@@ -12,19 +12,24 @@ import { AXES } from "../math/vec3";
 
 /** A rest lies within this share of its tile's edge from one of the tile's faces. */
 const DEEPEST = 3 / 20;
-/** A rest reaches at most this share of its own length from that face. */
+/** A rest extends at most this share of its own length from that face. */
 const FLATTEST = 1 / 3;
-/** A flat component that is longer than this share of the tile's shortest edge is a layer, which stays. */
+/**
+ * A flat component longer than this share of the tile's shortest edge is a layer, which is drawn.
+ */
 const LONGEST = 1 / 2;
-/** Share of the tile's edge within which a vertex lies in a face; coordinates have 14 bits or more. */
+/**
+ * Share of the tile's edge within which a vertex counts as lying in a face; coordinates have at
+ * least 14 bits.
+ */
 const TOUCHING = 1 / 1000;
 
 type Axis = (typeof AXES)[number];
 
-/** The face of a tile beyond which the open tile lies. */
+/** The face of a tile behind which the open tile lies. */
 export type Face = Readonly<{ axis: Axis; isUpper: boolean; tile: Box }>;
 
-/** The face of a tile that it shares with another one; null: they are not neighbours. */
+/** The face of a tile that it shares with another one; null if they are not neighbours. */
 export function faceTowards(tile: Box, other: Box): Face | null {
   const overlap = (axis: Axis) =>
     Math.min(tile.max[axis], other.max[axis]) - Math.max(tile.min[axis], other.min[axis]);
@@ -36,7 +41,7 @@ export function faceTowards(tile: Box, other: Box): Face | null {
 }
 
 /**
- * Leave the thin rests at a face out of a mesh, or draw all of it again.
+ * Removes the thin rests at a face from a mesh, or draws all triangles again.
  *
  * The triangles of the rests are moved to the end of the index, where they are not drawn.
  *
@@ -59,7 +64,7 @@ export function leaveRestsOut(geometry: BufferGeometry, toWorld: Matrix4, face: 
   geometry.setDrawRange(0, drawn.length);
 }
 
-/** Whether a vertex belongs to a thin rest; null: no vertex does. */
+/** Whether each vertex belongs to a thin rest; null if there is none. */
 function restVertices(
   geometry: BufferGeometry,
   toWorld: Matrix4,
@@ -79,7 +84,7 @@ function restVertices(
   return rests.size === 0 ? null : (vertex) => rests.has(roots[vertex]);
 }
 
-/** The vertices, x y z each, um, world. */
+/** The positions of the vertices, x y z each, um, world. */
 function placesOf(geometry: BufferGeometry, toWorld: Matrix4): Float32Array {
   const { position } = geometry.attributes;
   const places = new Float32Array(3 * position.count);
@@ -93,7 +98,10 @@ function placesOf(geometry: BufferGeometry, toWorld: Matrix4): Float32Array {
   return places;
 }
 
-/** For each vertex one vertex of its connected component. Vertices in one place near a face of the tile are connected. */
+/**
+ * For each vertex, one vertex of its connected component. Vertices in one place near a face of the
+ * tile count as connected.
+ */
 function components(places: Float32Array, corners: ArrayLike<number>, tile: Box): Int32Array {
   const parents = Int32Array.from({ length: places.length / 3 }, (_, vertex) => vertex);
   const rootOf = (vertex: number) => {
@@ -110,7 +118,7 @@ function components(places: Float32Array, corners: ArrayLike<number>, tile: Box)
   const first = new Map<string, number>();
   for (let vertex = 0; vertex < parents.length; vertex++) {
     const place = places.subarray(3 * vertex, 3 * vertex + 3);
-    if (!isNearFaces(place, tile)) continue; // no component that reaches there is a rest
+    if (!isNearFaces(place, tile)) continue; // a component that reaches this far is not a rest
     const name = place.join();
     connect(vertex, first.get(name) ?? vertex);
     first.set(name, vertex);
@@ -141,7 +149,6 @@ function isRest(extent: Box3, face: Face): boolean {
   });
 }
 
-/** Whether a box reaches a face of its tile. */
 function touches(box: Box3, { axis, isUpper, tile }: Face): boolean {
   const near = TOUCHING * (tile.max[axis] - tile.min[axis]);
   return isUpper

@@ -1,23 +1,28 @@
-/** Coarser surfaces where those in view would have more triangles than a device draws in time. Pure. */
+/** Makes surfaces coarser if those in view have more triangles than the device can draw in time. */
 
-/** The levels of a tile in view, coarsest first: its error on screen, infinite at the eye, and its triangles. */
+/**
+ * The levels of a tile in view, coarsest first: the error on screen, infinite at the eye, and the
+ * triangles.
+ */
 export type Levels = readonly Readonly<{ error_px: number; triangles: number }>[];
 
-/** `factor`: to the error that is asked for. `leftOut`: finest levels that no tile has, however near. */
+/**
+ * `factor`: factor of the requested error. `leftOut`: number of finest levels that are never used.
+ */
 export type Coarser = Readonly<{ factor: number; leftOut: number }>;
 
 const FACTORS = [1, Math.SQRT2, 2, 2 * Math.SQRT2, 4] as const;
-/** More than tiles have levels. */
+/** More levels than tiles have. */
 const MAX_LEVELS = 8;
-/** Finest first; the first asks for nothing coarser. */
+/** Finest first; the first one changes nothing. */
 const ALL: readonly Coarser[] = Array.from({ length: MAX_LEVELS }, (_, leftOut) =>
   FACTORS.map((factor) => ({ factor, leftOut })),
 ).flat();
 export const [FINEST] = ALL;
-/** Share of the budget within which what is finer has to stay: else levels would change to and fro. */
+/** Share of the budget that a finer choice must not exceed, so that levels do not alternate. */
 const ROOM = 0.8;
 
-/** About how many are drawn where each tile is refined down to an error. */
+/** Estimated number of triangles if each tile is refined to an error. */
 export function trianglesAt(
   tiles: readonly Levels[],
   target_px: number,
@@ -30,7 +35,10 @@ export function trianglesAt(
   }, 0);
 }
 
-/** By how much they are coarser, to be at most so many; by as much as can be where all are more. */
+/**
+ * Returns how much coarser the surfaces must be to stay within `most` triangles; the coarsest
+ * choice if none does.
+ */
 export function coarserFor(
   tiles: readonly Levels[],
   target_px: number,

@@ -1,10 +1,11 @@
-/** In which order boxes that don't overlap are blended. Pure. */
+/** The order in which boxes that do not overlap are blended. */
 import type { Vec3 } from "../math/vec3";
 
 /**
- * The sum over the axes of the distance from the eye to the box. In a grid of boxes along the axes
- * a ray leaves a box only for one that has more of it, so far boxes first is the right order, also
- * where boxes differ in size. (three sorts by depth, which is the same for a whole row of tiles.)
+ * Returns the sum over the axes of the distance from the eye to the box. In a grid of boxes along
+ * the axes, a ray enters only boxes with a larger sum. So drawing the largest sums first is the
+ * right order, also for boxes of different sizes. In contrast, three.js sorts by depth, which is
+ * the same for a whole row of tiles.
  */
 export function distanceInGrid(eye: Vec3, min: Vec3, max: Vec3): number {
   let sum = 0;

@@ -1,4 +1,6 @@
-/** How the volumes of each channel look: colour, window and transfer function, by the state. */
+/**
+ * The appearance of each channel's volumes: colour, window and transfer function from the state.
+ */
 import type { Shapes, Transfer2d } from "../bundle/transfer_2d";
 import { isTraced } from "../state/parameters/volumes";
 import { isInDisc } from "../state/representation";
@@ -19,12 +21,12 @@ type MadeTable2d = Readonly<{
 }>;
 
 export class ChannelAppearances {
-  /** The last table of each channel: all tiles ask for the same one. */
+  /** The last table of each channel, because all tiles ask for the same one. */
   private readonly tables2d = new Map<string, MadeTable2d>();
 
   constructor(private readonly lists: ChannelLists) {}
 
-  /** The appearance of a channel, whose list must have come. */
+  /** The appearance of a channel, whose list must be loaded. */
   of(state: ViewerState, id: string): Appearance {
     const appearance = this.untraced(state, id);
     if (!isTraced(state)) return appearance;
@@ -35,25 +37,28 @@ export class ChannelAppearances {
     return { ...appearance, table2d: shifted, table: shifted.envelope };
   }
 
-  /** The appearance of a channel by its transfer function alone. */
+  /** The appearance of a channel from its transfer function alone, without path tracing. */
   private untraced(state: ViewerState, id: string): Appearance {
     const channel = state.channels.find((each) => each.id === id);
     const volumes = this.lists.get(id);
     if (channel === undefined || volumes === undefined) {
-      throw new Error(`the list of volumes of channel ${id} has not come`);
+      throw new Error(`the list of volumes of channel ${id} is not loaded`);
     }
     const { color, window, opacity, transferFunction: name } = channel;
     const common = { color, window, isInDisc: isInDisc(state, channel) };
     const table2d = this.table2dOf(channel);
     if (table2d !== null) return { ...common, table: table2d.envelope, table2d };
-    // a two-dimensional function of the user's own has no one-dimensional one that stands for it
+    // a two-dimensional function of the user's own has no one-dimensional substitute
     const entries =
       volumes.transferFunctions.get(name) ?? (isTwoD(channel) ? NO_ENTRIES : undefined);
     if (entries === undefined) throw new Error(`channel ${id} has no transfer function ${name}`);
     return { ...common, table: lookUpTable(entries, window, opacity) };
   }
 
-  /** The table of a two-dimensional function; null: the function has one dimension, or its shapes have not come. */
+  /**
+   * The table of a two-dimensional function; null if the function has one dimension or its shapes
+   * are not loaded.
+   */
   private table2dOf(channel: ChannelState): TransferTable2d | null {
     const { id, transfer2d, window, opacity } = channel;
     const shapes = shapesOf(channel);

@@ -1,22 +1,21 @@
-/** What the bundle has of each channel's volumes: where each tile's comes from, and how it may look. */
+/** The bundle's volumes of each channel: the source for each tile, and the transfer functions. */
 import type { Bundle } from "../bundle/load";
 import { loadVolumes } from "../bundle/load";
 import { loadTransferFunctions, type TransferFunction } from "../voxels/transfer_luts";
 import { VolumeSource } from "../voxels/volume_source";
 
 export type ChannelVolumes = Readonly<{
-  /** By tile. */
   sources: ReadonlyMap<string, VolumeSource>;
   transferFunctions: ReadonlyMap<string, TransferFunction>;
 }>;
 
-/** Loads a channel's list of volumes when it is first asked for. */
+/** Loads a channel's list of volumes when it is first needed. */
 export class ChannelLists {
   private readonly loaded = new Map<string, ChannelVolumes>();
   private readonly underWay = new Map<string, Promise<void>>();
   private readonly failed = new Set<string>();
 
-  /** @param onChange a list has come, or has failed */
+  /** @param onChange called when a list is loaded or has failed */
   constructor(
     private readonly bundle: Bundle,
     private readonly onChange: () => void,
@@ -27,7 +26,6 @@ export class ChannelLists {
     return this.underWay.size > 0;
   }
 
-  /** undefined: it has not come. */
   get(channel: string): ChannelVolumes | undefined {
     return this.loaded.get(channel);
   }
@@ -36,12 +34,12 @@ export class ChannelLists {
     return this.failed.has(channel);
   }
 
-  /** Lists that have failed are asked for again, but for those of these channels. */
+  /** Lets failed lists be loaded again, except those of the given channels. */
   forgetFailed(but: readonly string[] = []): void {
     for (const id of this.failed) if (!but.includes(id)) this.failed.delete(id);
   }
 
-  /** Resolves once the list has come or has failed, which was reported. */
+  /** Resolves when the list is loaded or has failed; a failure is reported. */
   async load(channel: string): Promise<void> {
     if (this.loaded.has(channel) || this.failed.has(channel)) return;
     let underWay = this.underWay.get(channel);

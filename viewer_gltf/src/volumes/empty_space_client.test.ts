@@ -37,7 +37,7 @@ function standIn() {
   };
 }
 
-describe("tables of skips from the worker", () => {
+describe("empty-space tables from the worker", () => {
   it("arrive one after the other", async () => {
     const { asked, answer, client } = standIn();
     const first = client.computeDistances("a", request(1));
@@ -49,16 +49,16 @@ describe("tables of skips from the worker", () => {
     expect([await first, await second]).toEqual([Uint8Array.of(1), Uint8Array.of(2)]);
   });
 
-  it("are null where a newer request of the same key has overtaken them", async () => {
+  it("are null if a newer request with the same key has replaced them", async () => {
     const { asked, answer, client } = standIn();
     const all = [1, 2, 3, 4].map((x) => client.computeDistances("a", request(x)));
-    answer(); // of the first, which is outdated by now
+    answer(); // answers the first, which is outdated by now
     answer();
     expect(asked).toEqual([1, 4]);
     expect(await Promise.all(all)).toEqual([null, null, null, Uint8Array.of(4)]);
   });
 
-  it("do not keep another key waiting while one is dragged", async () => {
+  it("do not keep another key waiting while one changes continuously", async () => {
     const { asked, answer, client } = standIn();
     void client.computeDistances("a", request(1));
     void client.computeDistances("a", request(2));
@@ -70,7 +70,7 @@ describe("tables of skips from the worker", () => {
     expect(await other).toEqual(Uint8Array.of(10));
   });
 
-  it("fail one by one if the worker throws, and the next goes on", async () => {
+  it("fail one by one if the worker throws, and the next one continues", async () => {
     const { answer, client, fail } = standIn();
     const bad = client.computeDistances("a", request(1));
     const good = client.computeDistances("b", request(2));
@@ -80,7 +80,7 @@ describe("tables of skips from the worker", () => {
     expect(await good).toEqual(Uint8Array.of(2));
   });
 
-  it("fail all if the worker's script did not load", async () => {
+  it("all fail if the worker's script did not load", async () => {
     const { client, fail } = standIn();
     const all = ["a", "b"].map((key) => client.computeDistances(key, request(1)));
     fail();
@@ -88,7 +88,7 @@ describe("tables of skips from the worker", () => {
     await expect(client.computeDistances("c", request(1))).rejects.toThrow("did not load");
   });
 
-  it("are null after the client was disposed of", async () => {
+  it("are null after the client is disposed", async () => {
     const { client, isTerminated } = standIn();
     const all = ["a", "b"].map((key) => client.computeDistances(key, request(1)));
     client.dispose();

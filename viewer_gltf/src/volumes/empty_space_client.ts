@@ -1,11 +1,11 @@
 /**
- * Asks the worker for tables of skips. Dragging a transfer function asks faster than anyone needs
- * the answers, so of each key (a tile) only the latest request counts: the worker has one request
- * at a time, and those that wait are overtaken here.
+ * Requests empty-space tables from a worker. Dragging a transfer function makes more requests than
+ * answers are needed. So the worker gets one request at a time, and of the waiting ones only the
+ * latest for each key (a tile) is kept.
  */
 import type { OccupancyRequest } from "../voxels/empty_space";
 
-/** The part of a Worker that the client uses, so that tests need none. */
+/** The part of a Worker that the client uses, so that tests need no worker. */
 export type OccupancyPort = Pick<
   Worker,
   "postMessage" | "terminate" | "onmessage" | "onerror" | "onmessageerror"
@@ -27,7 +27,7 @@ export class OccupancyClient {
   private readonly waiting = new Map<string, Job>();
   private running: Job | null = null;
   private isDisposed = false;
-  /** Why no worker answers any more: its script did not load. */
+  /** The reason why no worker answers any more; null while it runs. */
   private fault: Error | null = null;
 
   constructor(start: () => OccupancyPort = startOccupancyWorker) {
@@ -38,17 +38,18 @@ export class OccupancyClient {
       this.next();
     };
     this.port.onerror = (event) => {
-      event.preventDefault(); // reported through the promise, so not printed on the console again
+      // The promise reports the fault, so it need not be printed on the console too.
+      event.preventDefault();
       if (event.message) this.fail(event.message);
-      else this.giveUp("the worker's script did not load");
+      else this.stop("the worker's script did not load");
     };
     this.port.onmessageerror = () => this.fail("its answer can't be read");
   }
 
   /**
-   * The distances of `brickDistances`; null if a newer request of the same key has overtaken this
-   * one, or the client was disposed of. The request's arrays are copied, not taken. Rejects if the
-   * arrays don't fit each other or the worker can't run.
+   * Returns the distances of `brickDistances`, or null if a newer request with the same key has
+   * replaced this one or the client was disposed. The request's arrays are copied. Rejects if the
+   * arrays do not fit each other or the worker can't run.
    */
   computeDistances(
     key: string,
@@ -58,7 +59,7 @@ export class OccupancyClient {
     if (this.fault !== null) return Promise.reject(this.fault);
     return new Promise((resolve, reject) => {
       this.waiting.get(key)?.resolve(null);
-      this.waiting.delete(key); // the newest goes to the end: no key starves another
+      this.waiting.delete(key); // the newest goes to the end, so that no key starves another
       this.waiting.set(key, { key, request, resolve, reject });
       if (this.running === null) this.next();
     });
@@ -74,12 +75,12 @@ export class OccupancyClient {
   }
 
   private fail(reason: string): void {
-    this.running?.reject(new Error(`the table of leaps could not be made: ${reason}`));
+    this.running?.reject(new Error(`the empty-space table could not be computed: ${reason}`));
     this.next();
   }
 
-  private giveUp(reason: string): void {
-    this.fault = new Error(`no table of leaps can be made: ${reason}`);
+  private stop(reason: string): void {
+    this.fault = new Error(`no empty-space table can be computed: ${reason}`);
     this.running?.reject(this.fault);
     for (const job of this.waiting.values()) job.reject(this.fault);
     this.waiting.clear();

@@ -1,4 +1,7 @@
-/** Module worker: tables of skips, off the thread that draws. See `empty_space_client.ts`. */
+/**
+ * Module worker that computes empty-space tables away from the main thread. See
+ * `empty_space_client.ts`.
+ */
 import { type OccupancyRequest, occupancyDistances } from "../voxels/empty_space";
 
 self.addEventListener("message", ({ data }: MessageEvent<OccupancyRequest>) => {

@@ -1,4 +1,3 @@
-/** The keys of where volumes show. Pure. */
 import { type KeyGroup, keysOf } from "../panel/key";
 import { VOLUMES } from "../state/parameters/volumes";
 

@@ -1,4 +1,7 @@
-/** The marches of all tiles whose volumes have come: a box each, with the textures and tables of its channels. */
+/**
+ * The ray marches of all tiles with loaded volumes: one box each, with the textures and tables of
+ * its channels.
+ */
 import { Group, type Matrix4, Scene, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { DrawnMarches, MarchView } from "../render/drawn_forms";
@@ -24,7 +27,6 @@ export class Marches implements DrawnMarches {
   private readonly group = new Group();
   private readonly occupancy = new OccupancyClient();
   private readonly shading: LaterShading;
-  /** Tables of skips that are being computed. */
   private skipsUnderWay = 0;
 
   constructor(
@@ -43,28 +45,26 @@ export class Marches implements DrawnMarches {
     return this.skipsUnderWay > 0 || this.shading.isLoading;
   }
 
-  /** Whether anything is to be marched. */
   get isEmpty(): boolean {
     return !this.group.children.some(({ visible }) => visible);
   }
 
-  /** Whether all that is marched shows in the disc alone. */
+  /** Whether all marched volumes show only inside the disc. */
   get isInDisc(): boolean {
     const { drawn } = this;
     return drawn.length > 0 && drawn.every(({ march }) => march.tables.isInDisc);
   }
 
-  /** Whether of what is marched some shows in the disc alone, and some beyond it too. */
+  /** Whether some marched volumes show only inside the disc and others everywhere. */
   get isPartlyInDisc(): boolean {
     return !this.isInDisc && this.drawn.some(({ march }) => march.tables.isPartlyInDisc);
   }
 
-  /** March what lies in the disc's cone alone, whatever the channels; false: as each shows. */
+  /** Restricts all marches to the disc's cone, or lets each channel show where it should. */
   endAtDisc(ends: boolean): void {
     for (const { march } of this.drawn) march.endAtDisc(ends);
   }
 
-  /** Those on screen. */
   get drawn(): readonly Marched[] {
     return this.residents.all.flatMap((resident) => {
       const { march, packed } = resident;
@@ -72,7 +72,9 @@ export class Marches implements DrawnMarches {
     });
   }
 
-  /** Values that change with what is drawn, as a level that has come and each step of a fade. */
+  /**
+   * Values that change when the marches look different, such as a new level or a step of a fade.
+   */
   get key(): readonly unknown[] {
     return this.drawn.map(({ march, packed, resident: { texture, presence } }) => [
       ...[march.volume.tile, packed.channels, packed.level, texture.fresh, presence],
@@ -91,7 +93,10 @@ export class Marches implements DrawnMarches {
     );
   }
 
-  /** Make the march of what has come of a tile, by the state. Returns false if its bricks lack what shows now. */
+  /**
+   * Updates the march of a tile's loaded volumes to the state. Returns false if its bricks lack a
+   * channel that is shown now.
+   */
   follow(resident: Resident, state: ViewerState): boolean {
     const { shown } = resident.texture;
     if (shown === null) {
@@ -116,10 +121,10 @@ export class Marches implements DrawnMarches {
     const { march: before } = resident;
     const { channels } = packed;
     const volume = volumeOf(packed, resident);
-    // a channel that has just been hidden is still among the packed ones, but its source is gone
+    // a channel that was just hidden is still packed, but its source is gone
     const isSameGrid = volume === null || before?.volume.size.join() === volume.size.join();
     if (before?.channelCount === channels.length && isSameGrid) return before;
-    if (volume === null) throw new Error(`channel ${channels[0]} has come without a source`);
+    if (volume === null) throw new Error(`channel ${channels[0]} is loaded without a source`);
     before?.dispose();
     const march = new TileMarch(volume, channels.length, this.frame);
     resident.march = march;
@@ -132,7 +137,7 @@ export class Marches implements DrawnMarches {
     shown: Packed,
     appearances: readonly Appearance[],
   ): Promise<void> {
-    march.skipBy(null); // what the old table skips over may show now
+    march.skipBy(null); // parts that the old table skips may be visible now
     this.skipsUnderWay++;
     const distances = await this.occupancy
       .computeDistances(march.volume.tile, {
@@ -148,7 +153,7 @@ export class Marches implements DrawnMarches {
     march.skipBy(distances);
   }
 
-  /** Show each march as far as it has faded in. */
+  /** Shows each march as far as it has faded in. */
   show(): void {
     for (const { march, texture, packed, presence } of this.residents.all) {
       if (march === null || packed === null) continue;
@@ -157,13 +162,13 @@ export class Marches implements DrawnMarches {
     }
   }
 
-  /** The volumes lie in the specimen's world; `specimen` is its pose in the scene. */
+  /** Sets the pose of the specimen in the scene; the volumes lie in the specimen's world. */
   placeAs(specimen: Matrix4): void {
     this.group.matrix.copy(specimen);
     this.group.matrixWorldNeedsUpdate = true;
   }
 
-  /** Before every frame. */
+  /** Updates the marches to the view. Call it before every frame. */
   aim(state: ViewerState | null, { eye, apex, axis, clip, lamp }: MarchView): void {
     const boxes = new Bounds();
     const { drawn } = this;
@@ -180,7 +185,7 @@ export class Marches implements DrawnMarches {
     }
   }
 
-  /** Drop what is on the GPU beside the residents' own. */
+  /** Forgets GPU resources beside those of the residents. */
   forget(): void {
     this.shading.forget();
   }
@@ -200,7 +205,7 @@ function volumeOf(
   return index === null ? source.volume : volumeOfBricks(source.volume);
 }
 
-/** The box round several marched tiles, um, world. */
+/** The box around several marched tiles, um, world. */
 class Bounds {
   readonly min = new Vector3().setScalar(Number.POSITIVE_INFINITY);
   readonly max = new Vector3().setScalar(Number.NEGATIVE_INFINITY);

@@ -1,16 +1,19 @@
-/** Where a channel shows something in a volume, by the ranges of its bricks. Pure. */
+/** Where a channel shows something in a volume, from the ranges of its bricks. */
 import type { Size3 } from "../bundle/ktx2";
 import type { Vec3 } from "../math/vec3";
 
-/** Of the part of a brick that is taken for full: a surface goes through the middle of those it meets. */
+/**
+ * The part of a brick that counts as occupied: a surface passes, on average, through the middle of
+ * its bricks.
+ */
 const [FROM, TO] = [0.25, 0.75];
 
 /**
- * Corners, in bricks, of the outermost bricks of every row that show something half-way through their range. Specks,
- * as of noise, which one voxel of many has, don't count.
+ * Returns the corners, in bricks, of the outermost bricks of each row in which the middle of the
+ * range is visible. Specks, such as a single voxel of noise, do not count.
  *
- * @param ranges smallest and largest intensity of every brick, interleaved
- * @param opacities 0..255, at each of 256 intensities
+ * @param ranges smallest and largest intensity of each brick, interleaved
+ * @param opacities 0 to 255, at each of 256 intensities
  */
 export function occupiedCorners(
   ranges: Uint8Array,

@@ -1,4 +1,4 @@
-/** The channels' volumes as a part of the viewer: which show, and their march. */
+/** The part of the viewer for the channels' volumes: which are shown, and their ray march. */
 import { type Matrix4, Vector3 } from "three";
 import { memoryBudget } from "../gpu/memory_budget";
 import type { Form, StreamView } from "../host/form";
@@ -20,7 +20,7 @@ class VolumesPart implements Part, Form {
   readonly form = this;
   readonly services;
   readonly marched: VolumeSet;
-  /** From a host that sends bricks by view; null: volumes come as files. */
+  /** Streams bricks from a host; null if volumes are files. */
   private readonly bricks: BrickService | null;
 
   constructor(private readonly host: PartHost) {
@@ -88,7 +88,10 @@ class VolumesPart implements Part, Form {
   }
 }
 
-/** What a camera sees, in um. @param specimen from um to the scene */
+/**
+ * The view of a camera, in um.
+ * @param specimen matrix from um to the scene
+ */
 function viewOf({ camera, height_px }: StreamView, specimen: Matrix4): BrickView {
   const { projectionMatrix, matrixWorld, matrixWorldInverse } = camera;
   const clip = projectionMatrix.clone().multiply(matrixWorldInverse).multiply(specimen);
@@ -105,7 +108,7 @@ function viewOf({ camera, height_px }: StreamView, specimen: Matrix4): BrickView
 
 function limitsOf(canvas: HTMLCanvasElement): VolumeLimits {
   const gl = canvas.getContext("webgl2");
-  if (gl === null) throw new Error("the canvas has no context of WebGL 2");
+  if (gl === null) throw new Error("the canvas has no WebGL 2 context");
   const side: number = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
   return { bytes: memoryBudget(navigator).volumes, side, edge: Number.POSITIVE_INFINITY };
 }

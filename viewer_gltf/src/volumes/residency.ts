@@ -1,26 +1,29 @@
-/** Which tiles have volumes on the GPU: how much each may take, how far it has faded in, which leave. */
+/**
+ * Tiles whose volumes are on the GPU: how much memory each may use, how far it has faded in, and
+ * when it is removed.
+ */
 import type { WantedTile } from "../state/representation";
 import type { BrickTile } from "../voxels/bricks/brick_atlas";
 import type { SharpenedTile } from "../voxels/bricks/sharpened_tile";
 import type { Packed, TileTexture } from "../voxels/tile_texture";
 import type { TileMarch } from "./tile_raymarch";
 
-/** Length of a fade, s: a volume that has come fades in, one that goes fades out. */
+/** Seconds in which a loaded volume fades in, or a removed one fades out. */
 const PRESENCE_S = 0.25;
-/** Tiles that stay for a while after the gaze has left them: it often comes back. */
+/** Number of tiles that stay for a while after the gaze has left them, since it often returns. */
 const KEPT_TILES = 2;
-/** Bytes of a level with the next coarser one, as a factor: both stay during a fade. */
+/** Factor for the bytes of a level together with the next coarser one; both stay during a fade. */
 const WITH_OLD_LEVEL = 9 / 8;
 
 export type Resident = {
   readonly texture: TileTexture | BrickTile | SharpenedTile;
   march: TileMarch | null;
-  /** The source of the march's tables. */
+  /** Source of the march's tables. */
   packed: Packed | null;
   wanted: WantedTile | null;
-  /** 0..1 */
+  /** 0 to 1. */
   presence: number;
-  /** When it was last wanted. */
+  /** Number of the request in which it was last wanted. */
   turn: number;
 };
 
@@ -28,7 +31,7 @@ export class Residency {
   private readonly residents = new Map<string, Resident>();
   private turn = 0;
 
-  /** @param budget bytes of the GPU's memory for all tiles */
+  /** @param budget bytes of GPU memory for all tiles */
   constructor(private readonly budget: number) {}
 
   get all(): readonly Resident[] {
@@ -54,13 +57,13 @@ export class Residency {
     return resident;
   }
 
-  /** Bytes for each tile, where so many are wanted. */
+  /** Bytes for each tile if this number of tiles is wanted. */
   share(wanted: number): number {
     return this.budget / (WITH_OLD_LEVEL * (wanted + KEPT_TILES));
   }
 
-  /** From now on none is wanted, until the next request. */
-  unwantAll(): void {
+  /** Marks all tiles as not wanted, until they are requested again. */
+  clearWanted(): void {
     this.turn++;
     for (const resident of this.residents.values()) resident.wanted = null;
   }
@@ -70,14 +73,14 @@ export class Residency {
     resident.turn = this.turn;
   }
 
-  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  /** How far the volume of a channel in a tile has faded in, 0 to 1. */
   presence(tile: string, channel: string): number {
     const resident = this.residents.get(tile);
     if (resident === undefined || resident.march === null) return 0;
     return resident.packed?.channels.includes(channel) ? resident.presence : 0;
   }
 
-  /** Go on with all fades, those between levels too; whether any is still under way. */
+  /** Advances all fades, including those between levels. Returns whether any is still going on. */
   advance(dt_s: number): boolean {
     let isFading = false;
     for (const resident of this.residents.values()) {
@@ -93,7 +96,10 @@ export class Residency {
     return isFading;
   }
 
-  /** Drop what is no longer wanted and has faded out, but for the few that were wanted last. */
+  /**
+   * Removes tiles that are no longer wanted and have faded out, except for the few wanted most
+   * recently.
+   */
   evict(): void {
     const idle = this.byTile.filter(([, { wanted, presence }]) => !wanted && presence === 0);
     idle.sort(([, a], [, b]) => b.turn - a.turn);

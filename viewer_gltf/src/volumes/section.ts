@@ -1,10 +1,10 @@
-/** The panel's sections of volumes: where they show, and how. Pure. */
+/** The panel's sections of volumes: where they are shown, and how. */
 import { controlOf, controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
 import { DISC_RADIUS, MODE, VOLUMES } from "../state/parameters/volumes";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
 
-/** @param discLimit_deg where the limit of tiles in the disc ends it; null: the disc covers no more */
+/** @param discLimit_deg radius to which the limit of tiles reduces the disc; null if it does not */
 export function volumeSections(
   state: ViewerState,
   discLimit_deg: number | null,
@@ -18,7 +18,7 @@ export function volumeSections(
   ];
 }
 
-/** The focus disc's slider, with its radius now where the limit of tiles makes it smaller than it was set. */
+/** The focus disc's slider; if the limit of tiles reduces the radius, with the current radius. */
 function discItem(item: Control, { mode }: ViewerState, discLimit_deg: number | null): Control {
   const isCut = item.id === DISC_RADIUS.id && mode === "disc" && discLimit_deg !== null;
   if (!isCut || item.kind !== "slider") return item;

@@ -39,9 +39,9 @@ import { distanceInGrid } from "./blend_order";
 import { occupiedCorners } from "./occupied_bricks";
 import { RAYMARCH_FRAGMENT, RAYMARCH_VERTEX } from "./shaders/sources";
 
-/** Shortest step, in voxels. */
+/** Voxels. Shortest step. */
 const STEP_VOXELS = 1;
-/** Opacity, 0..1, at which a ray ends. */
+/** Opacity, 0 to 1, at which a ray ends. */
 const OPAQUE = 0.99;
 const UNIT_CUBE = new BoxGeometry(1, 1, 1);
 
@@ -67,13 +67,13 @@ const ADDED = { ...OVER, blendDst: OneFactor };
 
 export class TileMarch {
   readonly mesh: Mesh<BoxGeometry, ShaderMaterial>;
-  /** All zero, nothing may be skipped, until the table has come. */
+  /** All zeros, so that nothing is skipped, until the table is computed. */
   private readonly skips: Uint8Array<ArrayBuffer>;
   private readonly occupancy: Data3DTexture;
   readonly tables: MarchTables;
   private readonly low: Vector3;
   private readonly toTile: Matrix4;
-  /** Between the world and the box from its low corner. */
+  /** Transforms between the world and the box, measured from its low corner. */
   private readonly fromBox: Matrix4;
   readonly toBox: Matrix4;
 
@@ -100,7 +100,7 @@ export class TileMarch {
       side: BackSide,
       transparent: true,
       ...OVER,
-      depthTest: false, // the march ends at the scene's depth itself
+      depthTest: false, // the march itself ends at the scene's depth
       depthWrite: false,
       uniforms: {
         ...frame,
@@ -146,34 +146,37 @@ export class TileMarch {
       .multiply(new Matrix4().makeScale(size.x, size.y, size.z));
   }
 
-  /** Blend in the right order with the other tiles. `eye` in um, world. */
+  /**
+   * Sets the draw order among the tiles.
+   * @param eye um, world
+   */
   sortBy(eye: Vector3): void {
     const { min, max } = this.volume.bounds_um;
     const local = eye.clone().applyMatrix4(this.toTile).toArray();
     this.mesh.renderOrder = -distanceInGrid(local, min, max);
   }
 
-  /** Where the disc's cone comes from and where to; um, world. */
+  /** Sets apex and axis of the disc's cone; um, world. */
   aim(apex: Vector3, axis: Vector3): void {
     const { uApex, uAxis } = this.mesh.material.uniforms;
     uApex.value.copy(apex).applyMatrix4(this.toBox);
     uAxis.value.copy(axis).transformDirection(this.toBox);
   }
 
-  /** The box, um, world, round all tiles that are marched: they share a ray's steps by length. */
+  /** Sets the box, um, world, around all marched tiles, which share a ray's steps by length. */
   shareWith(min: Vector3, max: Vector3, tiles: number): void {
     const { uniforms } = this.mesh.material;
     boxAround(min, max, this.toBox, uniforms.uAllLow.value, uniforms.uAllHigh.value);
-    // each tile takes a step at least, however short the ray's way through it
+    // each tile takes at least one step, even on a very short path
     uniforms.uSpare.value = Math.min(tiles - 1, MAX_STEPS / 2);
   }
 
-  /** The path that opacities hold for. */
+  /** Length of path for which the opacities hold, um. */
   get voxel_um(): number {
     return this.mesh.material.uniforms.uVoxel.value;
   }
 
-  /** Grow a box of the world, um, round this one. */
+  /** Grows a box of the world, um, so that it contains this one. */
   growBox(min: Vector3, max: Vector3): void {
     const { x, y, z } = this.mesh.material.uniforms.uSize.value;
     const at = new Vector3();
@@ -184,7 +187,10 @@ export class TileMarch {
     }
   }
 
-  /** Outermost points, um, world, of what a channel shows; `ranges`: of its bricks. */
+  /**
+   * Outermost points, um, world, of the visible part of a channel.
+   * @param ranges ranges of its bricks
+   */
   outline(ranges: Uint8Array, channel: number): readonly Vec3[] {
     const { uSize, uTexLow, uTexHigh, uTexels } = this.mesh.material.uniforms;
     const size: Vector3 = uSize.value;
@@ -202,7 +208,7 @@ export class TileMarch {
     return extremePoints(points);
   }
 
-  /** Where the grid of the shading lies: its low corner, um, world, cells, and a cell's edge, um. */
+  /** Sets the position of the shading's grid: low corner, um, world; cells; edge of a cell, um. */
   placeShading(low: Vec3, size: readonly [number, number, number], edge_um: number): void {
     const { uToShading, uShadingCell } = this.mesh.material.uniforms;
     const [x, y, z] = size.map((n) => 1 / (n * edge_um));
@@ -217,11 +223,14 @@ export class TileMarch {
     clipInto(clip, this.fromBox, this.toBox, this.mesh.material.uniforms as ClipUniforms);
   }
 
-  /** Show what has come. `presence` 0..1: how far it has faded in. */
+  /**
+   * Shows the loaded volumes.
+   * @param presence how far they have faded in, 0 to 1
+   */
   show(shown: Packed, old: Packed | null, fresh: number, presence: number): void {
     if (shown.channels.length !== this.channelCount) {
       throw new RangeError(
-        `expected ${this.channelCount} channels, found ${shown.channels.length}`,
+        `found ${shown.channels.length} channels; expected ${this.channelCount}`,
       );
     }
     const { uniforms } = this.mesh.material;
@@ -232,18 +241,21 @@ export class TileMarch {
     uniforms.uFresh.value = fresh;
     uniforms.uPresence.value = presence;
     const coarsest = Math.max(shown.level, old?.level ?? 0);
-    // ranges of bricks hold for what is drawn, however coarse
+    // streamed bricks have ranges of the drawn level, even if it is coarse
     const isExact = coarsest === 0 || shown.index !== null;
     uniforms.uBrickSlack.value = isExact ? 0 : Math.ceil(2 ** coarsest / SKIP_BRICK);
     uniforms.uMinStep.value = STEP_VOXELS * uniforms.uVoxel.value * 2 ** shown.level;
   }
 
-  /** March what lies in the disc's cone alone, whatever the channels. */
+  /** Restricts the march to the disc's cone, for all channels. */
   endAtDisc(ends: boolean): void {
     this.mesh.material.uniforms.uAllInDisc.value = ends || this.tables.isInDisc;
   }
 
-  /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
+  /**
+   * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
+   * may differ.
+   */
   setAppearances(appearances: readonly Appearance[]): boolean {
     const differs = this.tables.follow(appearances);
     this.define("TWO_D", this.tables.isTwoD ? 1 : null);
@@ -252,7 +264,7 @@ export class TileMarch {
     return differs;
   }
 
-  /** What a ray makes of its samples, and how tiles are blended: as samples within one are. */
+  /** Sets how a ray combines its samples; tiles are blended in the same way. */
   composite(how: Compositing): void {
     const { material } = this.mesh;
     this.define("MAXIMUM", how === "maximum" ? 1 : null);
@@ -260,7 +272,10 @@ export class TileMarch {
     Object.assign(material, how === "over" ? OVER : how === "maximum" ? LARGEST : ADDED);
   }
 
-  /** Where rays may skip, one byte a brick, of `brickDistances`; null: nowhere, for now. */
+  /**
+   * Sets where rays may skip, one byte for each brick, from `brickDistances`; null: nowhere for
+   * now.
+   */
   skipBy(distances: Uint8Array<ArrayBuffer> | null): void {
     if (distances === null) this.skips.fill(0);
     else this.skips.set(distances);

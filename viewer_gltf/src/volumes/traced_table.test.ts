@@ -3,18 +3,18 @@ import { ENTRIES } from "../voxels/transfer_luts";
 import { alikeRows } from "../voxels/transfer_table_2d";
 import { tracedTable, tracedTable2d } from "./traced_table";
 
-/** Its opacity and its red are the entry's number. */
+/** Opacity and red of each entry equal its number. */
 const ramp = Uint8Array.from({ length: 4 * ENTRIES }, (_, i) =>
   i % 4 === 0 || i % 4 === 3 ? Math.floor(i / 4) : 255,
 );
 const opacityOf = (table: Uint8Array, i: number) => table[4 * i + 3];
 
-describe("the table that paths of light and their stand-in look up", () => {
-  it("is the transfer function's own where nothing is set", () => {
+describe("the table of path tracing and its stand-in", () => {
+  it("is the transfer function's own table without settings", () => {
     expect(tracedTable(ramp, { bias: 0, threshold: 0 })).toBe(ramp);
   });
 
-  it("gives a grey value the entry of another one, by the transmission", () => {
+  it("gives each grey value the entry of another one, shifted by the transmission", () => {
     const brighter = tracedTable(ramp, { bias: 40 / 255, threshold: 0 });
     expect([0, 100, 230].map((i) => opacityOf(brighter, i))).toEqual([40, 140, 255]);
     const darker = tracedTable(ramp, { bias: -25 / 255, threshold: 0 });
@@ -25,7 +25,7 @@ describe("the table that paths of light and their stand-in look up", () => {
     ]);
   });
 
-  it("is empty below the threshold, and as it was from there on", () => {
+  it("is empty below the threshold, and unchanged above it", () => {
     const table = tracedTable(ramp, { bias: 0.5, threshold: 0.4 });
     const shifted = tracedTable(ramp, { bias: 0.5, threshold: 0 });
     expect([0, 50, 101].map((i) => opacityOf(table, i))).toEqual([0, 0, 0]);
@@ -34,7 +34,7 @@ describe("the table that paths of light and their stand-in look up", () => {
     );
   });
 
-  it("is made once for a table of value and gradient, in all of its rows", () => {
+  it("is computed once for a table of value and gradient, in all rows", () => {
     const table2d = { cells: alikeRows(ramp), gradientMax: 0.5, envelope: ramp };
     const shift = { bias: 0.1, threshold: 0.3 };
     const made = tracedTable2d(table2d, shift);

@@ -1,6 +1,6 @@
 /**
- * A channel's table as paths of light look it up, and the march that stands in for them while the view moves:
- * one table for both, so that they can't show different matter. Pure arrays.
+ * A channel's table for path tracing and for the march that stands in while the view moves. Both
+ * use the same table, so that they show the same matter. Plain arrays.
  */
 import type { TraceSettings } from "../state/path_trace_settings";
 import { ENTRIES } from "../voxels/transfer_luts";
@@ -9,8 +9,10 @@ import { envelopeOf, type TransferTable2d } from "../voxels/transfer_table_2d";
 type Shift = Pick<TraceSettings, "bias" | "threshold">;
 
 /**
+ * Returns the table with its settings applied.
+ *
  * @param table RGBA, rows of 256 entries
- * @param bias a grey value is as opaque as another one, which is brighter by so much of all intensities
+ * @param bias shift towards the opacity of brighter values, as a share
  * @param threshold share of the intensities below which voxels are empty
  */
 export function tracedTable<T extends Uint8Array>(table: T, { bias, threshold }: Shift): T {
@@ -33,7 +35,7 @@ export function tracedTable<T extends Uint8Array>(table: T, { bias, threshold }:
   return shifted;
 }
 
-/** The last shift of each table: callers know a table again by its identity. */
+/** The last result for each table, so that callers get the same object again. */
 const SHIFTED = new WeakMap<TransferTable2d, Shift & Readonly<{ table: TransferTable2d }>>();
 
 export function tracedTable2d(table: TransferTable2d, shift: Shift): TransferTable2d {

@@ -1,4 +1,4 @@
-/** The budget of all volumes together, whatever is wanted of them. */
+/** The memory budget of all volumes together, for any set of wanted volumes. */
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -19,15 +19,15 @@ import { VolumeSet } from "./volume_set";
 
 const TILES = 6;
 const SIDE = 2048;
-/** The set leaves room for as many tiles that were looked at before. */
+/** The set leaves room for this number of tiles that were looked at before. */
 const KEPT_TILES = 2;
-/** While a level fades in, the one before it, an eighth as large, is there too. */
+/** While a level fades in, the previous one, an eighth as large, is kept too. */
 const FADING = 9 / 8;
 
-describe("the volumes' memory", { timeout: 120_000 }, () => {
+describe("the memory of the volumes", { timeout: 120_000 }, () => {
   let folder: string;
   let manifest: Manifest;
-  /** The fixture's first volume stands for all: four channels in six tiles. */
+  /** The fixture's first volume represents all: four channels in six tiles. */
   let volume: TileVolume;
   let lists: Map<string, string>;
   const faults: unknown[] = [];
@@ -43,7 +43,8 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     const text = JSON.stringify({ volumes: ids.map((tile) => ({ ...volume, tile })) });
     lists = new Map([["volumes.json", text]]);
     const [first, ...others] = ids.map((id) => ({ ...fixture.tiles[0], id }));
-    const volumes = { path: "volumes.json", bytes: text.length, sha256: "" }; // no secure context
+    // The test has no secure context, so no hash is checked.
+    const volumes = { path: "volumes.json", bytes: text.length, sha256: "" };
     manifest = {
       ...fixture,
       tiles: [first, ...others],
@@ -70,7 +71,10 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     set = new VolumeSet({ base: BASE, manifest }, frame, limits, () => undefined, onError);
   }
 
-  /** Follow until all has come and faded; the most bytes that were taken on the way. */
+  /**
+   * Follows the state until everything is loaded and faded in. Returns the largest number of bytes
+   * on the way.
+   */
   async function follow(state: ViewerState, tiles: readonly string[]): Promise<number> {
     const wanted = wantedTiles(state, { ...NO_FOCUS, focusTile: tiles[0], near: new Set(tiles) });
     set.follow(state, wanted, true);
@@ -95,24 +99,27 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
   const bytesOf = (level: number, channels: number) =>
     texels(volume.levels[level]) * stride(channels);
 
-  it.each([0, 1, 2, 3])("is kept by four channels in all tiles, at level %i", async (level) => {
-    const state = opened("all");
-    expect(state.channels.filter(({ shown }) => shown)).toHaveLength(4);
-    const budget = FADING * (TILES + KEPT_TILES) * bytesOf(level, 4);
-    makeSet(budget);
-    const most = await follow(state, all());
-    expect(set.status()).toHaveLength(4 * TILES);
-    expect(levelsNow()).toEqual(new Set([level])); // the finest that there is room for
-    expect(set.bytes).toBe(TILES * bytesOf(level, 4));
-    expect(most).toBeLessThanOrEqual(budget);
-    if (level === 3) return; // the coarsest always comes
-    set.dispose();
-    makeSet(budget / 2);
-    expect(await follow(state, all())).toBeLessThanOrEqual(budget / 2);
-    expect(levelsNow()).toEqual(new Set([level + 1]));
-  });
+  it.each([0, 1, 2, 3])(
+    "stays within the budget for four channels in all tiles, at level %i",
+    async (level) => {
+      const state = opened("all");
+      expect(state.channels.filter(({ shown }) => shown)).toHaveLength(4);
+      const budget = FADING * (TILES + KEPT_TILES) * bytesOf(level, 4);
+      makeSet(budget);
+      const most = await follow(state, all());
+      expect(set.status()).toHaveLength(4 * TILES);
+      expect(levelsNow()).toEqual(new Set([level])); // the finest level that fits
+      expect(set.bytes).toBe(TILES * bytesOf(level, 4));
+      expect(most).toBeLessThanOrEqual(budget);
+      if (level === 3) return; // the coarsest level is always loaded
+      set.dispose();
+      makeSet(budget / 2);
+      expect(await follow(state, all())).toBeLessThanOrEqual(budget / 2);
+      expect(levelsNow()).toEqual(new Set([level + 1]));
+    },
+  );
 
-  it("makes another march necessary in each step of a fade, and none once all has faded in", async () => {
+  it("needs a new march in each step of a fade, and none when everything has faded in", async () => {
     makeSet(FADING * (TILES + KEPT_TILES) * bytesOf(1, 4));
     const state = opened("all");
     const [tile] = all();
@@ -139,7 +146,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     expect(set.marchKey).toBe(atRest);
   });
 
-  it("is not needed to know where a volume comes from", async () => {
+  it("is not needed to find the source of a volume", async () => {
     makeSet(0);
     set.follow(opened("off"), [], true);
     expect(set.source("r0_c1", "B")).toBeNull();
@@ -154,7 +161,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     expect(set.bytes).toBe(0);
   });
 
-  it("is filled with what has failed, once that is tried again", async () => {
+  it("is filled with volumes that failed, after a retry", async () => {
     makeSet(Number.POSITIVE_INFINITY);
     const { fetch } = globalThis;
     const without = (part: string) =>
@@ -168,7 +175,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
       follow();
       await vi.waitFor(() => expect(faults).toHaveLength(4));
       follow();
-      expect(set.isLoading).toBe(false); // not by itself
+      expect(set.isLoading).toBe(false); // no retry without a request
       faults.length = 0;
       set.retryFailed();
     };
@@ -187,7 +194,7 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     );
   });
 
-  it("is kept while one channel after another is shown", async () => {
+  it("stays within the budget while one channel after another is shown", async () => {
     const budget = FADING * (TILES + KEPT_TILES) * bytesOf(0, 1);
     makeSet(budget);
     let state = opened("all");
@@ -206,20 +213,20 @@ describe("the volumes' memory", { timeout: 120_000 }, () => {
     expect(levels).toEqual([...levels].sort());
   });
 
-  it("is kept while the gaze goes through all tiles, one by one", async () => {
+  it("stays within the budget while the gaze moves through all tiles", async () => {
     const budget = FADING * (1 + KEPT_TILES) * bytesOf(0, 4);
     makeSet(budget);
     const state = opened("tile");
     for (const tile of [...all(), ...all()]) {
       const most = await follow(state, [tile]);
       expect(levelsNow()).toEqual(new Set([0]));
-      expect(most).toBeLessThanOrEqual(budget); // also while what leaves fades out
+      expect(most).toBeLessThanOrEqual(budget); // also while the tiles that were left fade out
       expect(set.bytes).toBeLessThanOrEqual(budget);
     }
-    expect(set.bytes).toBe((1 + KEPT_TILES) * bytesOf(0, 4)); // the last ones are kept
+    expect(set.bytes).toBe((1 + KEPT_TILES) * bytesOf(0, 4)); // the last tiles are kept
   });
 
-  it("is kept where all tiles follow a few that had it all", async () => {
+  it("stays within the budget when all tiles follow a few that used all of it", async () => {
     const budget = FADING * (1 + KEPT_TILES) * bytesOf(0, 4);
     makeSet(budget);
     for (const tile of all().slice(0, 3)) await follow(opened("tile"), [tile]);

@@ -1,4 +1,4 @@
-/** All volumes on screen: shows and hides them, loads missing ones, drops unused ones. */
+/** All volumes on screen: shows and hides them, loads missing ones and removes unused ones. */
 import { BundleError } from "../bundle/errors";
 import type { Bounds } from "../bundle/generated/bundle";
 import type { TileVolume } from "../bundle/generated/volumes";
@@ -26,21 +26,20 @@ import { Marches } from "./marches";
 import { Residency, type Resident } from "./residency";
 
 const PARALLEL_LOADS = 4;
-/** Most bytes of a channel in a tile, where the march only stands in for paths of light. */
+/** Bytes. Largest level of a channel in a tile while the march only stands in for path tracing. */
 const STAND_IN_BYTES = 2 ** 21;
 
 export class VolumeSet implements MarchedVolumes, Volumes {
   private readonly queue = new LoadQueue(PARALLEL_LOADS);
   private readonly channels: ChannelLists;
   private readonly residents: Residency;
-  /** The marches that draw the volumes. */
   readonly marches: Marches;
   readonly appearances: ChannelAppearances;
   private state: ViewerState | null = null;
   private wanted: readonly WantedTile[] = [];
   private mayRefine = true;
   private hasReportedLimit = false;
-  /** Of each tile, um, world. */
+  /** Box of each tile, um, world. */
   private readonly bounds: ReadonlyMap<string, Bounds>;
 
   constructor(
@@ -49,7 +48,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     private limits: VolumeLimits,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
-    /** From a host that sends bricks by view; null: volumes come as files. */
+    /** Streams bricks from a host; null if volumes are files. */
     private readonly bricks: BrickService | null = null,
   ) {
     this.residents = new Residency(limits.bytes);
@@ -71,7 +70,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     );
   }
 
-  /** Whether a volume that is wanted shows at no level. */
+  /** Whether a wanted volume is not shown at any level. */
   get isIncomplete(): boolean {
     return this.wanted.some(({ tile, channels }) => {
       const shown = this.residents.get(tile)?.texture.shown?.channels ?? [];
@@ -80,12 +79,11 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     });
   }
 
-  /** Whether all that is marched shows in the disc alone. */
   get isInDisc(): boolean {
     return this.marches.isInDisc;
   }
 
-  /** Before every frame: where all is seen from. See `Marches`. */
+  /** Sets the view. Call it before every frame; see `Marches`. */
   aim(view: MarchView): void {
     this.marches.aim(this.state, view);
   }
@@ -105,39 +103,47 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     );
   }
 
-  /** A text that changes with what a march would draw: with the levels that have come, and in each step of a fade. */
+  /**
+   * A text that changes when a march would look different: with each loaded level and each step of
+   * a fade.
+   */
   get marchKey(): string {
     return JSON.stringify([this.status(), this.marches.key]);
   }
 
-  /** How far the volume of a channel in a tile has faded in, 0..1. */
+  /** How far the volume of a channel in a tile has faded in, 0 to 1. */
   presence(tile: string, channel: string): number {
     return this.residents.presence(tile, channel);
   }
 
-  /** Where a channel's volume in a tile comes from; null: not known yet, or there is none. */
+  /** The source of a channel's volume in a tile; null if it is not known yet or there is none. */
   source(tile: string, channel: string): VolumeSource | null {
     return this.channels.get(channel)?.sources.get(tile) ?? null;
   }
 
-  /** All volumes of a channel, by tile; null: its list has not come, which was reported. */
+  /** All volumes of a channel, by tile; null if the list failed to load, which is reported. */
   async sourcesOf(channel: string): Promise<ReadonlyMap<string, VolumeSource> | null> {
     await this.channels.load(channel);
     return this.channels.get(channel)?.sources ?? null;
   }
 
-  /** The same, once it is known; null also after a fault, which was reported. */
+  /**
+   * The source of a channel's volume in a tile, when it is known; null if there is none or the list
+   * failed to load.
+   */
   async sourceOf(tile: string, channel: string): Promise<VolumeSource | null> {
     await this.channels.load(channel);
     return this.source(tile, channel);
   }
 
-  /** The channels of the tiles that are on screen. */
   shown(): readonly ShownVolume[] {
     return this.state === null ? [] : this.marches.shown(this.state);
   }
 
-  /** Outermost points, um, world, of what a channel shows as volumes; null: not all has come. */
+  /**
+   * Outermost points, um, world, of the visible part of a channel's volumes; null if they are not
+   * all loaded.
+   */
   outline(channel: string): readonly Vec3[] | null {
     const tiles = this.wanted.filter(({ channels }) => channels.includes(channel));
     const points: Vec3[] = [];
@@ -150,7 +156,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return points.length === 0 ? null : points;
   }
 
-  /** Whether all that is wanted of a tile is there, at some level. */
+  /** Whether all wanted volumes of a tile are loaded, at some level. */
   isReady(tile: string): boolean {
     const resident = this.residents.get(tile);
     const shown = resident?.texture.shown;
@@ -160,7 +166,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     );
   }
 
-  /** Go on with all fades; whether any is still under way. */
+  /** Advances all fades. Returns whether any is still going on. */
   advance(dt_s: number): boolean {
     const isFading = this.residents.advance(dt_s);
     this.marches.show();
@@ -168,25 +174,30 @@ export class VolumeSet implements MarchedVolumes, Volumes {
   }
 
   /**
-   * @param mayRefine false while the gaze wanders: then nothing finer is begun
+   * Takes over the state and the wanted volumes.
+   *
+   * @param mayRefine false while the gaze wanders, so that no finer levels are loaded
    */
   follow(state: ViewerState, wanted: readonly WantedTile[], mayRefine: boolean): void {
-    // a host that sends bricks sends those of a tile to one place: to what is traced, while the march
-    // only stands in
+    // A host that streams bricks sends a tile's bricks to one receiver only: to path tracing while
+    // the march stands in.
     if (this.bricks !== null && this.state !== null && isTraced(this.state) !== isTraced(state)) {
       this.residents.dropAll();
     }
     this.state = state;
     this.wanted = wanted;
     this.mayRefine = mayRefine;
-    this.residents.unwantAll();
+    this.residents.clearWanted();
     for (const each of wanted) this.want(each);
     this.channels.forgetFailed(wanted.flatMap(({ channels }) => channels));
     this.residents.evict();
     for (const [tile] of this.residents.byTile) this.march(tile);
   }
 
-  /** In every frame: ask for finer volumes of what is looked at, of one tile at a time. */
+  /**
+   * Requests finer volumes of the tile that is looked at, one tile at a time. Call it in every
+   * frame.
+   */
   sharpen(view: BrickView): void {
     const { all } = this.residents;
     if (!this.mayRefine || all.some(({ texture }) => isSharpening(texture))) return;
@@ -203,12 +214,12 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (texture instanceof SharpenedTile) texture.sharpen();
   }
 
-  /** From the next `follow` on. */
+  /** Limits the texture edge from the next `follow` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
   }
 
-  /** With the next `follow`, what has failed is loaded anew. */
+  /** Lets failed volumes be loaded again by the next `follow`. */
   retryFailed(): void {
     this.channels.forgetFailed();
     for (const { texture } of this.residents.all) texture.retryFailed();
@@ -241,7 +252,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     resident.texture.want(sources, this.mayRefine ? levels : levels.slice(0, 1), finest);
   }
 
-  /** Announced once: the drawn level is coarser than the finest one there is. */
+  /** Reports once that the drawn level is coarser than the finest level. */
   private reportLimit({ volume }: VolumeSource): void {
     const { side } = this.limits;
     const longest = Math.max(...volume.size);
@@ -255,7 +266,10 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return sources.some(({ volume }) => volume.finer_size !== undefined);
   }
 
-  /** @param isOfSource whether the host has finer volumes than files, as of a source that is not built */
+  /**
+   * @param isOfSource whether the host has finer volumes than files, as for a source that is not
+   *   built
+   */
   private addTile(tile: string, isOfSource: boolean): Resident {
     const onChange = () => {
       this.march(tile);
@@ -273,12 +287,12 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return this.residents.add(tile, made ?? files);
   }
 
-  /** A tile that can't be had as bricks comes as files. */
+  /** Loads a tile as files if its bricks are refused. */
   private replace(tile: string): void {
     const resident = this.residents.get(tile);
     if (resident === undefined) return;
     if (resident.texture instanceof SharpenedTile) {
-      resident.texture.blur();
+      resident.texture.showCoarse();
       return;
     }
     this.bricks?.refuse(tile);
@@ -292,7 +306,6 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     return volumes.sources.has(tile) && !this.residents.get(tile)?.texture.hasFailed(channel);
   }
 
-  /** Make the march of what has come of a tile. */
   private march(tile: string): void {
     const { state } = this;
     const resident = this.residents.get(tile);
@@ -300,7 +313,7 @@ export class VolumeSet implements MarchedVolumes, Volumes {
     if (!this.marches.follow(resident, state)) this.replace(tile);
   }
 
-  /** Drop all that is on the GPU; what is wanted comes again. */
+  /** Releases all GPU resources; wanted volumes are loaded again. */
   forget(): void {
     this.residents.dropAll();
     this.marches.forget();
@@ -314,8 +327,8 @@ export class VolumeSet implements MarchedVolumes, Volumes {
 
 function tooLong(longest: number, side: number): BundleError {
   return new BundleError(
-    `This device draws volumes of at most ${side} voxels along an edge: ` +
-      `those of ${longest} are shown at a coarser level.`,
+    `This device draws volumes of at most ${side} voxels along an edge. ` +
+      `Volumes of ${longest} voxels are shown at a coarser level.`,
   );
 }
 

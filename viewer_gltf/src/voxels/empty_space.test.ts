@@ -18,9 +18,9 @@ function distancesByDefinition(visible: Uint8Array, [nx, ny, nz]: Size3): Uint8A
 }
 
 describe("empty space", () => {
-  it("is what no intensity between a brick's extremes makes visible", () => {
+  it("consists of bricks in which no intensity between the extremes is visible", () => {
     const alpha = new Uint8Array(256);
-    alpha[100] = 7; // one single visible intensity
+    alpha[100] = 7; // a single visible intensity
     const visible = new Uint8Array(4);
     markVisible(visible, Uint8Array.of(0, 99, 101, 255, 90, 110, 100, 100), opacityRanges(alpha));
     expect([...visible]).toEqual([0, 0, 1, 1]);
@@ -47,11 +47,11 @@ describe("empty space", () => {
         }
   });
 
-  it("is far everywhere if nothing is visible", () => {
+  it("has the distance FAR everywhere if nothing is visible", () => {
     expect([...brickDistances(new Uint8Array(8), [2, 2, 2])]).toEqual(Array(8).fill(FAR));
   });
 
-  it("has the distance of its definition in random volumes of every shape", () => {
+  it("has the distance by definition in random volumes of any shape", () => {
     const random = seeded(5);
     for (let run = 0; run < 120; run++) {
       const edge = () => 1 + Math.floor(random() ** 2 * 14);
@@ -63,7 +63,7 @@ describe("empty space", () => {
     }
   });
 
-  it("ends at the far end of the byte in a row longer than that", () => {
+  it("ends at the largest byte in a longer row", () => {
     const visible = new Uint8Array(600);
     visible[0] = 1;
     const distance = brickDistances(visible, [600, 1, 1]);
@@ -75,7 +75,7 @@ describe("empty space", () => {
     ]);
   });
 
-  it("is empty under all channels together", () => {
+  it("is empty under all channels combined", () => {
     const clear = new Uint8Array(256);
     const alpha = clear.slice();
     alpha[9] = 255;

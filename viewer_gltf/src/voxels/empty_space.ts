@@ -1,28 +1,34 @@
 /**
- * Where a ray may skip: for every brick of SKIP_BRICK^3 texels, how far the nearest brick lies in which the
- * transfer functions show anything. Pure arrays.
+ * Where a ray may skip: for each brick of SKIP_BRICK^3 texels, the distance to the nearest brick in
+ * which the transfer functions show anything. Plain arrays.
  *
  * The distance is Chebyshev's, in bricks, by the two-pass chamfer transform (Rosenfeld & Pfaltz
- * 1968), which is exact for it. The idea of skipping by it: Cohen & Sheffer, "Proximity clouds",
- * The Visual Computer 1994.
+ * 1968), which is exact for it. Skipping by distances: Cohen & Sheffer, "Proximity clouds", The
+ * Visual Computer 1994.
  */
 import type { Size3 } from "../bundle/ktx2";
 
-/** Least opacity that is drawn, in steps of 8 bits. */
+/** Smallest opacity that is drawn, in steps of 8 bits. */
 const INVISIBLE = 0.5;
 export const FAR = 255;
 
-/** The input of a table of skips: entry c of `bricks` and of `alphas` is channel c's. */
+/** Input of an empty-space table: entry c of `bricks` and of `alphas` belongs to channel c. */
 export type OccupancyRequest = Readonly<{
-  /** Smallest and largest intensity of every brick, interleaved. */
+  /** Smallest and largest intensity of each brick, interleaved. */
   bricks: readonly Uint8Array[];
-  /** The transfer function's opacity, 0..255, at each of 256 intensities: the largest over gradients. */
+  /**
+   * The transfer function's opacity, 0 to 255, at each of 256 intensities: the largest over all
+   * gradients.
+   */
   alphas: readonly Uint8Array[];
   /** Bricks along x, y, z. */
   count: Size3;
 }>;
 
-/** Largest opacity (0..255) between intensities lo and hi, for every lo <= hi: index lo * 256 + hi. */
+/**
+ * Largest opacity, 0 to 255, between intensities lo and hi, for each lo <= hi, at index lo * 256 +
+ * hi.
+ */
 export function opacityRanges(alpha: Uint8Array): Uint8Array {
   const ranges = new Uint8Array(256 * 256);
   for (let lo = 0; lo < 256; lo++) {
@@ -36,9 +42,9 @@ export function opacityRanges(alpha: Uint8Array): Uint8Array {
 }
 
 /**
- * Mark in `visible` (one byte a brick) the bricks in which a channel shows something.
+ * Marks in `visible` (one byte for each brick) the bricks in which a channel shows something.
  *
- * @param bricks smallest and largest intensity of every brick, interleaved
+ * @param bricks smallest and largest intensity of each brick, interleaved
  * @param ranges of the channel's transfer function, from `opacityRanges`
  */
 export function markVisible(visible: Uint8Array, bricks: Uint8Array, ranges: Uint8Array): void {
@@ -48,10 +54,10 @@ export function markVisible(visible: Uint8Array, bricks: Uint8Array, ranges: Uin
   }
 }
 
-/** Distance of each brick to the nearest visible one: 0 in a visible one, at most FAR. */
+/** Distance of each brick to the nearest visible one: 0 in a visible brick, at most FAR. */
 export function brickDistances(visible: Uint8Array, size: Size3): Uint8Array<ArrayBuffer> {
   const [nx, ny, nz] = size;
-  // A border of one brick that is FAR from everything spares every test for the volume's edge.
+  // A border of FAR bricks saves all tests for the volume's edge.
   const row = nx + 2;
   const plane = row * (ny + 2);
   const padded = new Uint8Array(plane * (nz + 2)).fill(FAR);
@@ -81,10 +87,10 @@ export function brickDistances(visible: Uint8Array, size: Size3): Uint8Array<Arr
 }
 
 /**
- * Bring a row up to date with the 13 neighbours that the sweep has passed: those of the four rows
- * passed are taken as the smallest of each column, so that three columns stand for twelve bricks.
+ * Updates a row from the 13 neighbours that the sweep has passed. In the four passed rows, the
+ * smallest value of each column is taken first, so that three columns stand for twelve bricks.
  *
- * @param start the border brick that the sweep comes from; `step` 1 or -1 leads along the row
+ * @param start the border brick from which the sweep starts; `step` 1 or -1 leads along the row
  */
 function relaxRow(
   padded: Uint8Array,
@@ -122,8 +128,8 @@ export function occupancyDistances(request: OccupancyRequest): Uint8Array<ArrayB
   bricks.forEach((channel, c) => {
     if (channel.length !== 2 * visible.length || alphas[c]?.length !== 256) {
       throw new RangeError(
-        `channel ${c}: expected ${2 * visible.length} bytes of bricks and 256 opacities, ` +
-          `found ${channel.length} and ${alphas[c]?.length ?? 0}`,
+        `channel ${c}: found ${channel.length} bytes of bricks and ${alphas[c]?.length ?? 0} opacities; ` +
+          `expected ${2 * visible.length} bytes and 256 opacities`,
       );
     }
     markVisible(visible, channel, opacityRanges(alphas[c]));

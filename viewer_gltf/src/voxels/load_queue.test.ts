@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { LoadQueue } from "./load_queue";
 
 describe("the queue of loads", () => {
-  it("starts the cheapest that waits, no more than its limit at a time", async () => {
+  it("starts the cheapest waiting job, up to its limit at a time", async () => {
     const queue = new LoadQueue(1);
     const { signal } = new AbortController();
     const order: number[] = [];
@@ -11,7 +11,7 @@ describe("the queue of loads", () => {
     expect(order).toEqual([5, 1, 3, 9]); // 5 found the queue empty
   });
 
-  it("goes on after a failure, and drops what was aborted", async () => {
+  it("goes on after a failure, and drops aborted jobs", async () => {
     const queue = new LoadQueue(1);
     const controller = new AbortController();
     const failing = queue.add(1, controller.signal, () => Promise.reject(new Error("no")));

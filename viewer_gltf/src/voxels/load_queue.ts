@@ -1,11 +1,13 @@
-/** Run jobs a few at a time, the cheapest first: the overview of every tile before any detail. */
+/**
+ * Runs jobs a few at a time, the cheapest first, so that each tile's overview precedes any detail.
+ */
 export class LoadQueue {
   private readonly waiting: { cost: number; start: () => void }[] = [];
   private running = 0;
 
   constructor(private readonly limit: number) {}
 
-  /** The job's result, once its turn has come. A job aborted while it waits never starts. */
+  /** Resolves with the job's result. A job that is aborted while it waits never starts. */
   add<T>(cost: number, signal: AbortSignal, job: () => Promise<T>): Promise<T> {
     return new Promise<T>((resolve, reject) => {
       const start = () => {

@@ -16,14 +16,17 @@ import {
 import { blueNoise, NOISE_SIZE } from "../gpu/blue_noise";
 import { GLOSS, OWN_LIGHT, type RoomLight } from "../gpu/room_light";
 
-/** Most steps of a ray while anything moves, for any size of the volume and any number of tiles. */
+/**
+ * Largest number of steps of a ray in a moving view, for any size of the volume and number of
+ * tiles.
+ */
 export const MAX_STEPS = 100;
-/** Most steps of a ray at rest: one a voxel through 512 of them. */
+/** Largest number of steps of a ray at rest: one step per voxel through 512 voxels. */
 export const REST_STEPS = 512;
-/** The light on all tiles: see gpu/chunks/shade.glsl. The directions are in the axes of the eye. */
+/** The light on all tiles; see gpu/chunks/shade.glsl. Directions are in the eye's axes. */
 export type MarchLight = ReturnType<typeof marchLight>;
 
-/** Uniforms of a light that is still dark. */
+/** Uniforms of a light, initially dark. */
 export function marchLight() {
   return {
     uLight: { value: new Vector3() },
@@ -37,9 +40,9 @@ export function marchLight() {
 }
 
 /**
- * The room's light, which surfaces have too.
+ * Sets the light from that of the scene, which surfaces use too.
  *
- * @param toEye from the axes that the lamps stand in to those of the eye
+ * @param toEye from the axes of the lamps to those of the eye
  */
 export function lightByRoom(
   light: MarchLight,
@@ -58,33 +61,40 @@ export function lightByRoom(
 /** Uniforms that all tiles share in a frame, by reference. */
 export type MarchFrame = Readonly<{
   uSceneDepth: { value: DepthTexture };
-  /** The depth of the nearest translucent surface, if there is one. */
+  /** Depth of the nearest translucent surface, if there is one. */
   uPaneDepth: { value: DepthTexture };
   uHasPane: { value: boolean };
   uNoise: { value: Texture };
-  /** By how much the noise is shifted in this frame, 0..1. */
+  /** Shift of the noise in this frame, 0 to 1. */
   uPhase: { value: number };
-  /** The eye's part of the picture, and of the march: x, y, width, height in pixels of each. */
+  /** The eye's part of the frame, and of the march: x, y, width, height in pixels of each. */
   uEye: { value: Vector4 };
   uPart: { value: Vector4 };
-  /** Tangents from the eye's axis by its clip space: factor, offset; 0: it looks through no lens. */
+  /** Tangents from the eye's axis for clip space: factor, offset; 0: no lens. */
   uLens: { value: Vector4 };
-  /** Cosines of the disc's inner and outer radius; below -1 the disc is everything. */
+  /** Cosines of the disc's inner and outer radius; below -1 the disc covers everything. */
   uDisc: { value: Vector2 };
   /** Cosine of the radius within which the disc is marched. */
   uReach: { value: number };
-  /** Whether all that is marched shows in the disc alone: then its picture is mixed with the surfaces'. */
+  /**
+   * Whether all marched volumes show only inside the disc, so that their image is mixed with that
+   * of the surfaces.
+   */
   uIsCrossing: { value: boolean };
   uSteps: { value: number };
-  /** Light that comes to each cell of a coarse grid, and by how much it counts, 0..1. */
+  /** Light that reaches each cell of a coarse grid, and the strength of this shading, 0 to 1. */
   uReached: { value: Data3DTexture | null };
   uDepthShading: { value: number };
-  /** Factor to the opacities' optical depth. */
+  /** Factor of the opacities' optical depth. */
   uDensity: { value: number };
 }> &
   MarchLight;
 
-/** Depth of what is opaque, and of the nearest that is translucent. */
+/**
+ * Makes the uniforms.
+ * @param depth depth of opaque objects
+ * @param pane depth of the nearest translucent surface
+ */
 export function makeFrame(depth: DepthTexture, pane = depth): MarchFrame {
   const noise = new DataTexture(blueNoise(), NOISE_SIZE, NOISE_SIZE, RedFormat, UnsignedByteType);
   noise.wrapS = noise.wrapT = RepeatWrapping;

@@ -1,4 +1,4 @@
-/** The colours and transfer functions of a tile's channels, as the march looks them up. */
+/** The colours and transfer functions of a tile's channels, as lookup tables for the march. */
 import {
   DataArrayTexture,
   DataTexture,
@@ -13,14 +13,12 @@ import type { Rgb } from "../math/color";
 import { ENTRIES, edgeContrast, opacities } from "./transfer_luts";
 import { alikeRows, type TransferTable2d, tablesInto, tableUniforms } from "./transfer_table_2d";
 
-/** How one channel of a tile looks. */
 export type Appearance = Readonly<{
   color: Rgb;
-  /** 256 RGBA entries, of `lookUpTable`; beside a 2D table, what of it shows at any gradient. */
+  /** 256 RGBA entries from `lookUpTable`; with a 2D table, the visible part at any gradient. */
   table: Uint8Array;
-  /** A two-dimensional transfer function. */
   table2d?: TransferTable2d | null;
-  /** Part of the intensities, 0..1, that is shown from dark to bright; absent: all. */
+  /** Range of the intensities, 0 to 1, that is shown from dark to bright; absent: all. */
   window?: readonly [number, number];
   isInDisc: boolean;
 }>;
@@ -57,15 +55,15 @@ function makeUniforms(channels: number, lut: DataTexture) {
 export class MarchTables {
   readonly uniforms;
   private readonly lut: DataTexture;
-  /** The tables of value and gradient, a layer each channel; null: no channel has needed any. */
+  /**
+   * The tables of value and gradient, one layer for each channel; null until a channel needs one.
+   */
   private tables2d: DataArrayTexture | null = null;
-  /** The content of each layer; null: a table that knows no gradients. */
+  /** The content of each layer; null for a table without gradients. */
   private readonly layers: (Uint8Array | null)[] = [];
-  /** Whether each channel shows in the disc alone. */
   private inDisc: readonly boolean[] = [];
   /** Whether any channel has a table of value and gradient. */
   isTwoD = false;
-  /** Goes up with each change of the tables. */
   changes = 0;
 
   constructor(private readonly channelCount: number) {
@@ -75,12 +73,10 @@ export class MarchTables {
     this.uniforms = makeUniforms(channelCount, this.lut);
   }
 
-  /** Whether all channels show in the disc alone. */
   get isInDisc(): boolean {
     return this.inDisc.length > 0 && this.inDisc.every((is) => is);
   }
 
-  /** Whether any channel shows in the disc alone. */
   get isPartlyInDisc(): boolean {
     return this.inDisc.includes(true);
   }
@@ -90,7 +86,10 @@ export class MarchTables {
     return opacities((this.lut.image.data as Uint8Array).subarray(channel * ENTRIES * 4));
   }
 
-  /** Follow colours and tables: uploads a few kilobytes. True if what is visible may differ. */
+  /**
+   * Takes over colours and tables, by uploading a few kilobytes. Returns whether the visible part
+   * may differ.
+   */
   follow(appearances: readonly Appearance[]): boolean {
     const { uniforms } = this;
     const rows = this.lut.image.data as Uint8Array;
@@ -117,7 +116,10 @@ export class MarchTables {
     return differs;
   }
 
-  /** If any channel has a table of value and gradient, all have: the others' rows are alike. */
+  /**
+   * If any channel has a table of value and gradient, all get one; the rows of the other channels
+   * are equal.
+   */
   private fillTables2d(appearances: readonly Appearance[]): void {
     const { uniforms } = this;
     this.tables2d ??= emptyTables2d(this.channelCount);
@@ -138,7 +140,7 @@ export class MarchTables {
       if (isThere) return;
       cells.set(table2d?.cells ?? alikeRows(table), at);
       this.layers[c] = table2d?.cells ?? null;
-      tables2d.addLayerUpdate(c); // the others stay as they are on the GPU
+      tables2d.addLayerUpdate(c); // the other layers stay on the GPU
       tables2d.needsUpdate = true;
     });
   }
@@ -149,7 +151,10 @@ export class MarchTables {
   }
 }
 
-/** The intensity 0..1 up to which a table shows nothing; it is linear between its entries. */
+/**
+ * The intensity, 0 to 1, up to which a table shows nothing; the table is linear between its
+ * entries.
+ */
 export function floorOf(table: Uint8Array): number {
   for (let i = 0; i < ENTRIES; i++) if (table[4 * i + 3] > 0) return (i - 1) / (ENTRIES - 1);
   return 1;

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import type { MipLevel } from "../bundle/generated/volumes";
 import { levelsToFetch } from "./mip_levels";
 
-/** A full mip chain: each level is half of the one before. */
+/** A full mip chain: each level is half as large as the previous one. */
 function chain(x: number, y: number, z: number): MipLevel[] {
   const levels: MipLevel[] = [];
   for (let k = 0; ; k++) {
@@ -12,8 +12,8 @@ function chain(x: number, y: number, z: number): MipLevel[] {
   }
 }
 
-describe("the levels of a volume", () => {
-  it("come from a small one to the finest", () => {
+describe("the levels to fetch", () => {
+  it("go from a small level to the finest", () => {
     // 128 x 128 x 64: level 2 is 32 x 32 x 16 = 16 KiB, level 1 128 KiB.
     expect(levelsToFetch(chain(128, 128, 64), 1e9, 2048)).toEqual([2, 1, 0]);
   });
@@ -23,15 +23,15 @@ describe("the levels of a volume", () => {
     expect(levelsToFetch(chain(128, 128, 64), 1024, 2048)).toEqual([4]);
   });
 
-  it("stop at the largest texture that the GPU takes", () => {
+  it("stop at the largest texture that the GPU supports", () => {
     expect(levelsToFetch(chain(512, 8, 8), 1e9, 256)).toEqual([1]);
   });
 
-  it("of a tiny volume are the finest alone", () => {
+  it("are only the finest level for a tiny volume", () => {
     expect(levelsToFetch(chain(8, 8, 8), 1e9, 2048)).toEqual([0]);
   });
 
-  it("never leave nothing", () => {
+  it("are never empty", () => {
     expect(levelsToFetch(chain(64, 64, 64).slice(0, 1), 10, 16)).toEqual([0]);
   });
 });

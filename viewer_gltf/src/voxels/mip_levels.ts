@@ -1,16 +1,16 @@
-/** Which mip levels of a volume to fetch, coarse first. Pure. */
+/** The mip levels of a volume to fetch, coarse first. */
 import type { MipLevel } from "../bundle/generated/volumes";
 
-/** Largest level for the first picture, bytes: it comes from the finest one within this. */
+/** Bytes. Largest level for the first image; the first level is the finest one within this. */
 const FIRST_LEVEL_BYTES = 64 * 1024;
 
-/** What volumes may take, all together or each. */
+/** Limits for volumes, together or each. */
 export type VolumeLimits = Readonly<{
-  /** Of the GPU's memory. */
+  /** Bytes of GPU memory. */
   bytes: number;
   /** Texels along an edge that a texture may have. */
   side: number;
-  /** Voxels along an edge that are wanted at most, of a tile; Infinity: as many as fit. */
+  /** Largest number of voxels along a tile's edge; Infinity: as many as fit. */
   edge: number;
 }>;
 
@@ -20,9 +20,9 @@ export function texels(level: MipLevel): number {
 }
 
 /**
- * Indices into `levels` (which go from fine to coarse), in the order in which they are fetched:
- * first a small one, then each finer one up to the finest that fits into `budget_bytes` (one byte
- * a texel) and has sides that the GPU takes. The coarsest is always allowed.
+ * Returns indices into `levels` (which go from fine to coarse) in the order of fetching. A small
+ * level comes first, then each finer one. The last is the finest that fits into `budget_bytes` (one
+ * byte per texel) and whose sides the GPU supports. The coarsest is always allowed.
  */
 export function levelsToFetch(
   levels: readonly MipLevel[],

@@ -1,4 +1,4 @@
-/** How many bricks of SKIP_BRICK^3 texels a volume has along each axis. Pure. */
+/** Number of bricks of SKIP_BRICK^3 texels along each axis of a volume. */
 import { SKIP_BRICK } from "../bundle/generated/constants";
 import type { Size3 } from "../bundle/ktx2";
 

@@ -1,8 +1,10 @@
-/** Where a volume's box lies in its texture. Pure. */
+/** Where a volume's box lies in its texture. */
 import { Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
 
-/** Texture coordinates at the low and high corner of the box; image rows run against world y. */
+/**
+ * Texture coordinates of the low and the high corner of the box; image rows run against world y.
+ */
 export function textureCorners(volume: TileVolume): { low: Vector3; high: Vector3 } {
   const first = volume.size.map((n) => (volume.apron + 0.5) / n);
   const last = volume.size.map((n) => (n - volume.apron - 0.5) / n);

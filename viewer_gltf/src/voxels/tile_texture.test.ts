@@ -11,7 +11,7 @@ import { texels } from "./mip_levels";
 import { LEVEL_FADE_S, TileTexture } from "./tile_texture";
 import { VolumeSource } from "./volume_source";
 
-describe("a tile's texture", { timeout: 120_000 }, () => {
+describe("the texture of a tile", { timeout: 120_000 }, () => {
   let folder: string;
   let manifest: Manifest;
   let volumes: ReadonlyMap<string, TileVolume>;
@@ -51,7 +51,7 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     new Map(
       ids.map((id) => {
         const volume = volumes.get(id);
-        if (volume === undefined) throw new Error(`no volume of ${id}`);
+        if (volume === undefined) throw new Error(`there is no volume of ${id}`);
         return [id, new VolumeSource(BASE, volume)] as const;
       }),
     );
@@ -69,7 +69,7 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     return stride * texels(volume.levels[level]);
   };
 
-  it("comes coarse first, each level once", async () => {
+  it("is loaded coarse first, each level once", async () => {
     texture.want(sourcesOf("Balls"), [3, 2, 1, 0]);
     await isAt(0);
     const levels = volumes.get("Balls")?.levels ?? [];
@@ -82,7 +82,7 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     );
   });
 
-  it("shows its first level at once, and fades from each to the next", async () => {
+  it("shows its first level at once, and fades from each level to the next", async () => {
     const sources = sourcesOf("F_x20_body", "Balls", "Block");
     texture.want(sources, [2]);
     await isAt(2);
@@ -97,7 +97,7 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     texture.want(sources, [2, 1]);
     await isAt(1);
     expect(texture.old).toBe(before);
-    expect(texture.fresh).toBe(0); // the frame that comes shows what the last one did
+    expect(texture.fresh).toBe(0); // the next frame looks like the last one
     expect(texture.bytes).toBe(bytesOf(2, 4) + bytesOf(1, 4));
     const shares: number[] = [];
     for (let i = 0; i < 4; i++) {
@@ -112,7 +112,7 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     expect(texture.bytes).toBe(bytesOf(1, 4));
   });
 
-  it("gives way to a coarser level where there is less room", async () => {
+  it("is replaced by a coarser level if there is less room", async () => {
     const sources = sourcesOf("Balls");
     texture.want(sources, [1, 0], 0);
     await isAt(0);
@@ -124,18 +124,19 @@ describe("a tile's texture", { timeout: 120_000 }, () => {
     expect(texture.bytes).toBe(bytesOf(1, 1));
   });
 
-  it("stays as it is while no more is wanted of it", async () => {
+  it("stays as it is while no finer level is wanted", async () => {
     const sources = sourcesOf("Balls");
     texture.want(sources, [1, 0], 0);
     await isAt(0);
     texture.advance(1);
     const asked = host.asked.length;
-    texture.want(sources, [1], 0); // the gaze wanders: nothing finer is begun, nothing is lost
+    // The gaze wanders, so no finer level is loaded and none is dropped.
+    texture.want(sources, [1], 0);
     await isAt(0);
     expect(host.asked.length).toBe(asked);
   });
 
-  it("takes another set of channels in at once, from what has come", async () => {
+  it("shows another set of channels at once, from loaded levels", async () => {
     const sources = sourcesOf("Balls", "Block");
     texture.want(sources, [1, 0]);
     await isAt(0);

@@ -1,6 +1,6 @@
 /**
  * The GPU texture of one tile: up to four channels side by side, coarse first, replaced as finer
- * levels arrive. A replacement fades in; another set of channels takes its place at once.
+ * levels arrive. Finer levels fade in; another set of channels replaces the texture at once.
  */
 import type { Data3DTexture } from "three";
 import { DecodeError, decodeTexels } from "../bundle/decode";
@@ -16,9 +16,9 @@ export type Packed = Readonly<{
   channels: readonly string[];
   level: number;
   texture: Data3DTexture;
-  /** Where bricks are in the texture, which is an atlas of them then: see bricks/brick_atlas.ts. */
+  /** Position of each brick, if the texture is an atlas of bricks; see bricks/brick_atlas.ts. */
   index: Data3DTexture | null;
-  /** Smallest and largest intensity of every brick of each channel, interleaved. */
+  /** Smallest and largest intensity of each brick of each channel, interleaved. */
   bricks: readonly Uint8Array[];
 }>;
 
@@ -26,18 +26,21 @@ export class TileTexture {
   shown: Packed | null = null;
   /** The texture that `shown` replaces, while it fades in. */
   old: Packed | null = null;
-  /** 0..1: share of `shown`. */
+  /** Share of `shown`, 0 to 1. */
   fresh = 1;
   isLoading = false;
 
   private sources: ReadonlyMap<string, VolumeSource> = new Map();
   private levels: readonly number[] = [];
-  /** That there is room for: what is finer gives way to it. */
+  /** The finest level that fits; finer ones are dropped. */
   private finest = 0;
-  /** After a fault, which was reported, a channel is not tried again until it is turned on anew. */
+  /**
+   * Channels with a fault, which was reported. They are not tried again until they are turned off
+   * and on.
+   */
   private readonly failed = new Set<string>();
   private isDisposed = false;
-  /** The present load; aborted when nothing wants it any longer. */
+  /** The current load; aborted when it is no longer wanted. */
   private loading: Readonly<{
     channels: readonly string[];
     level: number;
@@ -50,12 +53,12 @@ export class TileTexture {
     private readonly onError: (error: unknown) => void,
   ) {}
 
-  /** Of the GPU's memory. */
+  /** Bytes of GPU memory. */
   get bytes(): number {
     return [this.shown, this.old].reduce((sum, each) => sum + (each ? sizeOf(each) : 0), 0);
   }
 
-  /** Where what is wanted, or was, comes from. */
+  /** Sources of the channels that are wanted, or were wanted last. */
   get kept(): ReadonlyMap<string, VolumeSource> {
     return this.sources;
   }
@@ -64,12 +67,12 @@ export class TileTexture {
     return this.failed.has(channel);
   }
 
-  /** With the next `want`, what has failed is loaded anew. */
+  /** Lets failed channels be loaded again by the next `want`. */
   retryFailed(): void {
     this.failed.clear();
   }
 
-  /** Load these channels and levels, given coarse to fine; what is there already is kept. */
+  /** Loads these channels and levels, given coarse to fine; loaded levels are kept. */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     for (const [id, source] of this.sources) {
       if (sources.get(id) === source) continue;
@@ -87,7 +90,7 @@ export class TileTexture {
     if (!this.isLoading) void this.run();
   }
 
-  /** Go on with the fade; whether it is still under way. */
+  /** Advances the fade. Returns whether it is still going on. */
   advance(dt_s: number): boolean {
     if (this.old === null) return false;
     this.fresh = Math.min(1, this.fresh + dt_s / LEVEL_FADE_S);
@@ -114,7 +117,7 @@ export class TileTexture {
         packed?.texture.dispose();
         return;
       }
-      if (packed === null) continue; // aborted, or a channel failed: without it
+      if (packed === null) continue; // aborted, or a channel failed and is left out
       if (same(channels, this.wanted)) {
         this.replace(packed);
         this.onChange();
@@ -133,13 +136,13 @@ export class TileTexture {
       if (this.levels.length > 0 && this.finest > shown.level) return this.finest;
       return this.levels.find((index) => index < shown.level) ?? null;
     }
-    // the same level as before, if all of it has come; else what comes first
+    // the finest level that is fully loaded; otherwise the first of the list
     const isHere = (index: number) =>
       channels.every((id) => this.sources.get(id)?.has(index) === true);
     return [...this.levels].reverse().find(isHere) ?? this.levels[0] ?? null;
   }
 
-  /** The level of all channels; null if one of them failed, which was reported. */
+  /** Loads one level of all channels. Returns null if one of them failed, which is reported. */
   private async load(
     channels: readonly string[],
     level: number,

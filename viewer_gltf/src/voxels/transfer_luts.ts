@@ -1,4 +1,4 @@
-/** A channel's baked transfer functions, and the table that a choice among them makes. */
+/** A channel's transfer functions, and the lookup table made from one of them. */
 import { BundleError } from "../bundle/errors";
 import { fetchFile } from "../bundle/fetch";
 import type { Channel } from "../bundle/generated/bundle";
@@ -6,10 +6,10 @@ import { readLevel, readTexture } from "../bundle/ktx2";
 
 export const ENTRIES = 256;
 
-/** RGBA, one entry for each intensity; RGB is a factor to the channel's colour. */
+/** RGBA, one entry for each intensity; RGB is a factor of the channel's colour. */
 export type TransferFunction = Uint8Array<ArrayBuffer>;
 
-/** The channel's transfer functions by name. Throws BundleError. */
+/** Loads the channel's transfer functions, by name. Throws BundleError. */
 export async function loadTransferFunctions(
   base: string,
   channel: Channel,
@@ -21,8 +21,8 @@ export async function loadTransferFunctions(
   const texels = await readLevel(texture, path, "R8G8B8A8", 0);
   if (!names.includes(channel.transfer_function)) {
     throw new BundleError(
-      `manifest.json: transfer_function of ${channel.id}: expected one of ${names.join(", ")}, ` +
-        `found ${channel.transfer_function}`,
+      `manifest.json: transfer_function of ${channel.id} is ${channel.transfer_function}; ` +
+        `expected one of ${names.join(", ")}`,
     );
   }
   return new Map(
@@ -31,9 +31,9 @@ export async function loadTransferFunctions(
 }
 
 /**
- * The function stretched over a window of the intensities, its opacity times a factor. Pure.
+ * Stretches the function over a window of the intensities, and multiplies its opacity by a factor.
  *
- * @param window low and high end, 0..1 of the intensities
+ * @param window low and high end, as shares of the intensities
  */
 export function lookUpTable(
   entries: TransferFunction,
@@ -55,18 +55,20 @@ export function lookUpTable(
   return table;
 }
 
-/** The opacities of a table, 0..255. */
 export function opacities(table: Uint8Array): Uint8Array<ArrayBuffer> {
   return Uint8Array.from({ length: ENTRIES }, (_, i) => table[4 * i + 3]);
 }
 
-/** Rise of opacity, as a share of all intensities, of an edge that is shaded as it is. */
+/**
+ * Rise of the opacity, as a share of all intensities, of an edge that is shaded without added
+ * contrast.
+ */
 const GENTLE_RISE = 0.12;
 const MOST_CONTRAST = 3;
 
 /**
- * Factor to the gradients that a table's edges are shaded by. An edge that crosses the whole rise of the
- * opacity is a boundary, however few of all intensities it crosses: the skin of a CT is one.
+ * Factor of the gradients that shade a table's edges. An edge that crosses the whole rise of the
+ * opacity is a boundary, even if it crosses few of all intensities, like the skin in a CT.
  */
 export function edgeContrast(table: Uint8Array): number {
   const alphas = opacities(table);

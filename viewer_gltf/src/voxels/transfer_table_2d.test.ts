@@ -8,7 +8,7 @@ import { opacities } from "./transfer_luts";
 import { alikeRows, envelopeOf, transferTable2d } from "./transfer_table_2d";
 
 describe("the table of value and gradient", () => {
-  it("never shows what its envelope hides: skips hold at every gradient", () => {
+  it("never shows more than its envelope, so rays may skip by the envelope", () => {
     const random = seeded(3);
     for (let run = 0; run < 40; run++) {
       const window = [0.4 * random(), 0.6 + 0.4 * random()] as const;
@@ -31,7 +31,7 @@ describe("the table of value and gradient", () => {
     }
   });
 
-  it("of a narrower window reads further out, by value and by gradient", () => {
+  it("is read further out for a narrower window, by value and by gradient", () => {
     const shape = { ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }), softness: 0 };
     const whole = transferTable2d([shape], { gradient_max: 0.8, functions: {} }, [0, 1], 1);
     const narrow = transferTable2d(
@@ -48,7 +48,7 @@ describe("the table of value and gradient", () => {
     }
   });
 
-  it("of a one-dimensional function is the same at every gradient", () => {
+  it("is the same at every gradient for a one-dimensional function", () => {
     const random = seeded(5);
     const entries = Uint8Array.from({ length: 4 * COLUMNS }, () => Math.floor(256 * random()));
     const cells = alikeRows(entries);
@@ -65,7 +65,7 @@ describe("the table of value and gradient", () => {
     expect(envelopeOf(cells)).toEqual(entries);
   });
 
-  it("gives what lies beside a hard edge the shape's colour", () => {
+  it("gives the cells beside a hard edge the shape's colour", () => {
     const shape: Shape = {
       ...makeShape("rectangle", { value: 0.5, gradient: 0.5 }),
       color: [1, 0, 0],

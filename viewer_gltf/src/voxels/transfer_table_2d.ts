@@ -1,7 +1,7 @@
 /**
- * What a march looks up for a two-dimensional transfer function: a table of value and gradient
- * magnitude, and what stands for it where gradients are not asked for. Pure arrays, and the uniforms
- * that hand their numbers to gpu/chunks/transfer_table_2d.glsl.
+ * Lookup table of a two-dimensional transfer function: a table of value and gradient magnitude, and
+ * a one-dimensional envelope for steps that need no gradient. Plain arrays, and the uniforms that
+ * pass their numbers to gpu/chunks/transfer_table_2d.glsl.
  */
 import { Vector4 } from "three";
 
@@ -12,22 +12,23 @@ import { ENTRIES, lookUpTable } from "./transfer_luts";
 const ROW = 4 * ENTRIES;
 
 export type TransferTable2d = Readonly<{
-  /** RGBA, ROWS x ENTRIES, row 0 is gradient 0. */
+  /** RGBA, ROWS x ENTRIES; row 0 is gradient 0. */
   cells: Uint8Array<ArrayBuffer>;
-  /** The step of intensity that is the last row. */
+  /** The step of intensity that corresponds to the last row. */
   gradientMax: number;
-  /** Of each value the most opaque cell, whatever its gradient: nothing shows that this does not. */
+  /**
+   * The most opaque cell at each value, over all gradients: where it is empty, nothing is visible.
+   */
   envelope: Uint8Array;
 }>;
 
 export const NO_ENTRIES = new Uint8Array(ROW);
 
-/** An entry for each channel. */
 export function tableUniforms() {
   return { uGradientMax: { value: new Vector4(1, 1, 1, 1) } };
 }
 
-/** Set what `tableUniforms` made by the channels' tables; null: a channel has none. */
+/** Sets the uniforms from the channels' tables; null: a channel has no table. */
 export function tablesInto(
   { uGradientMax }: ReturnType<typeof tableUniforms>,
   tables: readonly (TransferTable2d | null | undefined)[],
@@ -36,9 +37,9 @@ export function tablesInto(
 }
 
 /**
- * The table of shapes in a window of the intensities, which divides the steps of intensity too.
+ * Makes the table of shapes in a window of the intensities. The window also scales the gradients.
  *
- * @param opacity factor to the shapes' own
+ * @param opacity factor of the shapes' own opacity
  */
 export function transferTable2d(
   shapes: Shapes,
@@ -59,14 +60,17 @@ export function transferTable2d(
   return { cells, gradientMax: gradient, envelope: envelopeOf(cells) };
 }
 
-/** A one-dimensional function as a table: all gradients are alike to it. */
+/**
+ * A one-dimensional function as a table: all rows are equal, since it does not depend on the
+ * gradient.
+ */
 export function alikeRows(entries: Uint8Array): Uint8Array<ArrayBuffer> {
   const cells = new Uint8Array(ROWS * ROW);
   for (let at = 0; at < cells.length; at += ROW) cells.set(entries, at);
   return cells;
 }
 
-/** Of each value the most opaque cell. */
+/** The most opaque cell at each value. */
 export function envelopeOf<T extends Uint8Array | Float32Array>(cells: T): T {
   const envelope = cells.slice(0, ROW) as T;
   for (let at = ROW; at < cells.length; at += ROW) {
@@ -79,8 +83,8 @@ export function envelopeOf<T extends Uint8Array | Float32Array>(cells: T): T {
 }
 
 /**
- * An empty cell is white, which would show beside a shape's hard edge, as cells are blended before
- * their opacity counts: it takes the colour of the next cell of a shape.
+ * Gives each empty cell the colour of the next cell of a shape. Empty cells are white, and cells
+ * are interpolated before their opacity counts, so white would show beside a shape's hard edge.
  */
 function tintEmpty(cells: Uint8Array): void {
   const tint = (to: number, from: number) => {

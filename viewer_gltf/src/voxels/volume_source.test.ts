@@ -21,7 +21,7 @@ const VOLUME: TileVolume = {
   ],
 };
 
-/** A host that knows ranges; `file` is what it has under every name. */
+/** A host that supports ranges; it has `file` under every name. */
 function serve(file: Uint8Array) {
   const fetched = vi.fn(async (_: string, { headers }: { headers: { Range: string } }) => {
     const [first, last] = headers.Range.replace("bytes=", "").split("-").map(Number);
@@ -34,14 +34,14 @@ function serve(file: Uint8Array) {
   return fetched;
 }
 
-describe("a level by range", () => {
+describe("a level that is fetched by range", () => {
   const { signal } = new AbortController();
   const source = () => new VolumeSource("https://host/b/", VOLUME);
 
   beforeEach(() => void vi.stubGlobal("isSecureContext", true));
   afterEach(() => vi.unstubAllGlobals());
 
-  it("is its part of the file, fetched once", async () => {
+  it("is its part of the file and is fetched once", async () => {
     const fetched = serve(FILE);
     const volume = source();
     expect([...(await volume.level(1, signal))]).toEqual([...FILE.subarray(20, 40)]);
@@ -50,12 +50,12 @@ describe("a level by range", () => {
     expect([...(await volume.level(0, signal))]).toEqual([...FILE.subarray(40, 90)]);
   });
 
-  it("with other bytes of the right number is refused; other levels are not", async () => {
-    const spoilt = FILE.slice();
-    spoilt[30] ^= 1;
-    serve(spoilt);
+  it("is rejected if its bytes are wrong, but other levels are not", async () => {
+    const damaged = FILE.slice();
+    damaged[30] ^= 1;
+    serve(damaged);
     const volume = source();
-    const found = hashOf(spoilt.subarray(20, 40));
+    const found = hashOf(damaged.subarray(20, 40));
     await expect(volume.level(1, signal)).rejects.toThrow(
       `v.ktx2: level 1: expected SHA-256 ${VOLUME.levels[1].sha256}, found ${found}`,
     );
@@ -63,10 +63,10 @@ describe("a level by range", () => {
     expect(await volume.level(0, signal)).toHaveLength(50);
   });
 
-  it("that a cache has spoilt is asked for once more, past the caches", async () => {
-    const spoilt = FILE.slice();
-    spoilt[30] ^= 1;
-    const [old, fresh] = [serve(spoilt), serve(FILE)];
+  it("is fetched again past the caches if a cache has damaged it", async () => {
+    const damaged = FILE.slice();
+    damaged[30] ^= 1;
+    const [old, fresh] = [serve(damaged), serve(FILE)];
     type Ask = Parameters<typeof fresh>[1] & { cache: RequestCache };
     const caches: RequestCache[] = [];
     vi.stubGlobal("fetch", (address: string, options: Ask) => {
@@ -77,7 +77,7 @@ describe("a level by range", () => {
     expect(caches).toEqual(["default", "reload"]);
   });
 
-  it("that is cut short is recognised by its length", async () => {
+  it("is rejected if it is too short", async () => {
     serve(FILE.subarray(0, 70));
     await expect(source().level(0, signal)).rejects.toThrow("expected 100 bytes, found 70");
   });

@@ -1,6 +1,7 @@
 /**
- * Mip levels of one volume file by HTTP range, still compressed, and its bricks. A host that knows
- * no ranges answers the first request with the whole file, which then serves every level.
+ * Mip levels of one volume file by HTTP range, still compressed, and the ranges of its bricks. A
+ * host without range support answers the first request with the whole file, which then serves all
+ * levels.
  */
 import { BundleError } from "../bundle/errors";
 import { fetchFile, fetchPart } from "../bundle/fetch";
@@ -8,14 +9,20 @@ import type { TileVolume } from "../bundle/generated/volumes";
 import { compressedLevel, readLevel, readTexture } from "../bundle/ktx2";
 import { brickCounts } from "./skip_bricks";
 
-/** A volume as its tree of bricks has it: of the texels that a host reads from the source, where these are finer. */
+/**
+ * The volume with the size of its brick tree, which is finer if the host reads bricks from the
+ * source.
+ */
 export function volumeOfBricks(volume: TileVolume): TileVolume {
   return volume.finer_size === undefined ? volume : { ...volume, size: volume.finer_size };
 }
 
 export class VolumeSource {
   private whole: Uint8Array<ArrayBuffer> | null = null;
-  /** What has come of a volume stays while it is wanted: another set of channels packs it anew. */
+  /**
+   * Loaded levels, kept while the volume is wanted, because another set of channels packs them
+   * again.
+   */
   private readonly levels = new Map<number, Uint8Array>();
   private ranges: Uint8Array | null = null;
 
@@ -24,12 +31,13 @@ export class VolumeSource {
     readonly volume: TileVolume,
   ) {}
 
-  /** Whether a level needs no fetching. */
   has(index: number): boolean {
     return this.levels.has(index);
   }
 
-  /** Smallest and largest intensity of every brick, interleaved. Throws BundleError, AbortError. */
+  /**
+   * Smallest and largest intensity of each brick, interleaved. Throws BundleError or AbortError.
+   */
   async bricks(signal: AbortSignal): Promise<Uint8Array> {
     if (this.ranges === null) {
       const { bricks, size } = this.volume;
@@ -40,7 +48,7 @@ export class VolumeSource {
     return this.ranges;
   }
 
-  /** The zstd frame of level `index`. Throws BundleError, or AbortError. */
+  /** The zstd frame of level `index`. Throws BundleError or AbortError. */
   async level(index: number, signal: AbortSignal): Promise<Uint8Array> {
     let bytes = this.levels.get(index);
     if (bytes === undefined) {
@@ -50,7 +58,6 @@ export class VolumeSource {
     return bytes;
   }
 
-  /** Forget what was fetched. */
   release(): void {
     this.levels.clear();
     this.ranges = null;
@@ -68,7 +75,7 @@ export class VolumeSource {
     const texture = readTexture(this.whole, file.path, "R8", size);
     const frame = compressedLevel(texture, file.path, index);
     if (frame === null) {
-      throw new BundleError(`${file.path}: supercompression: expected zstd, found none`);
+      throw new BundleError(`${file.path}: supercompression is missing; expected zstd`);
     }
     return frame;
   }

@@ -1,4 +1,3 @@
-/** Up to four channels' texels as one 3D texture. */
 import {
   ClampToEdgeWrapping,
   Data3DTexture,
@@ -10,12 +9,15 @@ import {
 } from "three";
 import type { Size3 } from "../bundle/ktx2";
 
-/** Bytes a texel takes on the GPU. */
+/** Bytes of a texel on the GPU. */
 export function stride(channels: number): number {
   return channels <= 2 ? channels : 4;
 }
 
-/** @param texels channels interleaved, `stride` bytes each, x fastest; let go once the GPU has them */
+/**
+ * @param texels channels interleaved, `stride` bytes each, x fastest; released when the GPU has
+ *   them
+ */
 export function volumeTexture(
   texels: Uint8Array<ArrayBuffer>,
   size: Size3,

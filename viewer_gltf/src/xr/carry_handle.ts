@@ -1,32 +1,32 @@
 /**
- * A handle that the gaze carries, where there is no button to hold: chosen once it follows the
- * gaze, and the next choice puts it down, by button or by letting the gaze rest.
+ * A handle that the gaze carries, for devices without a button to hold. Once chosen, the handle
+ * follows the gaze. The next choice puts it down, by a button or by a resting gaze.
  */
-import type { Hit, Met, RoomRay, Target } from "../interaction/ray_pointer";
+import type { Hit, SceneRay, Target, TargetHit } from "../interaction/ray_pointer";
 
-/** A gaze that stays within this angle of its first direction rests, radians. */
+/** Radians. A gaze that stays within this angle of its first direction is resting. */
 const REST_RAD = (1.5 * Math.PI) / 180;
 
 export class GazeCarry implements Target {
-  /** While it is carried, nothing else is met. */
+  /** While a handle is carried, no other target can be hit. */
   readonly isOnTop = true;
   readonly layout = "carry";
-  private carried: Met | null = null;
-  /** Where the gaze has come to rest, and how often it has gone on. */
-  private rest: RoomRay | null = null;
+  private carried: TargetHit | null = null;
+  /** The gaze since which the head has rested, and the number of such rests so far. */
+  private rest: SceneRay | null = null;
   private rests = 0;
 
   get isCarrying(): boolean {
     return this.carried !== null;
   }
 
-  /** The name of what is carried; null: nothing is. */
+  /** The key of the carried handle, or null. */
   get key(): string | null {
     return this.carried?.key ?? null;
   }
 
-  take(met: Met): void {
-    this.carried = met;
+  take(hit: TargetHit): void {
+    this.carried = hit;
     this.rest = null;
   }
 
@@ -34,8 +34,8 @@ export class GazeCarry implements Target {
     this.carried = null;
   }
 
-  /** It is as far away as it was when it was taken. */
-  meet(): Hit | null {
+  /** The carried handle, at the distance at which it was picked up. */
+  intersect(): Hit | null {
     if (this.carried === null) return null;
     return { key: `carry:${this.rests}`, distance_m: this.carried.distance_m };
   }
@@ -44,8 +44,8 @@ export class GazeCarry implements Target {
     this.drop();
   }
 
-  /** True if the handle was dragged. */
-  follow(gaze: RoomRay): boolean {
+  /** Drags the carried handle along the gaze. Returns whether a handle was dragged. */
+  follow(gaze: SceneRay): boolean {
     const { carried, rest } = this;
     if (carried?.key == null) return false;
     if (rest === null || rest.direction.angleTo(gaze.direction) > REST_RAD) {

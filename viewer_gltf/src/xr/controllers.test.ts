@@ -2,14 +2,14 @@ import { CylinderGeometry, Mesh, MeshBasicMaterial } from "three";
 import { describe, expect, it } from "vitest";
 import { Controllers, Hand } from "./controllers";
 
-/** Only what a hand reads of its source. */
+/** A hand with only the given properties of its source. */
 function handOf(source: Partial<Record<keyof XRInputSource, unknown>>): Hand {
   const line = new Mesh(new CylinderGeometry(), new MeshBasicMaterial());
   return new Hand({ profiles: [], ...source } as unknown as XRInputSource, line);
 }
 
 describe("an input source", () => {
-  it("squeezes if its profiles have it; bare hands and one-button remotes don't", () => {
+  it("can squeeze if its profiles say so, but not as a bare hand or a one-button remote", () => {
     const profiles = ["meta-quest-touch-plus", "generic-trigger-squeeze-thumbstick"];
     expect(handOf({ profiles }).canSqueeze).toBe(true);
     const remote = ["oculus-go", "generic-trigger-touchpad"];
@@ -19,7 +19,7 @@ describe("an input source", () => {
     expect(handOf({ profiles, hand: {} }).canSqueeze).toBe(false);
   });
 
-  it("has a stick that rests at zero, or a touchpad", () => {
+  it("has a stick with a dead zone, or a touchpad", () => {
     const stick = (axes: number[]) => handOf({ gamepad: { mapping: "xr-standard", axes } }).stick;
     expect(stick([0, 0, 0.1, -0.8])).toEqual({ x: 0, y: -0.8 });
     expect(stick([0.5, 0])).toEqual({ x: 0.5, y: 0 });
@@ -27,7 +27,7 @@ describe("an input source", () => {
     expect(handOf({}).stick).toEqual({ x: 0, y: 0 });
   });
 
-  it("has no place of its own where it is a look or a screen", () => {
+  it("has no position of its own if it is a gaze or a screen", () => {
     const isTracked = (targetRayMode: string) => handOf({ targetRayMode }).isTracked;
     expect(["gaze", "screen"].map(isTracked)).toEqual([false, false]);
     expect(["tracked-pointer", "transient-pointer"].map(isTracked)).toEqual([true, true]);
@@ -35,7 +35,7 @@ describe("an input source", () => {
 });
 
 describe("a finger on a screen", () => {
-  /** A tap that points along -z from (1, 2, 3), in a session of such a screen. */
+  /** A tap that points along -z from (1, 2, 3), in a session with this interaction mode. */
   function rayOfTap(interactionMode: XRInteractionMode) {
     const session = Object.assign(new EventTarget(), { interactionMode, inputSources: [] });
     const controllers = new Controllers();
@@ -48,13 +48,13 @@ describe("a finger on a screen", () => {
     return event.ray;
   }
 
-  it("points at what it touches where the phone is held in a hand", () => {
+  it("points at the touched place if the phone is held in a hand", () => {
     const ray = rayOfTap("screen-space");
     expect(ray?.origin.toArray()).toEqual([1, 2, 3]);
     expect(ray?.direction.toArray()).toEqual([0, 0, -1]);
   });
 
-  it("is the button of a phone in a viewer, which points as the head does", () => {
+  it("is a button if the phone is in a Cardboard viewer, and points with the head", () => {
     expect(rayOfTap("world-space")).toBeNull();
   });
 });

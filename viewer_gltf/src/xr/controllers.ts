@@ -1,6 +1,7 @@
 /**
- * The input sources of a WebXR session: where each hand points and holds, and which buttons were
- * pressed. Sources without a place of their own (Cardboard's button, a look) point as the head does.
+ * The input sources of a WebXR session: where each hand is and points, and which buttons were
+ * pressed. Sources without a position of their own (a Cardboard's button, a gaze) point with the
+ * head.
  */
 import {
   CylinderGeometry,
@@ -11,16 +12,19 @@ import {
   Quaternion,
   Vector3,
 } from "three";
-import { leaveUncut } from "../gpu/unclipped_material";
-import type { RoomRay } from "../interaction/ray_pointer";
+import { keepUnclipped } from "../gpu/unclipped_material";
+import type { SceneRay } from "../interaction/ray_pointer";
 import type { HandPose } from "../math/grab";
 
-/** `press` and `release` are of the trigger held, `select` is the trigger used. */
+/**
+ * `press` and `release` are the start and end of holding the trigger; `select` is a completed
+ * press.
+ */
 export type HandEvent = Readonly<{
   kind: "press" | "select" | "release" | "squeeze" | "let-go";
   source: XRInputSource;
-  /** At the time of the event; null: as the gaze. */
-  ray: RoomRay | null;
+  /** Ray at the time of the event; null: use the gaze. */
+  ray: SceneRay | null;
   time_ms: number;
 }>;
 
@@ -32,20 +36,21 @@ const KINDS = {
   squeezeend: "let-go",
 } as const;
 
-/** Of a thumbstick or touchpad, -1..1: to the right, and towards the body. */
+/** Position of a thumbstick or touchpad, -1 to 1: x to the right, y towards the body. */
 export type Stick = Readonly<{ x: number; y: number }>;
 const AT_REST: Stick = { x: 0, y: 0 };
-/** Dead zone of a stick, as a share of its way: sticks never rest at zero. */
-const DEAD = 0.15;
+/** Dead zone of a stick, as a share of its range: sticks do not rest exactly at zero. */
+const DEAD_ZONE = 0.15;
 
+/** Radius of a drawn ray, metres. */
 const LINE_RADIUS_M = 0.0012;
-/** Length of a ray that meets nothing, m. */
+/** Metres. Drawn length of a ray that hits nothing. */
 const LINE_M = 1.5;
 
 export class Hand {
-  /** null: the gaze's, or it is not tracked now. */
-  ray: RoomRay | null = null;
-  /** Where it holds things; null: not known now. */
+  /** Null if the source points with the gaze, or is not tracked now. */
+  ray: SceneRay | null = null;
+  /** Pose of the hand's grip; null if it is not tracked now. */
   pose: HandPose | null = null;
 
   constructor(
@@ -53,13 +58,16 @@ export class Hand {
     readonly line: Mesh<CylinderGeometry, MeshBasicMaterial>,
   ) {}
 
-  /** Whether it has a place in the room, other than the head's. */
+  /** Whether the source has a position in the scene other than the head's. */
   get isTracked(): boolean {
     const { targetRayMode } = this.source;
     return targetRayMode === "tracked-pointer" || targetRayMode === "transient-pointer";
   }
 
-  /** Profiles name what a controller has; one that names nothing is taken by its buttons. */
+  /**
+   * Whether the source has a squeeze button, from its profiles; if no profile is generic, from its
+   * buttons.
+   */
   get canSqueeze(): boolean {
     const { profiles, gamepad, hand } = this.source;
     if (hand) return false;
@@ -73,13 +81,13 @@ export class Hand {
     if (gamepad?.mapping !== "xr-standard") return AT_REST;
     const { axes } = gamepad;
     const [x = 0, y = 0] = axes.length >= 4 ? [axes[2], axes[3]] : axes;
-    const live = (v: number) => (Math.abs(v) < DEAD ? 0 : v);
+    const live = (v: number) => (Math.abs(v) < DEAD_ZONE ? 0 : v);
     return { x: live(x), y: live(y) };
   }
 }
 
 export class Controllers {
-  /** The rays, to be seen. */
+  /** The drawn rays. */
   readonly group = new Group();
   hands: readonly Hand[] = [];
   private readonly tube = lineGeometry();
@@ -117,7 +125,7 @@ export class Controllers {
     this.hands = [];
   }
 
-  /** Read where the hands are. Once a frame, before anything that asks for it. */
+  /** Reads the poses of the hands. Call it once a frame, before any other method reads them. */
   update(frame: XRFrame | null, space: XRReferenceSpace | null): void {
     this.space = space;
     const sources = this.session === null ? [] : [...this.session.inputSources];
@@ -134,12 +142,12 @@ export class Controllers {
     }
   }
 
-  /** The buttons that were pressed since the last call. */
+  /** Returns and removes the events since the last call. */
   take(): readonly HandEvent[] {
     return this.events.splice(0);
   }
 
-  /** Draw a hand's ray up to what it meets. */
+  /** Draws a hand's ray up to the target that it hits. */
   draw(hand: Hand, distance_m: number | null): void {
     hand.line.visible = hand.ray !== null;
     if (hand.ray === null) return;
@@ -156,18 +164,18 @@ export class Controllers {
 
   private add(source: XRInputSource): void {
     const material = new MeshBasicMaterial({ color: 0x9fb4d0, toneMapped: false });
-    material.transparent = true; // so that it is drawn after the panel, to which it leads
+    material.transparent = true; // sorts the ray after the panel at which it points
     const line = new Mesh(this.tube, material);
     line.renderOrder = RENDER_ORDER;
     line.visible = false;
-    leaveUncut(line);
+    keepUnclipped(line);
     this.group.add(line);
     this.hands = [...this.hands, new Hand(source, line)];
   }
 
   private drop({ line }: Hand): void {
     line.removeFromParent();
-    line.material.dispose(); // the geometry is everybody's
+    line.material.dispose(); // all hands share the geometry
   }
 
   private follow(hand: Hand, frame: XRFrame): void {
@@ -181,9 +189,9 @@ export class Controllers {
     hand.pose = { position, orientation };
   }
 
-  private rayOf(source: XRInputSource, frame: XRFrame): RoomRay | null {
+  private rayOf(source: XRInputSource, frame: XRFrame): SceneRay | null {
     if (source.targetRayMode === "gaze") return null;
-    // a finger on the one picture of a handheld screen points; in a Cardboard it is the button
+    // On a handheld screen a finger points. In a Cardboard viewer a touch is the button.
     const isHandheld = this.session?.interactionMode === "screen-space";
     if (source.targetRayMode === "screen" && !isHandheld) return null;
     const pose = matrixOf(frame, source.targetRaySpace, this.space);
@@ -195,17 +203,17 @@ export class Controllers {
   }
 }
 
-/** Over the panel, under notices and the ring. */
+/** Draw order: after the panel, before notices and the dwell ring. */
 const RENDER_ORDER = 1850;
 const FORWARD = new Vector3(0, 0, -1);
 
-/** null: the headset doesn't know. */
+/** Pose of a space in the session's space; null if the headset does not know it. */
 function matrixOf(frame: XRFrame, of: XRSpace, space: XRReferenceSpace | null): Matrix4 | null {
   const pose = space === null ? undefined : frame.getPose(of, space);
   return pose ? new Matrix4().fromArray(pose.transform.matrix) : null;
 }
 
-/** From the origin one metre along -z. */
+/** A tube from the origin to one metre along -z. */
 function lineGeometry(): CylinderGeometry {
   const tube = new CylinderGeometry(LINE_RADIUS_M, LINE_RADIUS_M, 1, 6, 1, true);
   tube.rotateX(Math.PI / 2);

@@ -1,15 +1,15 @@
 /**
- * How many gazes each task of the first paper's figure 3 takes by gaze alone, from the specimen before the eyes.
- * STEREOCELL_GAZES_TABLE names a file for the table of gazes.
+ * Counts how many gazes each task of the first paper's figure 3 takes by gaze alone, with the
+ * specimen in front of the user. STEREOCELL_GAZES_TABLE names a file for the table of counts.
  */
 import { afterAll, describe, expect, it } from "vitest";
 import { writeTable } from "../../test/support/table";
 import { LookingPerson } from "../../test/support/xr/looking_person";
 
-/** Looks from a level gaze, each until its ring is full; a last one, if any, only for a moment. */
+/** Gazes that start from a level view, each held until the dwell ring is full. */
 type Task = Readonly<{
   gazes: readonly string[];
-  /** A look of half a second on the way, which no ring follows. */
+  /** A control that is looked at for half a second on the way, without a dwell ring. */
   glance?: string;
   isDone: (person: LookingPerson, before: LookingPerson["state"]) => boolean;
 }>;
@@ -73,13 +73,13 @@ describe("a task by gaze alone", () => {
   });
 });
 
-describe("the undoing of a choice", () => {
+describe("undoing a choice", () => {
   const undo = (person: LookingPerson) => {
     person.lookAt("undo-choice");
     person.rest(DWELL_S);
   };
 
-  it("is offered for four seconds, and brings back state and place", () => {
+  it("is offered for four seconds, and restores the state and the pose of the specimen", () => {
     const person = new LookingPerson(4);
     const { state } = person;
     person.lookAt("bar-volumes");
@@ -99,7 +99,7 @@ describe("the undoing of a choice", () => {
     expect(person.hasMoved).toBe(false);
   });
 
-  it("is gone after that, and for a choice that has changed nothing", () => {
+  it("is not offered later, nor for a choice that changed nothing", () => {
     const person = new LookingPerson(4);
     person.lookAt("bar-volumes");
     person.rest(DWELL_S);
@@ -112,7 +112,7 @@ describe("the undoing of a choice", () => {
     expect(person.has("undo-choice")).toBe(false);
   });
 
-  it("brings back the tile that a resting gaze has chosen", () => {
+  it("restores the tile that was chosen before a resting gaze", () => {
     const person = new LookingPerson(4);
     person.lookAtTile("tile:r0_c1");
     person.rest(DWELL_S);
@@ -122,7 +122,7 @@ describe("the undoing of a choice", () => {
   });
 });
 
-describe("the scene under a gaze that rests", () => {
+describe("the scene under a resting gaze", () => {
   it("chooses no tile when stereo begins with the gaze on one", () => {
     const person = new LookingPerson(4);
     person.lookAtTile("tile:r0_c1");
@@ -132,7 +132,7 @@ describe("the scene under a gaze that rests", () => {
     expect(person.state.selected).toBeNull();
   });
 
-  it("chooses one tile, once, however long the gaze stays", () => {
+  it("chooses one tile once, even if the gaze stays longer", () => {
     const person = new LookingPerson(4);
     person.lookAtTile("tile:r0_c1");
     person.changes = 0;
@@ -141,7 +141,7 @@ describe("the scene under a gaze that rests", () => {
     expect(person.changes).toBe(1);
   });
 
-  it("chooses no tile that has come under the gaze because the specimen has turned", () => {
+  it("does not choose a tile that came under the gaze because the specimen turned", () => {
     const person = new LookingPerson(4);
     person.lookAtTile("tile:r0_c1");
     person.rest(1);

@@ -1,12 +1,14 @@
-/** Buttons, hands and fingers that hold something: a control that goes on, a handle, the specimen. */
+/**
+ * Buttons, hands and fingers that hold something: a repeating control, a handle, or the specimen.
+ */
 import type { Vector3 } from "three";
 import {
-  type Met,
-  meetFirst,
+  firstHit,
   type Pointer,
   pointOn,
-  type RoomRay,
+  type SceneRay,
   type Target,
+  type TargetHit,
 } from "../interaction/ray_pointer";
 import { TILE, type TileTarget } from "../interaction/tile_target";
 import type { HandPose } from "../math/grab";
@@ -23,25 +25,30 @@ import {
 } from "./hold_specimen";
 import type { SpecimenMover } from "./specimen_mover";
 
-/** Without a squeeze button, a trigger holds the specimen after this time, s, or this way, m. */
+/** Without a squeeze button, a trigger holds the specimen after this time, s, or this motion, m. */
 const HOLD_S = 0.35;
 const HOLD_M = 0.02;
-/** Time for which a Cardboard's button is held before the head holds the specimen by it, s: a thumb is slow. */
+/**
+ * Seconds that a Cardboard's button is held before the head holds the specimen: longer than HOLD_S,
+ * since a thumb is slow.
+ */
 const HEAD_HOLD_S = 0.6;
 
-/** A trigger that is down. */
 type Press = {
-  /** Where it went down. */
-  readonly met: Met | null;
+  /** The target at which it was pressed, and the place of the hand. */
+  readonly hit: TargetHit | null;
   readonly at: Vector3 | null;
   elapsed_s: number;
-  /** It drags or holds something: letting go of it chooses nothing. */
+  /** True once the press drags or holds something: then its release chooses nothing. */
   isUsed: boolean;
 };
 
-/** `source`: of the button that is held; null: the gaze stays. */
-type GoesOn = {
-  readonly met: Met;
+/**
+ * A control that repeats its command. `source`: the button that is held; null: the gaze rests on
+ * it.
+ */
+type Repeating = {
+  readonly hit: TargetHit;
   readonly source: XRInputSource | "finger" | null;
   elapsed_s: number;
 };
@@ -55,23 +62,24 @@ export type GripOptions = Readonly<{
   mover: SpecimenMover;
   tiles: TileTarget;
   /** The gaze, and the targets that can be chosen now. */
-  aim: () => Readonly<{ gaze: RoomRay; free: readonly Target[] }>;
-  /** Moves the specimen by a share of a command's step. */
+  aim: () => Readonly<{ gaze: SceneRay; choosable: readonly Target[] }>;
+  /** Moves the specimen by a share of a command's step, and returns whether it moved. */
   run: (command: Command, state: ViewerState, share: number) => boolean;
-  onPress: (ray: RoomRay, time_ms: number) => void;
+  onPress: (ray: SceneRay, time_ms: number) => void;
   onTap: (time_ms: number) => void;
 }>;
 
 export class Grips {
   private readonly presses = new Map<XRInputSource, Press>();
-  /** The hands that hold the specimen, and their places in the frame before. */
+  /** The hands that hold the specimen, and their poses in the last frame. */
   private held = new Map<XRInputSource, HandPose | null>();
-  /** A finger that rests on the split screen; `met`: what was gazed at when it came. */
-  private touched: { met: Met | null; isUsed: boolean; elapsed_s: number } | null = null;
-  /** The head holds the specimen by a button that is down. */
+  /**
+   * A finger that rests on the split screen; `hit`: the target under the gaze when it went down.
+   */
+  private touched: { hit: TargetHit | null; isUsed: boolean; elapsed_s: number } | null = null;
+  /** Set while the head holds the specimen because a button is held. */
   headHold: HeadHold | null = null;
-  /** What is gone on with. */
-  private goesOn: GoesOn | null = null;
+  private repeating: Repeating | null = null;
   private readonly mover: SpecimenMover;
   private readonly pointer: Pointer;
 
@@ -84,9 +92,8 @@ export class Grips {
     return this.held.size > 0;
   }
 
-  /** Whether a control goes on. */
-  get isGoingOn(): boolean {
-    return this.goesOn !== null;
+  get isRepeating(): boolean {
+    return this.repeating !== null;
   }
 
   get tracked(): readonly Hand[] {
@@ -97,17 +104,16 @@ export class Grips {
     return this.options.aim();
   }
 
-  /** A gaze that stays goes on with a control that it has chosen. */
-  goOnWith(met: Met): void {
-    if (met.repeats !== undefined) this.goesOn = { met, source: null, elapsed_s: 0 };
+  /** Repeats a control's command while the gaze rests on it. */
+  startRepeating(hit: TargetHit): void {
+    if (hit.repeats !== undefined) this.repeating = { hit, source: null, elapsed_s: 0 };
   }
 
-  /** Lets go of everything. */
   drop(): void {
     this.presses.clear();
     this.held.clear();
     this.touched = null;
-    this.goesOn = null;
+    this.repeating = null;
     this.headHold = null;
   }
 
@@ -137,26 +143,30 @@ export class Grips {
     }
   }
 
-  private begin(source: XRInputSource, ray: RoomRay | null, time_ms: number): Press {
-    const met = meetFirst(ray ?? this.aim.gaze, this.aim.free);
-    // A tap takes up a handle and another puts it down; nobody's thumb holds a Cardboard's button.
-    const isUsed = met?.hold === "slide" || (met?.hold === "carry" && ray !== null);
-    if (met !== null && isUsed && this.pointer.press(met, this.aim.free, time_ms)) {
-      met.target.choose(met, met.ray, false);
+  private begin(source: XRInputSource, ray: SceneRay | null, time_ms: number): Press {
+    const hit = firstHit(ray ?? this.aim.gaze, this.aim.choosable);
+    // A Cardboard's button can't be held for long: one tap picks up a handle, and the next puts it
+    // down.
+    const isUsed = hit?.hold === "slide" || (hit?.hold === "carry" && ray !== null);
+    if (hit !== null && isUsed && this.pointer.press(hit, this.aim.choosable, time_ms)) {
+      hit.target.choose(hit, hit.ray, false);
     }
-    if (met?.repeats !== undefined) this.goesOn = { met, source, elapsed_s: 0 };
+    if (hit?.repeats !== undefined) this.repeating = { hit, source, elapsed_s: 0 };
     const at = this.handOf(source)?.pose?.position ?? null;
-    return { met, at, elapsed_s: 0, isUsed };
+    return { hit, at, elapsed_s: 0, isUsed };
   }
 
-  /** What fingers on the split screen have done since the frame before; whether anything has moved. */
+  /**
+   * Applies the gestures on the split screen since the last frame. Returns whether the specimen
+   * moved.
+   */
   followFingers(gestures: readonly TimedGesture[], state: ViewerState): boolean {
     const before = this.mover.pose;
     for (const [gesture, time_ms] of gestures) {
       if (gesture.kind === "press") {
-        const met = meetFirst(this.aim.gaze, this.aim.free);
-        this.touched = { met, isUsed: false, elapsed_s: 0 };
-        if (met?.repeats !== undefined) this.goesOn = { met, source: "finger", elapsed_s: 0 };
+        const hit = firstHit(this.aim.gaze, this.aim.choosable);
+        this.touched = { hit, isUsed: false, elapsed_s: 0 };
+        if (hit?.repeats !== undefined) this.repeating = { hit, source: "finger", elapsed_s: 0 };
       } else if (gesture.kind === "release") this.touched = null;
       else if (gesture.kind === "tap") {
         if (this.touched?.isUsed === false) this.options.onTap(time_ms);
@@ -167,8 +177,8 @@ export class Grips {
     return this.mover.pose !== before;
   }
 
-  /** Input sources come and go, also while they hold something. */
-  forgetTheLost(): void {
+  /** Forgets input sources that have disconnected, even while they held something. */
+  forgetLostSources(): void {
     for (const map of [this.presses, this.held]) {
       for (const source of [...map.keys()]) {
         if (this.handOf(source) === undefined) map.delete(source);
@@ -176,25 +186,25 @@ export class Grips {
     }
   }
 
-  /** What the buttons that are down drag and hold; whether anything has moved. */
+  /** Drags and holds with the buttons that are down. Returns whether the specimen moved. */
   hold(dt_s: number): boolean {
     for (const [source, press] of this.presses) this.advance(source, press, dt_s);
     const now = new Map([...this.held.keys()].map((key) => [key, this.handOf(key)?.pose ?? null]));
     const pose = moveByHolders(this.mover.pose, this.held, now);
     this.held = now;
-    return this.mover.to(pose, this.aim.gaze.origin);
+    return this.mover.moveTo(pose, this.aim.gaze.origin);
   }
 
   private advance(source: XRInputSource, press: Press, dt_s: number): void {
     const hand = this.handOf(source);
     press.elapsed_s += dt_s;
-    const { met } = press;
-    if (met?.key == null) return;
-    if (met.hold !== undefined) {
-      if (press.isUsed) met.target.drag?.(met.key, hand?.ray ?? this.aim.gaze);
+    const { hit } = press;
+    if (hit?.key == null) return;
+    if (hit.hold !== undefined) {
+      if (press.isUsed) hit.target.drag?.(hit.key, hand?.ray ?? this.aim.gaze);
       return;
     }
-    const mayHold = hand?.pose && !hand.canSqueeze && met.key.startsWith(TILE);
+    const mayHold = hand?.pose && !hand.canSqueeze && hit.key.startsWith(TILE);
     if (press.isUsed || !mayHold || !hand?.pose) return;
     const isFar = press.at !== null && press.at.distanceTo(hand.pose.position) > HOLD_M;
     if (!isFar && press.elapsed_s < HOLD_S) return;
@@ -202,45 +212,52 @@ export class Grips {
     this.held.set(source, null);
   }
 
-  /** What was chosen by a gaze that stays, or a button that is held, goes on; whether it has moved. */
-  goOn(dt_s: number, state: ViewerState): boolean {
-    const { goesOn } = this;
-    if (goesOn === null) return false;
-    const { met, source } = goesOn;
+  /**
+   * Repeats the command of a control while it is gazed at or held. Returns whether the specimen
+   * moved.
+   */
+  repeat(dt_s: number, state: ViewerState): boolean {
+    const { repeating } = this;
+    if (repeating === null) return false;
+    const { hit, source } = repeating;
     const press = typeof source === "object" ? source && this.presses.get(source) : this.touched;
     const isHeld = source === null || press != null;
     const ray = (typeof source === "object" && source && this.handOf(source)?.ray) || this.aim.gaze;
-    if (!isHeld || meetFirst(ray, this.aim.free)?.key !== met.key || met.repeats === undefined) {
-      this.goesOn = null;
+    if (
+      !isHeld ||
+      firstHit(ray, this.aim.choosable)?.key !== hit.key ||
+      hit.repeats === undefined
+    ) {
+      this.repeating = null;
       return false;
     }
-    goesOn.elapsed_s += dt_s;
-    if (goesOn.elapsed_s < HOLD_S) return false;
-    if (press != null) press.isUsed = true; // letting go of it is no further step
-    return this.options.run(met.repeats, state, STEPS_PER_S * dt_s);
+    repeating.elapsed_s += dt_s;
+    if (repeating.elapsed_s < HOLD_S) return false;
+    if (press != null) press.isUsed = true; // so its release does not count as another step
+    return this.options.run(hit.repeats, state, STEPS_PER_S * dt_s);
   }
 
   /**
-   * A button that is held where no control is takes the specimen along with the head, if no hand is there to
-   * do it; whether it has moved.
+   * Moves the specimen with the head while a button is held outside the controls and no hand is
+   * tracked. Returns whether the specimen moved.
    */
   followHead(dt_s: number, state: ViewerState): boolean {
     if (this.touched !== null) this.touched.elapsed_s += dt_s;
     const handless = [...this.presses].filter(([source]) => this.handOf(source)?.pose == null);
     const press = [this.touched, ...handless.map(([, each]) => each)].find(
-      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.met)),
+      (each) => each != null && (each.isUsed ? this.headHold !== null : mayFollow(each.hit)),
     );
     if (press == null || press.elapsed_s < HEAD_HOLD_S) {
       this.headHold = null;
       return false;
     }
     const { gaze } = this.aim;
-    press.isUsed = true; // letting go of it chooses nothing
+    press.isUsed = true; // so its release chooses nothing
     if (this.headHold === null) {
       this.headHold = this.mover.holdBy(gaze, state);
       return false;
     }
-    this.mover.to(moveByHead(this.headHold, gaze), gaze.origin);
+    this.mover.moveTo(moveByHead(this.headHold, gaze), gaze.origin);
     return true;
   }
 
@@ -249,19 +266,22 @@ export class Grips {
     let { pose } = this.mover;
     for (const { stick, ray } of this.tracked) {
       if (stick.x === 0 && stick.y === 0) continue;
-      const met = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
-      pose = moveByStick(pose, stick, met ?? this.mover.middle(state), dt_s);
+      const hit = this.tileAlong(ray) ?? this.tileAlong(this.aim.gaze);
+      pose = moveByStick(pose, stick, hit ?? this.mover.middle(state), dt_s);
     }
-    return this.mover.to(pose, this.aim.gaze.origin);
+    return this.mover.moveTo(pose, this.aim.gaze.origin);
   }
 
-  private tileAlong(ray: RoomRay | null): Vector3 | null {
-    const hit = ray && this.options.tiles.meet(ray);
+  private tileAlong(ray: SceneRay | null): Vector3 | null {
+    const hit = ray && this.options.tiles.intersect(ray);
     return hit && pointOn({ ...hit, ray });
   }
 }
 
-/** Of what was met when the button went down: a control has its own use for it. */
-function mayFollow(met: Met | null): boolean {
-  return met === null || met.key?.startsWith(TILE) === true;
+/**
+ * Whether the head may hold the specimen by a button that was pressed on this target: controls use
+ * the button themselves.
+ */
+function mayFollow(hit: TargetHit | null): boolean {
+  return hit === null || hit.key?.startsWith(TILE) === true;
 }

@@ -1,17 +1,18 @@
 /**
- * A faint grid on the ground of the dark room in stereo: a head that turns or tilts sees by it that the room stays.
- * It fades out towards the horizon, and is before nothing.
+ * A faint grid on the ground of the dark scene in stereo. A user who turns or tilts the head sees
+ * by it that the scene stands still. The grid fades towards the horizon and is drawn behind
+ * everything.
  */
 import { BufferAttribute, BufferGeometry, Color, LineBasicMaterial, LineSegments } from "three";
 
-/** Height under the eyes as stereo begins, m: about that of a standing user. */
+/** Metres below the eyes when stereo begins: about the height of a standing user's eyes. */
 const UNDER_EYES_M = 1.45;
-/** Distance between two lines, and from the middle to the farthest line, m. */
+/** Metres between two lines, and from the middle to the farthest line. */
 const STEP_M = 0.75;
 const REACH_M = 9;
 const COLOR = new Color(0x5a6f96);
 const OPACITY = 0.55;
-/** The ground is drawn before everything else, which then covers it. */
+/** The ground is drawn first, so that everything else covers it. */
 const RENDER_ORDER = -1;
 
 export class Ground {
@@ -31,7 +32,7 @@ export class Ground {
     this.lines.visible = false;
   }
 
-  /** @param isShown false in the user's own room, which has a ground */
+  /** @param isShown false in augmented reality, where the user's own room has a ground */
   show(isShown: boolean): void {
     this.lines.visible = isShown;
   }
@@ -43,7 +44,7 @@ export class Ground {
   }
 }
 
-/** Lines along x and along z, in pieces, each end as opaque as it is near. */
+/** Lines along x and z in pieces; the opacity of each end falls with its distance. */
 function grid(): BufferGeometry {
   const count = Math.round(REACH_M / STEP_M);
   const steps = Array.from({ length: 2 * count + 1 }, (_, i) => (i - count) * STEP_M);

@@ -1,4 +1,3 @@
-/** Options of the hands in stereo. */
 import type { Scene, WebXRManager } from "three";
 import type { Target } from "../interaction/ray_pointer";
 import type { BoxedTile } from "../math/pick";
@@ -13,21 +12,24 @@ export type HandsOptions = Readonly<{
   scene: Scene;
   specimen: Specimen;
   tiles: readonly BoxedTile[];
-  /** Targets between the panel and the tiles that can be dragged, such as a cut's handles. */
+  /** Draggable targets between the panel and the tiles, such as the handles of a clip plane. */
   handles?: () => readonly Target[];
   buildPanel: (view: PanelView) => Layout;
   onAction: (action: Action) => void;
   onCommand: (command: Command) => void;
-  /** A tile was chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen. */
+  /**
+   * Called when a tile is chosen by dwell (`isByGaze`) or button; the ray is in um of the specimen.
+   */
   onChoose: (ray: Ray, tile: string, isByGaze: boolean) => void;
-  /** The object along a ray in um of the specimen: its name, and where; null: none. Absent: there are none. */
+  /**
+   * Returns the name and distance of the object along a ray in um of the specimen, or null. Absent
+   * if there are no objects.
+   */
   objectAlong?: (ray: Ray) => Readonly<{ id: string; distance: number }> | null;
-  /** The user asks to leave stereo. */
   onLeave: () => void;
-  /** The user has chosen another lens profile. */
   onLenses?: (lenses: Lenses) => void;
-  /** Absent: true. False: panel and notices are not painted, as in a program without a screen. */
+  /** False: panel and notices are not drawn, as in tests without a screen. Absent: true. */
   isPainted?: boolean;
-  /** The clock of the page's events, ms; absent: the page's own. */
+  /** Clock of the page's events, ms; absent: the page's own. */
   now_ms?: () => number;
 }>;

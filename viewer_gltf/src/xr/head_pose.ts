@@ -1,6 +1,6 @@
 /**
- * Where the head is: between its eyes. three 0.187 leaves the camera of a session at the left eye,
- * from which a gaze would be 1.8 degrees beside what both eyes look at, one metre away.
+ * The pose of the head, between its eyes. three.js 0.187 leaves a session's camera at the left eye.
+ * A gaze from there would be off by 1.8 degrees at one metre.
  */
 import { Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 
@@ -8,7 +8,10 @@ type Eye = Pick<Object3D, "matrixWorld">;
 
 const [position, turn, size] = [new Vector3(), new Quaternion(), new Vector3()];
 
-/** @param head is set; displays may be turned outwards, each by as much */
+/**
+ * Returns the pose midway between the eyes, written to `head`. Displays that are turned outwards
+ * must be turned by the same angle.
+ */
 export function betweenEyes(eyes: readonly Eye[], head = new Matrix4()): Matrix4 {
   const [left, right] = eyes;
   if (left === undefined) return head.identity();
@@ -21,7 +24,10 @@ export function betweenEyes(eyes: readonly Eye[], head = new Matrix4()): Matrix4
 
 const ONE = new Vector3(1, 1, 1);
 
-/** The point so far ahead of the head, at its height, wherever up or down it looks. */
+/**
+ * The point at this distance in front of the head and at its height, even if the head looks up or
+ * down.
+ */
 export function ahead(head: Matrix4, distance_m: number): Vector3 {
   const eye = new Vector3().setFromMatrixPosition(head);
   const gaze = new Vector3(0, 0, -1).transformDirection(head).setY(0);

@@ -26,7 +26,7 @@ const hand = (x: number, y: number, z: number): HandPose => ({
 });
 
 describe("hands that hold", () => {
-  it("carry by exactly their motion", () => {
+  it("carry the specimen by exactly their motion", () => {
     const before = new Map([["right", hand(0.2, 0, -0.3)]]);
     const after = new Map([["right", hand(0.3, 0.05, -0.5)]]);
     const { position, scale } = moveByHolders(START, before, after);
@@ -34,7 +34,7 @@ describe("hands that hold", () => {
     expect(scale).toBe(1);
   });
 
-  it("scale by the ratio of their distances", () => {
+  it("scale the specimen by the ratio of their distances", () => {
     const before = new Map([
       ["l", hand(-0.1, 0, -0.3)],
       ["r", hand(0.1, 0, -0.3)],
@@ -46,7 +46,7 @@ describe("hands that hold", () => {
     expect(moveByHolders(START, before, after).scale).toBeCloseTo(2, 12);
   });
 
-  it("move nothing in the frame in which they take hold, nor while they are lost", () => {
+  it("move nothing in their first frame, nor while tracking is lost", () => {
     const here = new Map([["right", hand(0, 0, 0)]]);
     expect(moveByHolders(START, new Map(), here)).toBe(START);
     expect(moveByHolders(START, new Map([["right", null]]), here)).toBe(START);
@@ -55,7 +55,7 @@ describe("hands that hold", () => {
 });
 
 describe("a stick", () => {
-  it("zooms about the point it is given", () => {
+  it("zooms about the given point", () => {
     const pivot = new Vector3(0, 0, -1);
     const { position, scale } = moveByStick(START, { x: 0, y: -1 }, pivot, 1);
     expect(scale).toBeCloseTo(2.5, 12);
@@ -82,7 +82,7 @@ describe("a command", () => {
     return pose.position.clone().sub(START.position);
   };
 
-  it("brings the side that it names to face the viewer, however it was turned", () => {
+  it("turns the named side to the user, from any pose", () => {
     const tilted = moveByStick(START, { x: 0.7, y: 0 }, pivot, 1);
     for (const [command, axis] of [
       ["front", new Vector3(0, 0, 1)],
@@ -95,37 +95,37 @@ describe("a command", () => {
     }
   });
 
-  it("comes nearer without growing, turns by a step, or is another's", () => {
+  it("moves the specimen nearer without scaling, turns it by a step, or is not handled", () => {
     expect(moveByCommand(START, "zoom-in", pivot, eye)?.scale).toBe(1);
     expect(moved("zoom-in").distanceTo(new Vector3(0, 0, 0.2 * 1.4))).toBeLessThan(1e-12);
     expect(moved("zoom-out").distanceTo(new Vector3(0, 0, -0.25 * 1.4))).toBeLessThan(1e-12);
     const left = moveByCommand(START, "turn-left", pivot, eye);
     expect(left?.orientation.angleTo(new Quaternion())).toBeCloseTo(Math.PI / 12, 12);
     expect(turned(new Vector3(0, 0, 1), left).x).toBeGreaterThan(0);
-    expect(moved("pan-left").toArray()).toEqual([0.1, 0, 0]); // as if the viewer went to the left
+    expect(moved("pan-left").toArray()).toEqual([0.1, 0, 0]); // as if the user moved to the left
     expect(moveByCommand(START, "share", pivot, eye)).toBeNull();
   });
 
-  it("stays before the eye, and in sight, however long it goes on", () => {
+  it("keeps the specimen between the nearest and the farthest distance when repeated", () => {
     const from = (distance: number): SpecimenPose => ({
       ...START,
       position: pivot.clone().setZ(-distance),
     });
-    const goOn = (pose: SpecimenPose, command: Command) => {
+    const repeat = (pose: SpecimenPose, command: Command) => {
       let next = pose;
       for (let i = 0; i < 200; i++) {
         next = moveByCommand(next, command, next.position, eye, 0.3) ?? next;
       }
       return next.position.distanceTo(eye);
     };
-    expect(goOn(from(1.4), "zoom-in")).toBeCloseTo(0.1, 9);
-    expect(goOn(from(1.4), "zoom-out")).toBeCloseTo(5, 9);
-    expect(goOn(from(0.04), "zoom-in")).toBeCloseTo(0.04, 9); // where hands put it: it does not jump
+    expect(repeat(from(1.4), "zoom-in")).toBeCloseTo(0.1, 9);
+    expect(repeat(from(1.4), "zoom-out")).toBeCloseTo(5, 9);
+    expect(repeat(from(0.04), "zoom-in")).toBeCloseTo(0.04, 9); // where hands put it: no jump
     const there = moveByCommand(from(0), "zoom-in", eye, eye);
     expect(there?.position.toArray().every(Number.isFinite)).toBe(true);
   });
 
-  it("goes on by parts of a step as far as by whole ones", () => {
+  it("moves as far by parts of a step as by whole steps", () => {
     const parts = (command: Command) => {
       let next = START;
       for (let i = 0; i < 10; i++) {
@@ -134,17 +134,17 @@ describe("a command", () => {
       }
       return next.position.clone().sub(START.position);
     };
-    // to the side it goes round the eye
+    // a sideways shift in parts curves around the eye, so it is left out here
     for (const command of ["zoom-in", "zoom-out", "pan-up"] as const) {
       expect(parts(command).distanceTo(moved(command)), command).toBeLessThan(1e-9);
     }
   });
 
-  it("means the left and the right of an eye that looks at it", () => {
-    const fromTheLeft = new Vector3(-1.2, 0.3, -1.4); // it looks along x
+  it("uses left and right as seen from the eye", () => {
+    const fromTheLeft = new Vector3(-1.2, 0.3, -1.4); // the eye looks along x
     expect(moved("pan-left", fromTheLeft).distanceTo(new Vector3(0, 0, 0.1))).toBeLessThan(1e-12);
     const up = moveByCommand(START, "turn-up", pivot, fromTheLeft);
-    const axis = new Vector3(0, 0, 1); // its right
+    const axis = new Vector3(0, 0, 1); // the eye's right
     expect(turned(axis, up).distanceTo(axis)).toBeLessThan(1e-12);
   });
 });
@@ -153,7 +153,7 @@ describe("fingers on the split screen", () => {
   const pivot = START.position;
   const eye = new Vector3();
 
-  it("turn what faces the viewer along with them, about its middle", () => {
+  it("turn the front of the specimen along with them, about its middle", () => {
     const right = moveByFingers(START, { kind: "drag", x: 0.25, y: 0 }, pivot, eye);
     const front = new Vector3(0, 0, 1).applyQuaternion(right.orientation);
     expect(front.x).toBeCloseTo(Math.SQRT1_2, 12); // a quarter of the height is 45 degrees
@@ -162,7 +162,7 @@ describe("fingers on the split screen", () => {
     expect(right.position.distanceTo(START.position)).toBeLessThan(1e-12);
   });
 
-  it("bring it nearer by pinching out, and shift it with their middle", () => {
+  it("bring the specimen nearer by pinching out, and shift it with their midpoint", () => {
     const near = moveByFingers(START, { kind: "pinch", factor: 2, x: 0, y: 0 }, pivot, eye);
     expect(near.position.distanceTo(new Vector3(0, 0, -0.75))).toBeLessThan(1e-12);
     expect(near.scale).toBe(1);
@@ -172,13 +172,13 @@ describe("fingers on the split screen", () => {
     expect(y).toBeCloseTo(-2 * x, 12);
   });
 
-  it("move nothing by a tap", () => {
+  it("do not move the specimen by a tap", () => {
     expect(moveByFingers(START, { kind: "tap" }, pivot, eye)).toBe(START);
   });
 });
 
-describe("the way to the specimen", () => {
-  it("leads through the switch distance: surfaces from afar, volumes when near", () => {
+describe("moving towards the specimen", () => {
+  it("crosses the volume distance: surfaces from afar, volumes when near", () => {
     const { specimen: about, tiles } = sampleManifest(1);
     const specimen = new Specimen(about.bounds_um);
     specimen.anchorAt(new Vector3(0, 0, -XR_DISTANCE_M));
@@ -207,7 +207,7 @@ describe("the way to the specimen", () => {
   });
 });
 
-describe("the head that holds the specimen by the button", () => {
+describe("a head that holds the specimen by the button", () => {
   const EYE = new Vector3(0, 1.6, 0);
   const gaze = (yaw_deg: number, pitch_deg: number, origin = EYE) => ({
     origin,
@@ -219,7 +219,7 @@ describe("the head that holds the specimen by the button", () => {
   const pose = { position: pivot.clone(), orientation: new Quaternion(), scale: 1 };
   const hold = { pose, pivot, gaze: gaze(0, 0) };
 
-  it("carries it round the eye, the same side to it", () => {
+  it("carries the specimen around the eye, with the same side facing it", () => {
     const { position, orientation, scale } = moveByHead(hold, gaze(90, 0));
     expect(position.toArray().map((v) => Number(v.toFixed(6)) + 0)).toEqual([-2, 1.6, 0]);
     const front = new Vector3(0, 0, 1).applyQuaternion(orientation);
@@ -227,7 +227,7 @@ describe("the head that holds the specimen by the button", () => {
     expect(scale).toBe(1);
   });
 
-  it("brings it nearer tilted down, and farther tilted up, within limits", () => {
+  it("brings the specimen nearer when tilted down and farther when tilted up, within limits", () => {
     const away = (pitch_deg: number) =>
       moveByHead(hold, gaze(0, pitch_deg)).position.distanceTo(EYE);
     expect(away(-12)).toBeCloseTo(1);
@@ -237,7 +237,7 @@ describe("the head that holds the specimen by the button", () => {
     expect(away(-80)).toBeCloseTo(0.1);
   });
 
-  it("takes hold where it was: nothing jumps", () => {
+  it("starts to hold without a jump", () => {
     const held = { ...hold, gaze: gaze(30, -20) };
     expect(moveByHead(held, gaze(30, -20)).position.distanceTo(pivot)).toBeLessThan(1e-9);
   });

@@ -1,4 +1,4 @@
-/** Hands that hold the specimen: one carries it, two carry, turn and scale it. Room, m. */
+/** Moves the specimen by hands, sticks, commands, fingers, or the head. Scene space, metres. */
 import { MathUtils, Quaternion, Vector3 } from "three";
 import {
   type HandPose,
@@ -13,32 +13,41 @@ import type { Stick } from "./controllers";
 
 const UP = new Vector3(0, 1, 0);
 const RIGHT = new Vector3(1, 0, 0);
+/** Degrees per second at full deflection of a stick. */
 const TURN_DEG_PER_S = 90;
+/** Scale factor per second at full deflection of a stick. */
 const ZOOM_PER_S = 2.5;
-/** One step of a turn, radians: as the keys move the camera on a flat screen. */
+/** Radians of one turning command; the same step as the keys use on a flat screen. */
 const STEP_RAD = Math.PI / 12;
+/** Factor of the distance for one zoom command. */
 const ZOOM = 0.8;
+/** Metres of one shifting command. */
 const STEP_M = 0.1;
-/** Turn by a finger that goes over the height of the screen, radians. */
+/** Radians turned by a finger that moves over the whole height of the screen. */
 const TURN_BY_FINGER_RAD = Math.PI;
-/** Height of an eye's picture as a multiple of the distance: a Cardboard shows 40 degrees up and down. */
+/**
+ * Height of an eye's image as a multiple of the distance: a Cardboard shows 40 degrees up and 40
+ * down.
+ */
 const HEIGHT_OF_VIEW = 2 * Math.tan(MathUtils.degToRad(40));
-/** So near and so far the middle of what is shown may come, m: no way in leads out at the back. */
+/**
+ * Limits of the distance from the eye to the specimen's middle, metres, so that moving nearer does
+ * not end behind the specimen.
+ */
 const NEAREST_M = 0.1;
 const FARTHEST_M = 5;
-/** So near to straight up or down a gaze carries the specimen no further, radians. */
+/** Radians. A gaze that carries the specimen stops at this angle from straight up or down. */
 const STEEPEST_RAD = MathUtils.degToRad(5);
-/** Tilt of a head that holds the specimen. */
+/** Radians of tilt by which a head halves or doubles the distance of the specimen that it holds. */
 const HALF_NEARER_RAD = MathUtils.degToRad(12);
-/** Steps in a second of a move that goes on. */
 export const STEPS_PER_S = 3;
 
-/** By holder: its pose now, null where tracking is lost. At most two count. */
+/** Pose of each holder, or null where tracking is lost. At most two holders count. */
 export type Holders<K> = ReadonlyMap<K, HandPose | null>;
 
 /**
- * The specimen after the hands have moved. A hand that has just taken hold, or is seen again,
- * moves nothing in its first frame.
+ * Returns the specimen's pose after the hands have moved. A hand that has just taken hold, or whose
+ * tracking has returned, moves nothing in its first frame.
  */
 export function moveByHolders<K>(
   pose: SpecimenPose,
@@ -56,7 +65,10 @@ export function moveByHolders<K>(
   return moveByTwoHands(pose, [first[0], second[0]], [first[1], second[1]]);
 }
 
-/** The stick to the side turns about the vertical through `pivot`, forward comes nearer. */
+/**
+ * Turns about the vertical through `pivot` by the stick's x, and zooms in when the stick is pushed
+ * forward.
+ */
 export function moveByStick(
   pose: SpecimenPose,
   { x, y }: Stick,
@@ -68,18 +80,20 @@ export function moveByStick(
   return zoomAbout(turnAbout(pose, turn, pivot), pivot, ZOOM_PER_S ** (-y * dt_s));
 }
 
-/** The side of the specimen that a view is named by faces the viewer. */
 const FACING: Readonly<Partial<Record<Command, Quaternion>>> = {
   front: new Quaternion(),
   side: about(UP, -Math.PI / 2),
   top: about(RIGHT, Math.PI / 2),
 };
-/** Whether a command turns the specimen at once, however far: the others go on by small steps. */
+/**
+ * Whether a command turns the specimen to a named side in one jump; other commands move by small
+ * steps.
+ */
 export function isFacing(command: Command): boolean {
   return FACING[command] !== undefined;
 }
 
-/** Where the camera would go to the left, the specimen turns to the right: about which axis. */
+/** Axis and angle by which the specimen turns: opposite to the turn of a camera. */
 const TURNS: Readonly<Partial<Record<Command, readonly [Vector3, number]>>> = {
   "turn-left": [UP, STEP_RAD],
   "turn-right": [UP, -STEP_RAD],
@@ -87,7 +101,7 @@ const TURNS: Readonly<Partial<Record<Command, readonly [Vector3, number]>>> = {
   "turn-down": [RIGHT, -STEP_RAD],
 };
 
-/** And to the right, where it would go to the left. */
+/** Shift of the specimen: opposite to that of a camera. */
 const SHIFTS: Readonly<Partial<Record<Command, Vector3>>> = {
   "pan-left": new Vector3(STEP_M, 0, 0),
   "pan-right": new Vector3(-STEP_M, 0, 0),
@@ -96,12 +110,12 @@ const SHIFTS: Readonly<Partial<Record<Command, Vector3>>> = {
 };
 
 /**
- * In stereo nobody moves the eyes but the head, so that what would move a camera moves the
- * specimen: about `pivot`, or along the line from the eye to it. It comes nearer, as to a camera, and
- * does not grow: so the distance at which volumes take over can be walked through. Left and right are
- * those of an eye that looks at the pivot. null: the command is another's.
+ * Applies a camera command to the specimen, because in stereo only the head moves the eyes.
+ * The specimen turns about `pivot`, or moves along the line from the eye to it. It comes nearer
+ * without growing, so that it crosses the distance at which volumes are shown. Left and right are
+ * as seen by an eye that looks at the pivot. Returns null if the command is not one of these.
  *
- * @param share of a step
+ * @param share share of a step
  */
 export function moveByCommand(
   pose: SpecimenPose,
@@ -128,8 +142,9 @@ export function moveByCommand(
 }
 
 /**
- * One finger turns the specimen about `pivot`, two bring it nearer and shift it with their middle.
- * It follows the fingers: what lies under one in each eye's picture goes with it.
+ * One finger turns the specimen about `pivot`; two bring it nearer and shift it with their
+ * midpoint. The shift follows the fingers: the point under a finger in the eye's image stays under
+ * it.
  */
 export function moveByFingers(
   pose: SpecimenPose,
@@ -151,18 +166,18 @@ export function moveByFingers(
   return { ...near, position: near.position.clone().add(shift) };
 }
 
-/** The head that holds the specimen by the button, as it took hold. */
+/** State at the moment when the head began to hold the specimen. */
 export type HeadHold = Readonly<{ pose: SpecimenPose; pivot: Vector3; gaze: Gaze }>;
 type Gaze = Readonly<{ origin: Vector3; direction: Vector3 }>;
 
-/** To the left, and up. */
+/** Angles of a gaze: to the left and up. */
 function bearingOf({ direction: { x, y, z } }: Gaze): readonly [yaw: number, pitch: number] {
   return [Math.atan2(-x, -z), Math.atan2(y, Math.hypot(x, z))];
 }
 
 /**
- * The specimen goes round the eye with the head that holds it, the same side to it. Tilted down the head
- * brings it nearer, tilted up sends it away: by a half, or twice as far, for each HALF_NEARER_RAD.
+ * Moves the specimen around the eye with the head that holds it, with the same side facing the eye.
+ * Tilting the head down by HALF_NEARER_RAD halves the distance; tilting up doubles it.
  */
 export function moveByHead({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze): SpecimenPose {
   const [yaw, pitch] = bearingOf(gaze);
@@ -176,8 +191,8 @@ export function moveByHead({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze):
 }
 
 /**
- * The specimen goes as far aside, up or down as the gaze that carries it, the same side to the eye and at the
- * same distance.
+ * Moves the specimen sideways, up or down by the turn of the gaze that carries it, at the same
+ * distance and with the same side facing the eye.
  */
 export function moveByGaze({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze): SpecimenPose {
   const [yaw, pitch] = bearingOf(gaze);
@@ -198,7 +213,7 @@ export function moveByGaze({ pose, pivot, gaze: before }: HeadHold, gaze: Gaze):
   return { ...turned, position: turned.position.clone().add(at).sub(pivot) };
 }
 
-/** With the pivot's distance from the eye multiplied by a factor, within limits. */
+/** Multiplies the distance from the eye to the pivot by a factor, within limits. */
 function bringNearer(
   pose: SpecimenPose,
   pivot: Vector3,
@@ -209,13 +224,16 @@ function bringNearer(
   const distance = away.length();
   if (distance === 0) return pose;
   const wanted = MathUtils.clamp(distance * factor, NEAREST_M, FARTHEST_M);
-  // what hands have put beyond a limit goes no further, and does not jump
+  // a pivot that hands put beyond a limit neither moves farther out nor jumps back
   const next = factor < 1 ? Math.min(distance, wanted) : Math.max(distance, wanted);
   const by = away.multiplyScalar(next / distance - 1);
   return { ...pose, position: pose.position.clone().add(by) };
 }
 
-/** The turn about the vertical of an eye that looks from `eye` to `pivot`; none straight below it. */
+/**
+ * Turn about the vertical of an eye that looks from `eye` to `pivot`; the identity if it looks
+ * straight up or down.
+ */
 function headingTo(pivot: Vector3, eye: Vector3): Quaternion {
   const { x, z } = pivot.clone().sub(eye);
   return about(UP, Math.hypot(x, z) < NEAREST_M ? 0 : Math.atan2(-x, -z));

@@ -1,22 +1,27 @@
-/** The card before the eyes when stereo begins: how the bar is found and how something is chosen. */
+/**
+ * The card in front of the user when stereo begins: how to find the bar and how to choose
+ * something.
+ */
 import type { Setting } from "./panel/placement";
 
-/** The text of the card. Before a head that looks at a table the bar is higher than the gaze. */
+/**
+ * The text of the card. In front of a user who looks down at a table, the bar is above the gaze.
+ */
 export function howItWorks(setting: Setting): string {
   const way = setting === "over-table" ? "up" : "down";
-  return `Look ${way}: the bar.\nRest or press: choose.\nHold: it follows you.`;
+  return `Look ${way} for a bar.\nRest or press to choose.\nHold: move specimen.`;
 }
-/** Times that the card is shown on a device. */
-const TOLD_OFTEN = 3;
-const TOLD_KEY = "stereocell-told";
+/** Number of times that the card is shown on a device. */
+const TIMES_SHOWN = 3;
+const STORAGE_KEY = "stereocell-told";
 
-/** Whether the card is shown this time, which counts. */
-export function isToBeTold(): boolean {
+/** Whether the card is due, which also counts this time. */
+export function isIntroductionDue(): boolean {
   try {
-    const times = Number(localStorage.getItem(TOLD_KEY) ?? 0);
-    localStorage.setItem(TOLD_KEY, String(times + 1));
-    return times < TOLD_OFTEN;
+    const times = Number(localStorage.getItem(STORAGE_KEY) ?? 0);
+    localStorage.setItem(STORAGE_KEY, String(times + 1));
+    return times < TIMES_SHOWN;
   } catch {
-    return true; // nothing can be kept here
+    return true; // nothing can be stored here
   }
 }

@@ -1,16 +1,16 @@
 /**
- * Everything that is done in stereo: looking, pointing, pressing, holding. One of it serves both
- * WebXR and the split screen, where there is nothing but the gaze and a tap.
+ * Handles all input in stereo: looking, pointing, pressing and holding. The same class serves WebXR
+ * and the split screen, which has only the gaze and a tap.
  */
 import { Matrix4 } from "three";
 import type { Ring } from "../interaction/dwell_ring";
 import {
+  firstHit,
   gazeOf,
-  type Met,
-  meetFirst,
   Pointer,
-  type RoomRay,
+  type SceneRay,
   type Target,
+  type TargetHit,
 } from "../interaction/ray_pointer";
 import { TileTarget } from "../interaction/tile_target";
 import { shownTiles } from "../math/pick";
@@ -24,30 +24,32 @@ import { Grips, type TimedGesture } from "./grips";
 import { Ground } from "./ground";
 import type { HandsOptions } from "./hands_options";
 import { type HeadHold, moveByGaze } from "./hold_specimen";
-import { howItWorks, isToBeTold } from "./how_it_works";
+import { howItWorks, isIntroductionDue } from "./how_it_works";
 import { LastChoice } from "./last_choice";
 import { type MenuEntry, menuEntries } from "./panel/menu_entries";
-import { RoomNotice } from "./panel/notice";
-import { RoomPanel } from "./panel/panel";
+import { StereoNotice } from "./panel/notice";
+import { HeadsetPanel } from "./panel/panel";
 import { PANEL } from "./panel/panel_surface";
 import type { Setting } from "./panel/placement";
 import { PointedLight } from "./pointed_light";
 import { SpecimenMover } from "./specimen_mover";
 
-/** By gaze alone it is not switched off: nothing would be left to switch it on by. */
+/**
+ * The switch for choosing by gaze. The gaze cannot switch it off, because it could not switch it on
+ * again.
+ */
 const GAZE_SWITCH = `${PANEL}${DWELL.id}`;
-const KEEPS_GAZE = "Switch this off by the button: where there is none, the gaze is all there is.";
+const KEEPS_GAZE = "Switch this off with a button: the gaze could not switch it on again.";
 
-const CARRY = "It moves with your gaze. Rest to put it down.";
-/** The bar's button that undoes the last choice. */
+const CARRY = "The specimen moves with your gaze. Rest your gaze to put it down.";
 const UNDO = `${PANEL}undo-choice`;
-/** The bar's button by which the gaze takes the specimen. */
+/** The bar's button with which the gaze picks up the specimen. */
 const CARRY_BUTTON = `${PANEL}bar-move`;
 
 export class Hands {
-  readonly panel: RoomPanel;
+  readonly panel: HeadsetPanel;
   private readonly light: PointedLight;
-  readonly notice: RoomNotice;
+  readonly notice: StereoNotice;
   readonly ground = new Ground();
   private readonly mover: SpecimenMover;
   private readonly controllers = new Controllers();
@@ -57,12 +59,12 @@ export class Hands {
   private readonly carry = new GazeCarry();
   private readonly grips: Grips;
   private gestures: TimedGesture[] = [];
-  private gaze: RoomRay = gazeOf(new Matrix4());
-  /** Times at which the button was pressed since the previous frame, ms. */
+  private gaze: SceneRay = gazeOf(new Matrix4());
+  /** Times of the button presses since the last frame, ms. */
   private taps: number[] = [];
   private isRunning = false;
   private readonly lastChoice = new LastChoice();
-  /** The specimen as it was taken by the bar. */
+  /** State at the moment when the specimen was picked up with the bar. */
   private barHold: HeadHold | null = null;
   private state: ViewerState | null = null;
 
@@ -70,8 +72,8 @@ export class Hands {
     const { scene, specimen, handles = () => [], buildPanel, onLeave } = options;
     const { onLenses = () => undefined, isPainted = true } = options;
     this.mover = new SpecimenMover(specimen, options.tiles);
-    this.notice = new RoomNotice(isPainted);
-    this.panel = new RoomPanel({
+    this.notice = new StereoNotice(isPainted);
+    this.panel = new HeadsetPanel({
       buildPanel,
       onLeave,
       onLenses,
@@ -79,16 +81,16 @@ export class Hands {
       onAnnounce: (text) => this.announce(text),
       onUndo: () => this.undo(),
       onCarry: (ray, isStart) => this.carrySpecimen(ray, isStart),
-      onWish: (wish) => {
-        if (typeof wish === "string") options.onCommand(wish);
-        else options.onAction(wish);
+      onRequest: (request) => {
+        if (typeof request === "string") options.onCommand(request);
+        else options.onAction(request);
       },
     });
     this.tiles = new TileTarget(specimen.group, options.onChoose, options.objectAlong);
     this.grips = new Grips({
       ...{ controllers: this.controllers, pointer: this.pointer },
       ...{ mover: this.mover, tiles: this.tiles },
-      aim: () => ({ gaze: this.gaze, free: this.free }),
+      aim: () => ({ gaze: this.gaze, choosable: this.choosable }),
       run: (command, state, share) => this.run(command, state, share),
       onPress: (ray, time_ms) => this.press(ray, time_ms),
       onTap: (time_ms) => this.tap(time_ms),
@@ -99,23 +101,24 @@ export class Hands {
     scene.add(...this.overlays);
   }
 
-  /** What is no opaque thing, which the pass for the depth has to leave out. */
+  /** Objects that are not part of the specimen, which the depth pass leaves out. */
   get overlays() {
     const { controllers, panel, ring, notice, ground } = this;
     return [controllers.group, panel.group, ring.group, notice.mesh, ground.lines];
   }
 
-  /** The ring of a dwell. */
   get ring(): Ring {
     return this.light.ring;
   }
 
-  /** The target met now, for tests and for names on gaze: `tile:r0_c1`, `panel:mode=disc`. */
+  /**
+   * Key of the target that is pointed at now, for tests and for names under the gaze: `tile:r0_c1`,
+   * `panel:mode=disc`.
+   */
   get pointed(): string | null {
     return this.pointer.leading?.key ?? null;
   }
 
-  /** Of the dwell, 0..1. */
   get progress(): number {
     return this.pointer.progress;
   }
@@ -125,27 +128,31 @@ export class Hands {
     return this.carry.isCarrying;
   }
 
-  /** Whether the gaze or the head carries something of the scene, not a part of the open menu. */
+  /**
+   * Whether the gaze or the head carries something of the scene and not a part of the open menu.
+   */
   private get isCarryingInScene(): boolean {
     const { key } = this.carry;
     const isOfMenu = key?.startsWith(PANEL) === true && key !== CARRY_BUTTON;
     return this.grips.headHold !== null || (key !== null && !isOfMenu);
   }
 
-  /** @param session null: split screen, without any controllers */
+  /**
+   * Starts input, and shows the introduction.
+   * @param session null: split screen, without controllers
+   */
   enter(session: XRSession | null, setting: Setting): void {
     this.panel.setting = setting;
     this.start(session);
     this.ground.show(setting === "before-eyes");
-    if (isToBeTold()) this.announce(howItWorks(setting));
+    if (isIntroductionDue()) this.announce(howItWorks(setting));
   }
 
-  /** The panel's controls as a head sees them. */
   menuFrom(head: Matrix4): readonly MenuEntry[] {
     return menuEntries(this.panel.places, head);
   }
 
-  /** As `enter` does, without the card that says how it works. */
+  /** Starts input as `enter` does, but without the introduction. */
   start(session: XRSession | null): void {
     this.stop();
     this.isRunning = true;
@@ -168,35 +175,42 @@ export class Hands {
     this.ground.show(false);
   }
 
-  /** Press the only button of the split screen, or a key in its place. @param time_ms on the clock of events */
+  /**
+   * Presses the only button of the split screen, or the key that stands for it.
+   * @param time_ms on the clock of events
+   */
   tap(time_ms = this.now_ms()): void {
     this.taps.push(time_ms);
   }
 
-  /** What fingers do on the split screen. */
   touch(gesture: Gesture, time_ms = this.now_ms()): void {
     this.gestures.push([gesture, time_ms]);
   }
 
-  /** Say something where the head looks. */
+  /** Shows a notice where the head looks. */
   announce(text: string): void {
     if (this.isRunning) this.notice.announce(text);
   }
 
-  /** What would move the camera of a flat screen, by a step; false: the command is another's. */
+  /**
+   * Applies a camera command of a flat screen to the specimen, by a share of a step. Returns false
+   * if the command is not one of these.
+   */
   run(command: Command, state: ViewerState, share = 1): boolean {
     return this.mover.run(command, state, this.gaze.origin, share);
   }
 
-  /** The specimen becomes so much larger about its middle. */
+  /** Scales the specimen by a factor about its middle. */
   resize(factor: number, state: ViewerState): void {
     this.mover.resize(factor, state, this.gaze.origin);
   }
 
   /**
-   * Once a frame of stereo, before it is drawn. True if the picture differs from the last one.
+   * Updates everything for one frame. Call it before drawing. Returns whether the image differs
+   * from the last one.
    *
-   * @param read_s for which notices could be read, s: of a slow frame more than what hands can move in
+   * @param read_s seconds for which notices could be read; in a slow frame more than `dt_s`, which
+   *   limits motion
    */
   update(dt_s: number, head: Matrix4, state: ViewerState, read_s = dt_s): boolean {
     if (!this.isRunning) return false;
@@ -209,27 +223,29 @@ export class Hands {
     for (const event of this.controllers.take()) this.grips.handle(event);
     const hasTouched = this.grips.followFingers(this.gestures.splice(0), state);
     for (const time_ms of this.taps.splice(0)) this.press(this.gaze, time_ms);
-    this.grips.forgetTheLost();
+    this.grips.forgetLostSources();
     const hasHeld = this.grips.hold(dt_s);
     const hasFollowed = this.grips.followHead(dt_s, state);
     const hasMoved = this.grips.moveBySticks(dt_s, state) || hasHeld || hasTouched || hasFollowed;
-    const isGoingOn = this.grips.isGoingOn || this.carry.isCarrying;
+    const isRepeating = this.grips.isRepeating || this.carry.isCarrying;
     const now = { state, pose: this.mover.pose };
-    const isAsked = this.pointer.gaze?.key === UNDO;
-    this.panel.canUndo = this.lastChoice.advance(dt_s, now, isGoingOn, isAsked);
+    const isLookedAt = this.pointer.gaze?.key === UNDO;
+    this.panel.canUndo = this.lastChoice.advance(dt_s, now, isRepeating, isLookedAt);
     this.panel.isCarrying = this.isCarryingInScene;
     const isRepainted = this.panel.update(dt_s, head, state);
     const isNoticeNew = this.notice.update(read_s, head, this.panel.upperEdge);
     const rays = this.carry.isCarrying ? [] : this.grips.tracked.map(({ ray }) => ray);
-    const fired = this.pointer.advance(this.gaze, rays, this.free, dt_s, state.isDwellOn);
+    const fired = this.pointer.advance(this.gaze, rays, this.choosable, dt_s, state.isDwellOn);
     if (fired?.key === GAZE_SWITCH && state.isDwellOn) this.announce(KEEPS_GAZE);
     else if (fired !== null) {
       this.choose(fired, this.now_ms(), true);
-      this.grips.goOnWith(fired);
+      this.grips.startRepeating(fired);
     }
-    const hasGone = this.grips.goOn(dt_s, state);
+    const hasRepeated = this.grips.repeat(dt_s, state);
     const hasCarried = this.carry.follow(this.gaze);
-    return this.light.draw(head) || hasMoved || isRepainted || isNoticeNew || hasGone || hasCarried;
+    return (
+      this.light.draw(head) || hasMoved || isRepainted || isNoticeNew || hasRepeated || hasCarried
+    );
   }
 
   dispose(): void {
@@ -247,42 +263,43 @@ export class Hands {
     return (this.options.now_ms ?? (() => performance.now()))();
   }
 
-  /** A carried thing covers all else until the gaze puts it down. */
-  private get free(): readonly Target[] {
-    if (this.grips.headHold !== null) return []; // nothing is chosen on the way
+  /** Targets that can be chosen now. A carried object covers all others until it is put down. */
+  private get choosable(): readonly Target[] {
+    // Nothing can be chosen while the head carries the specimen.
+    if (this.grips.headHold !== null) return [];
     return this.carry.isCarrying ? [this.carry] : this.targets;
   }
 
-  /** The button: what the ray meets, or if that is nothing, what is gazed at. */
-  private press(ray: RoomRay, time_ms: number): void {
-    const met = meetFirst(ray, this.free) ?? meetFirst(this.gaze, this.free);
-    if (met !== null) this.choose(met, time_ms);
+  /** Chooses the target on the ray of the button, or else the one under the gaze. */
+  private press(ray: SceneRay, time_ms: number): void {
+    const hit = firstHit(ray, this.choosable) ?? firstHit(this.gaze, this.choosable);
+    if (hit !== null) this.choose(hit, time_ms);
   }
 
-  private choose(met: Met, time_ms: number, isByGaze = false): void {
-    if (met.key === null) return;
-    const counts = this.pointer.press(met, this.free, time_ms);
+  private choose(hit: TargetHit, time_ms: number, isByGaze = false): void {
+    if (hit.key === null) return;
+    const counts = this.pointer.press(hit, this.choosable, time_ms);
     if (!counts && !isByGaze) return;
     const { pose } = this.mover;
-    if (met.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
-    met.target.choose(met, met.ray, isByGaze);
-    if (met.hold === "carry" && met.ray === this.gaze) this.carry.take(met);
+    if (hit.key !== UNDO && this.state) this.lastChoice.remember({ state: this.state, pose });
+    hit.target.choose(hit, hit.ray, isByGaze);
+    if (hit.hold === "carry" && hit.ray === this.gaze) this.carry.take(hit);
   }
 
   private undo(): void {
     const before = this.lastChoice.take();
     if (before === null) return;
     this.options.onAction({ type: "restore", state: before.state });
-    this.mover.backTo(before.pose, this.gaze.origin);
+    this.mover.jumpTo(before.pose, this.gaze.origin);
   }
 
-  /** The bar is taken hold of, and the specimen moves as the gaze does until it rests. */
-  private carrySpecimen(gaze: RoomRay, isStart: boolean): void {
+  /** Picks up the specimen with the bar, then moves it with the gaze until the gaze rests. */
+  private carrySpecimen(gaze: SceneRay, isStart: boolean): void {
     if (isStart && this.state !== null) {
       this.barHold = this.mover.holdBy(gaze, this.state);
       this.announce(CARRY);
     } else if (this.barHold !== null) {
-      this.mover.to(moveByGaze(this.barHold, gaze), gaze.origin);
+      this.mover.moveTo(moveByGaze(this.barHold, gaze), gaze.origin);
     }
   }
 }

@@ -1,5 +1,5 @@
 /**
- * Whether the panel can be read in a Cardboard: the pixels of its letters and the angles of its targets.
+ * Checks that the panel can be read in a Cardboard: pixels per letter, angles of targets.
  * STEREOCELL_LEGIBILITY_TABLE names a file for the figures.
  */
 import { afterAll, describe, expect, it } from "vitest";
@@ -27,7 +27,10 @@ import { NOTICE_DISTANCE_M } from "./panel/notice";
 import { NOTICE_PX_PER_M, noticeMarks } from "./panel/notice_queue";
 import { PANEL_DISTANCE_M } from "./panel/placement";
 
-/** Height of an x as a share of a letter's size: the least of the fonts that phones have (Roboto 0.53, San Francisco 0.53, Segoe UI 0.50). */
+/**
+ * Height of the letter x as a share of the font size: the least of the fonts on phones (Roboto
+ * 0.53, San Francisco 0.53, Segoe UI 0.50).
+ */
 const X_HEIGHT = 0.5;
 const INCH_M = 0.0254;
 const EDGE_M = 0.003;
@@ -44,7 +47,10 @@ function screenOf({ width_px, height_px, perInch }: Phone): Screen {
   return { width_m: width_px * toMetres, height_m: height_px * toMetres, border_m: EDGE_M };
 }
 
-/** Height on the phone, px, of what lies between two heights on a quad whose middle is looked at, px of it. */
+/**
+ * Height on the phone, px, between two heights on a quad, px of the quad, whose middle is looked
+ * at.
+ */
 function pixelsBetween(
   phone: Phone,
   profile: Profile,
@@ -65,7 +71,7 @@ function pixelsBetween(
 type Surface = Readonly<{ name: string; size: readonly [number, number] }> &
   Pick<Page, "marks" | "regions">;
 
-/** Every page of the menu, and the bar in each of its states. */
+/** Every page of the menu, and every state of the bar. */
 function surfaces(): readonly Surface[] {
   const lit = [
     { type: "notify", text: "a fault", isRetryable: true } as const,
@@ -108,7 +114,10 @@ function isText(mark: Mark): mark is Extract<Mark, { kind: "text" }> {
 const degrees = (px: number) =>
   (2 * Math.atan(px / PX_PER_M / 2 / PANEL_DISTANCE_M) * 180) / Math.PI;
 
-/** Palettes, maps and pictures are one control each, in a row or on a page of their own. */
+/**
+ * Palettes, tile maps and lists of choices count as one control each: they have a row or a page of
+ * their own.
+ */
 const isField = (id: string) => /^tile-map=|\/(palette|color)=|-choice/.test(id);
 
 describe("the panel in a Cardboard", () => {
@@ -119,7 +128,7 @@ describe("the panel in a Cardboard", () => {
 
   afterAll(() => writeTable("STEREOCELL_LEGIBILITY_TABLE", ["figure", "least", "at least"], rows));
 
-  it("is seen as 55 x 40 degrees", () => {
+  it("covers 55 x 40 degrees of the view", () => {
     expect(degrees(WIDTH)).toBeCloseTo(55, 0);
     expect(degrees(HEIGHT)).toBeCloseTo(40, 0);
   });
@@ -131,7 +140,7 @@ describe("the panel in a Cardboard", () => {
     expect(Math.min(...sizes_mm)).toBeGreaterThanOrEqual(24);
   });
 
-  it("has notices of at least 24 mm at 1 m, also where three long ones come together", () => {
+  it("has letters of at least 24 mm at 1 m in notices, even for three long ones", () => {
     const long = "A sentence that takes many words to say what is missing and what could be done.";
     const letters = noticeMarks([1, 2, 3].map((each) => `${each}. ${long}`)).filter(isText);
     expect(letters).toHaveLength(3);
@@ -169,7 +178,7 @@ describe("the panel in a Cardboard", () => {
     expect(small).toEqual([]);
   });
 
-  it("has at most six targets on a page, each palette, map or choice being one control", () => {
+  it("has at most six targets on a page, counting a palette, map or list as one", () => {
     const counts = ALL.filter(({ name }) => !name.startsWith("bar")).map(({ name, regions }) => {
       const whole = new Set(regions.map(({ id }) => (isField(id) ? id.split("=")[0] : id)));
       const rows = [...whole].filter((id) => !/\/(open|more)$/.test(id));

@@ -1,16 +1,19 @@
-/** The marks of what is pointed at: the hands' rays, the ring of a dwell, and the light on a control. */
+/**
+ * Marks of the targets that are pointed at: the hands' rays, the dwell ring, and the light on a
+ * control.
+ */
 import { type Matrix4, Vector3 } from "three";
 import { Ring } from "../interaction/dwell_ring";
 import { type Pointer, pointOn } from "../interaction/ray_pointer";
 import type { Controllers } from "./controllers";
 import type { Grips } from "./grips";
-import type { RoomPanel } from "./panel/panel";
+import type { HeadsetPanel } from "./panel/panel";
 
 export type PointedLightOptions = Readonly<{
   pointer: Pointer;
   controllers: Controllers;
   grips: Grips;
-  panel: RoomPanel;
+  panel: HeadsetPanel;
 }>;
 
 export class PointedLight {
@@ -19,7 +22,7 @@ export class PointedLight {
 
   constructor(private readonly options: PointedLightOptions) {}
 
-  /** Brings the marks to this frame. Returns whether the picture differs from the last one. */
+  /** Updates the marks for this frame. Returns whether the image differs from the last one. */
   draw(head: Matrix4): boolean {
     const { pointer, controllers, grips, panel } = this.options;
     grips.tracked.forEach((hand, i) => {

@@ -1,4 +1,7 @@
-/** People in stereo rest, tremble and press twice: each control of each page changes one thing, once. */
+/**
+ * Users in stereo rest their gaze, tremble and press twice: each control of each page changes one
+ * thing, once.
+ */
 import { describe, expect, it } from "vitest";
 import { sweep } from "../../test/support/exhaustive";
 import { LookingPerson, pagesOf } from "../../test/support/xr/looking_person";
@@ -6,7 +9,10 @@ import { reduce } from "../state/reduce";
 import type { ViewerState } from "../state/viewer_state";
 
 const VIEW = { picked: "c2", isHistogramOpen: true } as const;
-/** Faults, a measurement, and a path-traced picture, so that every section has all that it can have. */
+/**
+ * A state with faults, a measurement and path tracing, so that every section shows everything it
+ * can.
+ */
 function busy(state: ViewerState): ViewerState {
   const points = [
     [0, 0, 0],
@@ -19,7 +25,7 @@ function busy(state: ViewerState): ViewerState {
     { type: "measure", points } as const,
   ].reduce(reduce, state);
 }
-/** The light's section is another one where paths of light are traced. */
+/** With path tracing on, because the light section then has other controls. */
 const traced = (state: ViewerState) => reduce(state, { type: "set", id: "mode", value: "traced" });
 
 type Variant = (state: ViewerState) => ViewerState;
@@ -30,7 +36,7 @@ type TestedPage = readonly [
   ids: readonly string[],
   variant: Variant,
 ];
-/** The name of a page appears in the report of a failed test. */
+/** The first element names the page in the report of a failed test. */
 const PAGES: readonly TestedPage[] = [
   ...pagesOf(VIEW, busy).map(
     ([tab, page, ids]) => [`${tab} ${page}`, tab, page, ids, busy] as const,
@@ -67,20 +73,23 @@ const moreThanOne = (all: readonly Effect[]) =>
   all.filter(({ wishes, changes }) => wishes > 1 || changes > 1);
 
 describe("every control of every page", () => {
-  it("is part of these tests", () => {
+  it("is tested", () => {
     const ids = PAGES.flatMap(([, , , all]) => all);
     expect(ids.length).toBeGreaterThan(100);
     expect(ids).toEqual(expect.arrayContaining(["leave", "c0/shown", "dwell", "more"]));
   });
 
-  it.each(PAGES)("changes one thing under a gaze that rests on it for 6 s more: %s", (...page) => {
-    const all = effectsOf(page, (person, id) => {
-      person.lookAt(id, 0.5);
-      person.rest(7.5);
-    });
-    expect(moreThanOne(all)).toEqual([]);
-    expect(Math.max(...all.map(({ changes, wishes }) => changes + wishes))).toBeGreaterThan(0);
-  });
+  it.each(PAGES)(
+    "changes one thing under a gaze that rests on it for 6 s longer: %s",
+    (...page) => {
+      const all = effectsOf(page, (person, id) => {
+        person.lookAt(id, 0.5);
+        person.rest(7.5);
+      });
+      expect(moreThanOne(all)).toEqual([]);
+      expect(Math.max(...all.map(({ changes, wishes }) => changes + wishes))).toBeGreaterThan(0);
+    },
+  );
 
   it.each(sweep(PAGES, ([, tab, page]) => tab === "channels" && page < 2))(
     "changes one thing under a gaze at its lower edge: %s",
@@ -94,7 +103,7 @@ describe("every control of every page", () => {
   );
 
   it.each(sweep(PAGES, ([, tab]) => ["notices", "light", "measure"].includes(tab)))(
-    "changes one thing by the button, and the gaze adds nothing: %s",
+    "changes one thing by the button and nothing more by the gaze: %s",
     (...page) => {
       const all = effectsOf(page, (person, id) => {
         person.lookAt(id, 0.5);
@@ -106,7 +115,7 @@ describe("every control of every page", () => {
     },
   );
 
-  it.each(PAGES)("changes one thing by a double press, but for steps: %s", (...page) => {
+  it.each(PAGES)("changes one thing by a double press, unless it is a step: %s", (...page) => {
     const first = at(page);
     const isStep = (id: string) => {
       const { isStep, repeats } = first.region(id);
@@ -141,7 +150,7 @@ describe("the rows of the panel", () => {
       person.rest(1);
       const after = places(person);
       expect(after.get(id), id).toEqual(before.get(id));
-      // a block that opens below a switch moves the rest of the page
+      // a section that opens below a switch moves the rest of the page
       const common = [...before].filter(([each]) => after.has(each) && !id.endsWith("/plane"));
       expect(
         common.map(([each]) => [each, after.get(each)]),
@@ -151,7 +160,7 @@ describe("the rows of the panel", () => {
     }
   });
 
-  it("keep their places also in a list of many channels, and until the panel is opened again", () => {
+  it("keep their places in a list of many channels until the panel is opened again", () => {
     const person = new LookingPerson(70);
     person.open("channels");
     const ids = () => person.regions.flatMap(({ id }) => (id.endsWith("/shown") ? [id] : []));
@@ -172,7 +181,7 @@ describe("the rows of the panel", () => {
 });
 
 describe("a gaze that opens or closes the panel", () => {
-  it("does nothing more, though a control lies where the button was", () => {
+  it("does nothing more, even if a control appears where the button was", () => {
     const person = new LookingPerson(9, busy);
     person.lookAt("opener");
     person.changes = 0;
@@ -190,7 +199,8 @@ describe("a gaze that opens or closes the panel", () => {
     person.hands.stop();
     person.hands.start(null);
     person.rest(6);
-    expect(person.hands.pointed).toMatch(/^panel:bar-/); // it has come to where the head faces
+    // The bar has moved to where the head faces.
+    expect(person.hands.pointed).toMatch(/^panel:bar-/);
     expect([person.hands.panel.isOpen, person.wishes]).toEqual([false, []]);
     person.lookUp();
     person.lookAt("opener");
@@ -217,7 +227,7 @@ describe("a gaze that opens or closes the panel", () => {
 });
 
 describe("a press that comes just after the dwell", () => {
-  it("changes nothing more", () => {
+  it("does not change anything else", () => {
     const person = at(CHANNELS);
     person.lookAt("c0/shown");
     person.rest(1.6);
@@ -243,7 +253,7 @@ describe("the button of a WebXR session", () => {
   });
 });
 
-describe("a press again, after a while", () => {
+describe("a second press after a while", () => {
   it("switches back", () => {
     const person = at(CHANNELS);
     person.lookAt("c0/shown");

@@ -1,4 +1,7 @@
-/** A gaze that rests in the scene: on handles, lamps, objects, points to measure, and on the bar's buttons. */
+/**
+ * A gaze that rests in the scene: on handles, lamps, objects, points to measure, and the bar's
+ * buttons.
+ */
 import { describe, expect, it } from "vitest";
 import { LookingPerson } from "../../test/support/xr/looking_person";
 import { reduce } from "../state/reduce";
@@ -7,7 +10,7 @@ import type { ViewerState } from "../state/viewer_state";
 const DWELL_S = 1.7;
 const LONG_S = 7.5;
 
-/** The specimen in a box to cut by. */
+/** With a clip box. */
 function boxed(state: ViewerState): ViewerState {
   const box = { min: [5, -15, 2], max: [45, -5, 6] } as const;
   return { ...state, clip: { ...state.clip, box: { min: [...box.min], max: [...box.max] } } };
@@ -25,8 +28,8 @@ const HANDLES = [
   ["a lamp", "lamp-0", traced],
 ] as const;
 
-describe("a handle under a gaze that rests", () => {
-  it.each(HANDLES)("is taken, stays where it is, and is put down once: %s", (_, id, change) => {
+describe("a handle under a resting gaze", () => {
+  it.each(HANDLES)("is picked up, stays in place, and is put down once: %s", (_, id, change) => {
     const person = new LookingPerson(4, change);
     person.lookUp();
     person.lookAtHandle(id);
@@ -48,7 +51,7 @@ describe("a handle under a gaze that rests", () => {
     expect(at()).toEqual(put);
   });
 
-  it.each(HANDLES)("is not taken when it comes under the gaze: %s", (_, id, change) => {
+  it.each(HANDLES)("is not picked up when it moves under the gaze: %s", (_, id, change) => {
     const person = new LookingPerson(4, change);
     const { state } = person;
     person.lookAtHandle(id);
@@ -65,8 +68,8 @@ describe("a handle under a gaze that rests", () => {
   });
 });
 
-describe("a handle of a cut that was there when stereo began", () => {
-  it("is not taken by a gaze that rests ahead, but by the button", () => {
+describe("a clip handle that existed before stereo began", () => {
+  it("is picked up by the button, not by a resting gaze", () => {
     const person = new LookingPerson(4, boxed);
     person.handles.isCutAsleep = true;
     person.lookUp();
@@ -79,8 +82,8 @@ describe("a handle of a cut that was there when stereo began", () => {
   });
 });
 
-describe("a point to measure under a gaze that rests", () => {
-  it("is set once, and the next one where the gaze rests then, in the same tile, too", () => {
+describe("a point to measure under a resting gaze", () => {
+  it("is set once, and the next point where the gaze rests next, even in the same tile", () => {
     const person = new LookingPerson(4, measuring);
     person.lookUp();
     person.lookAtTile("tile:r0_c1");
@@ -93,14 +96,14 @@ describe("a point to measure under a gaze that rests", () => {
   });
 });
 
-describe("an object under a gaze that rests", () => {
+describe("an object under a resting gaze", () => {
   const showing = (person: LookingPerson, object: string | null) => {
     person.objectAlong = () => (object === null ? null : { id: object, distance: 0.9 });
     const { objects } = person.state;
     person.state = { ...person.state, objects: { ...objects } };
   };
 
-  it("is not chosen when it has come under the gaze because another was hidden", () => {
+  it("is not chosen if it came under the gaze because another object was hidden", () => {
     const person = new LookingPerson(4);
     showing(person, "c0/7");
     person.lookUp();
@@ -122,11 +125,11 @@ describe("an object under a gaze that rests", () => {
   });
 });
 
-describe("the bar under a gaze that rests", () => {
+describe("the bar under a resting gaze", () => {
   const ids = new LookingPerson(4).hands.panel.places.map(({ id }) => id);
   const repeating = ids.filter((id) => /nearer|farther|roll/.test(id));
 
-  it("has the buttons of these tests", () => {
+  it("has the buttons that are tested", () => {
     expect(repeating).toHaveLength(4);
     expect(ids).toEqual(expect.arrayContaining(["bar-volumes", "bar-move", "opener"]));
   });
@@ -139,7 +142,7 @@ describe("the bar under a gaze that rests", () => {
     expect(person.changes).toBe(1);
   });
 
-  it.each(repeating)("moves on while the gaze stays, and stops when it leaves: %s", (id) => {
+  it.each(repeating)("keeps moving while the gaze stays, and stops when it leaves: %s", (id) => {
     const person = new LookingPerson(4);
     const { state } = person;
     person.lookUp();
@@ -158,7 +161,7 @@ describe("the bar under a gaze that rests", () => {
     expect(person.state).toBe(state);
   });
 
-  it("takes the specimen once, and leaves it where it was put down", () => {
+  it("picks up the specimen once, and leaves it where it was put down", () => {
     const person = new LookingPerson(4);
     person.lookUp();
     person.lookAt("bar-move");
@@ -172,7 +175,7 @@ describe("the bar under a gaze that rests", () => {
     expect(person.place).toEqual(put);
   });
 
-  it("undoes one choice, and no earlier one, under Undo", () => {
+  it("undoes one choice with Undo, not earlier ones", () => {
     const person = new LookingPerson(4);
     person.lookAt("bar-volumes");
     person.rest(DWELL_S);
@@ -180,7 +183,8 @@ describe("the bar under a gaze that rests", () => {
     person.lookAt("undo-choice");
     person.changes = 0;
     person.rest(LONG_S);
-    expect(person.changes).toBeLessThanOrEqual(2); // undone, and Undo is gone from the bar
+    // One for the undoing, one because Undo disappears from the bar.
+    expect(person.changes).toBeLessThanOrEqual(2);
     expect(person.wishes.filter((wish) => JSON.stringify(wish).includes("restore"))).toHaveLength(
       1,
     );

@@ -3,7 +3,7 @@ import { describe, expect, it } from "vitest";
 import { XrSession } from "./session";
 
 describe("a stereo session", () => {
-  it("can be started again after it could not be set up", async () => {
+  it("can be started again after a start that failed", async () => {
     let tries = 0;
     const xr = {
       enabled: false,
@@ -28,14 +28,14 @@ describe("a stereo session", () => {
     expect(started).toBe(1);
   });
 
-  it("asks for an even rate and for foveation only where they are offered", async () => {
-    const wishes: string[] = [];
+  it("asks for a frame rate and for foveation only if they are offered", async () => {
+    const requests: string[] = [];
     const makeSession = (rates: number[] | undefined) =>
       Object.assign(new EventTarget(), {
         end: async () => undefined,
         supportedFrameRates: rates && new Float32Array(rates),
         updateTargetFrameRate: async (rate: number) => {
-          wishes.push(`${rate} Hz`);
+          requests.push(`${rate} Hz`);
           throw new DOMException("not now", "InvalidStateError");
         },
       });
@@ -43,18 +43,18 @@ describe("a stereo session", () => {
       enabled: false,
       setReferenceSpaceType: () => undefined,
       setSession: async () => undefined,
-      setFoveation: (share: number) => wishes.push(`foveation ${share}`),
+      setFoveation: (share: number) => requests.push(`foveation ${share}`),
     };
     for (const rates of [[72, 90, 120], [60], undefined]) {
       const stereo = new XrSession(
         { xr } as unknown as WebGLRenderer,
-        () => wishes.push("started"),
+        () => requests.push("started"),
         () => undefined,
       );
       const requestSession = async () => makeSession(rates);
       await stereo.start({ requestSession } as unknown as XRSystem);
     }
     const plain = ["foveation 0.67", "started"];
-    expect(wishes).toEqual(["foveation 0.67", "72 Hz", "started", ...plain, ...plain]);
+    expect(requests).toEqual(["foveation 0.67", "72 Hz", "started", ...plain, ...plain]);
   });
 });

@@ -1,9 +1,15 @@
-/** The immersive session: two eyes, the specimen in front of them; in the user's own room a phone's one, too. */
+/**
+ * The WebXR session: two eyes with the specimen in front of them, or augmented reality in a headset
+ * or on a phone's screen.
+ */
 import { PerspectiveCamera, type WebGLRenderer } from "three";
 
-/** Wanted frames a second: 72 even ones look better than 90 or 120 of which some come late. */
+/** Wanted frames per second: 72 steady ones look better than 90 or 120 of which some come late. */
 const RATE_HZ = 72;
-/** Foveation, 0..1, where the layer offers it: the panel's text stays legible at the side. */
+/**
+ * Foveation, 0 to 1, if the layer offers it; at this value the panel's text stays legible at the
+ * side.
+ */
 const FOVEATION = 0.67;
 
 export type ImmersiveMode = "immersive-vr" | "immersive-ar";
@@ -16,11 +22,11 @@ async function hasSpace(session: XRSession, type: XRReferenceSpaceType): Promise
 }
 
 export class XrSession {
-  /** three moves it with the head; its clip planes hold for both eyes. Metres. */
+  /** Camera that three.js moves with the head; near and far planes of both eyes, metres. */
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 20);
   private session: XRSession | null = null;
   private mode: ImmersiveMode = "immersive-vr";
-  /** Whether heights are from the floor; else from where the eyes are when it starts. */
+  /** Whether heights are measured from the floor; otherwise from the eyes' height at the start. */
   hasFloor = false;
 
   constructor(
@@ -35,32 +41,32 @@ export class XrSession {
     return this.session !== null;
   }
 
-  /** The session that runs, for its input sources. */
   get current(): XRSession | null {
     return this.session;
   }
 
-  /** Frames a second, where the headset reports them. */
+  /** Frames per second, if the headset reports them. */
   get rate_hz(): number | undefined {
     return this.session?.frameRate;
   }
 
-  /** Whether the user's own room shows behind the specimen. */
+  /** Whether the user's own room is visible behind the specimen. */
   get isInUsersRoom(): boolean {
     return this.session !== null && this.mode === "immersive-ar";
   }
 
   /**
-   * Must be called from a click or a tap. Rejects if the browser or the user refuses, or as `prepared` does.
+   * Starts a session. Must be called from a click or a tap. Rejects if the browser or the user
+   * refuses, or if `prepared` rejects.
    *
-   * @param prepared what has to be there before the first frame
+   * @param prepared resolves when everything for the first frame is loaded
    */
   async start(
     xr: XRSystem,
     mode: ImmersiveMode = "immersive-vr",
     prepared: Promise<unknown> = Promise.resolve(),
   ): Promise<void> {
-    prepared.catch(() => undefined); // it is awaited once the browser has answered
+    prepared.catch(() => undefined); // a rejection is reported where `prepared` is awaited below
     if (this.session !== null) return;
     const session = await xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
     this.session = session;
@@ -71,13 +77,14 @@ export class XrSession {
     });
     try {
       await prepared;
-      // the origin is where the eyes are when it starts, whatever the body's height; a table has its own
+      // The origin is at the eyes at the start, for any body height. In augmented reality it is on
+      // the floor if that is known.
       this.hasFloor = mode === "immersive-ar" && (await hasSpace(session, "local-floor"));
       this.renderer.xr.setReferenceSpaceType(this.hasFloor ? "local-floor" : "local");
       await this.renderer.xr.setSession(session);
     } catch (error) {
-      this.session = null; // so that it can be tried again
-      void session.end().catch(() => undefined); // it may have ended by itself: that was the fault
+      this.session = null; // allows another start
+      void session.end().catch(() => undefined); // fails if the session has ended by itself
       throw error;
     }
     this.tune(session);
@@ -88,13 +95,13 @@ export class XrSession {
     await this.session?.end();
   }
 
-  /** What only some headsets offer. */
+  /** Sets features that only some headsets offer. */
   private tune(session: XRSession): void {
     const { xr } = this.renderer;
     if (typeof xr.setFoveation === "function") xr.setFoveation(FOVEATION);
     if (!session.supportedFrameRates?.includes(RATE_HZ)) return;
     if (typeof session.updateTargetFrameRate !== "function") return;
-    // A wish: the headset may refuse, and then goes on at its own rate.
+    // The headset may refuse, and then keeps its own rate.
     void session.updateTargetFrameRate(RATE_HZ).catch(() => undefined);
   }
 }

@@ -1,8 +1,8 @@
-/** Where what is shown of the specimen is in the room. Pure. */
+/** Points of the shown part of the specimen, in the scene. */
 import { type Matrix4, Vector3 } from "three";
 import type { BoxedTile } from "../math/pick";
 
-/** Corners of the box around the tiles, middles of its edges and faces, and its own. */
+/** Corners of the box around the tiles, midpoints of its edges and faces, and its centre. */
 export function hullOf(tiles: readonly BoxedTile[], toRoom: Matrix4): readonly Vector3[] {
   const [xs, ys, zs] = ([0, 1, 2] as const).map((axis) => {
     const low = Math.min(...tiles.map(({ bounds_um }) => bounds_um.min[axis]));

@@ -1,6 +1,9 @@
-/** How the specimen is moved in stereo: by commands, fingers, sticks and hands, and along with gaze or head. */
+/**
+ * Moves the specimen in stereo: by commands, fingers, sticks and hands, or with the gaze or the
+ * head.
+ */
 import type { Vector3 } from "three";
-import type { RoomRay } from "../interaction/ray_pointer";
+import type { SceneRay } from "../interaction/ray_pointer";
 import { type SpecimenPose, zoomAbout } from "../math/grab";
 import { type BoxedTile, shownTiles } from "../math/pick";
 import type { Specimen } from "../render/specimen_pose";
@@ -9,7 +12,6 @@ import type { ViewerState } from "../state/viewer_state";
 import { type HeadHold, isFacing, moveByCommand, moveByFingers } from "./hold_specimen";
 import { hullOf, middleOf } from "./shown_hull";
 
-/** A gesture that moves something. */
 type Move = Parameters<typeof moveByFingers>[1];
 
 export class SpecimenMover {
@@ -22,20 +24,22 @@ export class SpecimenMover {
     return this.specimen.pose;
   }
 
-  /** Middle of what is shown, room. */
+  /** Middle of the shown tiles, in the scene. */
   middle({ isolated }: ViewerState): Vector3 {
     return middleOf(hullOf(shownTiles(this.tiles, isolated), this.specimen.group.matrixWorld));
   }
 
-  /** To a pose, as an eye sees it; whether that is another one. */
-  to(pose: SpecimenPose, eye: Vector3): boolean {
+  /**
+   * Moves the specimen to a pose, as seen from `eye`. Returns false if it has this pose already.
+   */
+  moveTo(pose: SpecimenPose, eye: Vector3): boolean {
     if (pose === this.pose) return false;
     this.specimen.moveTo(pose, eye);
     return true;
   }
 
-  /** To an earlier pose, at once. */
-  backTo(pose: SpecimenPose, eye: Vector3): void {
+  /** Returns to an earlier pose at once, without motion. */
+  jumpTo(pose: SpecimenPose, eye: Vector3): void {
     this.specimen.jumpTo(pose, eye);
   }
 
@@ -48,7 +52,6 @@ export class SpecimenMover {
     return true;
   }
 
-  /** So much larger about its middle. */
   resize(factor: number, state: ViewerState, eye: Vector3): void {
     this.specimen.moveTo(zoomAbout(this.pose, this.middle(state), factor), eye);
   }
@@ -57,8 +60,8 @@ export class SpecimenMover {
     this.specimen.moveTo(moveByFingers(this.pose, gesture, this.middle(state), eye), eye);
   }
 
-  /** How a gaze holds it that takes it now. */
-  holdBy(gaze: RoomRay, state: ViewerState): HeadHold {
+  /** State of a gaze or head that starts to hold the specimen now. */
+  holdBy(gaze: SceneRay, state: ViewerState): HeadHold {
     return { pose: this.pose, pivot: this.middle(state), gaze };
   }
 }

@@ -1,4 +1,7 @@
-/** Stereo, whichever way: a headset's session, or a split screen in a phone's viewer. */
+/**
+ * Stereo of all kinds: a headset's session, a phone's split screen, or two images on the page's
+ * screen.
+ */
 import {
   type Camera,
   Matrix4,
@@ -27,25 +30,24 @@ export type StereoOptions = Omit<HandsOptions, "xr" | "onLeave"> &
 
 export type EyeSettings = Readonly<{
   distance_m: number;
-  /** Factor to it. */
+  /** Factor of `distance_m`. */
   strength: number;
-  /** CSS pixels in an inch of the screen; null: guessed from the browser's name. */
+  /** CSS pixels per inch of the screen; null: estimated from the browser's name. */
   cssPixelsPerInch: number | null;
 }>;
 
 export class Stereo {
   readonly headset: XrSession;
-  /** Gaze, hands and the panel in the room; null until stereo is first wanted. */
+  /** Gaze, hands and the headset panel; null until stereo is first prepared. */
   hands: Hands | null = null;
   private loading: Promise<Hands> | null = null;
-  /** The page's own choices, for the panel in the room as soon as it is loaded. */
+  /** The choices on the page, passed to the headset panel when it is loaded. */
   private choices: Partial<PanelView> = {};
   private readonly split: LaterSplit;
-  /** Stereo on the page's own screen. */
   readonly screen: LaterScreen;
   private eyes: EyeSettings = { distance_m: 0.063, strength: 1, cssPixelsPerInch: null };
   private readonly between = new Matrix4();
-  /** In the user's own room, before the first frame with a head. */
+  /** True in augmented reality before the first frame that has a head pose. */
   private isArriving = false;
 
   constructor(
@@ -63,7 +65,7 @@ export class Stereo {
     this.headset = new XrSession(
       renderer,
       () => {
-        // where the head is in the user's own room the first frame tells
+        // in the user's own room, the position of the head is known only from the first frame on
         if (this.headset.isInUsersRoom) this.isArriving = true;
         else this.begin(this.headset.current);
       },
@@ -71,7 +73,10 @@ export class Stereo {
     );
   }
 
-  /** Load what stereo draws and listens with. Rejects with a BundleError, and may be asked again. */
+  /**
+   * Loads the code that draws stereo and handles input. Rejects with BundleError; may be called
+   * again.
+   */
   prepare(): Promise<Hands> {
     this.loading ??= import("./interaction")
       .then(({ Hands }) => {
@@ -88,7 +93,7 @@ export class Stereo {
     return this.loading;
   }
 
-  /** What the user has chosen on the page, and the panel in the room shows as well. */
+  /** Passes choices on the page to the headset panel. */
   showInPanel(choices: Partial<PanelView>): void {
     this.choices = { ...this.choices, ...choices };
     this.hands?.panel.take(choices);
@@ -99,12 +104,14 @@ export class Stereo {
     return this.headset.start(xr, mode, this.prepare());
   }
 
-  /** The eyes before the page's own screen, which look at `focus`: two, where it shows stereo. */
+  /**
+   * Places the eyes in front of the page's screen, looking at `focus`: two if the screen shows
+   * stereo, otherwise one.
+   */
   followScreen(eyes: Eyes, camera: PerspectiveCamera, focus: Vector3): void {
     this.screen.follow(eyes, camera, focus, this.eyes.distance_m * this.eyes.strength);
   }
 
-  /** What the user has set for the eyes. */
   setEyes(eyes: EyeSettings): void {
     const isSame = JSON.stringify(eyes) === JSON.stringify(this.eyes);
     this.eyes = eyes;
@@ -122,20 +129,21 @@ export class Stereo {
   }
 
   /**
-   * Split screen for a phone in a viewer without WebXR. Must be called from a tap. Throws
-   * BundleError in words if the browser or the user refuses. Returns what could not be had.
+   * Splits the screen for a phone in a Cardboard viewer, without WebXR. Must be called from a tap.
+   * Throws BundleError if the browser or the user refuses. Returns a message for each missing
+   * feature.
    */
   startSplit(profile: Profile): Promise<readonly string[]> {
     if (this.kind !== null) return Promise.resolve([]);
     return this.split.start(profile);
   }
 
-  /** Everything but what is opaque, which the pass for the depth has to leave out. */
+  /** Objects that are not part of the specimen, which the depth pass leaves out. */
   get overlays(): readonly Object3D[] {
     return this.hands?.overlays ?? [];
   }
 
-  /** Where the eyes are in this frame. Returns the camera to draw with; null: no stereo. */
+  /** Places the eyes for this frame. Returns the camera to draw with; null without stereo. */
   pose(eyes: Eyes): Camera | null {
     if (this.renderer.xr.isPresenting) {
       spreadEyes(this.renderer.xr.getCamera().cameras, this.eyes.strength);
@@ -153,18 +161,18 @@ export class Stereo {
     return running.camera;
   }
 
-  /** Whether the user's own room shows behind the specimen. */
+  /** Whether the user's own room is visible behind the specimen. */
   get isInUsersRoom(): boolean {
     return this.headset.isInUsersRoom;
   }
 
-  /** The camera that sees what both eyes see. */
+  /** The camera whose view contains both eyes' views. */
   seenBy(camera: Camera): Camera {
-    // three moves the headset's cameras, not the one that it is given
+    // three.js moves the headset's own cameras, not the one passed to it
     return this.renderer.xr.isPresenting ? this.renderer.xr.getCamera() : camera;
   }
 
-  /** Pose of the head in the room, between the eyes; null: no stereo. */
+  /** Pose of the point between the eyes in the scene; null without stereo. */
   get head(): Matrix4 | null {
     if (this.renderer.xr.isPresenting) {
       return betweenEyes(this.renderer.xr.getCamera().cameras, this.between);
@@ -172,19 +180,22 @@ export class Stereo {
     return this.split.running?.head ?? null;
   }
 
-  /** Take what the head looks at for ahead. Returns its pose then; null: no stereo. */
+  /**
+   * Makes the direction in which the head looks now the direction ahead. Returns the head's new
+   * pose; null without stereo.
+   */
   recentre(): Matrix4 | null {
     const { running } = this.split;
     if (running !== null) {
       const before = running.head.clone();
       running.recentre();
       running.update();
-      this.hands?.panel.comeAlong(before, running.head);
+      this.hands?.panel.keepPlace(before, running.head);
     }
     return this.head;
   }
 
-  /** Draw a frame: through the lenses, where the screen is split. */
+  /** Draws a frame, distorted for the lenses if the screen is split. */
   present(draw: () => void): void {
     const { running } = this.split;
     if (running === null) {
@@ -198,17 +209,17 @@ export class Stereo {
     running.present();
   }
 
-  /** The phone is in another viewer; nothing changes where there is no split screen. */
+  /** Changes the lens profile; has an effect only on a split screen. */
   setLenses(profile: Profile): void {
     this.split.setProfile(profile);
   }
 
-  /** The specimen becomes so much larger where it is; on a flat screen nothing does. */
+  /** Scales the specimen about its middle; has no effect on a flat screen. */
   resize(factor: number, state: ViewerState): void {
     if (this.kind !== null) this.hands?.resize(factor, state);
   }
 
-  /** Whether a command was one of those that move the specimen before the eyes. */
+  /** Applies a command that moves the specimen in stereo. Returns false for other commands. */
   run(command: Command, state: ViewerState): boolean {
     const { hands } = this;
     if (command !== "press") return hands?.run(command, state) ?? false;
@@ -221,34 +232,31 @@ export class Stereo {
     void this.headset.end();
   }
 
-  /** Once a frame of stereo, before it is drawn; see `Hands.update`. */
+  /** Updates input for one frame of stereo, before drawing; see `Hands.update`. */
   update(dt_s: number, head: Matrix4, state: ViewerState, read_s: number): void {
     this.hands?.update(dt_s, head, state, read_s);
   }
 
-  /** The notices before the eyes now. */
   get notices(): readonly string[] {
     return this.hands?.notice.texts ?? [];
   }
 
-  /** Say something before the eyes; nothing where there is no stereo. */
+  /** Shows a notice in stereo; has no effect on a flat screen. */
   announce(text: string): void {
     this.hands?.announce(text);
   }
 
-  /** Whether the panel in the room is open. */
   get isPanelOpen(): boolean {
     return this.hands?.panel.isOpen ?? false;
   }
 
-  /** What the panel in the room has now, and its button. */
   get menu(): readonly MenuEntry[] {
     const { head, hands } = this;
     if (head === null || hands === null) return [];
     return hands.menuFrom(head);
   }
 
-  /** Open or close the panel in the room; false: no stereo. */
+  /** Opens or closes the headset panel. Returns false without stereo. */
   togglePanel(): boolean {
     if (this.kind === null) return false;
     this.hands?.panel.toggle();

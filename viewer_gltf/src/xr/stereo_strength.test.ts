@@ -25,7 +25,7 @@ describe("the strength of stereo", () => {
     }
   });
 
-  it("leaves a single eye where it is", () => {
+  it("does not move a single eye", () => {
     const [camera] = eyes();
     spreadEyes([camera], 0);
     expect(places([camera])).toEqual([0.97]);

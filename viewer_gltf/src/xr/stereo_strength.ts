@@ -1,10 +1,10 @@
-/** How far apart a headset's eyes are, as a share of what the headset has. */
+/** Changes the distance between a headset's eyes, as a share of the headset's own distance. */
 import { type PerspectiveCamera, Vector3 } from "three";
 
 const middle = new Vector3();
 const eye = new Vector3();
 
-/** Moves the cameras, as the session has just placed them, to or from the point between them. */
+/** Moves the cameras, which the session has just placed, along the line between them. */
 export function spreadEyes(cameras: readonly PerspectiveCamera[], strength: number): void {
   if (strength === 1 || cameras.length < 2) return;
   middle.set(0, 0, 0);

@@ -4,7 +4,7 @@ import { findXrSupport, wayToStereo } from "./support";
 const system = (answer: () => Promise<boolean>) => ({ isSessionSupported: answer });
 
 describe("stereo", () => {
-  it("is there with a headset", async () => {
+  it("is available with a headset", async () => {
     const found = await findXrSupport(
       system(async () => true),
       true,
@@ -12,7 +12,7 @@ describe("stereo", () => {
     expect(found).toEqual({ isAvailable: true, reason: "" });
   });
 
-  it("reports why it is not there", async () => {
+  it("reports why it is not available", async () => {
     const reasonOf = async (...args: Parameters<typeof findXrSupport>) =>
       (await findXrSupport(...args)).reason;
     expect(await reasonOf(undefined, false)).toContain("https");
@@ -28,8 +28,8 @@ describe("stereo", () => {
   });
 });
 
-describe("the button on the picture", () => {
-  it("leads to a headset, on a phone without one to the split screen, else nowhere", () => {
+describe("the stereo button on the canvas", () => {
+  it("leads to a headset, to the split screen on a phone without one, or nowhere", () => {
     const had = { isAvailable: true, reason: "" };
     const none = { isAvailable: false, reason: "none" };
     expect([wayToStereo(had, true), wayToStereo(had, false)]).toEqual(["stereo", "stereo"]);

@@ -1,13 +1,13 @@
-/** Whether a headset can be used, and if not, why, in words. */
+/** Whether a headset can be used, and if not, the reason for the user. */
 import type { XrSupport } from "../state/stereo";
 
-/** What leads into stereo here at a touch; null: nothing that would be of use. */
+/** The kind of stereo that a touch on the button starts; null: none is useful here. */
 export function wayToStereo({ isAvailable }: XrSupport, isPhone: boolean) {
   if (isAvailable) return "stereo";
   return isPhone ? "split" : null;
 }
 
-/** Whether the specimen can stand in the user's own room, by camera or through glass. */
+/** Whether augmented reality is supported, by camera or through glasses. */
 export async function showsUsersRoom(
   xr: Pick<XRSystem, "isSessionSupported"> | undefined,
   isSecure: boolean,
@@ -21,7 +21,10 @@ export async function showsUsersRoom(
   }
 }
 
-/** @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context */
+/**
+ * Returns whether a VR session is supported, or the reason why not.
+ * @param xr `navigator.xr`, absent in browsers without WebXR or outside a secure context
+ */
 export async function findXrSupport(
   xr: Pick<XRSystem, "isSessionSupported"> | undefined,
   isSecure: boolean,

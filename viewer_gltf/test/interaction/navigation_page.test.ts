@@ -1,6 +1,6 @@
 /**
- * Moving and zooming on a flat screen, by mouse and by two fingers: neither turns the view, and
- * nobody loses the specimen, however far it is pushed.
+ * Moving and zooming on a flat screen, by mouse and by two fingers. Neither turns the view, and the
+ * specimen stays near however far it is pushed.
  */
 import { beforeEach, expect, it } from "vitest";
 import { difference, isBackground, takePicture } from "../support/browser/picture";
@@ -8,23 +8,26 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 
-/** Of the little axes in the corner, which are 76 pixels wide: half a degree is a quarter. */
+/**
+ * Pixels of the axes' mark in the corner, which is 76 pixels wide; half a degree is a quarter of a
+ * pixel.
+ */
 const UNTURNED_PX = 0.25;
-/** Of the stage: the visible part of a specimen with its corner in the middle, and more. */
+/** Share of the canvas that a specimen with its corner in the middle covers at least. */
 const SEEN = 0.01;
 
-describeInChromium("a view that is moved and zoomed", () => {
+describeInChromium("a moved and zoomed view", () => {
   const stand = prepareStand({ viewport: { width: 504, height: 240 }, hasTouch: true });
   const page = () => stand.viewer.page;
 
   beforeEach(async () => {
     await stand.open("&mode=off");
-    await page().keyboard.press("ArrowRight"); // so that moving goes along no axis of the specimen
+    await page().keyboard.press("ArrowRight"); // so the motion is not along an axis of the specimen
     await page().keyboard.press("ArrowDown");
     await stand.viewer.still();
   });
 
-  /** Whither the specimen's axes lead on screen. */
+  /** The directions of the specimen's axes on screen. */
   const axes = () =>
     page()
       .locator(".orientation-mark line")
@@ -49,7 +52,7 @@ describeInChromium("a view that is moved and zoomed", () => {
   const away = ({ position, target }: Awaited<ReturnType<typeof look>>) =>
     Math.hypot(...position.map((v, i) => v - target[i]));
 
-  /** A place in the window where the specimen is seen, and the stage. */
+  /** A place in the window where the specimen is seen, and the canvas. */
   async function findSpot() {
     const picture = await takePicture(page());
     const spots = Array.from({ length: picture.width * picture.height }, (_, i) => i)
@@ -62,7 +65,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     return { stage, x: stage.x + scale * x, y: stage.y + scale * y };
   }
 
-  it("flies to what is double-clicked, isolates nothing, and stays where nothing is hit", async () => {
+  it("flies to a double-clicked place, isolates nothing, and stays if nothing is hit", async () => {
     const { stage, x, y } = await findSpot();
     const before = await look();
     await page().mouse.dblclick(x, y);
@@ -70,7 +73,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     await stand.viewer.still();
     expect((await stand.viewer.snapshot()).state.isolated).toBeNull();
     const there = await look();
-    await page().keyboard.press("r"); // back to where nothing fills the corner
+    await page().keyboard.press("r"); // back to the view with an empty corner
     await stand.viewer.still();
     const whole = await look();
     expect(away(whole)).toBeGreaterThan(away(there));
@@ -80,14 +83,14 @@ describeInChromium("a view that is moved and zoomed", () => {
     expect(await page().locator("[data-said]").textContent()).toBe("There is nothing to fly to.");
   });
 
-  it("flies to what is tapped twice by a finger that rolls a little", async () => {
+  it("flies to a place that is tapped twice by a finger that rolls slightly", async () => {
     const { x, y } = await findSpot();
     const before = await look();
-    // at once: between a test's own taps more time may pass than within a double tap
+    // in one call, because more time than a double tap allows may pass between a test's own taps
     await page().evaluate(
       ([x, y]) => {
         const canvas = document.querySelector(".stage canvas") as HTMLCanvasElement;
-        canvas.setPointerCapture = () => undefined; // the system knows of no such finger
+        canvas.setPointerCapture = () => undefined; // the system does not know this finger
         canvas.releasePointerCapture = () => undefined;
         const send = (type: string, rolled_px: number) =>
           canvas.dispatchEvent(
@@ -106,7 +109,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     await expect.poll(async () => away(await look())).toBeLessThan(0.75 * away(before));
   });
 
-  it("is not turned by the right button, though it goes beyond the specimen's end", async () => {
+  it("is not turned by the right button, even beyond the end of the specimen", async () => {
     const before = await axes();
     const start = await takePicture(page());
     for (const [dx, dy] of [
@@ -127,7 +130,7 @@ describeInChromium("a view that is moved and zoomed", () => {
 
   type Point = readonly [number, number];
 
-  /** Two fingers go from where they are put to where they are lifted. */
+  /** Moves two fingers from where they go down to where they are lifted. */
   async function twoFingers(from: readonly [Point, Point], to: readonly [Point, Point]) {
     const devtools = await page().context().newCDPSession(page());
     const at = (share: number) =>
@@ -145,7 +148,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     await devtools.detach();
   }
 
-  it.runIf(IS_EXHAUSTIVE)("is not turned by two fingers either", async () => {
+  it.runIf(IS_EXHAUSTIVE)("is not turned by two fingers", async () => {
     const before = await axes();
     const start = await takePicture(page());
     for (let i = 0; i < 5; i++) {
@@ -164,7 +167,7 @@ describeInChromium("a view that is moved and zoomed", () => {
     expect(difference(start, await takePicture(page()))).toBeGreaterThan(SEEN);
   });
 
-  it("is zoomed by a pinch, which turns nothing", async () => {
+  it("is zoomed by a pinch, without turning", async () => {
     const before = await axes();
     const scale = await scaleText();
     await twoFingers(

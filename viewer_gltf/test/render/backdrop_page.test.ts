@@ -1,16 +1,19 @@
-/** The place of the specimen on a flat screen: gradient and shadow, light and dark; the specimen stays as it is. */
+/**
+ * The backdrop on a flat screen: gradient and shadow, light and dark theme; the specimen's colours
+ * do not change.
+ */
 import { expect, it } from "vitest";
 import { type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
-/** Largest difference of a part of a colour, of 255, between two pictures of the same surface. */
+/** Largest difference of a colour component, of 255, between two images of the same surface. */
 const SAME = 3;
 
-describeInChromium("the background of the flat picture", () => {
+describeInChromium("the background on a flat screen", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 360 }, pixelRatio: 1 });
 
-  /** Surfaces alone, from a little above, in a theme. */
+  /** An image of the surfaces, from slightly above, in a theme. */
   async function pictureIn(theme: string, query = ""): Promise<Picture> {
     await stand.viewer.page.emulateMedia({ contrast: "no-preference" });
     await stand.open(`&mode=off&view=opening&theme=${theme}&quality=high${query}`);
@@ -25,7 +28,7 @@ describeInChromium("the background of the flat picture", () => {
     for (const theme of ["dark", "light"]) {
       const [room, plain] = [await pictureIn(theme), await pictureIn(theme, "&backdrop=plain")];
       const ground = plain.at(1, 1);
-      // where the plain picture shows its one colour there is no specimen
+      // the specimen is where the plain image differs from its single background colour
       const bare = plain.where((pixel) => pixel.join() === ground.join());
       const lights = bare.map(([x, y]) => light(room, x, y));
       const [darkest, lightest] = [Math.min(...lights), Math.max(...lights)];
@@ -38,7 +41,7 @@ describeInChromium("the background of the flat picture", () => {
     }
   });
 
-  it("has the shadow of what is shown, and none under nothing", async () => {
+  it("has the shadow of the shown part, and none if nothing is shown", async () => {
     const { viewer, manifest } = stand;
     const whole = await pictureIn("light");
     const sky = light(whole, 1, 1);
@@ -65,7 +68,7 @@ describeInChromium("the background of the flat picture", () => {
     expect(lightThere(await takePicture(viewer.page))).toBeGreaterThan(lightThere(whole) + 45);
   });
 
-  it("leaves the specimen's colours as they are", async () => {
+  it("does not change the specimen's colours", async () => {
     const pictures = [
       await pictureIn("dark"),
       await pictureIn("light"),
@@ -73,7 +76,7 @@ describeInChromium("the background of the flat picture", () => {
     ];
     const isInside = ([r, g, b]: readonly number[]) => Math.max(r, g, b) - Math.min(r, g, b) > 60;
     const near = [-2, -1, 0, 1, 2];
-    // edges are smoothed: they are of both
+    // pixels at edges are left out, since they mix specimen and background
     const inside = pictures[2]
       .where(isInside)
       .filter(([x, y]) =>
@@ -89,7 +92,7 @@ describeInChromium("the background of the flat picture", () => {
     }
   });
 
-  it("is the same each time", async () => {
+  it("is the same in each run", async () => {
     const [first, again] = [await pictureIn("light"), await pictureIn("light")];
     const differing = first
       .where(() => true)
@@ -97,7 +100,7 @@ describeInChromium("the background of the flat picture", () => {
     expect(differing).toEqual([]);
   });
 
-  it("follows the system where the address names no theme", async () => {
+  it("follows the system's theme if the address names none", async () => {
     const { page } = stand.viewer;
     await page.emulateMedia({ colorScheme: "light", contrast: "no-preference" });
     await stand.open("&mode=off");

@@ -1,7 +1,7 @@
 /**
- * The clip plane and box cut surfaces and volumes alike, in one eye and in two. Rays through the
- * specimen give the expected picture: where a ray's whole way is cut away there
- * is nothing, and where all of it is kept the picture is what it was.
+ * Clip plane and clip box cut surfaces and volumes alike, for one eye and for two. The expected
+ * image follows from rays through the specimen. A ray that is removed over its whole length shows
+ * nothing. A ray that is kept over its whole length shows the same as before.
  */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";
@@ -16,18 +16,21 @@ import { SPECIMEN, type Vec3 } from "../support/fixture/bodies";
 type Headset = import("iwer").XRDevice;
 
 const CHANNELS = ["F_x20_body", "Balls"];
-/** Pixels that the cut's own marks take: round a handle, and beside a line. */
+/** Pixels covered by the clip's own marks: around a handle, and beside a line. */
 const HANDLE_PX = 16;
 const LINE_PX = 3;
-/** From a plane's middle to its tip. */
+/** um from a plane's middle to its tip. */
 const ARM_UM = 0.2 * 64;
-/** Least difference of neighbours at a silhouette: each drawing blends it otherwise. */
+/**
+ * Difference between neighbouring pixels that counts as a silhouette; silhouettes are blended
+ * differently in each drawing.
+ */
 const EDGE = 24;
-/** Rays so near to a cut are no matter: the picture's own edges. */
+/** um. Rays this close to a clip plane are ignored, because they lie at the image's own edges. */
 const MARGIN_UM = 0.6;
-/** Of the headset: what iwer gives by default. */
+/** Metres between the pupils; iwer's default for the emulated headset. */
 const PUPILS_M = 0.063;
-/** Share of pixels that may differ where all is kept. */
+/** Share of pixels that may differ where everything is kept. */
 const SAME = 0.02;
 
 const { scale, center } = place({ min: [...SPECIMEN.min], max: [...SPECIMEN.max] });
@@ -39,18 +42,20 @@ const along = (a: Vec3, by: number, d: Vec3): Vec3 => [
   a[2] + by * d[2],
 ];
 
-/** From where a picture is seen, um, and its axes; the specimen's own are x, y up, z to the front. */
+/** Position of an eye, um, and its axes; the specimen's own are x, y up, z to the front. */
 type Eye = Readonly<{
   at: Vec3;
   ahead: Vec3;
   right: Vec3;
   width: number;
   height: number;
-  /** Of the picture's plane, one unit before the eye. */
+  /** Pixels per unit in the image plane, one unit in front of the eye. */
   focal_px: number;
 }>;
 
-/** Towards the specimen's middle from the front or from the side, metres of the room away. */
+/**
+ * An eye that looks at the specimen's middle from the front or the side, from a distance in metres.
+ */
 function eyeOf(
   side: "front" | "side",
   away_m: number,
@@ -65,7 +70,7 @@ function eyeOf(
   return { at, ahead: [-back[0], 0, -back[2]], right, width, height, focal_px };
 }
 
-/** Through the middle of a pixel; not of unit length. */
+/** The ray through the middle of a pixel; not of unit length. */
 function rayOf(eye: Eye, x: number, y: number): Vec3 {
   const { width, height, focal_px } = eye;
   const ahead = along(eye.ahead, (x + 0.5 - width / 2) / focal_px, eye.right);
@@ -78,11 +83,11 @@ function pixelOf(eye: Eye, p: Vec3): readonly [number, number] {
   return [eye.width / 2 + per * dot(from, eye.right) - 0.5, eye.height / 2 - per * from[1] - 0.5];
 }
 
-/** Kept is where normal . p <= offset, um. */
+/** Keeps the points with normal . p <= offset, um. */
 type Cut = Readonly<{ normal: Vec3; offset: number }>;
 type Span = readonly [number, number] | null;
 
-/** Part of a ray's span that the cuts leave, moved outwards by a margin. */
+/** The part of a ray's span that the cuts keep, moved outwards by a margin. */
 function kept(span: Span, from: Vec3, dir: Vec3, cuts: readonly Cut[], margin = 0): Span {
   if (span === null) return null;
   let [a, b] = span;
@@ -107,9 +112,9 @@ const faces = (min: Vec3, max: Vec3): readonly Cut[] => [
 ];
 const WHOLE = faces(SPECIMEN.min, SPECIMEN.max);
 
-/** Something that is drawn over the picture: a line, um, so many pixels thick to either side. */
+/** A line, um, drawn over the image, with this radius in pixels. */
 type Mark = Readonly<{ from: Vec3; to: Vec3; radius_px: number }>;
-/** How a view is cut: in its link, by planes that cut, and the marks that show it. */
+/** A clip: its link, its planes, and the marks that show it. */
 type Clip = Readonly<{ hash: string; cuts: readonly Cut[]; marks: readonly Mark[] }>;
 
 const UNCUT: Clip = { hash: "", cuts: [], marks: [] };
@@ -141,7 +146,7 @@ function boxClip(min: Vec3, max: Vec3): Clip {
   return { hash: `&box=${[...min, ...max]}`, cuts, marks: [...handles, ...edges] };
 }
 
-/** The pixels that marks take. */
+/** The pixels covered by marks. */
 function maskOf(eye: Eye, marks: readonly Mark[]): ReadonlySet<number> {
   const mask = new Set<number>();
   for (const { from, to, radius_px } of marks) {
@@ -157,7 +162,7 @@ function maskOf(eye: Eye, marks: readonly Mark[]): ReadonlySet<number> {
   return mask;
 }
 
-/** Whether the picture is even there: no outline of anything. */
+/** Whether the image is uniform around a pixel, without any outline. */
 function isEven(picture: Picture, x: number, y: number): boolean {
   const here = picture.at(x, y);
   return [-1, 0, 1].every((dx) =>
@@ -174,10 +179,12 @@ function isEven(picture: Picture, x: number, y: number): boolean {
 type Found = Readonly<{ gone: number; left: number; stays: number; changed: number }>;
 
 /**
- * Of the pixels that are drawn in the uncut picture: how many the cut takes away and how many of
- * these are left all the same, how many stay and how many of these are no longer what they were.
+ * Compares a clipped image with the whole one, over the pixels of the whole specimen. Counts the
+ * pixels that the clip should remove, and those of them that are left; the pixels that should stay,
+ * and those of them that changed.
  *
- * @param lowest least height of a ray of length 1 that is looked at: in stereo bar and ground are below it
+ * @param lowest least height of the rays, of length 1, that are compared: in stereo, bar and ground
+ *   are below
  */
 function compare(
   whole: Picture,
@@ -193,7 +200,7 @@ function compare(
     const dir = rayOf(eye, x, y);
     if (dir[1] / Math.hypot(...dir) < lowest) continue;
     const span = kept([0, Number.POSITIVE_INFINITY], eye.at, dir, WHOLE);
-    if (span === null) continue; // no part of the specimen
+    if (span === null) continue; // the ray misses the specimen
     const ends = span.map((t) => along(eye.at, t, dir));
     const isKept = cuts.every(({ normal, offset }) =>
       ends.every((p) => dot(normal, p) < offset - MARGIN_UM),
@@ -217,34 +224,35 @@ function expectCut(found: Found, atLeast: number, which: string): void {
   expect(found.changed, which).toBeLessThanOrEqual(SAME * found.stays);
 }
 
-/** A link that holds all that matters. */
+/** A link with all settings that matter. */
 const linkOf = (mode: Mode, more: string) =>
   `#v=1&c=${CHANNELS}&mode=${mode}&dwell=off&quality=high${more}`;
 
 const PLANE = planeClip([1, 0, 0], 34);
 const OBLIQUE = planeClip([-0.8, 0.6, 0], -52);
 const BOX = boxClip([0, -48, 0], [46, -16, 24]);
-/** The cuts that every run makes of what is drawn so; others are made in stereo, and by keys. */
+/** The cuts that every run tests for each drawing; others are tested in stereo and with keys. */
 const KEPT: Readonly<Record<string, readonly Clip[]>> = { surfaces: [BOX], volumes: [OBLIQUE] };
 const DRAWN: readonly (readonly [string, Mode])[] = [
   ["surfaces", "off"],
   ["volumes", "all"],
 ];
 
-describeInChromium("a cut", () => {
+describeInChromium("a clip", () => {
   const stand = prepareStand({ viewport: { width: 600, height: 300 } });
   const page = () => stand.viewer.page;
   const AWAY_M = 1.8;
 
   async function shoot(mode: Mode, eye_m: readonly number[], hash: string): Promise<Picture> {
-    await page().goto("about:blank"); // the same address with another hash is no other page
+    // An address that differs only in its hash does not reload the page.
+    await page().goto("about:blank");
     await stand.open(linkOf(mode, `&eye=${[...eye_m, 0, 0, 0]}${hash}`));
     await stand.viewer.still();
     return takePicture(page());
   }
 
   for (const [as, mode] of DRAWN) {
-    it(`by plane or box takes ${as} away beyond it, and changes nothing else`, async () => {
+    it(`by plane or box removes ${as} beyond it, and changes nothing else`, async () => {
       const from = [0, 0, AWAY_M];
       const whole = await shoot(mode, from, "");
       const eye = eyeOf("front", AWAY_M, 40, whole);
@@ -255,8 +263,9 @@ describeInChromium("a cut", () => {
     });
   }
 
-  it("comes and goes by a key: a plane through the middle, a box round it", async () => {
-    const whole = await shoot("off", [AWAY_M, 0, 0], ""); // from the side: the plane faces the front
+  it("is switched by a key: a plane through the middle, a box around it", async () => {
+    // The view is from the side, since the plane faces the front.
+    const whole = await shoot("off", [AWAY_M, 0, 0], "");
     const eye = eyeOf("side", AWAY_M, 40, whole);
     const press = async (key: string) => {
       await page().keyboard.press(key);
@@ -274,14 +283,16 @@ describeInChromium("a cut", () => {
   });
 });
 
-describeInChromium("a cut in stereo", () => {
+describeInChromium("a clip in stereo", () => {
   const VIEWPORT = { width: 360, height: 180 };
-  /** Sine of the pitch at which the ground's farthest line is seen, 9 m away and 1.45 m below. */
+  /**
+   * Sine of the pitch of the ground's farthest line, which is 9 m away and 1.45 m below the eyes.
+   */
   const GROUND_BEGINS = -0.155;
   const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
   const page = () => stand.viewer.page;
 
-  /** What the left and the right eye see. */
+  /** The images of the left and the right eye. */
   async function shoot(mode: Mode, hash: string): Promise<readonly Picture[]> {
     await page().goto("about:blank");
     await stand.open(linkOf(mode, hash));
@@ -290,8 +301,8 @@ describeInChromium("a cut in stereo", () => {
       const { headset } = window as unknown as { headset: Headset };
       for (const hand of ["left", "right"] as const) {
         const controller = headset.controllers[hand];
-        if (controller === undefined) throw new Error(`no ${hand} controller`);
-        controller.connected = false; // its ray would lie over the picture
+        if (controller === undefined) throw new Error(`there is no ${hand} controller`);
+        controller.connected = false; // its ray would cover the image
       }
     });
     await stand.viewer.settled();
@@ -311,7 +322,7 @@ describeInChromium("a cut in stereo", () => {
     [DRAWN[1], BOX],
   ] as const;
   for (const [[as, mode], clip] of sweep(inStereo, ([, clip]) => clip === BOX)) {
-    it(`takes ${as} away in both eyes`, async () => {
+    it(`removes ${as} for both eyes`, async () => {
       await addHeadset(page());
       const whole = await shoot(mode, "");
       const cut = await shoot(mode, clip.hash);
@@ -319,6 +330,6 @@ describeInChromium("a cut in stereo", () => {
         const eye = eyeOf("front", XR_DISTANCE_M, 90, picture, (i - 0.5) * PUPILS_M);
         expectCut(compare(picture, cut[i], eye, clip, GROUND_BEGINS), 12, `${clip.hash}, eye ${i}`);
       });
-    }, 400_000); // twice a session, in software
+    }, 400_000); // two sessions, with a software renderer
   }
 });

@@ -1,4 +1,4 @@
-/** Surface and volume of one channel look like one thing: mean colours over the same pixels. */
+/** Surface and volume of one channel have the same mean colours over the same pixels. */
 import { describe, expect, it } from "vitest";
 import { isBackground, type Picture, type Pixel, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -8,12 +8,12 @@ import { sweep } from "../support/exhaustive";
 
 const VIEWPORT = { width: 640, height: 360 };
 const TAN_HALF_FIELD = Math.tan((20 * Math.PI) / 180);
-/** Of the disc, degrees, and of what is all volume within its soft rim. */
+/** Degrees: radius of the disc, and radius within its soft rim where only the volume shows. */
 const [DISC, WITHIN] = [12, 6.5];
 /** Largest difference of a channel's mean colours (CIEDE2000). */
 const MAX_DELTA_E = 5;
 
-/** Mean colours of two pictures over pixels of the disc's inside that show the specimen in both. */
+/** Mean colours of two images over the pixels inside the disc that show the specimen in both. */
 function meansWithin(a: Picture, b: Picture): Readonly<{ pixels: number; means: Pixel[] }> {
   const radius = ((a.height / 2) * Math.tan((WITHIN * Math.PI) / 180)) / TAN_HALF_FIELD;
   const sums = [0, 1].map(() => [0, 0, 0]);
@@ -32,7 +32,9 @@ function meansWithin(a: Picture, b: Picture): Readonly<{ pixels: number; means: 
   return { pixels, means: sums.map(([r, g, b]) => [r / pixels, g / pixels, b / pixels] as const) };
 }
 
-/** `solid`: the transfer function by which the volume looks as the surface does; null: it opens so. */
+/**
+ * `solid`: transfer function with which the volume looks like the surface; null: the default one.
+ */
 type Case = Readonly<{
   name: string;
   bundle: string | undefined;
@@ -47,11 +49,11 @@ const CASES: readonly Case[] = [
 
 for (const { name, bundle, channels, solid } of sweep(CASES, ({ name }) => name !== "real cells")) {
   describe.skipIf(!bundle)(name, () => {
-    describeInChromium("in the disc", () => {
+    describeInChromium("inside the disc", () => {
       const stand = prepareStand({ bundle, viewport: VIEWPORT, pixelRatio: 1 });
 
       for (const channel of sweep(channels, (each) => each === channels[0])) {
-        it(`${channel} has the surface's colour`, async () => {
+        it(`${channel} has the colour of its surface`, async () => {
           const at = async (mode: string) => {
             const look = solid === null ? "" : `&l=${channel}:t${solid}`;
             const link = `v=1&cut=none&c=${channel}${look}`;

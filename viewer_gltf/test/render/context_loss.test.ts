@@ -1,14 +1,19 @@
-/** What the graphics driver does to the page: it drops the picture, or draws smaller textures. */
+/**
+ * Effects of the graphics driver on the page: it loses the context, or supports only small
+ * textures.
+ */
 import { expect, it } from "vitest";
 import { changeContext, rememberContext } from "../support/browser/graphics_context";
 import { difference, type Picture, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 
-/** Pixels to a block's edge: light arrives by chance, which evens out over so many. */
+/**
+ * Pixels of a block's edge. Path-traced light is random, and the mean over a block evens it out.
+ */
 const BLOCK = 15;
 
-/** Mean brightness of each block of a picture, 0..255. */
+/** Mean brightness of each block of an image, 0 to 255. */
 function coarse(picture: Picture): readonly number[] {
   const { width, height } = picture;
   const across = Math.floor(width / BLOCK);
@@ -21,7 +26,7 @@ function coarse(picture: Picture): readonly number[] {
   });
 }
 
-describeInChromium("the graphics driver", () => {
+describeInChromium("a graphics driver", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 } });
   const notices = async () => (await stand.viewer.snapshot()).state.notices;
 
@@ -36,7 +41,7 @@ describeInChromium("the graphics driver", () => {
     await stand.viewer.settled();
   };
 
-  it("drops the picture, which is drawn again: surfaces and volumes", async () => {
+  it("drops the image, which is drawn again: surfaces and volumes", async () => {
     await prepareLoss();
     const warnings: string[] = [];
     stand.viewer.page.on("console", (message) => {
@@ -49,11 +54,11 @@ describeInChromium("the graphics driver", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(0.002);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.every(({ level }) => level === 0)).toBe(true);
-    // nothing is drawn while there is nothing to draw on, nor dropped what belongs to another
+    // nothing is drawn without a context, and no object of another context is deleted
     expect(warnings.filter((text) => /TilesRenderer|does not belong/.test(text))).toEqual([]);
   });
 
-  it("drops the picture, which is drawn again: slices, shaded volumes, a measurement and a cut", async () => {
+  it("drops the image, which is drawn again: slices, shaded volumes, a measurement and a clip", async () => {
     await prepareLoss();
     const cut = "cut=1,0,0,6&points=2,-2,1,8,-4,1&slices=on&planes=on&depth=0.5";
     await stand.open(`&mode=all#v=1&${cut}`);
@@ -64,7 +69,7 @@ describeInChromium("the graphics driver", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(0.002);
   });
 
-  it("drops the picture, which gathers light again", async () => {
+  it("drops the image, which gathers light again", async () => {
     await prepareLoss();
     await stand.open("&mode=traced");
     const gathered = async () => {
@@ -79,7 +84,7 @@ describeInChromium("the graphics driver", () => {
     });
   });
 
-  it("does not give the picture back: the page offers a reload with fewer pixels, which keeps the view", async () => {
+  it("does not restore the image: the page offers a reload with fewer pixels, which keeps the view", async () => {
     await prepareLoss();
     await stand.open("&mode=off");
     const { viewer } = stand;
@@ -94,9 +99,9 @@ describeInChromium("the graphics driver", () => {
     const [before, seen] = [await width(), await look()];
     await call("loseContext");
     await offer.waitFor();
-    expect(await notices()).toEqual([]); // the offer stands in its place
+    expect(await notices()).toEqual([]); // the offer replaces the notice
     await call("restoreContext");
-    await offer.waitFor({ state: "detached" }); // it has come back after all
+    await offer.waitFor({ state: "detached" }); // the context has returned after all
     await viewer.settled();
     await call("loseContext");
     await offer.click();
@@ -110,12 +115,12 @@ describeInChromium("the graphics driver", () => {
     await expect
       .poll(() => viewer.page.locator("[data-said]").textContent())
       .toContain("fewer pixels");
-    await viewer.page.evaluate(() => sessionStorage.clear()); // as in another tab
+    await viewer.page.evaluate(() => sessionStorage.clear()); // like another tab
     await viewer.page.reload();
     await expect.poll(width).toBe(before);
   });
 
-  it("takes no large textures: a coarser level is shown, and the page reports it", async () => {
+  it("supports no large textures: a coarser level is shown, and the page reports it", async () => {
     await stand.viewer.page.addInitScript(() => {
       const { prototype } = WebGL2RenderingContext;
       const original = prototype.getParameter;

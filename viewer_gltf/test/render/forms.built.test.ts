@@ -1,6 +1,6 @@
 /**
- * A scene looks like one thing as surfaces at each level of detail, marched, path-traced, and in slices.
- * STEREOCELL_FORM_BUNDLES holds the bundles of tests/support/form_scenes.py, joined by ":".
+ * A scene looks the same as surfaces at each level of detail, ray-marched, path-traced, and in
+ * slices. STEREOCELL_FORM_BUNDLES lists the bundles of tests/support/form_scenes.py, joined by ":".
  */
 import { createHash } from "node:crypto";
 import { readFile } from "node:fs/promises";
@@ -20,17 +20,20 @@ import { overlap, type Silhouette, silhouetteOf } from "../support/silhouette";
 const BUNDLES = (process.env.STEREOCELL_FORM_BUNDLES ?? "")
   .split(":")
   .filter((path) => path !== "");
-/** The scenes that are path-traced: one does for most runs, since software takes a minute for each. */
+/**
+ * The scenes that are path-traced: one in most runs, because a software renderer takes a minute for
+ * each.
+ */
 const TRACED = IS_EXHAUSTIVE ? BUNDLES : BUNDLES.slice(0, 1);
 /** Least intersection over union of two silhouettes. */
 const MIN_OVERLAP = 0.95;
-/** The same bound for a level that the page shows only where the object is a few pixels large. */
+/** The same limit for a level that the page uses only when the object is a few pixels large. */
 const MIN_OVERLAP_FROM_AFAR = 0.8;
 /** Largest difference of mean colours (CIEDE2000). */
 const MAX_DELTA_E = 8;
 /**
- * Samples of a traced picture from which on it is its own, and the denoiser smooths the rest; and those
- * with which the grain at its rim is gone, too.
+ * Samples after which a path-traced image is no longer the stand-in, so that the denoiser smooths
+ * its noise; and samples after which the noise at its rim is gone, too.
  */
 const SAMPLES = [5, 20] as const;
 const PATIENT = { timeout: 120_000 };
@@ -38,14 +41,14 @@ const FIELD_OF_VIEW_DEG = 40;
 /** Thickness, in voxels, of the slab of a volume that is compared with a slice. */
 const SLAB_VOXELS = 1;
 const VOXELS_ACROSS = 63;
-/** Brightness, of 255, of a pixel that the rim of a cut covers by half. */
+/** Brightness, of 255, of a pixel that the rim of a clip covers by half. */
 const RIM = 56;
 
 let pictures = 0;
 
 type TilesetNode = { geometricError: number; children?: TilesetNode[] };
 
-/** The means over the pixels that show the object in both pictures. */
+/** The mean colours over the pixels that show the object in both images. */
 function meansOf(pictures: readonly Picture[]): readonly Pixel[] {
   const silhouettes = pictures.map(silhouetteOf);
   const { width } = pictures[0];
@@ -66,21 +69,27 @@ function expectAlike(surface: Picture, picture: Picture, name: string, least = M
   expect.soft(colorDifference(a, b), `${name}: colour`).toBeLessThan(MAX_DELTA_E);
 }
 
-/** The function by which the volume has the bodies that its surface outlines: those of a microscope open translucent. */
+/**
+ * A link with the transfer function that shows the surface's objects in the volume; a microscope's
+ * volumes open translucent.
+ */
 function asBodies({ manifest }: Stand): string {
   const { id, transfer_function: name } = manifest.channels[0];
   return name === "soft" ? `&l=${id}:tdefault` : "";
 }
 
 async function pictureOf(stand: Stand, mode: string, link = asBodies(stand)): Promise<Picture> {
-  // an address that differs in its end alone opens no page anew
+  // an address that differs only in its hash would not reload the page
   const query = `&mode=${mode}&quality=high&picture=${pictures++}`;
   await stand.open(`${query}#v=1&cut=none${link}`);
   await stand.viewer.settled();
   return takePicture(stand.viewer.page);
 }
 
-/** The traced picture, clear enough to have the silhouette of `surface`, or as clear as we wait for. */
+/**
+ * The path-traced image, with enough samples for the silhouette of `surface`, or for as long as the
+ * test waits.
+ */
 async function tracedLike(stand: Stand, surface: Picture): Promise<Picture> {
   let picture = await pictureOf(stand, "traced");
   const samples = async () => (await stand.viewer.snapshot()).traced.samples;
@@ -100,7 +109,7 @@ function pixelSize(stand: Stand, { width, height }: Picture): number {
   return (2 * Math.tan(fov_rad / 2) * away_um) / height;
 }
 
-/** A cut's rim faces sideways and is dark: whatever the lamp leaves visible is the object. */
+/** The object as all pixels that are not dark: a clip's rim faces sideways and is dark. */
 function thresholded(picture: Picture): Silhouette {
   return Array.from({ length: picture.width * picture.height }, (_, i) => {
     const pixel = picture.at(i % picture.width, Math.floor(i / picture.width));
@@ -108,7 +117,7 @@ function thresholded(picture: Picture): Silhouette {
   });
 }
 
-/** Serve a tileset without the levels that are finer than `coarser` levels above the finest. */
+/** Serves a tileset without the finest `coarser` levels. */
 async function keepCoarser(stand: Stand, path: string, coarser: number): Promise<void> {
   const tileset = JSON.parse(await readFile(join(stand.bundle, path), "utf8"));
   const chain: TilesetNode[] = [];
@@ -125,27 +134,32 @@ async function keepCoarser(stand: Stand, path: string, coarser: number): Promise
   stand.host.overrides.set("/bundle/manifest.json", { status: 200, body: manifest });
 }
 
-describeInChromium("one scene in all forms", () => {
+describeInChromium("one scene in all representations", () => {
   if (BUNDLES.length === 0) it.skip("needs STEREOCELL_FORM_BUNDLES");
 
   describe.each(BUNDLES)("of %s", (bundle) => {
     const stand = prepareStand({ bundle, viewport: { width: 640, height: 300 }, pixelRatio: 0.8 });
 
-    /** The picture of the surface at its finest level, with which the tests compare the other forms. */
+    /**
+     * Image of the surface at its finest level, with which the other representations are compared.
+     */
     let surface: Picture;
     beforeAll(async () => {
       surface = await pictureOf(stand, "off");
     });
 
-    it("has one silhouette and one colour as surface and as volume", async () => {
+    it("has the same silhouette and colour as surface and as volume", async () => {
       expectAlike(surface, await pictureOf(stand, "all"), "marched");
     });
 
-    it.runIf(TRACED.includes(bundle))("has them path-traced, too", async () => {
-      expectAlike(surface, await tracedLike(stand, surface), "traced");
-    });
+    it.runIf(TRACED.includes(bundle))(
+      "has the same silhouette and colour when path-traced",
+      async () => {
+        expectAlike(surface, await tracedLike(stand, surface), "traced");
+      },
+    );
 
-    it("has them at each level of detail that the page would show at this distance", async () => {
+    it("has the same silhouette and colour at each level of detail for this distance", async () => {
       const { tileset, distances } = stand.manifest.channels[0];
       if (tileset === null || distances === undefined) throw new Error("the scene has no surface");
       const pixel_um = pixelSize(stand, surface);
@@ -157,7 +171,7 @@ describeInChromium("one scene in all forms", () => {
       }
     });
 
-    it("is cut by a slice where its volume is", async () => {
+    it("has the same silhouette in a slice as in a slab of its volume", async () => {
       const { bounds_um, sides } = stand.manifest.specimen;
       const { center } = place(bounds_um);
       const voxel_um = (bounds_um.max[0] - bounds_um.min[0]) / VOXELS_ACROSS;
@@ -176,7 +190,7 @@ describeInChromium("one scene in all forms", () => {
       const { width, height, values } = await stand.viewer.page.evaluate((at) => {
         const canvas = document.querySelector<HTMLCanvasElement>(`[data-slice="${at}"] canvas`);
         const context = canvas?.getContext("2d");
-        if (canvas == null || context == null) throw new Error("no picture of the slice");
+        if (canvas == null || context == null) throw new Error("there is no image of the slice");
         const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
         const values = Array.from(data).filter((_, i) => i % 4 === 0);
         return { width: canvas.width, height: canvas.height, values };
@@ -192,7 +206,7 @@ describeInChromium("one scene in all forms", () => {
         const isInside = column >= 0 && column < width && row >= 0 && row < height;
         return isInside && values[row * width + column] >= level;
       });
-      // the handles of the cut, which are blue, lie over the picture
+      // the clip's handles, which are blue, lie over the image
       const isSeen = (i: number) => {
         const [r, , b] = slab.at(i % slab.width, Math.floor(i / slab.width));
         return b <= r + 4;

@@ -1,4 +1,4 @@
-/** Representations: surfaces from afar, volumes round the gaze, in one tile, or everywhere. */
+/** Representations: surfaces from afar, volumes around the gaze, in one tile, or everywhere. */
 import { expect, it } from "vitest";
 import type { Mode } from "../../src/state/parameters/volumes";
 import { project } from "../support/browser/camera";
@@ -13,10 +13,13 @@ const VIEWPORT = { width: 480, height: 272 };
 const FIELD_OF_VIEW_DEG = 40;
 const DISC_DEG = 10;
 const NEAR = "&switch=9";
-/** Through soft volumes one sees, so that they look unlike the surfaces whose place they take. */
+/** Soft volumes are translucent, so they look different from the surfaces that they replace. */
 const SOFT = "#v=1&depth=0&l=Balls:tsoft,F_x20_body:tsoft";
 
-/** Pixels of a disc's picture outside those within and without it, by more than 5, and between both. */
+/**
+ * Counts the pixels of the disc's image that are outside the range of the images within and without
+ * it, by more than 5, and those between both.
+ */
 function rimOf(disc: Picture, within: Picture, without: Picture) {
   let [outside, between] = [0, 0];
   for (let y = 0; y < disc.height; y++) {
@@ -34,7 +37,7 @@ describeInChromium("a channel without a surface", () => {
   const stand = prepareStand({ viewport: VIEWPORT, fixture: { hasReason: true } });
 
   for (const quality of sweep(["high", "low"], (each) => each === "high")) {
-    it(`is a volume on both sides of the rim, which is nowhere outside both: ${quality}`, async () => {
+    it(`is a volume on both sides of the rim, whose colours stay between both: ${quality}`, async () => {
       const at = async (query: string) => {
         await stand.open(`${query}&disc=${DISC_DEG}&quality=${quality}#v=1&depth=0`);
         await stand.viewer.settled();
@@ -65,7 +68,9 @@ describeInChromium("surface or volume", () => {
   const modeAt = (mode: Mode, quality: string) =>
     `&mode=${mode}${NEAR}&disc=${DISC_DEG}&quality=${quality}`;
 
-  /** Pictures of several modes, of a page that is opened once: that takes more than all of them. */
+  /**
+   * Images in several modes of a page that is opened once, since opening takes longer than drawing.
+   */
   async function inModes(modes: readonly Mode[], quality: string, hash: string) {
     await stand.open(`${modeAt(modes[0], quality)}${hash}`);
     const pictures: Picture[] = [];
@@ -77,7 +82,10 @@ describeInChromium("surface or volume", () => {
   }
 
   const drawn = new Map<Mode, Picture>();
-  /** Drawn once for all tests that look at it, with soft volumes; the last one is on screen, if it is drawn now. */
+  /**
+   * Images with soft volumes, drawn once for all tests; the last one is on screen if it is drawn
+   * now.
+   */
   async function as(...modes: Mode[]): Promise<Picture[]> {
     const missing = modes.filter((mode) => !drawn.has(mode));
     const made = missing.length > 0 ? await inModes(missing, "high", SOFT) : [];
@@ -87,7 +95,7 @@ describeInChromium("surface or volume", () => {
     return modes.flatMap((mode) => drawn.get(mode) ?? []);
   }
 
-  /** How many pixels of a ring round the middle differ by more than `by`. */
+  /** Number of pixels in a ring around the middle that differ by more than `by`. */
   function apart(a: Picture, b: Picture, from_deg: number, to_deg: number, by = 2): number {
     const perTan = a.height / 2 / Math.tan((FIELD_OF_VIEW_DEG * Math.PI) / 360);
     const [inner, outer] = [from_deg, to_deg].map(
@@ -105,34 +113,35 @@ describeInChromium("surface or volume", () => {
     return count;
   }
 
-  it("is a disc: volumes within, surfaces without, over the border of two tiles", async () => {
+  it("is a disc across the border of two tiles: volumes inside, surfaces outside", async () => {
     const [all, off, disc] = await as("all", "off", "disc");
     const { volumes, gazed, discRadius_deg } = await stand.viewer.snapshot();
     expect(discRadius_deg).toBeCloseTo(DISC_DEG, 5);
     expect(gazed).not.toBeNull();
     expect(new Set(volumes.map(({ tile }) => tile))).toEqual(new Set(["r0_c0", "r0_c1"]));
     const inner_deg = 0.55 * DISC_DEG;
-    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25); // else this would show nothing
-    // the same picture as where everything is a volume, so that no box edge shows
+    // Without this difference the test would prove nothing.
+    expect(apart(all, off, 0, inner_deg, 20)).toBeGreaterThan(25);
+    // the same image as with volumes everywhere, so no box edge shows
     expect(apart(disc, all, 0, inner_deg)).toBe(0);
-    // a few pixels of silhouettes are multisampled otherwise where surfaces are blended
+    // a few pixels of silhouettes are multisampled differently where surfaces are blended
     expect(apart(disc, off, 1.04 * DISC_DEG, 40)).toBeLessThan(20);
-    expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the feather
+    expect(apart(disc, off, 0.65 * DISC_DEG, 0.95 * DISC_DEG)).toBeGreaterThan(20); // the soft rim
   });
 
   for (const quality of ["high", "low"]) {
     it.runIf(IS_EXHAUSTIVE)(
-      `has a rim that is nowhere outside both pictures, quality ${quality}`,
+      `has a rim whose colours stay between both images, quality ${quality}`,
       async () => {
         const [disc, all, off] = await inModes(["disc", "all", "off"], quality, "#v=1&depth=0");
         const { outside, between } = rimOf(disc, all, off);
         expect(outside).toBe(0);
-        expect(between).toBeGreaterThan(50); // there is a rim
+        expect(between).toBeGreaterThan(50); // so there is a rim
       },
     );
   }
 
-  it("takes another colour in the same frame, surface and volume", async () => {
+  it("changes colour in the same frame as surface and as volume", async () => {
     const { page } = stand.viewer;
     await addClock(page);
     await stand.open(`&mode=disc${NEAR}&disc=${DISC_DEG}&quality=high#v=1&c=Balls&depth=0`);
@@ -152,7 +161,7 @@ describeInChromium("surface or volume", () => {
     expect(Math.abs((await count(1)) - red)).toBeLessThan(red / 20);
   });
 
-  it("is drawn with less while frames are late, and as well as can be at rest", async () => {
+  it("is drawn in lower quality while frames are late, and in full quality at rest", async () => {
     const { page } = stand.viewer;
     await addClock(page);
     await stand.open(`&mode=all${NEAR}&quality=auto#v=1&depth=0`);
@@ -168,7 +177,7 @@ describeInChromium("surface or volume", () => {
     const moving = await settings();
     expect(moving.steps).toBeLessThan(100);
     expect(moving.resolution).toBeLessThan(1);
-    // what is still being fetched comes when it comes, fades in, and is movement too
+    // data that arrive fade in, which counts as movement
     const isLoading = async () => {
       await tick(page, 150);
       return (await stand.viewer.snapshot()).isLoading;
@@ -176,7 +185,7 @@ describeInChromium("surface or volume", () => {
     await expect.poll(isLoading).toBe(false);
     await tick(page, 150, 8);
     expect(await settings()).toEqual(best);
-    // and clears up, frame by frame, while nothing changes
+    // the noise averages out frame by frame while nothing changes
     const frames = () => page.evaluate(() => window.stereocell?.frames ?? 0);
     const rested = await frames();
     const later = async () => {
@@ -186,7 +195,7 @@ describeInChromium("surface or volume", () => {
     await expect.poll(later).toBeGreaterThan(rested + 2);
   });
 
-  it("stays a surface beyond the switch distance", async () => {
+  it("stays a surface beyond the volume distance", async () => {
     await stand.open("&switch=1");
     await stand.viewer.settled();
     const before = await stand.viewer.snapshot();
@@ -204,7 +213,7 @@ describeInChromium("surface or volume", () => {
     expect(near.discRadius_deg).toBeGreaterThan(0);
   });
 
-  it("is exactly the gazed tile in the paper's mode", async () => {
+  it("is a volume in exactly the gazed tile in the paper's mode", async () => {
     const [all, off, tile] = await as("all", "off", "tile");
     const { volumes, gazed } = await stand.viewer.snapshot();
     expect(new Set(volumes.map((each) => each.tile))).toEqual(new Set([gazed]));
@@ -218,11 +227,12 @@ describeInChromium("surface or volume", () => {
     expect(at(tile, other)).toEqual(at(off, other));
     expect(at(tile, own)).not.toEqual(at(off, own));
     at(tile, own).forEach((v, i) => {
-      expect(Math.abs(v - at(all, own)[i])).toBeLessThanOrEqual(8); // steps are shared otherwise
+      // The steps of the ray are distributed differently.
+      expect(Math.abs(v - at(all, own)[i])).toBeLessThanOrEqual(8);
     });
   });
 
-  it("uploads one small table for another look, never a volume", async () => {
+  it("uploads one small table for another appearance, never a volume", async () => {
     await stand.viewer.page.addInitScript(() => {
       const uploads: number[] = [];
       (window as unknown as { uploads: number[] }).uploads = uploads;
@@ -251,12 +261,12 @@ describeInChromium("surface or volume", () => {
     const requests = asked();
     const tables = await take();
     expect(tables.length).toBeGreaterThan(0);
-    // rows of the table, and the table of skips
+    // rows of the lookup table, and the empty-space table
     expect(Math.max(...tables)).toBeLessThanOrEqual(4 * 1024);
     await stand.viewer.recolor("Block", "#ff00ff");
     expect((await take()).filter((bytes) => bytes > 0)).toEqual([]);
     expect(asked()).toBe(requests);
-    // and for other shadows one coarse grid, from what is there already
+    // other shading needs one coarse grid, computed from loaded data
     await stand.viewer.slide("depth-shading", 0.5);
     expect(Math.max(...(await take()))).toBeLessThanOrEqual(2 * 64 ** 3);
     await stand.viewer.chooseTransferFunction("Block", "default");
@@ -266,7 +276,7 @@ describeInChromium("surface or volume", () => {
     expect(asked()).toBe(requests);
   });
 
-  it("is shaded by what encloses it and by what stands before it, each time alike", async () => {
+  it("is shaded by surrounding and occluding matter, equally in each run", async () => {
     const open = (depth: number) => pictureOf(`${modeAt("all", "high")}#v=1&depth=${depth}`);
     const slide = async (depth: number) => {
       await stand.viewer.slide("depth-shading", depth);
@@ -280,16 +290,16 @@ describeInChromium("surface or volume", () => {
       return drawn.reduce((sum, place) => sum + picture.at(...place)[1], 0) / drawn.length;
     };
     expect(mean(whole)).toBeLessThan(mean(half));
-    expect(mean(half)).toBeLessThan(mean(none) + 2); // open places are a little brighter
+    expect(mean(half)).toBeLessThan(mean(none) + 2); // open places are slightly brighter
     expect(mean(whole)).toBeGreaterThan(0.7 * mean(none));
   });
 
-  it("has the light of surfaces beside them, whatever the depth shading", async () => {
+  it("is lit like the surfaces beside it in a disc, at any depth shading", async () => {
     const disc = (depth: number) => pictureOf(`${modeAt("disc", "high")}#v=1&depth=${depth}`);
     expect(apart(await disc(1), await disc(0), 0, 90, 0)).toBe(0);
   });
 
-  it("looks alike at fewer pixels and steps", async () => {
+  it("looks similar with fewer pixels and steps", async () => {
     const blockAt = async (quality: string) => {
       await stand.open(`&mode=all&quality=${quality}#v=1&c=Block`);
       await stand.viewer.settled();
@@ -300,9 +310,9 @@ describeInChromium("surface or volume", () => {
     expect(settings.resolution).toBeLessThanOrEqual(0.5);
     expect(settings.steps).toBeLessThan(100);
     const pixels = VIEWPORT.width * VIEWPORT.height;
-    expect(apart(high, low, 0, 40)).toBeGreaterThan(0); // it is another picture
+    expect(apart(high, low, 0, 40)).toBeGreaterThan(0); // the images differ
     expect(apart(high, low, 0, 40, 20)).toBeLessThan(0.01 * pixels); // at outlines
-    // nothing is shifted: what is drawn has its middle where it was
+    // nothing is shifted: the middle of the drawn part stays in place
     const middle = (picture: Picture) => {
       const drawn = picture.where((pixel) => !isBackground(pixel));
       return [0, 1].map((i) => drawn.reduce((sum, at) => sum + at[i], 0) / drawn.length);
@@ -311,7 +321,7 @@ describeInChromium("surface or volume", () => {
     expect(Math.hypot(a[0] - b[0], a[1] - b[1])).toBeLessThan(0.7);
   });
 
-  it("cancels what is no longer wanted", async () => {
+  it("cancels requests that are no longer wanted", async () => {
     await stand.open(`&mode=tile${NEAR}`);
     await stand.viewer.settled();
     stand.host.delay_ms = 2500;

@@ -1,12 +1,12 @@
-/** Memory after many changes of tile is what it was after all tiles had been shown once. */
+/** Memory after many changes of tile equals the memory after all tiles were shown once. */
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, prepareStand } from "../support/browser/stand";
 
 const SWITCHES = 10;
-/** Of the JavaScript heap: compiled code and the driver's own handles. A volume is more. */
+/** Bytes of JavaScript heap for compiled code and the driver's own handles; a volume takes more. */
 const HEAP_SLACK_BYTES = 2 * 1024 * 1024;
-/** Timer queries are not among them: a few are under way at any time. */
+/** Timer queries are not counted, because a few are always pending. */
 const KINDS = [
   "Texture",
   "Buffer",
@@ -19,7 +19,7 @@ const KINDS = [
 ] as const;
 type Counts = Record<(typeof KINDS)[number], number>;
 
-/** Count what is made and not deleted, before the page's own scripts run. */
+/** Counts objects that are made and not deleted, from before the page's own scripts run. */
 function countGpuObjects(kinds: readonly string[]): void {
   const counts: Record<string, number> = Object.fromEntries(kinds.map((kind) => [kind, 0]));
   (window as unknown as { gpuObjects: Record<string, number> }).gpuObjects = counts;
@@ -65,25 +65,26 @@ describeInChromium("changing tiles", () => {
       return (await devtools.send("Runtime.getHeapUsage")).usedSize;
     };
 
-    // More than are kept for a while, where the bundle has them: the others have to go.
+    // More tiles than are kept for a while, if the bundle has them, so that some are removed.
     const tiles = stand.manifest.tiles.slice(0, 5).map(({ id }) => id);
     const show = async (n: number) => {
       for (let i = 0; i < n; i++) await stand.viewer.chooseTile(tiles[i % tiles.length]);
       await stand.viewer.still();
     };
-    await show(2 * tiles.length); // each once more, so that every shader has met every surface
+    // Each tile is shown twice, so that every shader was used with every surface.
+    await show(2 * tiles.length);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.map(({ tile }) => tile)).toContain(tiles[tiles.length - 1]);
     const [first, firstBytes] = [await counts(), await heapBytes()];
     expect(first.Texture).toBeGreaterThan(0);
     expect(first.Buffer).toBeGreaterThan(0);
     await show(SWITCHES);
-    // what a worker still makes is let go a moment later; a leak stays
+    // objects of a busy worker are released a moment later; a leak would stay
     await expect.poll(counts).toEqual(first);
     expect(await heapBytes()).toBeLessThan(firstBytes + HEAP_SLACK_BYTES);
   });
 
-  it("gives back what a channel took when it is shown and hidden again and again", async () => {
+  it("releases the memory of a channel that is shown and hidden repeatedly", async () => {
     const { page } = stand.viewer;
     await page.addInitScript(countGpuObjects, [...KINDS]);
     await stand.open("&mode=off");

@@ -1,4 +1,7 @@
-/** A lamp of the stage stands with the specimen: it lights the same side of it from wherever one looks. */
+/**
+ * A lamp of the stage stands with the specimen, so it lights the same side of the specimen in every
+ * view.
+ */
 import { expect, it } from "vitest";
 import type { Manifest } from "../../src/bundle/generated/bundle";
 import { project, type Side } from "../support/browser/camera";
@@ -10,7 +13,9 @@ import { BALLS, SPECIMEN } from "../support/fixture/bodies";
 
 const bounds = SPECIMEN as unknown as Manifest["specimen"]["bounds_um"];
 const [{ center, radius }] = BALLS;
-/** A direction along which the ball's surface is looked at, from its middle, in radii: it does not lie at the edge. */
+/**
+ * Direction, in radii from the ball's middle, at which its surface is sampled, away from the edge.
+ */
 const ASIDE = 0.6;
 
 describeInChromium("a lamp of the stage, from the specimen's right", () => {
@@ -27,7 +32,7 @@ describeInChromium("a lamp of the stage, from the specimen's right", () => {
     },
   });
 
-  /** Blue light of the ball where it faces along an axis, and where it faces the other way. */
+  /** Blue light of the ball where it faces along an axis and where it faces the opposite way. */
   async function lightOfSides(query: string, side: Side, axis: 0 | 2): Promise<readonly number[]> {
     await stand.open(query);
     await stand.viewer.settled();
@@ -41,7 +46,7 @@ describeInChromium("a lamp of the stage, from the specimen's right", () => {
   }
 
   for (const mode of ["off", "all"]) {
-    it(`lights ${mode === "off" ? "surfaces" : "volumes"} by the cosine, and nothing behind`, async () => {
+    it(`lights ${mode === "off" ? "surfaces" : "volumes"} by the cosine, and not from behind`, async () => {
       const [right, left] = await lightOfSides(
         `&mode=${mode}&quality=high#v=1&depth=0`,
         "front",
@@ -52,7 +57,7 @@ describeInChromium("a lamp of the stage, from the specimen's right", () => {
     });
   }
 
-  it("lights both halves of the side that faces it, seen from there", async () => {
+  it("lights both halves of the side that faces it, seen from the lamp", async () => {
     const sides = await lightOfSides("&mode=off&quality=high&view=side", "left", 2);
     for (const light of sides) expect(light).toBeGreaterThan(0.5);
   });

@@ -1,4 +1,7 @@
-/** Numbers out of the chunks of objects: the byte of a row, the light of a flag, a place drawn in by the gap. */
+/**
+ * Tests of the object chunks' numbers: the byte of a row, the light of a flag, a position drawn
+ * inwards by the gap.
+ */
 import { readdir, readFile } from "node:fs/promises";
 import { Matrix4 } from "three";
 import { expect, it } from "vitest";
@@ -15,7 +18,7 @@ async function chunk(name: string): Promise<Record<string, string>> {
   return { [`chunks/${name}`]: await readFile(new URL(`${name}.glsl`, FOLDER), "utf8") };
 }
 
-describeInChromium("the chunks of objects", () => {
+describeInChromium("the object chunks", () => {
   const bare = prepareBarePage();
 
   it("are all tested here", async () => {
@@ -27,7 +30,7 @@ describeInChromium("the chunks of objects", () => {
     ]);
   });
 
-  it("read the byte of a row, over the ends of lines", async () => {
+  it("read the byte of a row, also across line ends", async () => {
     const texels = Array.from({ length: 256 * 3 }, (_, i) => (i * 7) % 256);
     const head = "uniform sampler2D uBytes;\n#include <chunks/object_texel>\n";
     const rows = [0, 1, 255, 256, 511, 512, 767];
@@ -45,13 +48,13 @@ describeInChromium("the chunks of objects", () => {
     }
   });
 
-  // a mesh's own steps, in um, in the room
+  // the mesh's own steps, um, placed in the scene
   const umToRoom = new Matrix4().makeRotationY(0.7).scale({ x: 0.01, y: 0.01, z: 0.01 } as never);
   umToRoom.setPosition(0.1, 1.5, -0.8);
   const stepToUm = new Matrix4().makeScale(0.002, 0.002, 0.002).setPosition(-1, -2, -3);
   const matrix = ({ elements }: Matrix4) => `mat4(${elements.map((v) => v.toFixed(9)).join(", ")})`;
   const toRoom = umToRoom.clone().multiply(stepToUm);
-  /** A place of a row's object, as it is drawn, um. */
+  /** Position of a point of a row's object as it is drawn, um. */
   const drawn = async (row: number, place_um: readonly number[], gap_um: number) => {
     const steps = place_um.map((v, i) => ((v + 1 + i) / 0.002).toFixed(3));
     const head = "uniform sampler2D uMiddles;\n#include <chunks/object_gap>\n";
@@ -69,7 +72,7 @@ describeInChromium("the chunks of objects", () => {
     return found.slice(0, 3).map((v, i) => 0.002 * v - 1 - i);
   };
 
-  it("draw cells that touch at a concave corner in within their own walls, and nothing between", async () => {
+  it("draw touching cells with a concave corner inside their own outlines, with a gap between", async () => {
     const gap_um = 0.2 * WIDTH_UM;
     const outlines: [number, number][][] = [];
     for (const [row, outline] of CELLS.entries()) {
@@ -77,7 +80,8 @@ describeInChromium("the chunks of objects", () => {
       for (const [x, y] of outline) {
         const [toX, toY, toZ] = await drawn(row, [x, y, 0], gap_um);
         places.push([toX, toY]);
-        expect(toZ).toBeCloseTo(gap_um / 2, 3); // half of it at either end of its narrowest side
+        // Half of the gap at either end of the narrowest side.
+        expect(toZ).toBeCloseTo(gap_um / 2, 3);
       }
       outlines.push(places);
       for (const place of along(places)) expect(isWithin(outline, place), `${place}`).toBe(true);
@@ -86,10 +90,10 @@ describeInChromium("the chunks of objects", () => {
       for (const outline of outlines) expect(isWithin(outline, place), `${place}`).toBe(false);
     }
     const [one, next] = outlines;
-    expect(next[0][0] - one[3][0]).toBeCloseTo(0.4, 3); // corner and notch: .1 and .3
+    expect(next[0][0] - one[3][0]).toBeCloseTo(0.4, 3); // corner and notch: 0.1 and 0.3
   });
 
-  it("leave a fifth of an object, however wide the gap, and all of it without", async () => {
+  it("leave a fifth of an object at any gap, and all of it without a gap", async () => {
     for (const [gap_um, left] of [
       [0, 1],
       [99, 0.2],
@@ -101,7 +105,7 @@ describeInChromium("the chunks of objects", () => {
     }
   });
 
-  it("lay a stain over a colour by its intensity, no less than none and no more than all", async () => {
+  it("blend a stain over a colour by its intensity, limited to 0 and 1", async () => {
     for (const [intensity, share] of [
       [0, 0],
       [0.25, 0.25],
@@ -119,7 +123,7 @@ describeInChromium("the chunks of objects", () => {
     }
   });
 
-  it("light the picked most, then the selected, then neighbours, and leave the others", async () => {
+  it("light picked objects most, then selected ones, then neighbours, and not the others", async () => {
     const lit = async (flag: number) => {
       const body = `oColor = vec4(objectLight(vec3(0.2, 0.4, 0.6), ${flag}), 1.0);`;
       const head = "#include <chunks/object_light>\n";

@@ -1,7 +1,6 @@
 /**
- * Numbers out of the path tracer's chunks, each against what can be written down: what is drawn at
- * random, how light is scattered and where it comes from, how far it flies, what a view that trembles
- * keeps, and how colours are toned.
+ * Tests of the path tracer's chunks against known numbers: random numbers, scattering and lighting,
+ * free flight, the history of a trembling view, and tone mapping.
  */
 import { type Matrix4, PerspectiveCamera, type Vector3 } from "three";
 import { describe, expect, it } from "vitest";
@@ -39,21 +38,24 @@ describeInChromium("the path tracer's chunks", () => {
     return bare.run(names, `${samplers}\n${head}`, body, textures, pixels);
   }
 
-  /** A pixel's turns: few, so that floats are exact enough. */
+  /** Samples of a pixel: few, so that floats are exact enough. */
   const TURNS = 256;
   const PIXEL = "int(gl_FragCoord.x)";
-  /** Means of the four numbers that `body` adds to `sum` in a pixel's turns, the `i`th of all. */
+  /**
+   * Means of the four numbers that `body` adds to `sum` for each sample of a pixel; `i` counts all
+   * samples.
+   */
   const meanOf = (body: string) =>
     `vec4 sum = vec4(0.0);
      for (int k = 0; k < ${TURNS}; k++) { int i = ${TURNS} * ${PIXEL} + k; ${body} }
      oColor = sum / ${TURNS}.0;`;
   const PIXELS = 256;
   const COUNT = PIXELS * TURNS;
-  /** Of a mean of so many numbers of unit variance: 4 standard errors. */
+  /** Four standard errors of a mean of COUNT numbers of unit variance. */
   const SLACK = 4 / Math.sqrt(COUNT);
 
-  describe("draw numbers", () => {
-    it("evenly between 0 and 1, each for itself", async () => {
+  describe("draw random numbers", () => {
+    it("that are uniform between 0 and 1 and independent", async () => {
       const body = meanOf(
         `float a = random(); float b = random();
          if (a < 0.0 || a >= 1.0) sum += 1e6;
@@ -67,8 +69,8 @@ describeInChromium("the path tracer's chunks", () => {
       expect(Math.abs(found[3] - 0.1)).toBeLessThan(SLACK * 0.3);
     });
 
-    it("that differ from those of the pixel beside, above, and of the next sample", async () => {
-      // the first number after each seed, as a shader draws it
+    it("that are independent of the next pixels to the side and above, and of the next sample", async () => {
+      // the first number after each seed, as in a shader
       const at = (x: string, y: string, n: string) =>
         `seedRandom(uvec3(uint(${x}), uint(${y}), uint(${n}))); float `;
       const body = meanOf(
@@ -90,16 +92,16 @@ describeInChromium("the path tracer's chunks", () => {
     const along = (a: readonly number[], by: number, b: readonly number[]) =>
       a.map((v, i) => v + by * b[i]);
     const MIRRORED = along(FROM, -2 * dot(FROM, NORMAL), NORMAL);
-    /** Nearly within the surface: half of its lobe lies below. */
+    /** A direction nearly within the surface: half of its lobe lies below. */
     const GRAZING = unit(along([1, 0, 0], 0.02 - NORMAL[0], NORMAL));
 
     const cases = [
-      ["evenly", "PHASE", 0, MIRRORED],
+      ["isotropically", "PHASE", 0, MIRRORED],
       ["forward", "PHASE", 0.6, MIRRORED],
       ["back", "PHASE", -0.4, MIRRORED],
       ["by a matt surface", "DIFFUSE", 0, MIRRORED],
-      ["by a shiny surface", "GLOSSY", 0, MIRRORED],
-      ["by a shiny surface at a grazing angle", "GLOSSY", 0, GRAZING],
+      ["by a glossy surface", "GLOSSY", 0, MIRRORED],
+      ["by a glossy surface at a grazing angle", "GLOSSY", 0, GRAZING],
     ] as const;
 
     const head = (g: number) =>
@@ -107,7 +109,7 @@ describeInChromium("the path tracer's chunks", () => {
     const scatter = (way: string, mirrored: readonly number[]) =>
       `seedRandom(uvec3(${PIXEL}, 2u, 3u)); vec3 from = ${vec(...FROM)};
        Scatter s = Scatter(${way}, ${vec(...NORMAL)}, ${vec(...mirrored)});`;
-    /** Density integrated over the sphere, and with it the mean of `value`. */
+    /** The density integrated over the sphere, and the mean of `value` weighted by it. */
     const integrated = (value: string) =>
       `vec4 sum = vec4(0.0);
        float z = gl_FragCoord.x / 256.0 - 1.0;
@@ -120,12 +122,12 @@ describeInChromium("the path tracer's chunks", () => {
     const PLANES = 512;
 
     for (const [name, way, g, mirrored] of cases) {
-      it(`${name}: the density is one, and what is drawn follows it`, async () => {
+      it(`${name}: the density integrates to 1, and samples follow it`, async () => {
         const start = scatter(way, mirrored);
         const names = ["random", "phase_function"];
         const whole = (value: string) => run(names, head(g), start + integrated(value), {}, PLANES);
         const direction = await whole("vec4(to, 1.0)");
-        // a high power is none too exact on a GPU
+        // a high power is not very exact on a GPU
         const grid = way === "GLOSSY" ? 0.012 : 0.002;
         expect(Math.abs(direction[3] - 1)).toBeLessThan(grid);
         const square = "vec4(to * to, to.x * to.y)";
@@ -146,12 +148,12 @@ describeInChromium("the path tracer's chunks", () => {
         (await drawn(square)).forEach((v, k) => {
           expect(Math.abs(v - squares[k]), `square ${k}`).toBeLessThan(SLACK + grid);
         });
-        // and the cosines by theory
+        // compares the mean cosines with theory
         if (way === "PHASE") expect(Math.abs(dot(found.slice(0, 3), FROM) - g)).toBeLessThan(SLACK);
         if (way === "DIFFUSE") {
           expect(Math.abs(dot(found.slice(0, 3), NORMAL) - 2 / 3)).toBeLessThan(SLACK);
         }
-        if (name === "by a shiny surface") {
+        if (name === "by a glossy surface") {
           const cosine = dot(found.slice(0, 3), MIRRORED);
           expect(Math.abs(cosine - (GLOSS + 1) / (GLOSS + 2))).toBeLessThan(SLACK);
         }
@@ -170,7 +172,7 @@ describeInChromium("the path tracer's chunks", () => {
       }
     });
 
-    it("round an axis by the angle that is asked for, whichever way it points", async () => {
+    it("around any axis by the requested angle", async () => {
       for (const axis of [[0, 0, 1], [0, 0, -1], unit([1, -2, -0.5]), unit([-1, 0.1, 3])]) {
         const call = `vec3 a = ${vec(...axis)}; vec3 one = around(a, 0.3, 0.1);
           oColor = vec4(dot(one, a), dot(around(a, 0.3, 0.6), one), length(one),
@@ -178,17 +180,17 @@ describeInChromium("the path tracer's chunks", () => {
         const found = await run(["random", "phase_function"], head(0), call);
         const sine2 = 1 - 0.3 ** 2;
         [0.3, 0.09 - sine2, 1, 0.09].forEach((v, i) => {
-          expect(found[i]).toBeCloseTo(v, 4); // half a turn on, a quarter on
+          expect(found[i]).toBeCloseTo(v, 4); // half a turn further, and a quarter further
         });
       }
     });
   });
 
-  describe("light from all around", () => {
+  describe("the environment light", () => {
     const [width, height] = [8, 4];
     const random = seeded(5);
     const rgb = Float32Array.from({ length: 3 * width * height }, () => random() ** 4);
-    rgb.set([0, 0, 0], 3 * 11); // a texel that is dark
+    rgb.set([0, 0, 0], 3 * 11); // a dark texel
     rgb.set([20, 5, 1], 3 * 13);
     const tables = environmentTables({ width, height, rgb });
     const pairs = Array.from({ length: width * height }, (_, i) => [
@@ -207,7 +209,7 @@ describeInChromium("the path tracer's chunks", () => {
       [...rgb].slice(3 * (row * width + column), 3 * (row * width + column) + 3);
     const luminance = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
 
-    it("is the map's: its top is up, its left edge at the back, its first quarter on the right", async () => {
+    it("is read from the map: its top is up, its left edge at the back, its first quarter on the right", async () => {
       const at = async (dir: readonly number[]) =>
         (await look(`oColor = environmentAt(${vec(...unit(dir))});`)).slice(0, 3);
       for (const [dir, column, row] of [
@@ -224,8 +226,8 @@ describeInChromium("the path tracer's chunks", () => {
       }
     });
 
-    it("is drawn by a density that is one over the sphere", async () => {
-      const steps = 256; // of each of both angles: a multiple of the texels
+    it("is sampled by a density that integrates to 1 over the sphere", async () => {
+      const steps = 256; // steps of each of the two angles, a multiple of the texels
       const body = `float whole = 0.0;
         for (int j = 0; j < ${steps}; j++) {
           float sum = 0.0;
@@ -240,7 +242,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect((await look(body))[0]).toBeCloseTo(1, 3);
     });
 
-    it("is drawn in proportion to what comes from there, and returns it", async () => {
+    it("is sampled in proportion to its light, and returns the light", async () => {
       const weights = Array.from({ length: width * height }, (_, i) => {
         const row = Math.floor(i / width);
         const cap = (at: number) => Math.cos((at / height) * Math.PI);
@@ -257,7 +259,7 @@ describeInChromium("the path tracer's chunks", () => {
         const found = await look(`${start}\n${meanOf(body)}`, PIXELS);
         const error = Math.sqrt(Math.max(share * (1 - share), 1e-9));
         expect(Math.abs(found[0] - share), `texel ${i}`).toBeLessThan(SLACK * error + 1e-4);
-        // at a texel's very edge a float may fall on the other side
+        // at a texel's edge a float may fall on the other side
         expect(found[1]).toBeLessThan(1e-3);
         expect(found[2]).toBeCloseTo(1, 4);
       }
@@ -265,7 +267,7 @@ describeInChromium("the path tracer's chunks", () => {
   });
 
   describe("the medium", () => {
-    /** Planes beyond which nothing lies. */
+    /** Planes that remove nothing. */
     const NOWHERE = Array(3).fill([0, 0, 0, 1]);
     const cornerOf = (planes: readonly (readonly number[])[]) =>
       `const vec4 uCorner[3] = vec4[3](${planes.map((each) => vec(...each)).join(", ")});`;
@@ -293,11 +295,12 @@ describeInChromium("the path tracer's chunks", () => {
       a.forEach((v, k) => {
         expect(found[k]).toBeCloseTo(v + 0.25 * (b[k] - v), k === 3 ? 1 : 4);
       });
-      expect((await medium(1, [1.2, 0, 0, 0]))[3]).toBeCloseTo(255 ** 2, 1); // no further
+      // The lookup is clamped to the last entry.
+      expect((await medium(1, [1.2, 0, 0, 0]))[3]).toBeCloseTo(255 ** 2, 1);
       expect((await medium(1, [-0.1, 0, 0, 0]))[3]).toBe(0);
     });
 
-    it("is as dense as its channels are together, in the colour of the denser one", async () => {
+    it("has the sum of its channels' densities, weighted towards the colour of the denser one", async () => {
       const found = await medium(2, [51 / 255, 102 / 255, 0, 0]);
       const [a, b] = [entry(0, 51), entry(1, 102)];
       expect(found[3] / (a[3] + b[3])).toBeCloseTo(1, 4);
@@ -308,7 +311,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect(await medium(2, [0, 0, 1, 1])).toEqual([0, 0, 0, 0]);
     });
 
-    it("is found by the box's um, with rows that run against y", async () => {
+    it("is looked up by um of the box, with rows against y", async () => {
       const textures = { uMedium: floats([256, 2], table) };
       const head = `#define CHANNELS 1
         ${cornerOf(NOWHERE)}
@@ -319,7 +322,7 @@ describeInChromium("the path tracer's chunks", () => {
       expect(red).toBeCloseTo(0.5, 4);
     });
 
-    it("is none in the corner before the slices: light that is scattered goes through it", async () => {
+    it("is empty in the corner in front of the slices, so scattered light passes through it", async () => {
       const at = async (...p: number[]) => {
         const head = `#define CHANNELS 1
           ${cornerOf([
@@ -344,12 +347,12 @@ describeInChromium("the path tracer's chunks", () => {
     });
   });
 
-  describe("light flies", () => {
+  describe("light travels", () => {
     const FROM = [0.7, 15.2, 0.9];
     const DIR = unit([1, -0.8, 0.6]);
-    const [LENGTH, SIZE] = [14, 16]; // um; a box of 16 um, texels of 1 um
+    const [LENGTH, SIZE] = [14, 16]; // um; a box of 16 um with texels of 1 um
 
-    /** The extinction is `extinction`, GLSL of p in um; majorants of bricks of so many texels. */
+    /** `extinction` is GLSL of p in um; the majorants belong to bricks of `brick` texels. */
     async function fly(
       extinction: string,
       brick: number,
@@ -382,14 +385,14 @@ describeInChromium("the path tracer's chunks", () => {
     const uneven = (n: number) => Array.from({ length: n ** 3 }, () => SIGMA * (1 + 3 * random()));
 
     it.each([
-      ["under one tight majorant", 16, [SIGMA]],
-      ["under one that is far too large", 16, [10 * SIGMA]],
-      ["through bricks of different ones", 8, uneven(2)],
+      ["with one tight majorant", 16, [SIGMA]],
+      ["with one majorant that is far too large", 16, [10 * SIGMA]],
+      ["through bricks with different majorants", 8, uneven(2)],
       ["through many small bricks", 2, uneven(8)],
-    ] as const)("as far as a uniform medium lets it, %s", async (_, brick, majorants) => {
+    ] as const)("as far as expected in a uniform medium, %s", async (_, brick, majorants) => {
       const found = await fly(number(SIGMA), brick, majorants, flight);
       const through = Math.exp(-SIGMA * LENGTH);
-      // of an exponential cut off at LENGTH
+      // moments of an exponential distribution cut off at LENGTH
       const first = 1 / SIGMA - through * (LENGTH + 1 / SIGMA);
       const second =
         2 / SIGMA ** 2 - through * (LENGTH ** 2 + (2 * LENGTH) / SIGMA + 2 / SIGMA ** 2);
@@ -399,47 +402,47 @@ describeInChromium("the path tracer's chunks", () => {
       expect(Math.abs(found[2] - second)).toBeLessThan(SLACK * LENGTH * spread);
     });
 
-    it("through a thickening medium by its optical depth, by either tracking", async () => {
-      // extinction p.x / 32, um: along the ray (0.7 + 0.707 t) / 32
+    it("through an increasingly dense medium by its optical depth, with both kinds of tracking", async () => {
+      // extinction p.x / 32, in um along the ray: (0.7 + 0.707 t) / 32
       const at = (x: number) => x / 32;
       const depth = at(FROM[0]) * LENGTH + (at(DIR[0]) * LENGTH ** 2) / 2;
       const through = Math.exp(-depth);
       for (const brick of [16, 8, 4]) {
         const n = SIZE / brick;
-        // the far side of each brick along x
+        // the larger end of each brick along x
         const majorants = Array.from({ length: n ** 3 }, (_, i) => at(brick * ((i % n) + 1)));
         const body = `${flight}
           sum.w += transmittance(from, dir, 0.0, ${number(LENGTH)});`;
         const found = await fly("p.x / 32.0", brick, majorants, body);
         const error = Math.sqrt(through * (1 - through));
         expect(Math.abs(found[0] - through), `bricks of ${brick}`).toBeLessThan(SLACK * error);
-        // a share varies less than its being 0 or 1
+        // a share varies less than a value of 0 or 1
         expect(Math.abs(found[3] - through), `bricks of ${brick}`).toBeLessThan(SLACK * error);
       }
     });
 
-    it("by steps of the reader's own as far as by tracking", async () => {
+    it("as far by a set number of steps as by tracking", async () => {
       const depth = (FROM[0] * LENGTH + (DIR[0] * LENGTH ** 2) / 2) / 32;
       const through = Math.exp(-depth);
       const body = `${flight}
         sum.w += transmittance(from, dir, 0.0, ${number(LENGTH)});`;
-      // no majorants: steps look up the medium alone
+      // no majorants are needed, because steps look up only the medium
       const found = await fly("p.x / 32.0", 4, new Array(64).fill(0), body, 0.4);
       const error = Math.sqrt(through * (1 - through));
       expect(Math.abs(found[0] - through)).toBeLessThan(SLACK * error);
       expect(Math.abs(found[3] - through)).toBeLessThan(SLACK * error);
     });
 
-    it("freely where there is nothing", async () => {
+    it("freely through empty space", async () => {
       const body = `${flight} sum.w += transmittance(from, dir, 0.0, ${number(LENGTH)});`;
       const found = await fly("0.0", 4, new Array(64).fill(0), body);
       expect([found[0], found[3]]).toEqual([1, 1]);
     });
   });
 
-  describe("what was gathered before", () => {
+  describe("the history of a pixel", () => {
     const N = 4;
-    /** 4 x 4 pixels: an eye 10 um before the plane z = 0, of which it sees 4 x 4 um. */
+    /** An eye with 4 x 4 pixels, 10 um in front of the plane z = 0, of which it sees 4 x 4 um. */
     function eye(aside_um: number) {
       const fov = (2 * Math.atan(2 / 10) * 180) / Math.PI;
       const camera = new PerspectiveCamera(fov, 1, 1, 100);
@@ -451,7 +454,7 @@ describeInChromium("the path tracer's chunks", () => {
     const at = (v: Vector3) => vec(v.x, v.y, v.z);
     type Pixel = Readonly<{ sums: readonly number[]; moments: readonly number[] }>;
 
-    /** Distance of a pixel's own point of the plane. */
+    /** Distance of the plane's point in a pixel. */
     const awayOf = (i: number) => Math.hypot((i % N) - 1.5, Math.floor(i / N) - 1.5, 10);
     const seen = (i: number, n: number, color: number): Pixel => ({
       sums: [color * n, 0, 0, n],
@@ -493,15 +496,15 @@ describeInChromium("the path tracer's chunks", () => {
         expect(Math.abs(found[k] - v), `${found}`).toBeLessThan(1e-3 * Math.max(1, Math.abs(v)));
       });
 
-    it("is nothing for a new view, all for the same one", async () => {
+    it("is empty for a new view, and complete for the same view", async () => {
       expect(await history(0, 0, [1, 2], plane, "sums")).toEqual([0, 0, 0, 0]);
       expect(await history(1, 0, [1, 2], plane, "sums")).toEqual(plane[9].sums);
       expectClose(await history(1, 0, [1, 2], plane, "moments"), plane[9].moments);
-      expectClose(await history(2, 0, [1, 2], plane, "sums"), plane[9].sums); // aside by nothing
+      expectClose(await history(2, 0, [1, 2], plane, "sums"), plane[9].sums); // a shift of zero
     });
 
-    it("is looked up where the surface was, between pixels", async () => {
-      // the eye went to the right by a quarter of a pixel: what it sees was farther right before
+    it("is interpolated where the surface was before", async () => {
+      // The eye moved right by a quarter of a pixel, so the surface was farther right before.
       expectClose(await history(2, 0.25, [1, 2], plane, "sums"), [22.5, 0, 0, 10]);
       expectClose(await history(2, -0.5, [2, 1], plane, "sums"), [25, 0, 0, 10]);
       expectClose((await history(2, 1, [1, 2], plane, "moments")).slice(1), [
@@ -511,31 +514,32 @@ describeInChromium("the path tracer's chunks", () => {
       ]);
     });
 
-    it("is kept up to a number of samples, in the same proportions", async () => {
+    it("is limited to a number of samples, in the same proportions", async () => {
       const many = plane.map(({ sums, moments }) => ({
         sums: sums.map((v) => 20 * v),
         moments: moments.map((v) => 20 * v),
       }));
       expectClose(await history(2, 0.25, [1, 2], many, "sums"), [48 * 2.25, 0, 0, 48]);
       expect((await history(2, 0.25, [1, 2], many, "moments"))[1]).toBeCloseTo(48, 3);
-      expectClose(await history(1, 0, [1, 2], many, "sums"), many[9].sums); // a still view keeps all
+      // A view at rest keeps all samples.
+      expectClose(await history(1, 0, [1, 2], many, "sums"), many[9].sums);
     });
 
-    it("is left where something else was seen, or was not looked at", async () => {
+    it("is dropped where another surface was seen, or outside the earlier image", async () => {
       const nearer = plane.map((pixel, i) =>
         i % N === 2 ? { ...pixel, moments: [0, 10, 10 * (awayOf(i) - 2), 10] } : pixel,
       );
-      // between column 1, which is the same surface, and column 2, which isn't
+      // between column 1, which is the same surface, and column 2, which is another
       expectClose(await history(2, 0.25, [1, 2], nearer, "sums"), [20, 0, 0, 10]);
-      expect(await history(2, 2, [3, 2], plane, "sums")).toEqual([0, 0, 0, 0]); // out of the picture
+      expect(await history(2, 2, [3, 2], plane, "sums")).toEqual([0, 0, 0, 0]); // outside the image
     });
 
-    it("is nothing where nothing was met, and an edge stays where it is", async () => {
+    it("is empty where nothing was hit, and keeps an edge in place", async () => {
       const edge = plane.map((pixel, i) => (i % N >= 2 ? empty(10) : pixel));
       expectClose(await history(2, 0.25, [1, 2], edge, "sums"), [15, 0, 0, 7.5]);
       expect((await history(2, 0.25, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);
-      // an edge has gone by: it is found from this side, too
-      // by what is near the box's middle, where nothing gives the distance
+      // An edge has passed by. It is found from this side too, by the distance of the box's middle,
+      // since nothing else gives the distance.
       expect((await history(2, -1, [2, 2], edge, "sums"))[0]).toBeCloseTo(20, 0);
       expect(await history(2, 1, [1, 2], edge, "sums")).toEqual([0, 0, 0, 0]);
       expect((await history(2, 1, [1, 2], edge, "moments"))[1]).toBeCloseTo(10, 3);
@@ -561,8 +565,8 @@ describeInChromium("the path tracer's chunks", () => {
         },
       ).then(([found]) => found);
 
-    it("gets another sample in its turn, and more often the noisier it is", async () => {
-      expect(await share([0, 1], 0, 0)).toBe(1); // none rests
+    it("gets new samples in turn, and more often if it is noisy", async () => {
+      expect(await share([0, 1], 0, 0)).toBe(1); // every tile is drawn
       const quarters = [];
       for (const turn of [0, 0.25, 0.5, 0.75]) quarters.push(await share([turn, 0.25], 0, 0));
       expect(quarters.reduce((a, b) => a + b)).toBe(1);
@@ -580,15 +584,15 @@ describeInChromium("the path tracer's chunks", () => {
     });
   });
 
-  describe("tone", () => {
+  describe("map tones", () => {
     const tone = (call: string) => run(["tone_map"], "", `oColor = vec4(${call}, 1.0);`);
     const expectColor = (found: readonly number[], expected: readonly number[]) =>
       expected.forEach((v, k) => {
         expect(found[k], `${found}`).toBeCloseTo(v, 4);
       });
 
-    it("by hue, saturation and lightness, there and back", async () => {
-      // by hand: CSS's hsl(20, 60 %, 40 %) is rgb(64 %, 32 %, 16 %)
+    it("to hue, saturation and lightness and back", async () => {
+      // computed by hand: CSS's hsl(20, 60 %, 40 %) is rgb(64 %, 32 %, 16 %)
       for (const [rgb, hsl] of [
         [
           [0.64, 0.32, 0.16],
@@ -628,7 +632,7 @@ describeInChromium("the path tracer's chunks", () => {
       }
     });
 
-    it("by what is changed, and by nothing else", async () => {
+    it("with the given change only", async () => {
       const toned = (change: readonly number[]) =>
         tone(`toned(${vec(0.64, 0.32, 0.16)}, ${vec(...change)})`);
       expectColor(await toned([0, 1, 0]), [0.64, 0.32, 0.16]);
@@ -636,12 +640,12 @@ describeInChromium("the path tracer's chunks", () => {
       expectColor(await toned([-1 / 3, 1, 0]), [0.32, 0.16, 0.64]);
       expectColor(await toned([0, 0, 0]), [0.4, 0.4, 0.4]);
       expectColor(await toned([0, 0.5, 0]), [0.52, 0.36, 0.28]);
-      expectColor(await toned([0, 10, 0]), [0.8, 0.8 / 3, 0]); // no more than all of it
+      expectColor(await toned([0, 10, 0]), [0.8, 0.8 / 3, 0]); // limited to full saturation
       expectColor(await toned([0, 1, -0.2]), [0.32, 0.16, 0.08]);
       expectColor(await toned([0, 1, 0.9]), [1, 1, 1]);
     });
 
-    it("by the curve of film", async () => {
+    it("with the film curve", async () => {
       expectColor(await tone("filmic(vec3(0.0, 1.0, 100.0))"), [0, 2.54 / 3.16, 1]);
       const [a, b, c] = await tone("filmic(vec3(0.1, 0.4, 2.0))");
       expect([a, b, c]).toEqual([a, b, c].sort((x, y) => x - y));
@@ -649,9 +653,12 @@ describeInChromium("the path tracer's chunks", () => {
     });
   });
 
-  describe("the light of the march that stands in", () => {
+  describe("the light of the stand-in march", () => {
     const alpha = 0.5;
-    /** Returns a calibrated pixel. The mean colours are those of 4 traced and 2 marched pixels that see the specimen. */
+    /**
+     * Returns a calibrated pixel. The mean colours are those of 4 path-traced and 2 marched pixels
+     * that see the specimen.
+     */
     const calibrated = async (
       light: readonly number[],
       traced: readonly number[],
@@ -674,7 +681,7 @@ describeInChromium("the path tracer's chunks", () => {
         expect(v).toBeCloseTo(wanted[k], 5);
       });
 
-    it("is multiplied, colour by colour, to the traced mean", async () => {
+    it("is multiplied to the path-traced mean, colour by colour", async () => {
       const [traced, marched] = [
         [0.6, 0.3, 0.15],
         [0.2, 0.2, 0.3],
@@ -683,7 +690,7 @@ describeInChromium("the path tracer's chunks", () => {
       expectNear(await calibrated([0.1, 0.4, 0.9], traced, marched), [0.3, 0.6, 0.45]);
     });
 
-    it("gains what it has hardly any of by an addition", async () => {
+    it("gains a colour that it hardly has by addition", async () => {
       const traced = [0.1, 0.4, 0.1];
       const marched = [0.001, 0.2, 0.001];
       const brightness = ([r, g, b]: readonly number[]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -697,7 +704,7 @@ describeInChromium("the path tracer's chunks", () => {
       ]);
     });
 
-    it("stays as it is where either picture shows nothing", async () => {
+    it("is unchanged if either image shows nothing", async () => {
       const light = [0.1, 0.4, 0.9];
       for (const coverage of [
         [0, 2],
@@ -722,7 +729,7 @@ describeInChromium("the path tracer's chunks", () => {
     });
   });
 
-  it("find no gradient of what goes up and down beside: terraces of a sharp edge, noise", async () => {
+  it("ignore values that alternate sideways: terraces of a sharp edge, noise", async () => {
     const head = `const float uVoxel = 0.5;
       vec4 sampleIntensities(vec3 p) {
         vec3 um = (p - 0.5) * 10.0;
@@ -730,7 +737,7 @@ describeInChromium("the path tracer's chunks", () => {
       }`;
     const body = "oColor = vec4(gradientAt(vec3(0.5), vec3(0.1), vec4(1.0)), 1.0);";
     const [x, y, z] = await run(["gradient"], head, body);
-    expect(x).toBeCloseTo(0, 5); // 0.2 along the axis alone
+    expect(x).toBeCloseTo(0, 5); // on the axis alone it would be 0.2
     expect(y).toBeCloseTo(0, 5);
     expect(z).toBeCloseTo(0.2, 5);
   });

@@ -1,7 +1,7 @@
 /**
- * The viewer's picture against the float64 reference renderer, tests/support/reference_raymarch.py: of the
- * fixture, and of a real stack where STEREOCELL_REAL_BUNDLE names its bundle. Skipped where the
- * repository has no .venv (`make setup`).
+ * Compares the viewer's image with the float64 reference renderer,
+ * tests/support/reference_raymarch.py: for the fixture, and for a real stack if
+ * STEREOCELL_REAL_BUNDLE names its bundle. Skipped without the repository's .venv (`make setup`).
  */
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
@@ -18,15 +18,18 @@ const REAL = process.env.STEREOCELL_REAL_BUNDLE;
 const FIELD_OF_VIEW_DEG = 40;
 const VIEWPORT = { width: 360, height: 240 };
 const MIN_DB = 40;
-/** Pictures of a view at rest after which their mean is clear. */
+/** Number of frames of a view at rest after which their mean has little noise. */
 const GATHERED = 20;
 
-/** Show these channels alone, as volumes everywhere, from the front; how near that comes, in dB. */
-async function hold(stand: Stand, channels: readonly string[]) {
-  // the reference has no shadows
+/**
+ * Shows only these channels, as volumes everywhere, from the front. Returns how near the image is
+ * to the reference, in dB.
+ */
+async function compare(stand: Stand, channels: readonly string[]) {
+  // the reference has no shading
   await stand.open(`&mode=all&quality=auto#v=1&depth=0&c=${channels.join(",")}`);
   await stand.viewer.settled();
-  // a picture at rest is the mean of many, whose samples lie between each other's
+  // an image at rest is the mean of many, whose samples interleave
   const frames = () => stand.viewer.page.evaluate(() => window.stereocell?.frames ?? 0);
   const first = await frames();
   await expect.poll(frames, { timeout: 60_000 }).toBeGreaterThan(first + GATHERED);
@@ -50,16 +53,16 @@ async function hold(stand: Stand, channels: readonly string[]) {
   return JSON.parse(said) as { psnr: number; drawn: number };
 }
 
-describe.skipIf(!hasPython)("against the float64 reference", () => {
-  describeInChromium("the picture of the fixture", () => {
+describe.skipIf(!hasPython)("compared with the float64 reference", () => {
+  describeInChromium("the image of the fixture", () => {
     const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
     const all = ["F_x20_body", "Balls", "Block"];
     for (const channels of [["Balls"], ["Block"], all]) {
-      // once, of real data where there are any
+      // in most runs only once, and with real data if available
       it.runIf(IS_EXHAUSTIVE || (REAL === undefined && channels === all))(
-        `is as near as 40 dB: ${channels.join(", ")}`,
+        `has a PSNR above 40 dB: ${channels.join(", ")}`,
         async () => {
-          const { psnr, drawn } = await hold(stand, channels);
+          const { psnr, drawn } = await compare(stand, channels);
           expect(drawn).toBeGreaterThan(280);
           expect(psnr).toBeGreaterThan(MIN_DB);
         },
@@ -67,11 +70,11 @@ describe.skipIf(!hasPython)("against the float64 reference", () => {
     }
   });
 
-  describe.skipIf(REAL === undefined)("of a real stack", () => {
-    describeInChromium("the picture", () => {
+  describe.skipIf(REAL === undefined)("with a real stack", () => {
+    describeInChromium("the image", () => {
       const stand = prepareStand({ bundle: REAL, viewport: VIEWPORT, pixelRatio: 1 });
-      it("is as near as 40 dB", async () => {
-        const { psnr, drawn } = await hold(stand, [stand.manifest.channels[0].id]);
+      it("has a PSNR above 40 dB", async () => {
+        const { psnr, drawn } = await compare(stand, [stand.manifest.channels[0].id]);
         expect(drawn).toBeGreaterThan(280);
         expect(psnr).toBeGreaterThan(MIN_DB);
       });

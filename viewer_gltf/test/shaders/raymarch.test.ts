@@ -1,4 +1,4 @@
-/** Numbers out of the ray-march: how many steps a ray takes, and what its chunks compute. */
+/** Tests of the ray march's numbers: how many steps a ray takes, and what its chunks compute. */
 import { expect, it } from "vitest";
 import { MAX_STEPS } from "../../src/voxels/march_frame";
 import { prepareBarePage } from "../support/browser/bare_page";
@@ -7,7 +7,7 @@ import { sweep } from "../support/exhaustive";
 import { readChunks, runProgram } from "../support/shaders/chunk";
 import type { Counts, Harness, Run } from "../support/shaders/harness";
 
-describeInChromium("the ray-march", () => {
+describeInChromium("the ray march", () => {
   const bare = prepareBarePage<Harness>(new URL("../support/shaders/harness.ts", import.meta.url));
 
   async function count(run: Run): Promise<Counts> {
@@ -16,22 +16,22 @@ describeInChromium("the ray-march", () => {
     return counts;
   }
 
-  it("takes at most 100 steps, and reaches the end with them", async () => {
+  it("takes at most 100 steps, and reaches the end", async () => {
     expect(MAX_STEPS).toBe(100);
-    // The space diagonal is 337 voxels: 481 steps of the shortest length.
+    // The space diagonal is 337 voxels, which would be 481 steps of the shortest length.
     const { most, covered } = await count({ side: 198, opacity: 1, bricks: "all" });
     expect(most).toBeLessThanOrEqual(100);
     expect(most).toBeGreaterThan(90);
     expect(covered).toBeGreaterThan(0.99);
   });
 
-  it("keeps to the limit where skips and samples alternate", async () => {
+  it("stays within the limit if skips and samples alternate", async () => {
     const { most, covered } = await count({ side: 198, opacity: 1, bricks: "checkerboard" });
     expect(most).toBeLessThanOrEqual(100);
     expect(covered).toBeGreaterThan(0.99);
   });
 
-  it("stops behind an opaque entry", async () => {
+  it("stops after an opaque first sample", async () => {
     const { most } = await count({ side: 198, opacity: 255, bricks: "all" });
     expect(most).toBeLessThanOrEqual(2);
   });
@@ -42,7 +42,7 @@ describeInChromium("the ray-march", () => {
     expect(covered).toBeGreaterThan(0.99);
   });
 
-  it("takes no more steps where a ray goes through several tiles", async () => {
+  it("takes no more steps if a ray passes several tiles", async () => {
     for (const cubes of [2, 3, 7]) {
       const most = await bare.call("countThrough", { side: 51, opacity: 1, bricks: "all" }, cubes);
       expect(most).toBeLessThanOrEqual(MAX_STEPS);
@@ -50,7 +50,7 @@ describeInChromium("the ray-march", () => {
     }
   });
 
-  it("shows the same with skips and without, whatever is drawn", async () => {
+  it("shows the same with and without skips, for random volumes", async () => {
     let drawn = 0;
     const seeds = sweep(
       Array.from({ length: 30 }, (_, i) => i),
@@ -64,9 +64,10 @@ describeInChromium("the ray-march", () => {
     expect(drawn).toBeGreaterThan(seeds.length * 100);
   });
 
-  it("makes a ramp as opaque as its integral", async () => {
+  it("gives a ramp the opacity of its integral", async () => {
     const [side, opacity] = [67, 20];
-    // transmittance is the product of (1 - a)^length: its logarithm is an integral along the ray
+    // Transmittance is the product of (1 - a)^length, so its logarithm is an integral along the
+    // ray.
     let log = 0;
     for (let i = 0; i < 10_000; i++) {
       log += Math.log(1 - ((opacity / 255) * (i + 0.5)) / 10_000);
@@ -76,27 +77,27 @@ describeInChromium("the ray-march", () => {
     expect(Math.abs(found - expected)).toBeLessThan(2 / 255);
   });
 
-  it("makes a uniform cube as opaque as its length makes it, at any opacity", async () => {
-    // 64 voxels are a step each; of 200 some are longer than a voxel, and are corrected for it
+  it("gives a uniform cube the opacity for its length, at any opacity", async () => {
+    // 64 voxels take one step each; of 200, some steps are longer than a voxel and are corrected
     for (const side of [67, 203]) {
       for (const opacity of [1, 5, 20]) {
         const expected = 1 - (1 - opacity / 255) ** (side - 3);
         const found = await bare.call("meanOpacity", "uniform", side, opacity);
-        const ends = expected > 0.99 ? 0.01 : 2 / 255; // rays that are as opaque go no further
+        const ends = expected > 0.99 ? 0.01 : 2 / 255; // rays end at this opacity
         expect(Math.abs(found - expected), `${side}, ${opacity}`).toBeLessThan(ends);
       }
     }
   });
 
-  it("has no light where the benchmark compares it with others", async () => {
+  it("is unlit when the benchmark compares it with other programs", async () => {
     const through = (isUnlit: boolean) =>
       bare.call("meanAlong", "over", "uniform", 67, 20, [0, 1], isUnlit);
     const [[lit], [red, , , alpha]] = [await through(false), await through(true)];
-    expect(red).toBeCloseTo(alpha, 2); // white as it is
+    expect(red).toBeCloseTo(alpha, 2); // unshaded white
     expect(Math.abs(lit - alpha)).toBeGreaterThan(0.03);
   });
 
-  it("finds the largest value along a ray, whatever lies before it", async () => {
+  it("finds the largest value along a ray, behind any others", async () => {
     const [red, , , alpha] = await bare.call("meanAlong", "maximum", "ramp", 67, 20);
     expect(red).toBeGreaterThan(0.97); // the last samples, just before 255
     expect(alpha).toBeCloseTo(red, 2);
@@ -104,22 +105,24 @@ describeInChromium("the ray-march", () => {
 
   it("shows the middle of a channel's window half as bright on the screen as its end", async () => {
     const [red] = await bare.call("meanAlong", "maximum", "uniform", 67, 255, [0, 2]);
-    expect(red).toBeCloseTo(((0.5 + 0.055) / 1.055) ** 2.4, 2); // light of an sRGB of a half
+    // Linear light of an sRGB value of one half.
+    expect(red).toBeCloseTo(((0.5 + 0.055) / 1.055) ** 2.4, 2);
   });
 
-  it("adds up what lies along a ray, without a veil", async () => {
-    // however many voxels a specimen has, 4 where it is opaque; opacities would veil: 0.98
+  it("adds up values along a ray, without occlusion", async () => {
+    // 4 for an opaque specimen, for any number of voxels; occlusion would give 0.98
     for (const side of [67, 35]) {
       const [red, , , alpha] = await bare.call("meanAlong", "sum", "uniform", side, 16);
       expect(red).toBeCloseTo((4 * 16) / 255, 2);
-      expect(alpha).toBe(0); // what lies behind is seen as it is
+      expect(alpha).toBe(0); // the background is not attenuated
     }
   });
 
-  it("averages pictures of a view at rest", async () => {
+  it("averages images of a view at rest", async () => {
     const reds = Array.from({ length: 64 }, (_, i) => 0.5 + 0.25 * Math.sin(2.4 * i));
     const means = await bare.call("meansOf", reds);
-    // halves that blending leaves are rounded, or cut off, as by Mesa's software: up to a step of them a picture
+    // Blended half floats are rounded, but Mesa's software renderer truncates them, which adds an
+    // error of up to half a step for each image.
     const [stored] = await bare.call("meansOf", [0.7]);
     const step = stored < 0.7 ? 2 ** -11 : 0;
     for (const count of [1, 2, 9, 64]) {
@@ -128,7 +131,7 @@ describeInChromium("the ray-march", () => {
     }
   });
 
-  it("draws half of what lies beside a lens's middle, in fewer steps, and shows all of it", async () => {
+  it("draws half of a lens's periphery, in fewer steps, and fills the rest", async () => {
     const pixels = await bare.call("sparsePixels");
     for (const eye of [0, 1]) {
       const mine = pixels.filter((pixel) => pixel.eye === eye);
@@ -146,13 +149,13 @@ describeInChromium("the ray-march", () => {
     }
   });
 
-  it("mixes light over the border of two tiles as within one", async () => {
+  it("blends light across the border of two tiles as within one", async () => {
     const columns = await bare.call("columnsOverBorder");
     for (const k of [0, 1, 2]) {
       const values = columns.map((column) => column[k]);
       expect(Math.max(...values) - Math.min(...values)).toBeLessThan(3);
     }
-    expect(columns[0][0]).toBeGreaterThan(60); // both are there
+    expect(columns[0][0]).toBeGreaterThan(60); // two tiles are visible
     expect(columns[0][1]).toBeGreaterThan(60);
   });
 
@@ -164,14 +167,14 @@ describeInChromium("the ray-march", () => {
       const head = "#include <chunks/intersect_box>";
       return (await runProgram(bare.page, chunks, head, `oColor = ${call}.xyxy;`)).slice(0, 2);
     };
-    // Along z, a hair off the axes, since the reciprocal of 0 is not defined in GLSL.
+    // Along z, slightly off the axes, since the reciprocal of 0 is not defined in GLSL.
     const [near, far] = await intersect("1.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
     expect(near).toBeCloseTo(5, 4);
     expect(far).toBeCloseTo(13, 4);
-    // Along the diagonal (1, 1, 1): in by y = 0, out by y = 2.
+    // Along the diagonal (1, 1, 1): in through y = 0, out through y = 2.
     expect(await intersect("0.0, -1.0, 0.0", "1.0, 1.0, 1.0")).toEqual([1, 3]);
     const [enters, leaves] = await intersect("9.0, 1.0, -5.0", "1e-7, 1e-7, 1.0");
-    expect(enters).toBeGreaterThan(leaves); // a miss
+    expect(enters).toBeGreaterThan(leaves); // the ray misses
   });
 
   it("finds the end of the empty block, and of a visible brick", async () => {
@@ -199,14 +202,14 @@ describeInChromium("the ray-march", () => {
       expect(x).toBeCloseTo(exit + 1e-3, 4);
       expect(y).toBe(empty);
     };
-    await expectBlock(ahead(0.5, 1, 0), 6.5, 1); // from brick 0 to the wall of brick 7
-    await expectBlock(ahead(0.5, 1, 2), 6.5, 1); // t counts from the start
+    await expectBlock(ahead(0.5, 1, 0), 6.5, 1); // from brick 0 to the boundary of brick 7
+    await expectBlock(ahead(0.5, 1, 2), 6.5, 1); // t starts at the beginning of the ray
     await expectBlock(ahead(0.5, 0.5, 0), 13, 1);
     await expectBlock(ahead(7.5, 1, 0), 0.5, 0); // the visible brick's own end
-    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6: its block is that brick
+    await expectBlock(ahead(6.5, -1, 0), 0.5, 1); // back from brick 6, whose block is that brick
   });
 
-  it("classifies by the table, with the opacity of the step's length", async () => {
+  it("classifies by the table, with the opacity for the step's length", async () => {
     const chunks = await readChunks("classify");
     const head = `uniform sampler2D uLut; uniform vec4 uAsked;
       #define CHANNELS 2
@@ -228,7 +231,7 @@ describeInChromium("the ray-march", () => {
     [1, 0, 0, 1 - 0.8 ** 3].forEach((v, i) => {
       expect(one[i]).toBeCloseTo(v, 5);
     });
-    // Both: absorbed together, the colour shared 0.2 to 0.4.
+    // Two channels absorb together, and share the colour 0.2 to 0.4.
     const both = await classify("200.0, 200.0", "1.0");
     [1 / 3, 0, 2 / 3, 1 - 0.8 * 0.6].forEach((v, i) => {
       expect(both[i]).toBeCloseTo(v, 5);

@@ -1,6 +1,6 @@
 /**
- * Numbers out of the shader's small chunks, each against what can be written down: where rays are
- * cut and end, how the disc weighs, what a sample is, how it is lit and how far it is shifted.
+ * Tests of the shader's small chunks against known numbers: where rays are clipped and end, the
+ * weight of the disc, and how a sample is read, lit and shifted.
  */
 import { readdir, readFile } from "node:fs/promises";
 import { describe, expect, it } from "vitest";
@@ -10,13 +10,13 @@ import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
 import { readChunks, runProgram, type Texture } from "../support/shaders/chunk";
 
-describeInChromium("the shader's chunks", () => {
+describeInChromium("the shader chunks", () => {
   const bare = prepareBarePage();
   const { run } = bare;
 
   const vec = (...v: number[]) => `vec${v.length}(${v.map((n) => n.toExponential(9)).join(", ")})`;
 
-  it("cut a ray's span by box and plane", async () => {
+  it("clip a ray's span by box and plane", async () => {
     const nowhere = [0, 0, 0, 1];
     const clip = async (plane: number[], dir: number[], corner = [nowhere, nowhere, nowhere]) => {
       const head = `const vec3 uClipLow = vec3(-1.0); const vec3 uClipHigh = vec3(1.0, 1.0, 3.0);
@@ -27,13 +27,13 @@ describeInChromium("the shader's chunks", () => {
       return (await run(["intersect_box", "clip_span"], head, call)).slice(0, 2);
     };
     const ahead = [1e-9, 1e-9, 1];
-    expect(await clip([0, 0, 0, 1], ahead)).toEqual([4, 8]); // the box alone: z -1 to 3
+    expect(await clip([0, 0, 0, 1], ahead)).toEqual([4, 8]); // the box alone: z from -1 to 3
     expect(await clip([0, 0, 1, 2], ahead)).toEqual([4, 7]); // kept up to z = 2
     expect(await clip([0, 0, -1, -2], ahead)).toEqual([7, 8]); // kept from z = 2 on
-    const [from, to] = await clip([1, 0, 0, -0.5], ahead); // beside the ray: all is cut away
+    const [from, to] = await clip([1, 0, 0, -0.5], ahead); // the kept part is beside the ray
     expect(from).toBeGreaterThan(to);
-    expect(await clip([1, 0, 0, 0.5], ahead)).toEqual([4, 8]); // beside the ray: nothing is
-    // the corner x > -0.5, y > -0.5, z < 0, in which the ray begins; and one beside it
+    expect(await clip([1, 0, 0, 0.5], ahead)).toEqual([4, 8]); // the removed part is beside the ray
+    // the corner x > -0.5, y > -0.5, z < 0, in which the ray begins, and a corner beside it
     const [x, y, z] = [
       [1, 0, 0, -0.5],
       [0, 1, 0, -0.5],
@@ -41,10 +41,11 @@ describeInChromium("the shader's chunks", () => {
     ];
     expect(await clip(nowhere, ahead, [x, y, z])).toEqual([5, 8]);
     expect(await clip(nowhere, ahead, [[1, 0, 0, 0.5], y, z])).toEqual([4, 8]);
-    expect(await clip(nowhere, ahead, [x, y, [0, 0, 1, 0]])).toEqual([4, 8]); // only behind
+    // The corner is only behind the eye.
+    expect(await clip(nowhere, ahead, [x, y, [0, 0, 1, 0]])).toEqual([4, 8]);
   });
 
-  it("cut a ray's span by the disc's cone, seen from its apex or from another eye", async () => {
+  it("clip a ray's span by the disc's cone, from its apex or from another eye", async () => {
     const cone = async (eye: number[], dir: number[]) => {
       const length = Math.hypot(...dir);
       const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
@@ -53,14 +54,14 @@ describeInChromium("the shader's chunks", () => {
       const call = `oColor = coneSpan(vec2(0.0, 10.0), ${vec(...eye)}, ${unit}).xyxy;`;
       return (await run(["cone_span"], head, call)).slice(0, 2);
     };
-    expect(await cone([0, 0, 0], [0.5, 0, -1])).toEqual([0, 10]); // within
-    const [a, b] = await cone([0, 0, 0], [1.5, 0, -1]); // beside
+    expect(await cone([0, 0, 0], [0.5, 0, -1])).toEqual([0, 10]); // inside
+    const [a, b] = await cone([0, 0, 0], [1.5, 0, -1]); // outside
     expect(a).toBeGreaterThanOrEqual(b);
-    // along x, two ahead of the apex: the cone is x = -2 to 2 there
+    // along x at two units ahead of the apex, where the cone is from x = -2 to 2
     const [from, to] = await cone([-5, 0, -2], [1, 0, 0]);
     expect(from).toBeCloseTo(3, 4);
     expect(to).toBeCloseTo(7, 4);
-    // parallel to the axis, one aside: in from z = -1 on
+    // parallel to the axis at a distance of one: inside from z = -1 on
     const [enters, leaves] = await cone([1, 0, 0], [0, 0, -1]);
     expect(enters).toBeCloseTo(1, 4);
     expect(leaves).toBe(10);
@@ -68,7 +69,7 @@ describeInChromium("the shader's chunks", () => {
     expect(behind).toBeGreaterThan(none);
   });
 
-  it("weigh the disc from 1 within its inner radius to 0 beyond its outer one", async () => {
+  it("weight the disc from 1 within its inner radius to 0 beyond its outer one", async () => {
     const weigh = async (degrees: number) => {
       const at = (degrees * Math.PI) / 180;
       const p = vec(3 * Math.sin(at), 0, -3 * Math.cos(at));
@@ -86,7 +87,7 @@ describeInChromium("the shader's chunks", () => {
     expect(between[2]).toBeGreaterThan(0);
   });
 
-  it("let channels without a disc count everywhere, the others by the cube of their weight", async () => {
+  it("weight channels that are not limited to the disc fully, others by the cube of the disc's weight", async () => {
     const head = `const vec3 uApex = vec3(0.0); const vec3 uAxis = vec3(0.0, 0.0, -1.0);
       const vec2 uDisc = vec2(0.99, 0.9); const float uPresence = 0.5; const bool uIsCrossing = false;
       const bvec4 uInDisc = bvec4(true, false, true, false);`;
@@ -102,17 +103,17 @@ describeInChromium("the shader's chunks", () => {
       "oColor = weights(vec3(0.0, 0.0, -1.0));",
     );
     expect(near).toEqual([0.5, 0.5, 0.5, 0.5]);
-    // cosine 0.945: half of the way, where the smooth step is a half
+    // cosine 0.945: half-way, where smoothstep is one half
     const at = `vec3(${Math.sqrt(1 - 0.945 ** 2)}, 0.0, -0.945)`;
     const half = await run(["focus_disc", "disc_weights"], head, `oColor = weights(${at});`);
     expect(half[0]).toBeCloseTo(0.5 / 8, 4);
     const crossing = head.replace("uIsCrossing = false", "uIsCrossing = true");
     const far2 = "oColor = weights(vec3(5.0, 0.0, -1.0));";
-    // the pictures are mixed then: each is whole
+    // the images are mixed later, so each is complete
     expect(await run(["focus_disc", "disc_weights"], crossing, far2)).toEqual([1, 1, 1, 1]);
   });
 
-  it("decode what was encoded", async () => {
+  it("decode encoded light to the same values", async () => {
     const light = [0.001, 0.2, 0.75] as const;
     const body = `oColor = vec4(decoded(encoded(${vec(...light)})), 1.0);`;
     const found = await run(["encode_srgb", "decode_srgb"], "", body);
@@ -121,8 +122,8 @@ describeInChromium("the shader's chunks", () => {
     });
   });
 
-  it("mix the marched pixels around by nearness, but for those of another depth", async () => {
-    // two pixels of the march side by side, to four of the picture
+  it("mix the surrounding marched pixels by nearness, except those at another depth", async () => {
+    // two pixels of the march for four pixels of the frame
     const chunks = await readChunks("marched_light");
     const text = chunks["chunks/marched_light"]
       .replace("uniform int uEyeCount;", "const int uEyeCount = 1;")
@@ -145,10 +146,10 @@ describeInChromium("the shader's chunks", () => {
     expect((await at(0.5, even))[0]).toBeCloseTo(1, 2);
     expect((await at(1.5, even))[0]).toBeCloseTo(0.75, 2);
     expect((await at(2.5, even))[3]).toBeCloseTo(0.25, 2);
-    expect((await at(2.5, [100, 100, 200, 200]))[0]).toBeLessThan(0.01); // beyond an edge
+    expect((await at(2.5, [100, 100, 200, 200]))[0]).toBeLessThan(0.01); // across an edge
   });
 
-  it("keep the hue of light that no screen shows, and leave all other light", async () => {
+  it("keep the hue of light that is too bright for the screen, and do not change other light", async () => {
     const within = (...light: number[]) =>
       run(["within_gamut"], "", `oColor = vec4(withinGamut(${vec(...light)}), 1.0);`);
     const [r, g, b] = await within(0.2, 1, 0.5);
@@ -157,7 +158,7 @@ describeInChromium("the shader's chunks", () => {
     });
     const bright = await within(3, 1.5, 0.3);
     expect(bright[0]).toBeCloseTo(1, 5);
-    // the middle part lies as far between the others as it did
+    // the middle component keeps its relative place between the others
     expect((bright[1] - bright[2]) / (bright[0] - bright[2])).toBeCloseTo(1.2 / 2.7, 4);
     expect(bright[2]).toBeGreaterThan(0.1); // nearer to white than 0.3 / 3
   });
@@ -171,7 +172,7 @@ describeInChromium("the shader's chunks", () => {
     });
   });
 
-  it("return the cut by which a ray came in", async () => {
+  it("return the clip plane through which a ray entered", async () => {
     const cut = async (planes: number[][], body: string, corner = Array(3).fill([0, 0, 0, 1])) => {
       const given = (plane: number[], i: number) => `uCutsGiven[${i}] = ${vec(...plane)};`;
       const bounds = corner.map((plane, i) => given(plane, 7 + i));
@@ -188,7 +189,7 @@ describeInChromium("the shader's chunks", () => {
         `${lines}\n${body}`,
       );
     };
-    const front = [0, 0, 1, 2]; // gone is z > 2
+    const front = [0, 0, 1, 2]; // removes z > 2
     const isCut = (p: string) => cut([front], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`);
     expect((await isCut("vec3(0.0, 0.0, 3.0)"))[0]).toBe(1);
     expect((await isCut("vec3(0.0, 0.0, 1.0)"))[0]).toBe(0);
@@ -200,17 +201,18 @@ describeInChromium("the shader's chunks", () => {
     const inCorner = (p: string) => cut([], `oColor = vec4(isCut(${p}) ? 1.0 : 0.0);`, octant);
     expect((await inCorner("vec3(1.0, 1.0, 1.0)"))[0]).toBe(1);
     expect((await inCorner("vec3(1.0, -1.0, 1.0)"))[0]).toBe(0);
-    const right = [1, 0, 0, 1]; // gone is x > 1
+    const right = [1, 0, 0, 1]; // removes x > 1
     const normal = (eye: string) =>
       cut([front, right], `oColor = vec4(cutNormal(${eye}, vec3(0.0)), 1.0);`);
     expect((await normal("vec3(0.0, 0.0, 9.0)")).slice(0, 3)).toEqual([0, 0, 1]);
     expect((await normal("vec3(9.0, 0.0, 1.0)")).slice(0, 3)).toEqual([1, 0, 0]);
-    expect((await normal("vec3(0.5, 0.0, 1.0)")).slice(0, 3)).toEqual([0, 0, 0]); // on the kept side
-    // through both: the one that is passed last
+    // The eye is on the kept side.
+    expect((await normal("vec3(0.5, 0.0, 1.0)")).slice(0, 3)).toEqual([0, 0, 0]);
+    // through both planes: the one that is crossed last
     expect((await normal("vec3(9.0, 0.0, 9.0)")).slice(0, 3)).toEqual([1, 0, 0]);
   });
 
-  it("return the face by which a ray comes in, of the box round all tiles or of a cut", async () => {
+  it("return the face through which a ray enters, of the box around all tiles or of a clip", async () => {
     const face = async (start: number[], plane = [0, 0, 0, 1]) => {
       const head = `const float uVoxel = 1.0; const vec4 uClipPlane = ${vec(...plane)};
         const vec3 uAllLow = vec3(-10.0, 0.0, 0.0); const vec3 uAllHigh = vec3(10.0);
@@ -220,7 +222,7 @@ describeInChromium("the shader's chunks", () => {
     };
     expect(await face([10, 5, 5])).toEqual([1, 0, 0]);
     expect(await face([3, 0, 5])).toEqual([0, -1, 0]);
-    expect(await face([3, 4, 8])).toEqual([0, 0, 1]); // the cut's, within the box
+    expect(await face([3, 4, 8])).toEqual([0, 0, 1]); // the clip's face, inside the box
     expect(await face([0, 5, 5])).toEqual([0, 0, 0]); // where two tiles meet
     expect(await face([3, 4, 5], [0.6, 0.8, 0, 5])).toEqual([
       expect.closeTo(0.6),
@@ -231,18 +233,18 @@ describeInChromium("the shader's chunks", () => {
 
   describe("find where the opaque scene ends a ray", () => {
     const [NEAR, FAR] = [1, 100];
-    /** Of a fragment's point on the ray, as the eye sees it: its distance, and its view z. */
+    /** Distance of a fragment's point on the ray from the eye, and its view z. */
     const [BACK, VIEW_Z] = [13, -12];
     const VOXEL = 0.5;
     type Rect = readonly [number, number, number, number];
 
-    /** Distance along the ray, of a depth as the buffer has it: k of 255. */
+    /** Distance along the ray for a depth in the buffer, k of 255. */
     function distanceOf(k: number): number {
-      const away = (NEAR * FAR) / (FAR - (k / 255) * (FAR - NEAR)); // along the view's axis
+      const away = (NEAR * FAR) / (FAR - (k / 255) * (FAR - NEAR)); // along the view axis
       return (away * BACK) / -VIEW_Z;
     }
 
-    /** Of a fragment at `at`, in a picture of these depths, row by row from below. */
+    /** Results of a fragment at `at` in a depth image, given row by row from below. */
     async function ends(
       depths: readonly (readonly number[])[],
       at: readonly [number, number],
@@ -274,12 +276,12 @@ describeInChromium("the shader's chunks", () => {
       expect(found[2]).toBe(share);
     };
 
-    it("by the projection's own depth, along a ray that is no axis", async () => {
+    it("by the projection's own depth, along a ray that is not an axis", async () => {
       for (const k of [0, 128, 250, 255]) {
         const d = distanceOf(k);
         expectEnds(await ends(plain(k), [1.5, 1.5]), d, d, 0);
       }
-      expect(distanceOf(255)).toBeCloseTo((FAR * 13) / 12, 6); // where there is nothing: far away
+      expect(distanceOf(255)).toBeCloseTo((FAR * 13) / 12, 6); // empty pixels are far away
       expect(distanceOf(0)).toBeCloseTo((NEAR * 13) / 12, 6);
     });
 
@@ -304,12 +306,12 @@ describeInChromium("the shader's chunks", () => {
       }
       expectEnds(await at(255, 200, 255, 200), near, far, 1);
       expectEnds(await at(255, 255, 255, 255), near, far, 1);
-      expectEnds(await at(200, 240, 255, 200), near, far, 1); // the farthest of them
+      expectEnds(await at(200, 240, 255, 200), near, far, 1); // the farthest neighbour counts
       expectEnds(await at(200, 255, 240, 200), near, far, 1);
-      expectEnds(await at(100, 100, 100, 100), near, near, 0); // what is nearer is no matter
+      expectEnds(await at(100, 100, 100, 100), near, near, 0); // nearer neighbours do not count
     });
 
-    it("and takes the slope of one surface for no silhouette", async () => {
+    it("and does not take the slope of one surface for a silhouette", async () => {
       const [k, jump] = [200, 4 * VOXEL];
       const beside = (other: number) => ends([[k, other]], [0.5, 0.5]);
       const firstJump = Array.from({ length: 256 }, (_, i) => i).findIndex(
@@ -319,7 +321,7 @@ describeInChromium("the shader's chunks", () => {
       expectEnds(await beside(firstJump), distanceOf(k), distanceOf(firstJump), 0.5);
     });
 
-    it("not in the other eye's picture", async () => {
+    it("without reading the other eye's image", async () => {
       const row = [200, 200, 200, 200, 255, 255, 255, 255];
       const left = { eye: [0, 0, 4, 1], part: [0, 0, 4, 1] } as const;
       expectEnds(await ends([row], [3.5, 0.5], left), distanceOf(200), distanceOf(200), 0);
@@ -332,7 +334,7 @@ describeInChromium("the shader's chunks", () => {
       );
     });
 
-    it("at the eye's own place, where the march has fewer pixels than the picture", async () => {
+    it("at the eye's own pixels, if the march has fewer pixels than the frame", async () => {
       const row = [10, 20, 30, 40, 150, 160, 170, 180];
       const picture = [row.map((k) => k + 5), row];
       const right = { eye: [4, 0, 4, 2], part: [2, 0, 2, 1] } as const; // half as many
@@ -344,7 +346,7 @@ describeInChromium("the shader's chunks", () => {
     });
   });
 
-  it("sample between voxels by the distances to them, and mix a fresh level in", async () => {
+  it("interpolate between voxels, and mix in a new level", async () => {
     const values = (add: number) =>
       Array.from({ length: 8 }, (_, i) => [20 * i + add, 255 - 20 * i, i % 2 ? 255 : 0, 7]).flat();
     const volume = (add: number): Texture => ({
@@ -358,7 +360,7 @@ describeInChromium("the shader's chunks", () => {
         ["sample_intensities"],
         `uniform sampler3D uVolume; uniform sampler3D uOldVolume;
          const float uFresh = ${fresh.toFixed(3)};`,
-        // voxels' middles lie at 1/4 and 3/4
+        // the centres of voxels lie at 1/4 and 3/4
         `oColor = 255.0 * sampleIntensities(${vec(...at.map((v) => 0.25 + v / 2))});`,
         { uVolume: volume(100), uOldVolume: volume(0) },
       );
@@ -367,7 +369,7 @@ describeInChromium("the shader's chunks", () => {
       [1, 0, 1],
       [0.25, 0.5, 0.75],
       [0.5, 0, 0],
-      [-0.5, 2, 0.5], // beyond the last voxel's middle: that voxel's own value
+      [-0.5, 2, 0.5], // beyond the centre of the last voxel its value is used
     ]) {
       const [x, y, z] = at.map((v) => Math.min(1, Math.max(0, v)));
       const index = x + 2 * y + 4 * z;
@@ -381,8 +383,8 @@ describeInChromium("the shader's chunks", () => {
     }
   });
 
-  describe("light a sample", () => {
-    /** A lamp and a sky of even light, in grey, and how much of both comes to the place. */
+  describe("shade a sample", () => {
+    /** A lamp and a uniform sky, in grey, and the shares of both that reach the place. */
     const lights = (key: number, even: number, gloss = 0, reaches = "1.0") => `
       vec2 reached(vec3 um, vec3 outwards) { return vec2(${reaches}); }
       const vec3 uKeyLight = vec3(${key.toFixed(4)}); const vec3 uFillLight = vec3(0.0);
@@ -391,8 +393,8 @@ describeInChromium("the shader's chunks", () => {
       const float uGloss = ${gloss.toFixed(4)};`;
 
     /**
-     * Of an intensity that rises by `slope` a um, in two channels, on voxels of 0.5 x 0.75 x 2 um;
-     * their rows run against y, as a tile's do.
+     * Shades an intensity that rises by `slope` per um, in two channels, with voxels of 0.5 x 0.75
+     * x 2 um whose rows run against y, as in a tile.
      */
     function lit(
       slope: readonly number[],
@@ -409,7 +411,7 @@ describeInChromium("the shader's chunks", () => {
           float v = dot(um - vec3(20.0, 30.0, 12.0), ${vec(...slope)});
           return vec4(0.5 + v, 0.5 - v, 0.5 + v, 0.0);
         }`;
-      const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no say
+      const shares = "vec4(0.25, 0.0, 0.75, 0.0)"; // the second channel has no weight
       const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${vec(...perUm)}, ${shares}), ${vec(...unit(dir))}, vec3(0.0))`;
       const body = `oColor = vec4(${call}, 1.0);`;
       return run(["gradient", "shade"], head, body).then(([found]) => found);
@@ -420,7 +422,7 @@ describeInChromium("the shader's chunks", () => {
       a.reduce((sum, v, i) => sum + v * b[i], 0);
     const [AMBIENT, DIFFUSE] = [0.4, 0.7];
 
-    it("by the ramp's own direction, whatever the voxels' shape", async () => {
+    it("by the ramp's own direction, for any shape of the voxels", async () => {
       const [dir, light] = [
         [0.1, -0.2, -1],
         [-0.35, 0.5, 0.8],
@@ -432,14 +434,14 @@ describeInChromium("the shader's chunks", () => {
         [0.2, -0.3, 0.1],
         [-0.2, 0.25, -0.4],
       ]) {
-        const outwards = unit(slope.map((v) => -v)); // from much to little
+        const outwards = unit(slope.map((v) => -v)); // from large to small values
         const normal = dot(outwards, dir) > 0 ? outwards.map((v) => -v) : outwards;
         const expected = AMBIENT + DIFFUSE * Math.max(0, dot(normal, unit(light)));
         expect(await lit(slope, dir, light), `${slope}`).toBeCloseTo(expected, 3);
       }
     });
 
-    it("by the angle: full in the lamp's way, half at 60 degrees, none beyond", async () => {
+    it("by the angle: fully towards the lamp, half at 60 degrees, not at all from behind", async () => {
       const facing = (degrees: number) => {
         const at = (degrees * Math.PI) / 180;
         return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)]);
@@ -449,18 +451,19 @@ describeInChromium("the shader's chunks", () => {
       expect(await facing(100)).toBeCloseTo(AMBIENT, 4);
     });
 
-    it("not at all where there is no direction or only noise, and fades in between", async () => {
-      // the lamp stands beside the eye, and behind the boundary, which would be dark
-      const edgewise = [-1e-5, 0, -1]; // but for rounding, to either side of which it turns
+    it("without direction where the gradient is zero or noise, and gradually in between", async () => {
+      // The lamp is beside the eye and behind the boundary, which would be dark.
+      // The direction is slightly off the axis, so that rounding does not decide the side.
+      const edgewise = [-1e-5, 0, -1];
       const steep = (step: number) => lit([-step, 0, 0], edgewise, [-1, 0, 1]); // over 1 um
-      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as on what faces the eye
+      const even = 1.2 * (AMBIENT + DIFFUSE * Math.SQRT1_2); // as for a boundary that faces the eye
       expect(await steep(0)).toBeCloseTo(even, 4);
       expect(await steep(0.03)).toBeCloseTo(even, 4);
-      expect(await steep(0.105)).toBeCloseTo((even + AMBIENT) / 2, 3); // half of the way
+      expect(await steep(0.105)).toBeCloseTo((even + AMBIENT) / 2, 3); // half-way
       expect(await steep(0.18)).toBeCloseTo(AMBIENT, 4);
     });
 
-    it("with gloss where the boundary mirrors the lamp", async () => {
+    it("with a highlight where the boundary mirrors the lamp", async () => {
       const facing = (degrees: number) => {
         const at = (degrees * Math.PI) / 180;
         return lit([0, 0, -0.5], [0, 0, -1], [Math.sin(at), 0, Math.cos(at)], 0.5);
@@ -470,12 +473,12 @@ describeInChromium("the shader's chunks", () => {
       expect(await facing(60)).toBeCloseTo(AMBIENT + DIFFUSE * (0.5 + 0.5 * half), 4);
     });
 
-    it("by as much as comes to its place: of the sky, and of the lamp", async () => {
+    it("by the shares of the sky and of the lamp that reach its place", async () => {
       const lit = async (reaches: string) => {
         const head = `const float uVoxel = 1.0; const vec3 vLight = vec3(0.0, 0.0, 1.0);
           ${lights(DIFFUSE, AMBIENT, 0, reaches)}
           vec4 sampleIntensities(vec3 p) { return vec4(0.0); }`;
-        // a boundary that faces lamp and eye, and what has none
+        // a boundary that faces lamp and eye, and a place without a boundary
         const call = (slope: string) =>
           `shadeBy(vec3(1.0), vec3(0.0, 0.0, ${slope}), vec3(0.0, 0.0, -1.0), vec3(0.0)).r`;
         const body = `oColor = vec4(${call("-0.5")}, ${call("0.0")}, 0.0, 1.0);`;
@@ -494,7 +497,7 @@ describeInChromium("the shader's chunks", () => {
       }
     });
 
-    it("by what the grid of the shading says a cell further out, as far as it counts", async () => {
+    it("by the shading one cell further out, weighted by its strength", async () => {
       // 4 cells of 2 um along x; sky and lamp in the first two channels
       const uReached: Texture = {
         size: [4, 1, 1],
@@ -517,11 +520,11 @@ describeInChromium("the shader's chunks", () => {
       expectAt(await reached(3, "vec3(0.0)", 1), 1.1 * 0.2, 1.1 * 0.8);
       expectAt(await reached(3, "vec3(1.0, 0.0, 0.0)", 1), 1.1 * 0.4, 1.1 * 0.6);
       expectAt(await reached(3, "vec3(0.0)", 0.5), 0.5 + 0.55 * 0.2, 0.5 + 0.55 * 0.8);
-      expect(await reached(3, "vec3(0.0)", 0)).toEqual([1, 1]); // exactly as without
+      expect(await reached(3, "vec3(0.0)", 0)).toEqual([1, 1]); // exactly as without shading
     });
 
     it("by the volume's own texels too", async () => {
-      // 8 x 8 x 4 voxels: rises by 16 of 255 a voxel along x, and by half of it along the rows
+      // 8 x 8 x 4 voxels: rises by 16 of 255 per voxel along x, and by half of that along the rows
       const texels = Array.from({ length: 256 }, (_, i) => 16 * (i % 8) + 8 * ((i >> 3) % 8));
       const uVolume: Texture = { size: [8, 8, 4], channels: 1, texels, isLinear: true };
       const light = unit([-1, 1, 1]);
@@ -529,7 +532,7 @@ describeInChromium("the shader's chunks", () => {
         const float uFresh = 1.0; const float uVoxel = 1.0; const vec3 vLight = ${vec(...light)};
         ${lights(DIFFUSE, AMBIENT)}
         #define uOldVolume uVolume`;
-      // voxels of 1 um each; rows run against y
+      // voxels of 1 um; rows run against y
       const perUm = vec(1 / 8, -1 / 8, 1 / 4);
       const shares = "vec4(1.0, 0.0, 0.0, 0.0)";
       const call = `shadeBy(vec3(1.0), gradientAt(vec3(0.5), ${perUm}, ${shares}), vec3(0.6, -0.8, 0.0), vec3(0.0))`;
@@ -555,7 +558,9 @@ describeInChromium("the shader's chunks", () => {
     const size = [NOISE_SIZE, NOISE_SIZE];
     const noise: Texture = { size, channels: 1, texels: [...blueNoise()] };
 
-    /** What the march itself asks for, at a place of the picture of which an eye has a part. */
+    /**
+     * The shift that the march itself computes at a pixel of the frame, of which an eye has a part.
+     */
     async function shiftAt(
       at: readonly number[],
       corner: readonly number[],
@@ -572,7 +577,7 @@ describeInChromium("the shader's chunks", () => {
       return (await run(["jitter"], head, body, { uNoise: texture }))[0];
     }
 
-    it("by another value in another frame, within the same step", async () => {
+    it("by another value in each frame, within the same step", async () => {
       const [first, next] = [
         await shiftAt([3, 1], [0, 0]),
         await shiftAt([3, 1], [0, 0], noise, 0.9),
@@ -580,7 +585,7 @@ describeInChromium("the shader's chunks", () => {
       expect(next).toBeCloseTo((first + 0.9) % 1, 4);
     });
 
-    it("by the table's value at the place, which repeats", async () => {
+    it("by the value of the repeating table at the pixel", async () => {
       for (const [x, y] of [
         [0, 0],
         [3, 1],
@@ -592,13 +597,13 @@ describeInChromium("the shader's chunks", () => {
       }
     });
 
-    it("by less than a step, and never by nothing", async () => {
+    it("by less than a step, and never by zero", async () => {
       const ends: Texture = { size: [2, 1], channels: 1, texels: [0, 255] };
       expect(await shiftAt([0.5, 0.5], [0, 0], ends)).toBeGreaterThan(0);
       expect(await shiftAt([1.5, 0.5], [0, 0], ends)).toBeLessThan(1);
     });
 
-    it("the same for both eyes at the same place", async () => {
+    it("equally for both eyes at the same place", async () => {
       const found: number[] = [];
       for (const [x, y] of [
         [0.5, 0.5],
@@ -607,7 +612,8 @@ describeInChromium("the shader's chunks", () => {
       ]) {
         const left = await shiftAt([x, y], [0, 0]);
         found.push(left);
-        // the right eye's part begins where the left one's ends, at no multiple of the table
+        // the right eye's part begins where the left eye's ends, which is not a multiple of the
+        // table
         expect(await shiftAt([x + 213, y], [213, 0])).toBe(left);
         expect(await shiftAt([x + 213, y + 5], [213, 5])).toBe(left);
       }
@@ -647,7 +653,7 @@ describeInChromium("the shader's chunks", () => {
     }
   });
 
-  it("end an empty block earlier where a coarse level smears", async () => {
+  it("end an empty block earlier where a coarse level is blurred", async () => {
     const uOccupancy: Texture = { size: [8, 1, 1], channels: 1, texels: [7, 6, 5, 4, 3, 2, 1, 0] };
     const ahead = (slack: number, start: number) =>
       run(
@@ -658,7 +664,7 @@ describeInChromium("the shader's chunks", () => {
          oColor = blockAhead(vec3(${start.toFixed(2)}, 0.5, 0.5), dir, 1.0 / dir, 0.0).xyxy;`,
         { uOccupancy },
       );
-    // two bricks earlier than the visible one, which is brick 7; near it all may be smeared
+    // Two bricks before the visible one, which is brick 7. Near it, all values may be blurred.
     for (const [slack, start, exit, isEmpty] of [
       [0, 2.5, 4.5, 1],
       [2, 2.5, 2.5, 1],
@@ -671,8 +677,8 @@ describeInChromium("the shader's chunks", () => {
     }
   });
 
-  it("measure the angle from the lens's middle, and leave blocks out beyond 25 degrees", async () => {
-    // a part of 40 x 20 pixels from (10, 0), whose eye's axis lies at a quarter of its width
+  it("measure the angle from the lens's middle, and skip blocks beyond 25 degrees", async () => {
+    // a part of 40 x 20 pixels from (10, 0); the eye's axis is at a quarter of its width
     const part = vec(10, 0, 40, 20);
     const at = async (x: number, y: number) => {
       const body = `ivec2 pixel = ivec2(${x}, ${y});
@@ -681,7 +687,7 @@ describeInChromium("the shader's chunks", () => {
       return run(["periphery"], "", body, { uLens: [2, 1, 1, 0] });
     };
     expect(await at(20, 10)).toEqual([0, 1, 0, 0].map((v) => expect.closeTo(v, 5)));
-    const [tangent, share] = await at(30, 10); // half the clip space aside: 45 degrees
+    const [tangent, share] = await at(30, 10); // half of clip space to the side: 45 degrees
     expect(tangent).toBeCloseTo(1, 5);
     expect(share).toBeCloseTo(0.5, 5);
     const blocks = [];
@@ -689,7 +695,7 @@ describeInChromium("the shader's chunks", () => {
     expect(blocks).toEqual([0, 0, 1, 1]);
   });
 
-  it("find the face by which a ray to a surface leaves the tile that is a volume", async () => {
+  it("find the face through which a ray to a surface leaves the open tile", async () => {
     // the tile is the box from -1 to 1
     const outwards = [0, 1, 2].flatMap((axis) =>
       [1, -1].map((side) => [0, 1, 2].map((k) => (k === axis ? side : 0))),
@@ -700,17 +706,17 @@ describeInChromium("the shader's chunks", () => {
       return (await run(["open_tile"], "", body, { uOpen })).slice(0, 3);
     };
     const eye = [0, 0, 5];
-    expect(await normalAt(eye, [0, 0, -1])).toEqual([0, 0, 1]); // in the far face itself
+    expect(await normalAt(eye, [0, 0, -1])).toEqual([0, 0, 1]); // exactly in the far face
     expect(await normalAt(eye, [0, 0, -3])).toEqual([0, 0, 1]);
-    expect(await normalAt(eye, [1.6, 0, -3])).toEqual([-1, 0, 0]); // out by a side
-    expect(await normalAt([0, 0, 0], [0, 3, 0])).toEqual([0, -1, 0]); // from within
-    expect(await normalAt(eye, [0, 0, 0])).toEqual([0, 0, 0]); // ends within
-    expect(await normalAt(eye, [2, 0, -1])).toEqual([0, 0, 0]); // passes beside
-    expect(await normalAt(eye, [0, 0, 2])).toEqual([0, 0, 0]); // ends before
+    expect(await normalAt(eye, [1.6, 0, -3])).toEqual([-1, 0, 0]); // leaves through a side
+    expect(await normalAt([0, 0, 0], [0, 3, 0])).toEqual([0, -1, 0]); // from inside
+    expect(await normalAt(eye, [0, 0, 0])).toEqual([0, 0, 0]); // ends inside
+    expect(await normalAt(eye, [2, 0, -1])).toEqual([0, 0, 0]); // passes beside the tile
+    expect(await normalAt(eye, [0, 0, 2])).toEqual([0, 0, 0]); // ends in front of the tile
     expect(await normalAt(eye, [0, 0, -3], new Array<number>(24).fill(0))).toEqual([0, 0, 0]);
   });
 
-  it("put each instance of a scene into its eye's part of the picture", async () => {
+  it("put each instance of a scene into its eye's part of the frame", async () => {
     const chunks = await readChunks("both_eyes_vertex");
     const drawn = async (isForBoth: boolean, eye: number) => {
       const text = chunks["chunks/both_eyes_vertex"]
@@ -727,9 +733,12 @@ describeInChromium("the shader's chunks", () => {
     expect(await drawn(true, 1)).toEqual([3, 3, 1, 0]);
   });
 
-  it("keep a fragment to its own eye's part of the picture", async () => {
+  it("keep a fragment in its own eye's part of the frame", async () => {
     const chunks = await readChunks("both_eyes_fragment");
-    /** Mean of two pixels, 0.5 and 1.5, of which the right one begins the right eye's part; discarded is 0. */
+    /**
+     * Mean of two pixels, 0.5 and 1.5, where the right one begins the right eye's part; a discarded
+     * pixel counts as 0.
+     */
     const mean = async (eye: number) => {
       const text = chunks["chunks/both_eyes_fragment"]
         .replace("varying float vEye;", `const float vEye = ${eye.toFixed(1)};`)
@@ -742,7 +751,7 @@ describeInChromium("the shader's chunks", () => {
     expect(await mean(-1)).toBe(1);
   });
 
-  it("leave of a surface what its volume doesn't take", async () => {
+  it("leave the share of a surface that its volume does not replace", async () => {
     const [focus, share] = ["focus_disc", "surface_share"];
     const chunks = await readChunks(focus, share);
     const left = async (taken: number, isInDisc: boolean, crosses: boolean, x = 0) => {
@@ -757,12 +766,12 @@ describeInChromium("the shader's chunks", () => {
     };
     expect(await left(0.25, false, false)).toEqual([0.25, 0]);
     expect(await left(1, false, false)).toEqual([1, 1]);
-    expect(await left(1, false, true)).toEqual([1, 0]); // mixed with the volume's picture
+    expect(await left(1, false, true)).toEqual([1, 0]); // mixed with the volume's image
     expect(await left(1, true, false)).toEqual([1, 1]);
-    expect(await left(1, true, false, 5)).toEqual([0, 0]); // beside the disc
+    expect(await left(1, true, false, 5)).toEqual([0, 0]); // outside the disc
   });
 
-  it("have a test each", async () => {
+  it("are all tested", async () => {
     const tests = [
       "raymarch_chunks.test.ts",
       "path_trace_chunks.test.ts",

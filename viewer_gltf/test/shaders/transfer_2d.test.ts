@@ -1,4 +1,4 @@
-/** Numbers out of the march and the paths by two-dimensional transfer functions. */
+/** Tests of the ray march and path tracing with two-dimensional transfer functions. */
 import { expect, it } from "vitest";
 import { prepareBarePage } from "../support/browser/bare_page";
 import { describeInChromium } from "../support/browser/skip";
@@ -11,19 +11,19 @@ describeInChromium("two-dimensional transfer functions", () => {
     new URL("../support/shaders/harness2d.ts", import.meta.url),
   );
 
-  // The slope climbs from 0 at 20 to 1 at 28 of 48 voxels: two voxels on it differ by a quarter,
-  // which is half of the steepest, 0.5; at its ends by half of that.
+  // The slope rises from 0 at voxel 20 to 1 at voxel 28 of 48. Two voxels on it differ by a
+  // quarter, which is half of the steepest gradient, 0.5; at its ends the gradient is half of that.
   const SLOPE_AT = [20, 28] as const;
   const OPACITY = 3 / 255;
   const through = 1 - (1 - OPACITY) ** 48;
-  /** Opacities of the columns with their middle between two places. */
+  /** Opacities of the columns whose middle lies between two places. */
   const between = (columns: readonly number[], from: number, to: number) =>
     columns.filter((_, i) => {
       const x = (48 * (i + 0.5)) / columns.length;
       return x > from && x < to;
     });
 
-  it("show a boundary by its gradient, and nothing of what is uniform", async () => {
+  it("show a boundary by its gradient, and nothing of uniform matter", async () => {
     const columns = await bare.call("showSlope", [0, 1], [0.4, 0.6], OPACITY);
     const [from, to] = SLOPE_AT;
     const onSlope = between(columns, from + 1.2, to - 1.2);
@@ -34,18 +34,18 @@ describeInChromium("two-dimensional transfer functions", () => {
     expect(Math.max(...flat)).toBe(0);
   });
 
-  it("show what is uniform, and nothing of its boundary, though the values are alike", async () => {
+  it("show uniform matter, and nothing of its boundary, even at the same values", async () => {
     const columns = await bare.call("showSlope", [0.1, 1], [0, 0.2], OPACITY);
     const [from, to] = SLOPE_AT;
     for (const found of between(columns, to + 1, 47)) {
       expect(Math.abs(found - through)).toBeLessThan(0.02);
     }
-    // values 0.15 to 0.85 lie in the shape, but for their gradient
+    // values 0.15 to 0.85 lie in the shape's range, but their gradients do not
     expect(Math.max(...between(columns, 0, to - 1.2))).toBe(0);
     expect(between(columns, from + 1.2, to - 1.2).length).toBeGreaterThan(5);
   });
 
-  it("that know no gradients give the picture of a one-dimensional one", async () => {
+  it("give the image of a one-dimensional function if they do not depend on the gradient", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 6; seed++) {
       const found = await bare.call("compareAlike", seed);
@@ -55,7 +55,7 @@ describeInChromium("two-dimensional transfer functions", () => {
     expect(drawn).toBeGreaterThan(500);
   });
 
-  it("show the same with skips and without", async () => {
+  it("show the same with and without skips", async () => {
     let drawn = 0;
     for (let seed = 0; seed < 8; seed++) {
       const found = await bare.call("compareSkips2d", seed);
@@ -65,9 +65,9 @@ describeInChromium("two-dimensional transfer functions", () => {
     expect(drawn).toBeGreaterThan(500);
   });
 
-  it("measure the step over two voxels of each channel by itself", async () => {
+  it("measure the step over two voxels for each channel separately", async () => {
     const chunks = await readChunks("transfer_table_2d");
-    // intensities that climb by so much a unit of the texture, along each axis
+    // intensities that rise by this much per unit of the texture, along each axis
     const slopes = [
       [1, 0, 0],
       [0, -2, 0],
@@ -95,7 +95,7 @@ describeInChromium("two-dimensional transfer functions", () => {
     });
   });
 
-  it("look up a path's medium between the cells of each channel's rows", async () => {
+  it("interpolate a path's medium between the cells of each channel's rows", async () => {
     const chunks = await readChunks("medium_2d");
     const random = seeded(11);
     const texels = Array.from({ length: 256 * 128 * 4 }, () => Math.floor(256 * random()));
@@ -126,4 +126,4 @@ describeInChromium("two-dimensional transfer functions", () => {
     expect(found[3]).toBeCloseTo(sum, 4);
   });
 });
-// The march's own lookup, "classify_2d", is part of the pictures above.
+// The march's own lookup, "classify_2d", is part of the images above.

@@ -1,4 +1,4 @@
-/** Finer surfaces in external tilesets, as in bundles of many tiles. */
+/** Finer surfaces in external tilesets, as in bundles with many tiles. */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
@@ -7,7 +7,7 @@ import { prepareStand } from "../support/browser/stand";
 import { BALLS } from "../support/fixture/bodies";
 
 const CHANNEL = "channels/Balls";
-/** Of all balls, on screen, with the coarsest surface of both tiles: 6 rings each. */
+/** Triangles of all balls on screen, with the coarsest surface of both tiles: 6 rings each. */
 const COARSEST_TRIANGLES = BALLS.length * 4 * 6 * 6;
 
 describeInChromium("a bundle with external tilesets", () => {
@@ -17,19 +17,19 @@ describeInChromium("a bundle with external tilesets", () => {
     fixture: { hasFinerApart: true },
   });
 
-  it("keeps the coarsest surfaces where what is behind them fails, until it comes", async () => {
-    const spoilt = `${CHANNEL}/r0_c0/finer.json`;
-    const text = await readFile(join(stand.bundle, spoilt), "utf8");
+  it("keeps the coarsest surfaces until failed finer ones are loaded", async () => {
+    const damaged = `${CHANNEL}/r0_c0/finer.json`;
+    const text = await readFile(join(stand.bundle, damaged), "utf8");
     const body = text.replace("lod1.glb", "lod2.glb");
-    stand.host.overrides.set(`/bundle/${spoilt}`, { status: 200, body });
-    // of the other tile, the external tileset comes, and its surface doesn't
+    stand.host.overrides.set(`/bundle/${damaged}`, { status: 200, body });
+    // in the other tile, the external tileset is loaded but its surface is not
     const gone = `${CHANNEL}/r0_c1/lod1.glb`;
     stand.host.overrides.set(`/bundle/${gone}`, { status: 404, body: "gone" });
     await stand.open("&mode=off"); // no volume in place of a surface
     await stand.viewer.show("F_x20_body", false);
     await stand.viewer.settled();
     const { state, triangles } = await stand.viewer.snapshot();
-    expect(state.notices.join()).toContain(`${spoilt}: expected sha-256-128`);
+    expect(state.notices.join()).toContain(`${damaged}: expected sha-256-128`);
     expect(state.notices.join()).toContain(`${gone}: not found (404)`);
     expect(triangles).toBe(COARSEST_TRIANGLES);
 

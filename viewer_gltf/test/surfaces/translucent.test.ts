@@ -10,7 +10,7 @@ import { BALLS, SPECIMEN } from "../support/fixture/bodies";
 import { BODIES } from "../support/fixture/bundle";
 
 const [F, BALL] = BODIES;
-/** The small ball lies before the F's upright, seen from the side. */
+/** The small ball is in front of the F's upright, seen from the side. */
 const { center } = BALLS[1];
 const OPACITY = 0.5;
 
@@ -23,11 +23,11 @@ describeInChromium("translucent surfaces", () => {
     return takePicture(stand.viewer.page);
   }
 
-  /** Light at the middle of the ball, and beside all surfaces: red, green, blue. */
+  /** Light (red, green, blue) of the pixel at the middle of the ball. */
   async function lightOfBall(link: string): Promise<readonly number[]> {
     const picture = await look(link);
     const bounds = SPECIMEN as unknown as Manifest["specimen"]["bounds_um"];
-    // From the other side, left and right change places.
+    // From the other side, left and right are swapped.
     const [low, high] = [bounds.min[0], bounds.max[0]];
     const mirrored = [low + high - center[0], center[1], center[2]] as const;
     const { x, y } = project(mirrored, bounds, picture.width, picture.height, "left");
@@ -37,7 +37,7 @@ describeInChromium("translucent surfaces", () => {
   const half = (...ids: readonly string[]) =>
     `c=${ids.join(",")}&l=${ids.map((id) => `${id}:o${OPACITY}`).join(",")}`;
 
-  it("are drawn over one another, the nearest last", async () => {
+  it("are drawn over each other, the nearest last", async () => {
     const [both, ball] = [await lightOfBall(half(F.id, BALL.id)), await lightOfBall(half(BALL.id))];
     const [letter, alone] = [await lightOfBall(`c=${F.id}`), await lightOfBall(`c=${BALL.id}`)];
     for (const k of [0, 1, 2]) {
@@ -45,7 +45,7 @@ describeInChromium("translucent surfaces", () => {
       const behind = OPACITY * letter[k] + (1 - OPACITY) * ground;
       expect(both[k], `part ${k}`).toBeCloseTo(OPACITY * alone[k] + (1 - OPACITY) * behind, 1.5);
     }
-    // The letter is red, the ball blue.
+    // The letter is red, and the ball is blue.
     expect(both[0]).toBeGreaterThan(ball[0] + 0.03);
   });
 });

@@ -1,7 +1,7 @@
 /**
- * Volumes as bricks from `stereocell serve`: the picture that files give, piece by piece; a second
- * visit that asks the network for none; and files where bricks don't do. Skipped where the
- * repository has no .venv (`make setup`).
+ * Volumes as bricks from `stereocell serve`. They give the same image as files, arrive piece by
+ * piece, and need no network on a second visit. Files replace them where bricks do not suffice.
+ * Skipped without the repository's .venv (`make setup`).
  */
 import { existsSync } from "node:fs";
 import { cp, mkdtemp, rm } from "node:fs/promises";
@@ -22,12 +22,12 @@ import { describeInChromium } from "../support/browser/skip";
 import { DIST } from "../support/browser/stand";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 
-const VIEWPORT = { width: 240, height: 160 }; // small: software draws it
+const VIEWPORT = { width: 240, height: 160 }; // small, for the software renderer
 const QUERY = "?mode=all&quality=high";
-/** Bricks shade by the middles of their ranges, files by their levels. */
+/** Shading is off, since it uses the middles of ranges for bricks but levels for files. */
 const UNSHADED = "#v=1&depth=0";
 
-/** What a page got by the websocket, and which volumes as files. */
+/** Counts what a page gets over the websocket, and lists the volumes that it gets as files. */
 function count(page: Page) {
   const counted = { bricks: 0, sockets: 0, files: [] as string[] };
   page.on("websocket", (socket) => {
@@ -43,7 +43,10 @@ function count(page: Page) {
   return counted;
 }
 
-/** Mean over blocks of 8 x 8 pixels of how far their means are apart, of 255: noise is no difference. */
+/**
+ * Mean difference, of 255, between the mean values of blocks of 8 x 8 pixels, so that noise does
+ * not count.
+ */
 function apart(a: Picture, b: Picture): number {
   const EDGE = 8;
   let [sum, count] = [0, 0];
@@ -63,8 +66,8 @@ function apart(a: Picture, b: Picture): number {
   return sum / count;
 }
 
-describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
-  describeInChromium("of a served bundle", () => {
+describe.skipIf(!existsSync(STEREOCELL))("bricks streamed by view", () => {
+  describeInChromium("for a served bundle", () => {
     let out: string;
     let server: Awaited<ReturnType<typeof serve>>;
     let host: Host;
@@ -95,7 +98,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       return { page, viewer, counted };
     }
 
-    it("draw what files draw, and are kept for the next visit", async () => {
+    it("give the same image as files, and are kept for the next visit", async () => {
       const files = await open(`${host.address}/${QUERY}${UNSHADED}`);
       const expected = await takePicture(files.page);
       expect(files.counted.sockets).toBe(0);
@@ -117,9 +120,10 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
     });
 
     it.runIf(IS_EXHAUSTIVE)(
-      "draw what files draw by value and gradient, marched and traced",
+      "give the same image as files by value and gradient, marched and path-traced",
       async () => {
-        // above the value at which the authored function begins: bricks leave out what lies below
+        // above the value at which the authored function begins, because bricks leave out smaller
+        // values
         const slope: Shape = {
           ...makeShape("rectangle", { value: 0.7, gradient: 0.55 }),
           values: [0.4, 1],
@@ -143,7 +147,8 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
           const files = await drawn(`${host.address}/`);
           const bricks = await drawn(server.address);
           expect(bricks.state.notices).toEqual([]);
-          // the march that stands in for what is traced has files: bricks of a tile go to one place
+          // the stand-in march for path tracing uses files, since a tile's bricks go to one
+          // receiver only
           if (mode === "all") expect(bricks.counted.files).toEqual([]);
           else expect(bricks.standIn.every(({ level }) => level !== null)).toBe(true);
           expect(bricks.standIn.length).toBeGreaterThan(0);
@@ -155,7 +160,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       },
     );
 
-    it("give way to files where a function shows what they leave out", async () => {
+    it("are replaced by files if a function shows voxels that they leave out", async () => {
       const link = "#v=1&l=Balls:w0_0.02,Block:w0_0.02,F_x20_body:w0_0.02";
       const { page, viewer, counted } = await open(`${server.address}${QUERY}${link}`);
       expect(counted.files.length).toBeGreaterThan(0);
@@ -163,7 +168,7 @@ describe.skipIf(!existsSync(STEREOCELL))("bricks by view", () => {
       await page.close();
     });
 
-    it("give way to files where the host has none after all", async () => {
+    it("are replaced by files if the host has no bricks after all", async () => {
       host.headers = { "Stereocell-Bricks": "version=1" };
       const { page, viewer, counted } = await open(`${host.address}/${QUERY}`);
       host.headers = {};

@@ -1,4 +1,7 @@
-/** How volumes come: a coarse level first, a finer one where the gaze rests, and no jump between. */
+/**
+ * How volumes are loaded: a coarse level first, a finer one where the gaze rests, without a jump
+ * between them.
+ */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { expect, it } from "vitest";
@@ -10,11 +13,14 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { IS_EXHAUSTIVE } from "../support/exhaustive";
 
-/** Levels of the fixture's volumes: the first is the finest within 64 KiB, the last has it all. */
+/**
+ * Levels of the fixture's volumes: the first is the finest one within 64 KiB, the last is the full
+ * volume.
+ */
 const [FIRST, FINEST] = [1, 0];
 const PATIENT = { timeout: 120_000 };
 
-/** Of a picture, by how much it differs from another, of 255. */
+/** Mean difference between two images, of 255. */
 function apart(a: Picture, b: Picture): number {
   let sum = 0;
   for (let y = 0; y < a.height; y++) {
@@ -44,7 +50,7 @@ describeInChromium("volumes", () => {
     return (await Promise.all(lists)).flat();
   }
 
-  /** Levels that were asked for, volume by volume, in the order of the requests. */
+  /** Requested levels of each volume, in the order of the requests. */
   async function asked(): Promise<ReadonlyMap<string, readonly number[]>> {
     const byPath = new Map<string, readonly number[]>();
     for (const { file, levels } of await listed()) {
@@ -61,7 +67,7 @@ describeInChromium("volumes", () => {
     return byPath;
   }
 
-  /** Keep the answers of a level back until the returned function is called. */
+  /** Delays the answers for a level until the returned function is called. */
   async function holdBack(level: number): Promise<() => void> {
     let release = () => {};
     const gate = new Promise<void>((open) => {
@@ -73,12 +79,12 @@ describeInChromium("volumes", () => {
       const range = await request.headerValue("range");
       const { offset } = starts.get(path) ?? { offset: -1 };
       if (range?.startsWith(`bytes=${offset}-`)) await gate;
-      await route.continue().catch(() => undefined); // the page may be closed by now
+      await route.continue().catch(() => undefined); // the page may be closed already
     });
     return release;
   }
 
-  it("come coarse first: all tiles show before any of them is whole", async () => {
+  it("are loaded coarse first: all tiles are shown before any is complete", async () => {
     const release = await holdBack(FINEST);
     await stand.open("&mode=all");
     const total = stand.manifest.tiles.length * stand.manifest.channels.length;
@@ -98,14 +104,14 @@ describeInChromium("volumes", () => {
     for (const [path, found] of levels) expect(found, path).toEqual([FIRST, FINEST]);
   });
 
-  it("refine where the gaze rests, and not while it wanders", async () => {
+  it("are refined where the gaze rests, but not while it wanders", async () => {
     await addClock(page());
     await stand.open("&mode=off&switch=9&quality=low");
     await stand.viewer.settled();
     await holdFrames(page());
     await page().keyboard.press("ArrowLeft");
     const gazed = new Set<string | null>();
-    /** From one tile to the other and back: looked at for long enough to be meant, not to rest. */
+    /** Looks from one tile to the other and back, long enough to focus a tile but not to rest. */
     const wander = async () => {
       for (const key of ["ArrowRight", "ArrowLeft"]) {
         for (let i = 0; i < 2; i++) await page().keyboard.press(key); // across the tiles' border
@@ -115,7 +121,8 @@ describeInChromium("volumes", () => {
     };
     await wander();
     await page().locator("select[data-mode]").selectOption("disc");
-    await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur()); // its keys
+    // The menu must not take the keys.
+    await page().evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     await expect
       .poll(async () => {
         await wander();
@@ -126,9 +133,9 @@ describeInChromium("volumes", () => {
     expect(shown).toEqual(new Set(stand.manifest.tiles.map(({ id }) => id)));
     for (let i = 0; i < 5; i++) {
       await wander();
-      await page().waitForTimeout(200); // what was asked for would have come
+      await page().waitForTimeout(200); // a requested level would have arrived
     }
-    expect(gazed).toEqual(shown); // it did wander
+    expect(gazed).toEqual(shown); // the gaze did wander
     expect(areAt(await volumes(), FIRST)).toBe(true);
     for (const [path, found] of await asked()) expect(found, path).toEqual([FIRST]);
 
@@ -142,7 +149,7 @@ describeInChromium("volumes", () => {
   });
 
   it.runIf(IS_EXHAUSTIVE)(
-    "are gone with the frame after one that took longer than they fade",
+    "have disappeared in the frame after one that took longer than the fade",
     async () => {
       await addClock(page());
       await stand.open("&mode=off&switch=9&quality=high");
@@ -154,12 +161,12 @@ describeInChromium("volumes", () => {
       await holdFrames(page());
       await page().locator("select[data-mode]").selectOption("off");
       await tick(page(), 16);
-      await tick(page(), 1800); // so slow a device
+      await tick(page(), 1800); // a very slow device
       expect(apart(await takePicture(page()), surfaces)).toBeLessThan(0.02);
     },
   );
 
-  it("fade from one level to the next", async () => {
+  it("are faded from one level to the next", async () => {
     await addClock(page());
     const release = await holdBack(FINEST);
     await stand.open("&mode=off&quality=high");
@@ -173,11 +180,12 @@ describeInChromium("volumes", () => {
       }, PATIENT)
       .toBe(true);
     await tick(page(), 100, 10);
-    for (let i = 0; i < 2; i++) await tick(page(), 2000); // nothing is being drawn any more
+    for (let i = 0; i < 2; i++) await tick(page(), 2000); // nothing more is being drawn
     const coarse = await takePicture(page());
     const { volumeBytes: coarseBytes } = await stand.viewer.snapshot();
     release();
-    await expect.poll(async () => areAt(await volumes(), FINEST), PATIENT).toBe(true); // no frame yet
+    // No frame has been drawn yet.
+    await expect.poll(async () => areAt(await volumes(), FINEST), PATIENT).toBe(true);
 
     const frames = async () => (await page().evaluate(() => window.stereocell?.frames)) ?? 0;
     const bytes: number[] = [];
@@ -186,7 +194,7 @@ describeInChromium("volumes", () => {
       const before = await frames();
       await tick(page(), 40); // a fifth of the fade
       const isDrawn = async () => {
-        await tick(page(), 0.1); // once the picture before is done
+        await tick(page(), 0.1); // when the last image is done
         return (await frames()) > before;
       };
       if (i < 5) await expect.poll(isDrawn, PATIENT).toBe(true);
@@ -201,7 +209,7 @@ describeInChromium("volumes", () => {
       expect(away[i - 1] - away[i], `frame ${i}`).toBeLessThan(0.5 * away[0]);
     }
     expect(away[5]).toBeLessThan(0.02 * away[0]);
-    // both are there as long as they are mixed, then the new one alone
+    // two levels are kept while they are mixed, then only the new one
     expect(bytes.slice(0, 4)).toEqual(new Array(4).fill(coarseBytes + bytes[5]));
   });
 });

@@ -1,4 +1,4 @@
-/** The link into iOS's own viewer of augmented reality. */
+/** The link to iOS's own viewer of augmented reality. */
 import { join } from "node:path";
 import { expect, it } from "vitest";
 import { describeInChromium } from "../support/browser/skip";
@@ -6,7 +6,7 @@ import { prepareStand } from "../support/browser/stand";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
 
-describeInChromium("the link to the specimen in the user's room", () => {
+describeInChromium("the link to augmented reality", () => {
   const stand = prepareStand({
     viewport: { width: 390, height: 844 },
     hasTouch: true,
@@ -22,12 +22,12 @@ describeInChromium("the link to the specimen in the user's room", () => {
       };
     });
 
-  it("is not there where the browser has no such viewer", async () => {
+  it("is hidden if the browser has no such viewer", async () => {
     await stand.open("&mode=off");
     expect(await link().isVisible()).toBe(false);
   });
 
-  it("is one image in a link, as Quick Look wants it", async () => {
+  it("is a link with one image, as Quick Look requires", async () => {
     await pretendIos();
     await stand.open("&mode=off");
     expect(await link().isVisible()).toBe(true);
@@ -48,7 +48,7 @@ describeInChromium("the link to the specimen in the user's room", () => {
     if (SHOTS) await stand.viewer.page.screenshot({ path: join(SHOTS, "ar_link.png") });
   });
 
-  it("is not there where the bundle has no such file", async () => {
+  it("is hidden if the bundle has no such file", async () => {
     await pretendIos();
     const manifest = { ...stand.manifest, usdz: null, usdz_reason: "no surface is drawn" };
     stand.host.overrides.set("/bundle/manifest.json", {

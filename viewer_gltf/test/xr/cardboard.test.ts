@@ -1,4 +1,4 @@
-/** Stereo without WebXR: the two eyes, the lenses, the head, and every way out of it. */
+/** Stereo without WebXR: the two eyes, the lenses, the head, and all ways to leave it. */
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, expect, it } from "vitest";
 import { bundled } from "../support/browser/bundled";
@@ -10,7 +10,9 @@ import type { Spot } from "../support/xr/cardboard_harness";
 const WIDTH = 844;
 const HEIGHT = 390;
 const PIXELS_PER_m = 153.3 / 0.0254;
-/** Cardboard v1: its 40 degrees are less than this screen shows, so both eyes see them in full. */
+/**
+ * Cardboard v1: its field of 40 degrees is smaller than this screen, so both eyes see it in full.
+ */
 const V1 = { interLens_m: 0.06, screenToLens_m: 0.042, lensHeight_m: 0.032, k: [0.441, 0.156] };
 const PIXELS_PER_TANGENT = WIDTH / 2 / (2 * Math.tan((40 * Math.PI) / 180));
 const ADDRESS = "http://localhost/split";
@@ -50,12 +52,12 @@ describeInChromium("stereo without WebXR", () => {
     await page.click("button");
     const result = await page.evaluate(() => window.started);
     if (result !== "started") return result;
-    // The canvas follows the stage after the next layout.
+    // the canvas is resized after the next layout
     await page.waitForFunction((width) => document.querySelector("canvas")?.width === width, WIDTH);
     return result;
   };
   const status = () => page.evaluate(() => window.stand.status());
-  /** ... and rest there: a head that has just turned is taken to turn on. */
+  /** Turns the head and rests there, since the turn of a moving head is predicted further. */
   const turnTo = (alpha: number, beta: number, gamma: number) =>
     page.evaluate(
       ([alpha, beta, gamma]) => {
@@ -66,7 +68,7 @@ describeInChromium("stereo without WebXR", () => {
     );
   const lookAt = (at: At, radius_m: number): Promise<Spot[]> =>
     page.evaluate(([at, radius]) => window.stand.lookAt(at, radius), [at, radius_m] as const);
-  /** Keep looking there until that is ahead. */
+  /** Keeps looking there until that is the direction ahead. */
   const rest = async () => {
     for (let k = 0; k < 2; k++) {
       await lookAt([0, 0, -2], 0.04);
@@ -79,7 +81,7 @@ describeInChromium("stereo without WebXR", () => {
   const colorsAt = (places: readonly Place[], hasRoom: boolean): Promise<number[][]> =>
     page.evaluate(([at, room]) => window.stand.colorsAt(at, room), [places, hasRoom] as const);
 
-  it("gives a known point the disparity that its distance has", async () => {
+  it("gives a known point the disparity of its distance", async () => {
     expect(await start()).toBe("started");
     const points: At[] = [
       [0, 0, -0.5],
@@ -98,7 +100,7 @@ describeInChromium("stereo without WebXR", () => {
     }
   });
 
-  it("asks to turn an upright phone, and begins as soon as it lies on its side", async () => {
+  it("asks to turn an upright phone, and begins when it lies on its side", async () => {
     const sign = page.getByText("Turn the phone on its side");
     await page.setViewportSize({ width: HEIGHT, height: WIDTH });
     await page.click("button");
@@ -116,7 +118,7 @@ describeInChromium("stereo without WebXR", () => {
     await page.setViewportSize({ width: WIDTH, height: HEIGHT });
   });
 
-  it("shows what lies on a lens's axis at the lens's centre", async () => {
+  it("shows a point on a lens's axis at the lens's centre", async () => {
     await start();
     for (const [eye, sign] of [
       [0, -1],
@@ -129,7 +131,7 @@ describeInChromium("stereo without WebXR", () => {
     }
   });
 
-  it("shows what lies beside it where the lens makes it straight", async () => {
+  it("shows a point beside the axis where the lens makes it straight", async () => {
     await start();
     for (const [x, y] of [
       [0.5, 0],
@@ -137,7 +139,7 @@ describeInChromium("stereo without WebXR", () => {
       [0, -0.6],
       [0.45, -0.5],
     ]) {
-      // The place r at which r (1 + k1 r^2 + k2 r^4) is the tangent, by Newton's method.
+      // r at which r (1 + k1 r^2 + k2 r^4) equals the tangent, by Newton's method
       const seen = Math.hypot(x, y);
       let r = seen;
       for (let i = 0; i < 20; i++) {
@@ -153,7 +155,7 @@ describeInChromium("stereo without WebXR", () => {
     }
   });
 
-  it("shows a colour as the page does", async () => {
+  it("shows the same colours as the page", async () => {
     await start();
     const lens: Place = [240, 193];
     const [color] = await colorsAt([lens], false);
@@ -162,7 +164,7 @@ describeInChromium("stereo without WebXR", () => {
     });
   });
 
-  it("is black where no lens looks, and has a line to lay the phone by", async () => {
+  it("is black outside the lenses, and has a line to align the phone", async () => {
     await start();
     const corners: Place[] = [
       [0, 0],
@@ -189,7 +191,7 @@ describeInChromium("stereo without WebXR", () => {
     await rest();
     const [ahead] = await lookAt(at, 0.04);
 
-    // Twenty degrees to the left about the neck, 8 cm behind the eyes: the mark goes to the right.
+    // Twenty degrees to the left about the neck, 8 cm behind the eyes: the mark moves to the right.
     await turnTo(20, 90, 0);
     const [left, right] = await lookAt(at, 0.04);
     const turn = (20 * Math.PI) / 180;
@@ -199,23 +201,24 @@ describeInChromium("stereo without WebXR", () => {
     const middle = WIDTH / 4 + (across / away) * PIXELS_PER_TANGENT;
     expect(Math.abs((left.x + right.x) / 2 - middle)).toBeLessThan(1);
 
-    await turnTo(0, 100, 0); // up
+    await turnTo(0, 100, 0); // tilted up
     const [below] = await lookAt(at, 0.04);
     expect(below.y).toBeLessThan(ahead.y - 20);
     expect(Math.abs(below.x - ahead.x)).toBeLessThan(1);
 
-    await turnTo(270, 80, 90); // the head to its right shoulder: the picture turns to the left
+    // The head tilts to its right shoulder, so the image rotates to the left.
+    await turnTo(270, 80, 90);
     const [rolled] = await lookAt([0, 0.5, -2], 0.04);
     expect(rolled.x).toBeLessThan(ahead.x - 5);
   });
 
-  it("takes the way ahead from where the head rests, not from where the hands held the phone", async () => {
+  it("takes the direction ahead from the resting head, not from the hands that held the phone", async () => {
     await start();
     const middle = async () => {
       const [left, right] = await lookAt([0, 0, -2], 0.04);
       return (left.x + right.x) / 2 - WIDTH / 4;
     };
-    await turnTo(40, 90, 0); // across and level, in a hand
+    await turnTo(40, 90, 0); // in landscape and level, in a hand
     expect(Math.abs(await middle())).toBeLessThan(1);
     await turnTo(137, 90, 0);
     await rest();
@@ -226,11 +229,11 @@ describeInChromium("stereo without WebXR", () => {
     expect(Math.abs(await middle())).toBeLessThan(1);
   });
 
-  it("reports that the orientation was refused, and leaves the page as it was", async () => {
+  it("reports that the orientation was refused, and restores the page", async () => {
     await page.evaluate(() => {
       Object.assign(DeviceOrientationEvent, { requestPermission: async () => "denied" });
     });
-    expect(await start()).toMatch(/not allowed to tell how the phone is turned.*open the page/);
+    expect(await start()).toMatch(/not allowed to read how the phone is turned.*open the page/);
     const { isRunning, log } = await status();
     expect(isRunning).toBe(false);
     expect(log).toEqual([]);
@@ -254,7 +257,7 @@ describeInChromium("stereo without WebXR", () => {
     ]);
   });
 
-  it("reports what this browser could not give, and goes on without", async () => {
+  it("reports features that this browser lacks, and continues without them", async () => {
     await page.evaluate(() => {
       Object.assign(HTMLElement.prototype, {
         requestFullscreen: undefined,
@@ -266,12 +269,12 @@ describeInChromium("stereo without WebXR", () => {
     expect(await start()).toBe("started");
     const { isRunning, problems } = await status();
     expect(isRunning).toBe(true);
-    expect(problems.join(" ")).toMatch(/home screen.*dim.*doesn't follow your head/);
-    // Without full screen it still covers the page.
+    expect(problems.join(" ")).toMatch(/home screen.*dim.*can't follow your head/);
+    // The canvas covers the page even without full screen.
     expect(await page.locator("#stage").evaluate(({ clientWidth }) => clientWidth)).toBe(WIDTH);
   });
 
-  it("takes a tap as its button, once the finger is up", async () => {
+  it("takes a tap as a button press when the finger is lifted", async () => {
     await start();
     await page.mouse.move(500, 100);
     await page.mouse.down();
@@ -280,7 +283,7 @@ describeInChromium("stereo without WebXR", () => {
     expect((await status()).log).toEqual(["start", "press", "tap", "release"]);
   });
 
-  it("takes a drag for no tap", async () => {
+  it("does not take a drag for a tap", async () => {
     await start();
     await page.mouse.move(500, 100);
     await page.mouse.down();
@@ -294,7 +297,7 @@ describeInChromium("stereo without WebXR", () => {
     ["the back gesture", () => page.evaluate(() => history.back())],
     ["leaving full screen", () => page.evaluate(() => document.exitFullscreen())],
     ["the page itself", () => page.evaluate(() => window.stand.end())],
-  ])("is ended by %s, once, on the same page", async (_, leave) => {
+  ])("is ended once by %s, on the same page", async (_, leave) => {
     await start();
     expect(await page.evaluate(() => document.fullscreenElement?.id)).toBe("stage");
     await leave();
@@ -306,7 +309,7 @@ describeInChromium("stereo without WebXR", () => {
     expect(await page.locator("#stage").evaluate(({ clientWidth }) => clientWidth)).toBe(200);
   });
 
-  it("goes one step back, also where the page was loaded again in a session", async () => {
+  it("goes one step back, even if the page was reloaded in a session", async () => {
     await start();
     await page.reload();
     await page.addScriptTag({ content: script });
@@ -314,10 +317,10 @@ describeInChromium("stereo without WebXR", () => {
     await page.evaluate(() => history.back());
     await page.waitForFunction(() => !window.stand.status().isRunning);
     await page.waitForTimeout(300);
-    expect((await status()).log).toEqual(["start", "end"]); // it is the same page, not an older one
+    expect((await status()).log).toEqual(["start", "end"]); // the same page, not an older one
   });
 
-  it("holds no more of the GPU the tenth time than the second", async () => {
+  it("uses no more GPU resources the tenth time than the second", async () => {
     const counts: number[] = [];
     for (let i = 0; i < 10; i++) {
       expect(await start(i % 2 === 0 ? "v1" : "v2")).toBe("started");

@@ -1,4 +1,7 @@
-/** Stereo that is right: a known point lies at its place by the two eyes' geometry, either way. */
+/**
+ * Correct stereo: a known point lies where the geometry of the two eyes puts it, in both kinds of
+ * stereo.
+ */
 import { expect, it } from "vitest";
 import { place, XR_DISTANCE_M } from "../../src/render/placement";
 import { addHeadset } from "../support/browser/chromium";
@@ -9,7 +12,7 @@ import { sweep } from "../support/exhaustive";
 import { BALLS } from "../support/fixture/bodies";
 
 const VIEWPORT = { width: 480, height: 240 };
-/** Of the emulated headset: what iwer gives by default. */
+/** Metres between the pupils; iwer's default for the emulated headset. */
 const PUPILS_M = 0.063;
 const FIELD_OF_VIEW_RAD = Math.PI / 2;
 
@@ -20,13 +23,13 @@ const EYES = [
   [HALF_PX, 1],
 ] as const;
 
-describeInChromium("in stereo", () => {
+describeInChromium("correct stereo", () => {
   const stand = prepareStand({ viewport: VIEWPORT, pixelRatio: 1 });
 
   const pictureOf = (left: number) =>
     takePicture(stand.viewer.page, { x: left, y: 0, width: HALF_PX, height: VIEWPORT.height });
 
-  it("surfaces hide volumes, and volumes veil surfaces, for both eyes", async () => {
+  it("hides volumes behind surfaces, and surfaces behind volumes, for both eyes", async () => {
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=all&quality=high#v=1&depth=0");
     await stand.viewer.showOnly();
@@ -41,7 +44,7 @@ describeInChromium("in stereo", () => {
       for (const [left, side] of EYES) {
         const eye = await pictureOf(left);
         for (const ball of [BALLS[2], BALLS[3]]) {
-          // the point of the ball that is nearest to the eyes' plane
+          // the point of the ball nearest to the eyes' plane
           const [x, y, z] = ball.center.map((v, i) => (v - center[i]) * scale);
           const perMetre = FOCAL_PX / (XR_DISTANCE_M - z - ball.radius * scale);
           const px = HALF_PX / 2 + perMetre * (x - (side * PUPILS_M) / 2);
@@ -61,9 +64,9 @@ describeInChromium("in stereo", () => {
     }
   });
 
-  it("a slice's plane lies where both eyes should see it, over all of the specimen", async () => {
+  it("puts a slice where both eyes should see it, across the whole specimen", async () => {
     const { viewer } = stand;
-    const at = 0.9; // of the specimen's depth: before most of it
+    const at = 0.9; // share of the specimen's depth, in front of most of it
     await addHeadset(viewer.page);
     await stand.open(`&mode=off&quality=high#v=1&slice-z=${at}`);
     await viewer.enterStereo();
@@ -79,7 +82,7 @@ describeInChromium("in stereo", () => {
     const depth = XR_DISTANCE_M - (min[2] + at * (max[2] - min[2]) - center[2]) * scale;
     const perMetre = FOCAL_PX / depth;
     const columns = EYES.map(([, side], i) => {
-      // the middle of each half of the plane, up and down, where no line nor letter is
+      // the upper and lower middle of each half of the slice, where there are no lines or letters
       const [a, b] = [shown[i], without[i]];
       const differs = (x: number, y: number) =>
         a.at(x, y).some((v, k) => Math.abs(v - b.at(x, y)[k]) > 8);
@@ -110,7 +113,7 @@ describeInChromium("in stereo", () => {
     ["disc", "&mode=disc&switch=9&disc=40"],
   ] as const;
   for (const [as, query] of sweep(drawn, ([as]) => as === "volume")) {
-    it(`a ball's middle lies where both eyes should see it, as a ${as}`, async () => {
+    it(`puts a ball's middle where both eyes should see it, as a ${as}`, async () => {
       await addHeadset(stand.viewer.page);
       await stand.open(`${query}&quality=high#v=1&c=Balls&depth=0`);
       await stand.viewer.enterStereo();
@@ -120,7 +123,7 @@ describeInChromium("in stereo", () => {
       const [{ center: ball, radius }] = BALLS;
       const [x, y, z] = ball.map((v, i) => (v - center[i]) * scale);
       const depth = XR_DISTANCE_M - z;
-      // the middle of a ball's outline lies a little farther out than its centre's image
+      // the middle of a ball's outline lies slightly farther out than the image of its centre
       const perMetre = (FOCAL_PX * depth) / (depth ** 2 - (radius * scale) ** 2);
       const around_px = (1.3 * radius * scale * FOCAL_PX) / depth;
 

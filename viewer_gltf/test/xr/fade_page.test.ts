@@ -1,4 +1,6 @@
-/** The room in stereo: a jump of the specimen is a fade of the picture, and a grid on the ground stays where it is. */
+/**
+ * The scene in stereo: a jump of the specimen is a fade, and the grid on the ground stays in place.
+ */
 import { expect, it } from "vitest";
 import { addClock, holdFrames, tick } from "../support/browser/clock";
 import { type Picture, takePicture } from "../support/browser/picture";
@@ -8,10 +10,10 @@ import { Gazer } from "../support/xr/gazer";
 
 const SIZE = { width: 320, height: 144 };
 const FRAME_MS = 50;
-/** Frames after which a fade of 0.25 s is over. */
+/** Number of frames after which a fade of 0.25 s is over. */
 const FRAMES = 7;
 
-/** Mean difference of the colours, 0..255. */
+/** Mean difference of the colours, 0 to 255. */
 function apart(a: Picture, b: Picture): number {
   let sum = 0;
   for (let y = 0; y < a.height; y++) {
@@ -25,10 +27,10 @@ function apart(a: Picture, b: Picture): number {
   return sum / (3 * a.width * a.height);
 }
 
-describeInChromium("the picture in stereo", () => {
+describeInChromium("the frame in stereo", () => {
   const stand = prepareStand({ viewport: SIZE });
   const page = () => stand.viewer.page;
-  // above the bar
+  // the part above the bar
   const picture = () => takePicture(page(), { x: 0, y: 0, width: SIZE.width, height: 88 });
 
   async function enter(): Promise<void> {
@@ -43,7 +45,9 @@ describeInChromium("the picture in stereo", () => {
     await tick(page(), FRAME_MS, FRAMES);
   }
 
-  /** Distances of the frames after a key to the frame before, as shares of the last one. */
+  /**
+   * Differences of the frames after a key press from the frame before, relative to the last one.
+   */
   async function changes(key: string): Promise<readonly number[]> {
     const before = await picture();
     await page().keyboard.press(key);
@@ -57,18 +61,18 @@ describeInChromium("the picture in stereo", () => {
     return found.map((each) => each / last);
   }
 
-  it("fades where a view, a reset or a tile jumps, and follows a turn at once", async () => {
+  it("fades after a jump to a view, a reset or a tile, and follows a turn at once", async () => {
     await enter();
     await page().keyboard.press("ArrowLeft");
     await tick(page(), FRAME_MS, FRAMES);
-    const jumps = ["y", "r", "i", "i"]; // the second one shows all tiles again
+    const jumps = ["y", "r", "i", "i"]; // the second "i" shows all tiles again
     for (const key of jumps) {
       const shares = await changes(key);
       expect(shares[0], key).toBeLessThan(0.2);
       expect(shares[2], key).toBeLessThan(0.8);
       shares.slice(1).forEach((share, i) => {
         expect(share, key).toBeGreaterThan(shares[i] - 0.05);
-        expect(share - shares[i], key).toBeLessThan(0.55); // it jumps nowhere
+        expect(share - shares[i], key).toBeLessThan(0.55); // there is no jump
       });
       expect(shares[FRAMES - 2], key).toBeGreaterThan(0.97);
     }
@@ -76,13 +80,13 @@ describeInChromium("the picture in stereo", () => {
     expect(turned).toBeGreaterThan(0.9);
   });
 
-  it("has a faint grid on the ground, also behind the head", async () => {
+  it("has a faint grid on the ground, also behind the user", async () => {
     await enter();
     const gazer = new Gazer(stand.viewer);
     await gazer.turnTo(0, 0);
     await gazer.turnTo(140, -20);
     await tick(page(), FRAME_MS, FRAMES);
-    const dark = 0x0b + 0x0d + 0x12; // the room behind
+    const dark = 0x0b + 0x0d + 0x12; // the background
     const sum = ([r, g, b]: readonly [number, number, number]) => r + g + b;
     const shown = await picture();
     expect(shown.count((pixel) => sum(pixel) > dark + 12)).toBeGreaterThan(100);

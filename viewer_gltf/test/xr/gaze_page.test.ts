@@ -1,4 +1,4 @@
-/** A gaze that rests on a control of the split screen does one thing, on the whole page. */
+/** A gaze that rests on a control of the split screen does exactly one thing, on the whole page. */
 import { join } from "node:path";
 import { expect, it } from "vitest";
 import { addClock, holdFrames } from "../support/browser/clock";
@@ -27,8 +27,8 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     stand.host.overrides.set("/bundle/manifest.json", { status: 200, body });
     await addClock(page);
     await page.addInitScript(() => {
-      localStorage.setItem("stereocell-told", "9"); // no card before the eyes
-      localStorage.setItem("stereocell-screen", "240"); // pixels in an inch of the phone's screen
+      localStorage.setItem("stereocell-told", "9"); // no introduction card
+      localStorage.setItem("stereocell-screen", "240"); // CSS pixels per inch of the phone's screen
     });
     await stand.open("&mode=off");
     await page.keyboard.press("P");
@@ -43,7 +43,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     if (SHOTS) await stand.viewer.page.screenshot({ path: join(SHOTS, `${name}.png`) });
   };
 
-  it("opens the menu and does nothing more, however long it stays", async () => {
+  it("opens the menu and does nothing more, even if it stays", async () => {
     const gazer = await enter();
     const before = (await stand.viewer.snapshot()).state;
     await gazer.lookAt("opener");
@@ -58,7 +58,7 @@ describeInChromium("a gaze that rests on the page's panel", () => {
     expect((await stand.viewer.snapshot()).state).toEqual(before);
   });
 
-  it("hides one channel, whose row stays where it is, and no other", async () => {
+  it("hides only one channel, and keeps its row in place", async () => {
     const gazer = await enter();
     await gazer.lookAt("opener");
     await gazer.rest(2);

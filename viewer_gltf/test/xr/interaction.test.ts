@@ -1,4 +1,4 @@
-/** What hands do on the picture: click, drag with the mouse, drag with a finger. */
+/** Input on the canvas: clicks, dragging with the mouse, dragging with a finger. */
 import { beforeEach, expect, it } from "vitest";
 import { project } from "../support/browser/camera";
 import { difference, takePicture } from "../support/browser/picture";
@@ -6,10 +6,12 @@ import { describeInChromium } from "../support/browser/skip";
 import { prepareStand } from "../support/browser/stand";
 import { sweep } from "../support/exhaustive";
 
-/** Of the picture's pixels: the specimen fills a good part of it. */
+/**
+ * Share of the image's pixels that change when the specimen moves; it fills a good part of them.
+ */
 const TURNED = 0.02;
 
-describeInChromium("hands on the picture", () => {
+describeInChromium("input on the canvas", () => {
   const viewport = { width: 504, height: 240 };
   const stand = prepareStand({ viewport, hasTouch: true });
 
@@ -26,7 +28,7 @@ describeInChromium("hands on the picture", () => {
     return { ...box, middle: [box.x + box.width / 2, box.y + box.height / 2] as const };
   }
 
-  it("choose exactly the tile under a click, wherever it lies", async () => {
+  it("chooses exactly the tile under a click", async () => {
     expect(await tileNow()).toBeNull();
     const box = await stageBox();
     const { tiles } = stand.manifest;
@@ -39,7 +41,7 @@ describeInChromium("hands on the picture", () => {
     }
   });
 
-  it("choose no tile where all of it is cut away", async () => {
+  it("chooses no tile where the tile is clipped away", async () => {
     const box = await stageBox();
     const [{ id, bounds_um }] = stand.manifest.tiles;
     const { min, max } = bounds_um;
@@ -48,14 +50,14 @@ describeInChromium("hands on the picture", () => {
     const { x, y } = project(front, specimen.bounds_um, box.width, box.height);
     const { page } = stand.viewer;
     await page.keyboard.press("b");
-    await page.mouse.click(box.x + x, box.y + y); // a corner, of which the box leaves nothing there
+    await page.mouse.click(box.x + x, box.y + y); // a corner where the clip box leaves nothing
     expect(await tileNow()).toBeNull();
     await page.keyboard.press("b");
     await page.mouse.click(box.x + x, box.y + y);
     expect(await tileNow()).toBe(id);
   });
 
-  it("move the picture by keys, and back", async () => {
+  it("moves the view with keys, and back", async () => {
     const { page } = stand.viewer;
     const before = await takePicture(page);
     for (const key of ["Shift+ArrowRight", "Shift+ArrowUp"]) await page.keyboard.press(key);
@@ -66,7 +68,7 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(page))).toBeLessThan(TURNED / 10);
   });
 
-  it("isolate the tile from the card beside a click, and bring all back", async () => {
+  it("isolates the tile from the card beside a click, and shows all tiles again", async () => {
     const box = await stageBox();
     const [{ id, bounds_um }] = stand.manifest.tiles;
     const { min, max } = bounds_um;
@@ -75,7 +77,7 @@ describeInChromium("hands on the picture", () => {
     const click = () => stand.viewer.clickOnce(box.x + x, box.y + y);
     const whole = await takePicture(stand.viewer.page);
     await click();
-    await click(); // a second one asks for the same card
+    await click(); // the second click opens the same card
     expect((await stand.viewer.snapshot()).state.isolated).toBeNull();
     await stand.viewer.page.locator('[data-control="tap-isolate"]').click();
     await stand.viewer.settled();
@@ -92,7 +94,7 @@ describeInChromium("hands on the picture", () => {
     expect(difference(whole, await takePicture(stand.viewer.page))).toBeLessThan(TURNED / 10);
   });
 
-  it("turn the specimen by dragging, which chooses nothing", async () => {
+  it("turns the specimen by dragging, without choosing anything", async () => {
     const before = await takePicture(stand.viewer.page);
     const start = await tileNow();
     const { middle, width } = await stageBox();
@@ -104,7 +106,7 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeLessThan(TURNED / 10);
   });
 
-  it("turn it by one finger", async () => {
+  it("turns the specimen with one finger", async () => {
     const before = await takePicture(stand.viewer.page);
     const { middle, height } = await stageBox();
     const devtools = await stand.viewer.page.context().newCDPSession(stand.viewer.page);
@@ -120,9 +122,9 @@ describeInChromium("hands on the picture", () => {
     expect(difference(before, await takePicture(stand.viewer.page))).toBeGreaterThan(TURNED);
   });
 
-  // also where no volume is drawn
+  // also without any volume
   it.each(sweep(["off", "all"] as const, (mode) => mode === "off"))(
-    "measure, and read the channels' values there (%s) in the panel too",
+    "measures, and shows the channels' values (%s) in the panel too",
     async (mode) => {
       await stand.viewer.chooseMode(mode);
       const box = await stageBox();
@@ -151,7 +153,7 @@ describeInChromium("hands on the picture", () => {
     },
   );
 
-  it("choose nothing by two fingers, though neither moves", async () => {
+  it("chooses nothing with two fingers, even if they do not move", async () => {
     const { middle } = await stageBox();
     const devtools = await stand.viewer.page.context().newCDPSession(stand.viewer.page);
     const [x, y] = middle;
@@ -167,18 +169,18 @@ describeInChromium("hands on the picture", () => {
     await touch("touchEnd", []);
     await stand.viewer.still();
     expect(await tileNow()).toBeNull();
-    await touch("touchStart", [one]); // one finger does
+    await touch("touchStart", [one]); // one finger chooses
     await touch("touchEnd", []);
     await stand.viewer.still();
     expect(await tileNow()).not.toBeNull();
   });
 
-  it("find targets of 40 pixels where the pointer is a finger", async () => {
+  it("has targets of at least 40 pixels for fingers", async () => {
     await stand.viewer.drawVolume(stand.manifest.channels[0].id, true);
     const small = await stand.viewer.page.evaluate(() => {
       const isShown = (e: Element) => e.getClientRects().length > 0;
       const selector = ".panel button, .panel select, .panel label, .panel input";
-      const covered = "label input"; // the label around it is what is touched
+      const covered = "label input"; // the label around it is the target
       return [...document.querySelectorAll(selector)]
         .filter((e) => isShown(e) && !e.matches(covered))
         .map((e) => ({ text: e.outerHTML.slice(0, 80), box: e.getBoundingClientRect() }))

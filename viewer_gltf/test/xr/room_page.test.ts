@@ -1,4 +1,7 @@
-/** The specimen in the user's own room (immersive-ar): nothing behind it, on a table, worked by a tap. */
+/**
+ * The specimen in the user's own room (immersive-ar): nothing behind it, on a table, usable by
+ * taps.
+ */
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 import type { Page } from "playwright-core";
@@ -8,10 +11,13 @@ import { prepareStand } from "../support/browser/stand";
 import { sweep } from "../support/exhaustive";
 
 const SHOTS = process.env.STEREOCELL_SHOTS;
-/** Of the emulated head, m. */
+/** Metres; height of the emulated eyes. */
 const EYES_M = 1.6;
 
-/** Before the page's scripts: a headset whose cameras show the room, or a phone held in a hand. */
+/**
+ * Adds a device before the page's scripts: a headset whose cameras show the room, or a phone held
+ * in a hand.
+ */
 async function addDevice(page: Page, isPhone: boolean, hasFloor = true): Promise<void> {
   const script = new URL(import.meta.resolve("iwer/build/iwer.min.js"));
   await page.addInitScript(await readFile(script, "utf8"));
@@ -31,14 +37,14 @@ async function addDevice(page: Page, isPhone: boolean, hasFloor = true): Promise
       });
       device.installRuntime({ forceInstall: true });
       device.position.set(0.5, eyes_m, 0.3);
-      // a quarter to the left, and down to the table
+      // 90 degrees to the left, and down to the table
       device.quaternion.set(-0.2391, 0.6634, 0.2415, 0.6656);
       Object.assign(window, { headset: device });
       document.addEventListener("DOMContentLoaded", () => {
         const sheet = new CSSStyleSheet();
         sheet.replaceSync(
           "[data-webxr_runtime] canvas { width: 100% !important; height: 100% !important; }" +
-            // what the cameras would show
+            // stands for the image of the cameras
             "body { background: repeating-linear-gradient(45deg, #385, #385 20px, #583 20px, #583 40px); }",
         );
         document.adoptedStyleSheets.push(sheet);
@@ -62,7 +68,10 @@ describeInChromium("the specimen in the user's room", () => {
     await page().waitForFunction((n) => (window.stereocell?.frames ?? 0) > n + 3, frames);
   }
 
-  /** Of the canvas, right after a frame: shares of pixels that are clear, and that are opaque. */
+  /**
+   * Shares of the canvas's pixels, right after a frame, that are clear, opaque, or lighter than
+   * their opacity.
+   */
   const coverage = () =>
     page().evaluate(async () => {
       const canvas = document.querySelector("canvas");
@@ -80,7 +89,7 @@ describeInChromium("the specimen in the user's room", () => {
         const [r, g, b, a] = data.subarray(i, i + 4);
         if (a === 0) clear++;
         if (a === 255) opaque++;
-        if (Math.max(r, g, b) > a + 2) glowing++; // no light without its opacity
+        if (Math.max(r, g, b) > a + 2) glowing++; // light without opacity is an error
       }
       return [clear, opaque, glowing].map((count) => count / (w * h));
     });
@@ -117,8 +126,8 @@ describeInChromium("the specimen in the user's room", () => {
   );
 
   it.each([
-    ["a headset's bar and panel over it, in a head's reach", false],
-    ["a phone's panel before it, as its picture shows no more, and the bar at its foot", true],
+    ["a headset's bar and panel above it, within reach", false],
+    ["a phone's panel in front of it, within the image, and the bar at its foot", true],
   ])("has %s", async (_, isPhone) => {
     await enter("&mode=off", isPhone);
     const angles = async () => (await stand.viewer.snapshot()).menu.map(({ up_deg }) => up_deg);
@@ -130,7 +139,7 @@ describeInChromium("the specimen in the user's room", () => {
     if (SHOTS) await page().screenshot({ path: join(SHOTS, `room_panel_${isPhone}.png`) });
     const opened = await angles();
     expect(opened.length).toBeGreaterThan(6);
-    // its middle is 0.65 m under the eyes and 0.9 m ahead: 36 degrees down, and it is 0.48 m long
+    // its middle is 0.65 m below the eyes and 0.9 m ahead, 36 degrees down, and it is 0.48 m long
     for (const up_deg of [closed, opened]) {
       const [lowest, highest] = [Math.min(...up_deg), Math.max(...up_deg)];
       if (isPhone) {
@@ -144,13 +153,13 @@ describeInChromium("the specimen in the user's room", () => {
     if (isPhone) expect(Math.max(...closed)).toBeLessThan(-54); // below its lower edge
   });
 
-  it("is one picture on a phone, and a key leads out of it again", async () => {
+  it("is one image on a phone, and a key leaves it again", async () => {
     await enter("&mode=off", true);
     if (SHOTS) await page().screenshot({ path: join(SHOTS, "room_phone.png") });
     const [clear] = await coverage();
     expect(clear).toBeGreaterThan(0.5);
     expect(clear).toBeLessThan(0.995);
-    await page().keyboard.press("Home"); // and out again
+    await page().keyboard.press("Home"); // leaves it again
     await page().waitForFunction(() => window.stereocell?.snapshot().isStereo === false);
     await stand.viewer.still();
     expect(await page().locator('[data-overlay="room"]').isVisible()).toBe(true);

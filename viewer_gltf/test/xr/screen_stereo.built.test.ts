@@ -1,4 +1,4 @@
-/** Stereo on the page's own screen: what each eye sees lies where two eyes see it, and greys stay grey. */
+/** Stereo on the page's own screen: points lie where two eyes see them, and greys stay grey. */
 import { readFile } from "node:fs/promises";
 import { expect, it } from "vitest";
 import { place } from "../../src/render/placement";
@@ -16,7 +16,7 @@ import { colorDifference, toLab } from "../support/color_difference";
 import { BALLS } from "../support/fixture/bodies";
 
 const VIEWPORT = { width: 640, height: 300 };
-/** From straight ahead: a ball's distance is its depth. */
+/** Metres, straight in front, so that a ball's distance is its depth. */
 const EYE_M = 1.8;
 const LINK = `#v=1&depth=0&eye=0,0,${EYE_M},0,0,0`;
 const PUPILS_M = 0.063;
@@ -27,7 +27,7 @@ describeInChromium("stereo on the screen", () => {
 
   const openSideBySide = async () => {
     await stand.open(`&mode=off&stereo=side-by-side${LINK}`);
-    // its part of the page comes after the first picture
+    // its code is loaded after the first frame
     await stand.viewer.page.waitForFunction(() =>
       performance.getEntriesByType("resource").some(({ name }) => name.includes("screen_stereo")),
     );
@@ -43,7 +43,7 @@ describeInChromium("stereo on the screen", () => {
     return { left, right, ...half };
   };
 
-  /** Mean column of what is lit in the rows about one, among columns about another. */
+  /** Mean column of the lit pixels in the rows around y, among the columns around x. */
   function middleOf(picture: Picture, [x, y]: readonly [number, number], reach_px: number): number {
     const isLit = (at: readonly [number, number]) =>
       Math.abs(at[0] - x) < reach_px &&
@@ -53,7 +53,7 @@ describeInChromium("stereo on the screen", () => {
     return found.reduce((sum, [column]) => sum + column, 0) / found.length;
   }
 
-  it("lies side by side as far apart as two eyes see a ball, and Escape leaves it", async () => {
+  it("shows a ball in both images with the parallax of two eyes, and Escape leaves stereo", async () => {
     const { viewer } = stand;
     await openSideBySide();
     await viewer.showOnly("Balls");
@@ -78,7 +78,7 @@ describeInChromium("stereo on the screen", () => {
     expect(await viewer.page.locator(".scale-bar").isVisible()).toBe(true);
   });
 
-  it("saves both pictures as the screen shows them, and shows them as before", async () => {
+  it("saves both images as the screen shows them, and keeps showing them", async () => {
     const { viewer } = stand;
     await openSideBySide();
     await viewer.settled();
@@ -95,7 +95,7 @@ describeInChromium("stereo on the screen", () => {
     expect(difference(await takePicture(viewer.page), before)).toBeLessThan(0.01);
   });
 
-  it("hits what is clicked in either eye's picture", async () => {
+  it("chooses the tile that is clicked in either eye's image", async () => {
     const { viewer } = stand;
     await openSideBySide();
     await viewer.settled();
@@ -104,17 +104,17 @@ describeInChromium("stereo on the screen", () => {
     const selected = async () => (await viewer.snapshot()).state.selected;
     const found = [];
     for (const share of [0.25, 0.75]) {
-      // somewhat to the left of each picture's middle
+      // slightly to the left of each image's middle
       await viewer.clickOnce(box.x + share * box.width - 0.06 * box.width, box.y + box.height / 2);
       found.push(await selected());
-      await viewer.page.keyboard.press("g"); // no tile is left chosen by the click before
+      await viewer.page.keyboard.press("g"); // clears the choice of the click before
       await viewer.clickOnce(box.x + 2, box.y + 2);
     }
     expect(found[0]).toBe("r0_c0");
     expect(found[1]).toBe(found[0]);
   });
 
-  it("keeps a grey specimen grey in an anaglyph whose eyes are in one place", async () => {
+  it("keeps a grey specimen grey in an anaglyph with both eyes in one place", async () => {
     const { viewer } = stand;
     await stand.open(`&mode=off${LINK}`);
     await viewer.showOnly("Balls");
@@ -122,14 +122,14 @@ describeInChromium("stereo on the screen", () => {
     const flat = await takePicture(viewer.page);
     await viewer.unfold("stereo");
     await viewer.page.locator('[data-control="screen-stereo"]').selectOption("anaglyph");
-    // at full strength the rims of a ball are red on one side and cyan on the other
+    // at full strength, the rims of a ball are red on one side and cyan on the other
     const isRed = ([r, g, b]: Pixel) => r > 40 && r > 2 * Math.max(g, b);
     const isCyan = ([r, g, b]: Pixel) => Math.min(g, b) > 40 && Math.min(g, b) > 2 * r;
     const rims = async () => {
       const picture = await takePicture(viewer.page);
       return Math.min(picture.count(isRed), picture.count(isCyan));
     };
-    await expect.poll(rims).toBeGreaterThan(20); // its part of the page has to come first
+    await expect.poll(rims).toBeGreaterThan(20); // the code must be loaded first
     await viewer.slide("stereo-strength", 0);
     const alike = await takePicture(viewer.page);
     const differences = (a: Picture, b: Picture) => {

@@ -1,4 +1,7 @@
-/** Fingers on the split screen: one turns, two bring nearer, a tap chooses, and no press does. */
+/**
+ * Fingers on the split screen: one turns, two bring nearer, a tap chooses, and a press chooses
+ * nothing.
+ */
 import { expect, it } from "vitest";
 import { difference, takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -7,10 +10,10 @@ import { prepareStand } from "../support/browser/stand";
 const SIZE = { width: 640, height: 300 };
 type Finger = Readonly<{ x: number; y: number; id: number }>;
 
-describeInChromium("a Cardboard's phone with a notch", () => {
+describeInChromium("a phone with a notch in a Cardboard", () => {
   const stand = prepareStand({ viewport: SIZE, hasTouch: true, hasRests: true });
 
-  it("shows both eyes as much, about the middle of the screen", async () => {
+  it("gives both eyes equal parts around the middle of the screen", async () => {
     await stand.open("&mode=off");
     const { page } = stand.viewer;
     const devtools = await page.context().newCDPSession(page);
@@ -26,11 +29,11 @@ describeInChromium("a Cardboard's phone with a notch", () => {
 describeInChromium("fingers in a Cardboard", () => {
   const stand = prepareStand({ viewport: SIZE, hasTouch: true, hasRests: true });
 
-  it("turn, bring nearer and choose, and choose nothing on the way", async () => {
+  it("turn, bring nearer and choose, without choosing anything on the way", async () => {
     await stand.open("&mode=off");
     const { page } = stand.viewer;
-    await page.keyboard.press("j"); // the gaze alone chooses nothing
-    await page.locator('[data-overlay="stereo"]').tap(); // on the picture: a phone has no headset
+    await page.keyboard.press("j"); // choosing by gaze off
+    await page.locator('[data-overlay="stereo"]').tap(); // on the canvas: a phone has no headset
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     const told = async () => (await stand.viewer.snapshot()).told.length;
     await expect.poll(told).toBe(0);
@@ -43,7 +46,7 @@ describeInChromium("fingers in a Cardboard", () => {
       await devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
       await page.waitForTimeout(150); // a few frames
     };
-    // above the horizon: bar and ground stay where they are in the room
+    // above the horizon, since bar and ground stay in place
     const leftEye = () => takePicture(page, { x: 0, y: 0, width: SIZE.width / 2, height: 146 });
     const drawn = async () => (await leftEye()).count((pixel) => Math.max(...pixel) > 110);
     const finger = (x: number, y = 150, id = 1): Finger => ({ x, y, id });
@@ -59,7 +62,7 @@ describeInChromium("fingers in a Cardboard", () => {
       await touch(x === 370 ? "touchStart" : "touchMove", [finger(x)]);
     }
     await touch("touchEnd", []);
-    expect(difference(before, await leftEye())).toBeLessThan(0.01); // the same way back
+    expect(difference(before, await leftEye())).toBeLessThan(0.01); // moved back the same way
 
     const far = await drawn();
     await touch("touchStart", [finger(280)]);
@@ -77,9 +80,9 @@ describeInChromium("fingers in a Cardboard", () => {
       await touch(type, [finger(type === "touchStart" ? 300 : 360)]);
     }
     await touch("touchEnd", []);
-    expect((await chosen())[1]).toBeNull(); // a drag over a chosen tile isolates nothing
+    expect((await chosen())[1]).toBeNull(); // a drag over a chosen tile does not isolate it
 
-    // held, the specimen goes with the head, nearer as that tilts down
+    // while held, the specimen follows the head, and comes nearer when the head tilts down
     const turnHead = async (alpha: number, beta: number) => {
       await page.evaluate(
         ([alpha, beta]) =>
@@ -91,10 +94,10 @@ describeInChromium("fingers in a Cardboard", () => {
       await page.waitForTimeout(400);
     };
     await turnHead(0, 90);
-    await page.waitForTimeout(600); // it has come to rest: that is ahead
+    await page.waitForTimeout(600); // the head has rested, so this is the direction ahead
     const still = await leftEye();
     await turnHead(25, 90);
-    expect(difference(still, await leftEye())).toBeGreaterThan(0.05); // the head alone looks aside
+    expect(difference(still, await leftEye())).toBeGreaterThan(0.05); // only the head looks aside
     await turnHead(0, 90);
     const [size, selected] = [await drawn(), await chosen()];
     await touch("touchStart", [finger(300)]);
@@ -104,9 +107,9 @@ describeInChromium("fingers in a Cardboard", () => {
     await turnHead(25, 80);
     await expect.poll(drawn).toBeGreaterThan(1.2 * size);
     await touch("touchEnd", []);
-    expect(await chosen()).toEqual(selected); // that was no tap
+    expect(await chosen()).toEqual(selected); // the release was not a tap
     const held = await leftEye();
     await turnHead(0, 90);
-    expect(difference(held, await leftEye())).toBeGreaterThan(0.05); // let go of, it stays
+    expect(difference(held, await leftEye())).toBeGreaterThan(0.05); // the released specimen stays
   });
 });

@@ -1,4 +1,4 @@
-/** Head and hands in stereo: what rays meet, what they choose, and what is held. */
+/** Head and hands in stereo: what rays hit, choose and hold. */
 import { expect, it } from "vitest";
 import { takePicture } from "../support/browser/picture";
 import { describeInChromium } from "../support/browser/skip";
@@ -7,7 +7,7 @@ import { type At, prepareHands } from "../support/xr/stand";
 const AWAY: At = [0, 5, -1];
 const RIGHT: At = [0.25, -0.3, -0.3];
 const LEFT: At = [-0.25, -0.3, -0.3];
-/** As in the harness: hovering before the specimen's upper edge. */
+/** As in the harness: in front of the specimen's upper edge. */
 const HANDLE: At = [0, 0.45, -1.2];
 const EYES_APART_M = 0.063;
 const SIZE = { width: 640, height: 320 };
@@ -20,21 +20,21 @@ describeInChromium("hands in stereo", () => {
     await hands().point("right", RIGHT, AWAY);
   }
 
-  it("point at a tile's box, and the trigger chooses it once", async () => {
+  it("point at a tile's box, and the trigger chooses the tile once", async () => {
     await idle();
     await hands().point("right", RIGHT, await hands().tileAt("r1_c3"));
     expect((await hands().status()).pointed).toBe("tile:r1_c3");
     await hands().press("right");
     const chosen = await hands().chosen();
     expect(chosen.map(({ tile }) => tile)).toEqual(["r1_c3"]);
-    // the ray, in um, meets the middle of the tile's front face
+    // the ray, in um, hits the middle of the tile's front face
     const [{ ray }] = chosen;
     const share = (8 - ray.origin[2]) / ray.direction[2];
     expect(ray.origin[0] + share * ray.direction[0]).toBeCloseTo(35, 3);
     expect(ray.origin[1] + share * ray.direction[1]).toBeCloseTo(-15, 3);
   });
 
-  it("choose what is gazed at where a hand points at nothing", async () => {
+  it("choose the target of the gaze if a hand points at nothing", async () => {
     await idle();
     await hands().lookAt(await hands().tileAt("r0_c1"));
     await hands().press("left");
@@ -65,7 +65,7 @@ describeInChromium("hands in stereo", () => {
     expect(await hands().chosen()).toEqual([]);
   });
 
-  it("scale it by the ratio of their distances, both squeezed", async () => {
+  it("scale the specimen by the ratio of their distances while both squeeze", async () => {
     await idle();
     const ahead = (x: number): [At, At] => [
       [x, -0.3, -0.3],
@@ -81,12 +81,12 @@ describeInChromium("hands in stereo", () => {
       await hands().point("left", ...ahead(-half));
       await hands().point("right", ...ahead(half));
       const now = await apart();
-      expect(Math.abs(now - 2 * half)).toBeLessThan(0.02); // a grip is not where the ray begins
+      expect(Math.abs(now - 2 * half)).toBeLessThan(0.02); // a grip is not where its ray begins
       expect((await hands().status()).scale).toBeCloseTo(now / before, 5);
     }
   });
 
-  it("let go of it when they are gone", async () => {
+  it("release the specimen when they disconnect", async () => {
     await idle();
     await hands().button("right", "squeeze", 1);
     await hands().connect("right", false);
@@ -96,7 +96,7 @@ describeInChromium("hands in stereo", () => {
     expect((await hands().status()).position).toEqual(before);
   });
 
-  it("hold it by a trigger that stays down, where there is nothing to squeeze", async () => {
+  it("hold the specimen by a held trigger if there is no squeeze button", async () => {
     await hands().page.evaluate(() => window.hands.useRemote());
     await idle();
     const at = await hands().tileAt("r1_c3");
@@ -113,7 +113,7 @@ describeInChromium("hands in stereo", () => {
     expect((await hands().status()).position).toEqual(held);
   });
 
-  it("drag a handle as long as the trigger is held", async () => {
+  it("drag a handle while the trigger is held", async () => {
     await idle();
     await hands().point("right", RIGHT, HANDLE);
     expect((await hands().status()).pointed).toBe("handle");
@@ -128,7 +128,7 @@ describeInChromium("hands in stereo", () => {
     expect(await hands().chosen()).toEqual([]);
   });
 
-  it("zoom about the tile pointed at by the stick", async () => {
+  it("zoom with the stick about the tile that is pointed at", async () => {
     await idle();
     const at = await hands().tileAt("r0_c4");
     await hands().point("right", RIGHT, at);
@@ -145,12 +145,12 @@ describeInChromium("hands in stereo", () => {
 describeInChromium("the gaze in stereo", () => {
   const hands = prepareHands(undefined, 1);
 
-  it("chooses at 1.5 s and not at 1.4, once, and its ring fills", async () => {
+  it("chooses once, at 1.5 s and not at 1.4 s, and fills its ring", async () => {
     await hands().gazeOnly();
     await hands().lookAt(await hands().tileAt("r0_c2"));
     expect((await hands().status()).pointed).toBe("tile:r0_c2");
     await hands().wait(0.4);
-    expect((await hands().status()).progress).toBe(0); // a gaze that passes by starts no ring
+    expect((await hands().status()).progress).toBe(0); // a passing gaze shows no ring
     await hands().wait(0.55);
     expect((await hands().status()).progress).toBeCloseTo(0.5, 6);
     expect((await hands().status()).isRingShown).toBe(true);
@@ -162,7 +162,7 @@ describeInChromium("the gaze in stereo", () => {
     expect(await hands().chosen()).toHaveLength(1);
   });
 
-  it("starts anew after it has left", async () => {
+  it("starts again after it has left", async () => {
     await hands().gazeOnly();
     const at = await hands().tileAt("r0_c2");
     await hands().lookAt(at);
@@ -176,7 +176,7 @@ describeInChromium("the gaze in stereo", () => {
     expect(await hands().chosen()).toHaveLength(1);
   });
 
-  it("chooses nothing with dwell off, but the button does at once", async () => {
+  it("chooses nothing with dwell off, but the button chooses at once", async () => {
     await hands().gazeOnly();
     await hands().page.evaluate(() =>
       window.hands.dispatch({ type: "set", id: "dwell", value: false }),
@@ -188,12 +188,12 @@ describeInChromium("the gaze in stereo", () => {
     expect((await hands().chosen()).map(({ tile }) => tile)).toEqual(["r1_c0"]);
   });
 
-  it("takes up a handle, carries it, and puts it down where it rests", async () => {
+  it("picks up a handle, carries it, and puts it down where it rests", async () => {
     await hands().gazeOnly();
     await hands().lookAt(HANDLE);
     await hands().wait(1.5);
     expect((await hands().status()).drags).toBeGreaterThan(0);
-    const tile = await hands().tileAt("r1_c3"); // not chosen: the handle is carried past it
+    const tile = await hands().tileAt("r1_c3"); // not chosen, because the handle is carried past it
     await hands().lookAt(tile);
     const [x, y, z] = await hands().page.evaluate(() => window.hands.drags.at(-1) ?? [0, 0, 0]);
     expect(Math.hypot(x / z - tile[0] / tile[2], y / z - tile[1] / tile[2])).toBeLessThan(1e-4);
@@ -204,7 +204,7 @@ describeInChromium("the gaze in stereo", () => {
     expect(await hands().chosen()).toEqual([]);
   });
 
-  it("has its ring as far away as the tile, for both eyes", async () => {
+  it("shows its ring at the distance of the tile, for both eyes", async () => {
     await hands().gazeOnly();
     const fov_deg = 30;
     await hands().page.evaluate((degrees) => {
@@ -225,11 +225,11 @@ describeInChromium("the gaze in stereo", () => {
     const px_per_tangent = SIZE.height / 2 / Math.tan((fov_deg * Math.PI) / 360);
     const expected = (px_per_tangent * EYES_APART_M) / Math.hypot(...at);
     expect(Math.abs(centre(0) - centre(1) - expected)).toBeLessThan(1);
-    // the gaze is of neither eye: the ring is as far from the middle in both
+    // the gaze starts between the eyes, so the ring is equally far from the middle in both images
     expect(Math.abs(centre(0) + centre(1) + 1 - SIZE.width / 2)).toBeLessThan(1);
   });
 
-  it("waits while a hand points at something", async () => {
+  it("waits while a hand points at a target", async () => {
     await hands().lookAt(await hands().tileAt("r0_c2"));
     await hands().point("left", LEFT, AWAY);
     await hands().point("right", RIGHT, await hands().tileAt("r1_c3"));
@@ -241,7 +241,7 @@ describeInChromium("the gaze in stereo", () => {
   });
 });
 
-describeInChromium("the page of moves", () => {
+describeInChromium("the page of moves in the panel", () => {
   const hands = prepareHands();
   const away = async () => Math.hypot(...(await hands().status()).position);
 
@@ -252,7 +252,7 @@ describeInChromium("the page of moves", () => {
     await hands().wait(0.1);
   }
 
-  it("brings the specimen near by a gaze that stays, and stops when it leaves", async () => {
+  it("brings the specimen nearer while the gaze stays, and stops when it leaves", async () => {
     await hands().gazeOnly();
     await openMoves();
     const before = await away();
@@ -261,19 +261,19 @@ describeInChromium("the page of moves", () => {
     expect(await away()).toBe(before);
     await hands().wait(0.1);
     const stepped = await away();
-    expect(stepped).toBeLessThan(before); // a step at once, so that a short look is one
+    expect(stepped).toBeLessThan(before); // one step at once, so that a short look makes one step
     await hands().wait(0.25);
     expect(await away()).toBe(stepped);
     await hands().wait(2);
     const near = await away();
     expect(near).toBeLessThan(0.5 * stepped);
-    expect((await hands().status()).scale).toBe(1); // nearer, not larger: so volumes come
+    expect((await hands().status()).scale).toBe(1); // nearer, not larger, so that volumes are shown
     await hands().lookAt(AWAY);
     await hands().wait(1);
     expect(await away()).toBe(near);
   });
 
-  it("takes a tap as one step, and what is held by a trigger as many", async () => {
+  it("takes a tap as one step, and a held trigger as many", async () => {
     await hands().gazeOnly();
     await openMoves();
     await hands().reach("shift-right");

@@ -1,4 +1,4 @@
-/** The whole page in stereo: what hands and gaze do to it, and how it ends. */
+/** The whole page in stereo: what hands and gaze do, and how stereo ends. */
 import type { Page } from "playwright-core";
 import { expect, it } from "vitest";
 import { addHeadset, restBetweenFrames } from "../support/browser/chromium";
@@ -10,19 +10,19 @@ import { sweep } from "../support/exhaustive";
 
 type Headset = import("iwer").XRDevice;
 
-/** To the floor, or straight ahead. */
+/** Orientations: to the floor, and straight ahead. */
 const DOWN = [-Math.SQRT1_2, 0, 0, Math.SQRT1_2] as const;
 const AHEAD = [0, 0, 0, 1] as const;
-/** Time, ms, after which a press is no second one of a double press, which does nothing. */
+/** Milliseconds after which a second press is not part of a double press and counts. */
 const PRESS_APART_MS = 500;
 
-/** Both controllers of the page's headset, beside the head. */
+/** Points both controllers of the page's headset, beside the head, in this direction. */
 function pointHands(page: Page, turn: readonly [number, number, number, number]): Promise<void> {
   return page.evaluate((quaternion) => {
     const { headset } = window as unknown as { headset: Headset };
     for (const hand of ["left", "right"] as const) {
       const controller = headset.controllers[hand];
-      if (controller === undefined) throw new Error(`no ${hand} controller`);
+      if (controller === undefined) throw new Error(`there is no ${hand} controller`);
       controller.position.set(hand === "left" ? -0.2 : 0.2, 1.5, -0.1);
       controller.quaternion.set(...quaternion);
     }
@@ -32,7 +32,7 @@ function pointHands(page: Page, turn: readonly [number, number, number, number])
 describeInChromium("a headset's frame", () => {
   const stand = prepareStand({ viewport: { width: 480, height: 270 }, bundle: DEMO_BUNDLE });
 
-  it("takes under 60 draw calls with both controllers, also with volumes and slices", async () => {
+  it("takes fewer than 60 draw calls with both controllers, also with volumes and slices", async () => {
     const { viewer } = stand;
     await addHeadset(viewer.page);
     await stand.open("&mode=off&switch=9&quality=auto");
@@ -41,7 +41,7 @@ describeInChromium("a headset's frame", () => {
     const calls: Record<string, number> = {};
     for (const mode of ["off", "all", "disc", "slices"]) {
       if (mode === "slices")
-        await viewer.page.keyboard.press("|"); // and the disc
+        await viewer.page.keyboard.press("|"); // slices together with the disc
       else await viewer.page.locator("select[data-mode]").selectOption(mode);
       await viewer.settled();
       await viewer.page.waitForTimeout(500);
@@ -51,7 +51,7 @@ describeInChromium("a headset's frame", () => {
       calls[mode] = drawCalls;
     }
     expect(Math.max(...Object.values(calls)), JSON.stringify(calls)).toBeLessThan(60);
-    expect(Math.min(...Object.values(calls))).toBeGreaterThan(10); // there is something
+    expect(Math.min(...Object.values(calls))).toBeGreaterThan(10); // so something is drawn
   });
 });
 
@@ -63,7 +63,10 @@ describeInChromium("the page in stereo", () => {
 
   const isFull = () => stand.viewer.page.evaluate(() => document.fullscreenElement !== null);
 
-  /** Controllers away from the specimen: then the gaze alone points at it. */
+  /**
+   * Opens the page in stereo with the controllers away from the specimen, so that only the gaze
+   * points at it.
+   */
   async function open(query: string, hasHands: boolean): Promise<void> {
     await addHeadset(stand.viewer.page);
     await stand.open(query);
@@ -71,15 +74,15 @@ describeInChromium("the page in stereo", () => {
     await pointHands(stand.viewer.page, hasHands ? AHEAD : DOWN);
   }
 
-  it("selects what is looked at for 1.5 s, and nothing where dwell is off", async () => {
+  it("selects the target that is looked at for 1.5 s, and nothing with dwell off", async () => {
     await open("&mode=off", false);
     await expect.poll(async () => (await state()).selected).not.toBeNull();
-    expect((await state()).isolated).toBeNull(); // once
-    expect(await undo().isDisabled()).toBe(true); // nobody has set anything
+    expect((await state()).isolated).toBeNull(); // chosen once, not twice
+    expect(await undo().isDisabled()).toBe(true); // no setting was changed
   });
 
   const LOOKED_AT = [
-    ["what was looked at on the screen", false, "r0_c1"],
+    ["the place that was looked at on the screen", false, "r0_c1"],
     ["the side that was turned to the screen", true, "r0_c0"],
   ] as const;
   it.each(sweep(LOOKED_AT, ([, isTurned]) => isTurned))("shows %s", async (_, isTurned, tile) => {
@@ -88,7 +91,7 @@ describeInChromium("the page in stereo", () => {
     const press = async (key: string, n: number) => {
       for (let i = 0; i < n; i++) await stand.viewer.page.keyboard.press(key);
     };
-    if (isTurned) await press("ArrowRight", 12); // half round: what lay on the left lies on the right
+    if (isTurned) await press("ArrowRight", 12); // half a turn: the left side is on the right now
     await press("Shift+ArrowRight", 4);
     await stand.viewer.settled();
     const gazed = async () => (await stand.viewer.snapshot()).gazed;
@@ -97,7 +100,10 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(gazed).toBe(tile);
   });
 
-  /** Wait until so many frames have begun and ended. A busy machine takes longer for one than a press lasts. */
+  /**
+   * Waits until this number of frames has begun and ended. On a busy machine one frame can take
+   * longer than a press.
+   */
   async function drawFrames(count: number): Promise<void> {
     const { page } = stand.viewer;
     const before = await page.evaluate(() => window.stereocell?.frames ?? 0);
@@ -105,7 +111,7 @@ describeInChromium("the page in stereo", () => {
     await page.waitForFunction((n) => (window.stereocell?.frames ?? 0) > n, least);
   }
 
-  it("selects by the trigger, and isolates by the next", async () => {
+  it("selects with the trigger, and isolates with the next press", async () => {
     await open("&mode=off", true);
     const press = async () => {
       for (const value of [1, 0]) {
@@ -136,7 +142,7 @@ describeInChromium("the page in stereo", () => {
     expect(await notices()).toEqual([]);
   });
 
-  /** An iPhone's: it lets a page ask in a click's own call only. */
+  /** Adds an iPhone's permission API, which allows a question only within the call of a click. */
   async function addIphone(answer: "granted" | "denied"): Promise<void> {
     await stand.viewer.page.addInitScript((given) => {
       let isInTap = false;
@@ -162,7 +168,7 @@ describeInChromium("the page in stereo", () => {
   const tapSplit = () => stand.viewer.page.locator('[data-action="split"]').click();
   const isStereo = async () => (await stand.viewer.snapshot()).isStereo;
 
-  it("splits an iPhone's screen by the first tap", async () => {
+  it("splits an iPhone's screen with the first tap", async () => {
     await addIphone("granted");
     await tapSplit();
     await expect.poll(isStereo).toBe(true);
@@ -174,13 +180,13 @@ describeInChromium("the page in stereo", () => {
     await tapSplit();
     await expect
       .poll(notices)
-      .toEqual([expect.stringMatching(/not allowed to tell.*open the page again, and allow/)]);
+      .toEqual([expect.stringMatching(/not allowed to read.*open the page again, and allow/)]);
     expect(await isStereo()).toBe(false);
     await expect.poll(isFull).toBe(false);
   });
 
   const PARTS = ["split_session", "interaction"];
-  it.each(PARTS)("reports that %s could not be loaded, and gives the screen back", async (part) => {
+  it.each(PARTS)("reports that %s could not be loaded, and releases the screen", async (part) => {
     await stand.viewer.page.route(`**/${part}*`, (route) => route.abort());
     await addIphone("granted");
     await tapSplit();
@@ -189,7 +195,7 @@ describeInChromium("the page in stereo", () => {
     await expect.poll(isFull).toBe(false);
   });
 
-  it("ends a headset's session where its part of the page could not be loaded", async () => {
+  it("ends a headset's session if its code could not be loaded", async () => {
     await stand.viewer.page.route("**/interaction*", (route) => route.abort());
     await addHeadset(stand.viewer.page);
     await stand.open("&mode=off");
@@ -200,7 +206,7 @@ describeInChromium("the page in stereo", () => {
     await stand.viewer.enterStereo();
   });
 
-  it("splits the screen without WebXR, and goes back by Escape", async () => {
+  it("splits the screen without WebXR, and Escape goes back", async () => {
     await restBetweenFrames(stand.viewer.page);
     await addClock(stand.viewer.page);
     await stand.viewer.page.addInitScript(() =>
@@ -210,7 +216,7 @@ describeInChromium("the page in stereo", () => {
     await stand.viewer.page.keyboard.press("t");
     await stand.viewer.page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
-    // Each refused feature is reported before the eyes: the stage hides the page.
+    // Each refused feature is reported in stereo, since the page is hidden.
     const { told } = await stand.viewer.snapshot();
     expect(told.at(-1)).toMatch(/can't keep the screen on/);
     expect(told).toEqual(await notices());
@@ -227,7 +233,8 @@ describeInChromium("the page in stereo", () => {
     }
     expect(Math.min(...lit)).toBeGreaterThan(100);
     expect(Math.abs(lit[0] - lit[1])).toBeLessThan(0.2 * lit[0]);
-    // The balls' surface, one a tile, is drawn once for both eyes; what tells of the change has gone
+    // The surface of the balls, one for each tile, is drawn once for both eyes. The notice about
+    // the change has disappeared.
     const tellings = async () => (await stand.viewer.snapshot()).told.length;
     const draws = [];
     await holdFrames(stand.viewer.page);
@@ -243,10 +250,10 @@ describeInChromium("the page in stereo", () => {
     await stand.viewer.page.keyboard.press("Escape");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(false);
     expect((await stand.viewer.snapshot()).told).toEqual([]);
-    expect((await state()).selected).not.toBeNull(); // Escape has done no more than that
+    expect((await state()).selected).not.toBeNull(); // Escape has done nothing else
   });
 
-  it("says how to go about for 5 s, however few frames these are", async () => {
+  it("shows the introduction for 5 s, even at a low frame rate", async () => {
     const { page } = stand.viewer;
     await restBetweenFrames(page);
     await addClock(page);
@@ -258,7 +265,7 @@ describeInChromium("the page in stereo", () => {
     await holdFrames(page);
     const texts = async () => (await stand.viewer.snapshot()).told;
     const before = await texts();
-    await tick(page, 700, 8); // 5.6 s: the oldest has gone, the next one has not
+    await tick(page, 700, 8); // 5.6 s: the oldest notice has disappeared, the next one has not
     expect(await texts()).toEqual(before.slice(1));
   });
 });

@@ -1,4 +1,4 @@
-/** Walking through the switch distance in stereo: surfaces from afar, volumes near by, and back. */
+/** Moving through the volume distance in stereo: surfaces from afar, volumes near by, and back. */
 import { expect, it } from "vitest";
 import { NAME_S } from "../../src/annotations/hover_name";
 import { difference, takePicture } from "../support/browser/picture";
@@ -13,7 +13,7 @@ describeInChromium("nearer and farther on the split screen", () => {
   it("goes from surfaces to volumes, and back", async () => {
     const { page } = stand.viewer;
     await stand.open(`&mode=disc&switch=${SWITCH_M}&disc=20&quality=low`);
-    await page.keyboard.press("j"); // what is looked at is not chosen
+    await page.keyboard.press("j"); // choosing by gaze off
     await page.keyboard.press("P");
     await expect.poll(async () => (await stand.viewer.snapshot()).isStereo).toBe(true);
     const seen = async () => {
@@ -25,7 +25,10 @@ describeInChromium("nearer and farther on the split screen", () => {
         triangles,
       };
     };
-    /** Press until what shows is another, and how far the specimen was before and after. */
+    /**
+     * Presses a key until the representation changes. Returns the distance before and after the
+     * change.
+     */
     const walk = async (key: string, isVolume: boolean) => {
       let before = await seen();
       expect(before.isVolume).toBe(!isVolume);
@@ -37,15 +40,15 @@ describeInChromium("nearer and farther on the split screen", () => {
         if (now.isVolume === isVolume) return [before.distance_m, now.distance_m] as const;
         before = now;
       }
-      throw new Error(`still as it was, ${before.distance_m} m away`);
+      throw new Error(`nothing has changed at ${before.distance_m} m`);
     };
-    /** How unlike the picture is to that of surfaces alone. */
+    /** Difference of the frame from one with surfaces only. */
     const unlikeSurfaces = async () => {
       await expect.poll(async () => (await stand.viewer.snapshot()).told.length).toBe(0);
       const pictures = [];
       for (const mode of ["disc", "off", "disc"]) {
         await page.locator("select[data-mode]").selectOption(mode);
-        await page.waitForTimeout(3 * NAME_S * 1000); // all pictures have the name of what is looked at
+        await page.waitForTimeout(3 * NAME_S * 1000); // all frames show the name under the gaze
         await stand.viewer.settled();
         pictures.push(await takePicture(page, { x: 0, y: 0, width: 320, height: 160 }));
       }
@@ -58,7 +61,7 @@ describeInChromium("nearer and farther on the split screen", () => {
     expect(near).toBeLessThan(far);
     expect(await unlikeSurfaces()).toBeGreaterThan(0.005);
     const [nearer, farther] = await walk("-", false);
-    // it neither flickers nor sticks: volumes go a tenth beyond where they came
+    // no flicker, and no sticking: volumes disappear a tenth farther away than they appeared
     expect(nearer).toBeGreaterThanOrEqual(near * 0.999);
     expect(farther).toBeLessThan(1.35 * far);
     expect(await unlikeSurfaces()).toBeLessThan(0.001);

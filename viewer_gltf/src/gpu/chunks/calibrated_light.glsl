@@ -1,10 +1,11 @@
-// The marched stand-in's light, made as bright and as coloured in the mean as a small traced picture of the
-// same view: see light_probe.frag.glsl, which sums both.
-uniform sampler2D uTracedLight;  // one texel: light and coverage of the traced pixels
-uniform sampler2D uMarchedLight;  // ... and of the marched ones
+// Scales the stand-in march to the mean brightness and colour of a small path-traced image of the
+// same view; light_probe.frag.glsl sums both.
+uniform sampler2D uTracedLight;  // one texel: light and coverage of the path-traced pixels
+uniform sampler2D uMarchedLight;  // one texel: light and coverage of the marched pixels
 
-// Largest factor of one colour part, relative to that of the luminance. Where the march has hardly any of
-// a part, the missing light is added and not multiplied, such as a white shine on a green surface.
+// Largest factor of one colour channel relative to that of the luminance. Where the march has
+// hardly any of a channel, such as a white highlight on a green surface, the missing light is added
+// and not multiplied.
 const float MAX_TINT = 4.0;
 
 float brightnessOf(vec3 c) {

@@ -1,5 +1,5 @@
-// Colour (not premultiplied) and opacity of a step that is so many voxels long for each channel.
-// Channels that overlap absorb together and share the colour by their opacities, which are `shares`.
+// Colour (not premultiplied) and opacity of a step; `voxels` is its length in voxels for each
+// channel. Overlapping channels absorb together and share the colour by their opacities, `shares`.
 #if CHANNELS == 1
 vec4 classify(vec4 intensity, vec4 voxels, out vec4 shares) {
   shares = vec4(1.0, 0.0, 0.0, 0.0);

@@ -1,4 +1,5 @@
-// Whether any channel shows this intensity at some gradient: else gradients need not be asked for.
+// Whether any channel shows this intensity at some gradient. If not, the gradient need not be
+// computed.
 bool mayShow(vec4 intensity) {
   float most = 0.0;
   for (int c = 0; c < CHANNELS; c++) {
@@ -8,7 +9,7 @@ bool mayShow(vec4 intensity) {
   return most > 0.0;
 }
 
-// As `classify`, by tables of value and steepness, a layer each channel.
+// Like `classify`, by tables of intensity and steepness, one layer for each channel.
 vec4 classify2d(vec4 intensity, vec4 steepness, vec4 voxels, out vec4 shares) {
   shares = vec4(0.0);
   vec3 color = vec3(0.0);

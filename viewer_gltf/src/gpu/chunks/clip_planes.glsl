@@ -1,5 +1,6 @@
-// What the clip box and plane cut away, as planes of the room: gone is where dot(xyz, p) > w; and the
-// corner before the slices, which the last three bound: gone is what lies beyond all of them.
+// The clip box and clip plane as planes of the scene, which remove the points with dot(xyz, p) > w.
+// The last three planes bound the corner in front of the slices, which removes the points beyond
+// all three.
 uniform vec4 uCuts[10];
 uniform int uCutCount;
 
@@ -13,7 +14,8 @@ bool isCut(vec3 p) {
   return true;
 }
 
-// The normal of the cut by which the ray from the eye to `p` came in; 0 if it met none.
+// The normal of the clip plane through which the ray from the eye to `p` entered; 0 if there is
+// none.
 vec3 cutNormal(vec3 eye, vec3 p) {
   vec3 normal = vec3(0.0);
   float latest = 0.0;

@@ -1,4 +1,4 @@
-// Where a ray that begins in the corner before the slices leaves it, if later than `from`; else `from`.
+// Where a ray that begins in the corner in front of the slices leaves it; at least `from`.
 float cornerExit(float from, vec3 eye, vec3 dir) {
   float exit = 1e30;
   for (int i = 0; i < 3; i++) {
@@ -9,7 +9,8 @@ float cornerExit(float from, vec3 eye, vec3 dir) {
   return max(from, exit);
 }
 
-// The part of a ray's span that the clip box, the clip plane and the corner before the slices leave.
+// The part of a ray's span that is kept by the clip box, the clip plane and the corner in front of
+// the slices.
 vec2 clipSpan(vec2 span, vec3 eye, vec3 dir, vec3 invDir) {
   vec2 box = intersectBox(eye, invDir, uClipLow, uClipHigh);
   span = vec2(max(span.x, box.x), min(span.y, box.y));

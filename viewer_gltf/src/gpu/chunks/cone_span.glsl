@@ -1,6 +1,6 @@
-// The part of a ray's span inside the cone that reaches uReach, the cosine of an angle below 90
-// degrees: there f(t) = (axis . q)^2 - cos^2 |q|^2 >= 0 for q = eye + t dir - apex, on the side
-// that the axis points to.
+// The part of a ray's span inside the cone with the cosine uReach, an angle below 90 degrees.
+// Inside, f(t) = (axis . q)^2 - cos^2 |q|^2 >= 0 for q = eye + t dir - apex, on the side to which
+// the axis points.
 vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
   vec3 m = eye - uApex;
   float square = uReach * uReach;
@@ -15,7 +15,7 @@ vec2 coneSpan(vec2 span, vec3 eye, vec3 dir) {
   float near = (-b - root) / a;
   float far = (-b + root) / a;
   if (a > 0.0) return dg > 0.0 ? vec2(max(span.x, far), span.y) : vec2(span.x, min(span.y, near));
-  // a < 0: near > far, and the ray is inside between them, in front of the apex or behind it
+  // a < 0: near > far, and the ray is inside between them, either in front of the apex or behind it
   if (mg + 0.5 * (near + far) * dg < 0.0) return vec2(1.0, 0.0);
   return vec2(max(span.x, far), min(span.y, near));
 }

@@ -1,6 +1,6 @@
-// Unit normal of the face through which a ray enters the drawn part: a face of the box round all tiles, or of a
-// cut. It is 0 if the ray begins inside. Matter that is cut through is lit by this normal, because there the
-// gradient of the values has an arbitrary direction.
+// Unit normal of the face through which a ray enters the drawn part; 0 if the ray begins inside.
+// The face belongs to the box around all tiles or to a clip plane. Clipped matter is lit by this
+// normal, because the gradient of the values has an arbitrary direction there.
 vec3 cutFace(vec3 start) {
   float near = 0.05 * uVoxel;
   if (abs(dot(uClipPlane.xyz, start) - uClipPlane.w) < near) return uClipPlane.xyz;

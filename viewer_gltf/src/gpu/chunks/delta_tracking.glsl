@@ -1,15 +1,17 @@
-// Free flight through the medium. No extinction in a brick exceeds its majorant, so that tracking
-// brick by brick is unbiased whatever the bricks' size: Woodcock et al. 1965; local majorants:
-// Szirmay-Kalos et al., Computer Graphics Forum 2010. `from` and `to` are lengths along the ray, um;
-// `dir` is a unit vector, none of its parts 0. Bricks are gone through as by Amanatides & Woo 1987.
-const int MAX_EVENTS = 8192;  // no path ends here; it keeps a fault from hanging the page
+// Free flight through the medium. The extinction in a brick never exceeds the brick's majorant, so
+// tracking brick by brick is unbiased for bricks of any size (Woodcock et al. 1965). Local
+// majorants are from Szirmay-Kalos et al., Computer Graphics Forum 2010. The arguments `from` and
+// `to` are lengths along the ray, um. The direction `dir` is a unit vector without zero components.
+// Bricks are traversed as by Amanatides & Woo 1987.
+// The limit is more than any path needs; it keeps a fault from hanging the page.
+const int MAX_EVENTS = 8192;
 
 struct Bricks {
   vec3 pace;  // bricks per um
   ivec3 cell;
   ivec3 way;
-  vec3 wall;  // lengths along the ray to the next wall across each axis
-  vec3 gap;  // ... and from there to the one after it
+  vec3 wall;  // lengths along the ray to the next brick boundary of each axis
+  vec3 gap;  // lengths between two boundaries of each axis
 };
 
 Bricks enterBricks(vec3 origin, vec3 dir, float from) {
@@ -47,8 +49,8 @@ float majorantOf(Bricks b) {
   return texelFetch(uMajorants, clamp(b.cell, ivec3(0), last), 0).r;
 }
 
-// With a number of steps of the reader's own (uStride), the medium is looked up once in each step instead, at
-// random: few steps are quick and pass over what is thin, many come to the same.
+// If the user sets a number of steps (uStride), the medium is sampled once at a random place of
+// each step instead. Few steps are fast but may miss thin structures; many give the same result.
 float trackBySteps(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
   medium = vec4(0.0);
   for (float t = from; t < to; t += uStride) {
@@ -69,7 +71,7 @@ float transmittanceBySteps(vec3 origin, vec3 dir, float from, float to) {
   return exp(-depth);
 }
 
-// Where the path meets the medium, and what is there; -1: it leaves.
+// Where the path hits the medium, and the medium there; -1 if the path leaves it.
 float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
   if (uStride > 0.0) return trackBySteps(origin, dir, from, to, medium);
   Bricks b = enterBricks(origin, dir, from);
@@ -94,7 +96,7 @@ float track(vec3 origin, vec3 dir, float from, float to, out vec4 medium) {
   return -1.0;
 }
 
-// Share of light that comes through, by ratio tracking (Novak et al. 2014): right in the mean.
+// Share of light that is transmitted, by ratio tracking (Novak et al. 2014); its mean is exact.
 float transmittance(vec3 origin, vec3 dir, float from, float to) {
   if (uStride > 0.0) return transmittanceBySteps(origin, dir, from, to);
   Bricks b = enterBricks(origin, dir, from);

@@ -1,8 +1,9 @@
-// What reaches a place in the volume's box (um) of the light around it, x, and of the lamp's, y: 0..1, from
-// a coarse grid round all volumes. Looked up a cell further out, `outwards`, so that what is lit does not
-// hide itself.
+// Share of light, 0 to 1, that reaches a place in the volume's box (um): x from all around, y from
+// the lamp. It is looked up in a coarse grid around all volumes, one cell outwards, so that matter
+// does not shade itself.
 
-// What hides light throws some of it back: then volumes are as bright in the mean as the surfaces.
+// Matter that blocks light also scatters some of it, so this factor makes volumes as bright on
+// average as surfaces.
 const float LIFT = 1.1;
 
 vec2 reached(vec3 um, vec3 outwards) {

@@ -1,6 +1,7 @@
-// Gradient of the intensities, each channel by its share: differences over two voxels of the means of the
-// cube's corners, one voxel to every side, in the box's directions. Six samples on the axes follow every
-// terrace of a sharp edge, and noise twice as much. `p` is a texture coordinate.
+// Gradient of the intensities, each channel weighted by its share. It is the difference, over two
+// voxels, between mean values at the corners of a cube, in the box's directions. Six samples on the
+// axes would follow every terrace of a sharp edge, and have twice the noise. The point `p` is a
+// texture coordinate.
 vec3 gradientAt(vec3 p, vec3 texPerUm, vec4 shares) {
   vec3 h = uVoxel * abs(texPerUm);
   vec3 gradient = vec3(0.0);

@@ -1,19 +1,20 @@
-// The marched picture at a pixel of the whole. Where it was marched at fewer pixels, each pixel mixes
-// the four around it by nearness, and by how alike the depth of the scene is there, so that colour
-// does not bleed over a surface's edge (joint bilateral upsampling, Kopf et al., SIGGRAPH 2007).
+// The marched image at a pixel of the whole frame. If it was marched with fewer pixels, each pixel
+// mixes the four around it, by nearness and by similarity of the scene's depth. So colour does not
+// bleed across a surface's edge (joint bilateral upsampling, Kopf et al., SIGGRAPH 2007).
 uniform sampler2D uMarched;  // premultiplied, linear; with ENCODED its colours are encoded
 uniform highp sampler2D uSceneDepth;
 uniform int uEyeCount;
-uniform vec4 uEyes[2];  // each eye's part of the picture: x, y, width, height, pixels ...
-uniform vec4 uParts[2];  // ... and of uMarched
+uniform vec4 uEyes[2];  // each eye's part of the frame: x, y, width, height, pixels
+uniform vec4 uParts[2];  // each eye's part of uMarched, likewise
 
-const float ALIKE = 0.02;  // of the depth's distance to the far plane
+// Difference of depths that count as similar, as a share of the depth's distance to the far plane.
+const float ALIKE = 0.02;
 
 int eyeAt(vec2 pixel) {
   return uEyeCount > 1 && pixel.x >= uEyes[1].x ? 1 : 0;
 }
 
-// Of a pixel of uMarched.
+// Linear light of a pixel of uMarched.
 vec4 lightAt(ivec2 pixel) {
   vec4 light = texelFetch(uMarched, pixel, 0);
 #ifdef ENCODED
@@ -36,7 +37,7 @@ vec4 marchedLight(vec2 pixel) {
   float total = 0.0;
   for (int k = 0; k < 4; k++) {
     vec2 side = vec2(k & 1, k >> 1);
-    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // never the other eye's
+    vec2 tap = clamp(corner + side, vec2(0.0), part.zw - 1.0);  // never a pixel of the other eye
     vec2 source = (tap + 0.5) / scale + eye.xy;
     float there = 1.0 - texelFetch(uSceneDepth, ivec2(source), 0).r;
     vec2 near = mix(1.0 - share, share, side);

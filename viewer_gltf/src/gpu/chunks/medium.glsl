@@ -1,5 +1,5 @@
-// Single-scattering albedo (rgb) and extinction per um (a) of intensities, by each channel's table,
-// linear between its entries. The extinctions of channels that overlap add up.
+// Single-scattering albedo (rgb) and extinction per um (a) for intensities, from each channel's
+// table, linear between its entries. The extinctions of overlapping channels add up.
 vec4 mediumOf(vec4 intensity) {
   vec3 color = vec3(0.0);
   float sum = 0.0;

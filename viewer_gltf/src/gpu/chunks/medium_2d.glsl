@@ -1,4 +1,4 @@
-// As `mediumOf`, by tables of value and steepness, 64 rows each channel.
+// Like `mediumOf`, by tables of intensity and steepness, 64 rows for each channel.
 vec4 mediumOf2d(vec4 intensity, vec4 steepness) {
   vec3 color = vec3(0.0);
   float sum = 0.0;

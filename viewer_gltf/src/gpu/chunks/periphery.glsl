@@ -1,12 +1,13 @@
-// Before an eye that looks through a lens, what lies beside the lens's middle is marched in fewer
-// steps, and farther out in every second block of 2 x 2 pixels, which the GPU shades together: radial
+// For an eye that looks through a lens, the periphery is marched in fewer steps. Farther out, only
+// every second block of 2 x 2 pixels is marched, because the GPU shades a block together: radial
 // density masking (Vlachos, Advanced VR Rendering Performance, GDC 2016).
-uniform vec4 uLens;  // tangents from the eye's axis by clip space: factor, offset; 0: no lens
+uniform vec4 uLens;  // tangents from the eye's axis for clip space: factor, offset; 0: no lens
 
-const vec2 SPARSE = vec2(0.36, 1.0);  // tangents between which steps fall by half: 20 and 45 degrees
-const float MASKED = 0.47;  // tangent from which blocks are left out: 25 degrees
+// Tangents between which steps fall by half: 20 and 45 degrees.
+const vec2 SPARSE = vec2(0.36, 1.0);
+const float MASKED = 0.47;  // tangent from which blocks are skipped: 25 degrees
 
-// `part`: what the eye has of the picture: x, y, width, height, pixels.
+// `part`: the eye's part of the image: x, y, width, height, pixels.
 float tangentAt(vec2 pixel, vec4 part) {
   vec2 clip = 2.0 * (pixel - part.xy) / part.zw - 1.0;
   return length(clip * uLens.xy + uLens.zw);

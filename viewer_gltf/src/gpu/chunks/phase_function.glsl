@@ -1,8 +1,8 @@
-// How a path goes on where it meets the medium: three ways, each sampled by its own density, so
-// that the density is the value, too, and the weight of a path is the way's colour alone.
-// PHASE: Henyey & Greenstein 1941. DIFFUSE: Lambert's cosine. GLOSSY: a normalised Phong lobe round
-// the mirrored ray (Lafortune & Willems 1994), its part below the surface folded up, so that no
-// light is lost.
+// How a path continues where it hits the medium. There are three ways. Each is sampled by its own
+// density, so the density equals the value, and the weight of a path is the scattering colour
+// alone. PHASE: Henyey & Greenstein 1941. DIFFUSE: Lambert's cosine. GLOSSY: a normalised Phong
+// lobe around the mirrored ray (Lafortune & Willems 1994); its part below the surface is folded up,
+// so that no light is lost.
 const int PHASE = 0;
 const int DIFFUSE = 1;
 const int GLOSSY = 2;
@@ -10,11 +10,12 @@ const float PI = 3.14159265358979;
 
 struct Scatter {
   int way;
-  vec3 normal;  // of the surface, on the side that the ray comes from
+  vec3 normal;  // the surface's normal, on the side from which the ray comes
   vec3 mirrored;
 };
 
-// A unit vector at an angle of the given cosine to `axis`, turned round it by `turn` of a full turn.
+// A unit vector at an angle of the given cosine to `axis`, rotated about it by `turn` of a full
+// turn.
 vec3 around(vec3 axis, float cosine, float turn) {
   // Duff et al., JCGT 2017
   float s = axis.z >= 0.0 ? 1.0 : -1.0;
@@ -27,7 +28,7 @@ vec3 around(vec3 axis, float cosine, float turn) {
   return normalize(sine * (cos(phi) * u + sin(phi) * v) + cosine * axis);
 }
 
-// Density per steradian of going on along `to` after coming along `from`.
+// Density per steradian of continuing along `to` after arriving along `from`.
 float scatterDensity(Scatter s, vec3 from, vec3 to) {
   if (s.way == PHASE) {
     float g = uAnisotropy;

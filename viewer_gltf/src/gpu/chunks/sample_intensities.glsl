@@ -1,7 +1,8 @@
 #ifdef STREAM_BRICK
-// Virtual texturing: uVolume is an atlas of bricks of STREAM_BRICK^3 texels with an apron of one. uIndex
-// has an entry for every cell of STREAM_BRICK^3 texels, channel by channel: its brick's slot (x, y, z)
-// and level (a); a of 255: the cell is r / 255 throughout.
+// Virtual texturing: the texture uVolume is an atlas of bricks of STREAM_BRICK^3 texels, each with
+// an apron of one texel. The texture uIndex has an entry for each cell of STREAM_BRICK^3 texels,
+// channel by channel. The entry is the slot (x, y, z) and level (a) of the cell's brick. If a is
+// 255, the whole cell has the value r / 255.
 vec4 sampleIntensities(vec3 p) {
   const float EDGE = float(STREAM_BRICK);
   ivec3 size = textureSize(uIndex, 0);
@@ -23,7 +24,7 @@ vec4 sampleIntensities(vec3 p) {
   return v;
 }
 #else
-// Intensity of each channel, 0..1, at a texture coordinate.
+// Intensity of each channel, 0 to 1, at a texture coordinate.
 vec4 sampleIntensities(vec3 p) {
   vec4 v = texture(uVolume, p);
   return uFresh < 1.0 ? mix(texture(uOldVolume, p), v, uFresh) : v;

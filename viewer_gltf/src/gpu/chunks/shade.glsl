@@ -1,14 +1,17 @@
-// The room's light, as the surfaces have it; the includer declares it: uKeyLight, uFillLight, uSkyLight
-// and uGroundLight are what a white surface sends on that faces each, vLight, vFill and vUp lead there;
-// and reached(): how much of the surroundings' and of the lamp's comes to a place in the box.
+// The scene's light, the same as for surfaces. The including shader declares three things. The
+// light that a white surface reflects when it faces each lamp: uKeyLight, uFillLight, uSkyLight,
+// uGroundLight. The directions to the lamps and the sky: vLight, vFill, vUp. The function
+// reached(): the shares of the surrounding light and of the key light that reach a place in the
+// box.
 
-// Steps of intensity over two voxels: below the first they are the noise of 8 bits and of the
-// detector, above the second a boundary of its own; between, light fades in.
+// Steps of intensity over two voxels. Steps below the first are noise of 8 bits and of the
+// detector; above the second they are boundaries. In between, shading fades in.
 const float NOISE_STEP = 0.03;
 const float BOUNDARY_STEP = 0.18;
-const float FLAT_STEP = 1e-4;  // less than one of 8 bits: no direction at all
+const float FLAT_STEP = 1e-4;  // less than one step of 8 bits: no direction at all
 
-// What has no boundary is lit through by its surroundings: as bright in the mean as the surfaces.
+// Matter without a boundary is lit from all around by this factor: on average as bright as the
+// surfaces.
 const float SCATTERED = 1.2;
 
 vec3 lightOn(vec3 normal, vec2 reaches) {
@@ -17,8 +20,8 @@ vec3 lightOn(vec3 normal, vec2 reaches) {
   return reaches.y * uKeyLight * max(dot(normal, vLight), 0.0) + reaches.x * around;
 }
 
-// Diffuse light by the gradient (Levoy 1988), and the lamp's own gloss (Blinn 1977, exponent 16). Where
-// there is none to give a direction, or only noise, light falls as on what faces the eye.
+// Diffuse light by the gradient (Levoy 1988), and a highlight of the key light (Blinn 1977,
+// exponent 16). Where the gradient is zero or only noise, matter is lit as if it faced the eye.
 // `um`: the place in the box.
 vec3 shadeBy(vec3 color, vec3 gradient, vec3 dir, vec3 um) {
   float steepness = length(gradient);

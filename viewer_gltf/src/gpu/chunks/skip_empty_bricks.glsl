@@ -1,7 +1,8 @@
-// The block of bricks round the ray's point t that is alike: x is where the ray leaves it, a little
-// beyond the wall, so that what lies there is another brick; y is 1 if nothing in it is visible. A
-// stored distance of d bricks means that the block of bricks up to d - 1 around is empty; a visible
-// brick is a block by itself. `start` and `dir` in bricks, no part of `dir` is 0.
+// The block of uniform bricks around the ray's point t. Component x is where the ray leaves it,
+// slightly beyond the boundary, so that the next lookup is in another brick. Component y is 1 if
+// nothing in it is visible. A stored distance of d bricks means that the bricks up to d - 1 around
+// are empty. A visible brick is a block by itself. Both `start` and `dir` are in bricks; no
+// component of `dir` is 0.
 vec2 blockAhead(vec3 start, vec3 dir, vec3 invDir, float t) {
   vec3 brick = floor(start + t * dir);
   ivec3 last = textureSize(uOccupancy, 0) - 1;

@@ -1,7 +1,7 @@
-// What earlier frames have gathered for a pixel. Seen from a little aside, it is looked up where
-// this pixel's surface was before, without what lies nearer or farther there; so much of it is kept
-// that the picture can follow.
-float metAt(ivec2 pixel) {
+// The history of a pixel: samples gathered in earlier frames. After a small move of the eye it is
+// looked up where this pixel's surface was before, except where nearer or farther things were. Only
+// a limited number of samples is kept, so that the image follows changes.
+float hitDistanceAt(ivec2 pixel) {
   float covered = texelFetch(uSums, pixel, 0).a;
   return covered > 0.0 ? texelFetch(uMoments, pixel, 0).z / covered : 0.0;
 }
@@ -11,8 +11,8 @@ struct History {
   vec4 moments;
 };
 
-// Whether a tile takes a sample in this frame. Frames that draw a part of the tiles take turns; of
-// its turns a noisy tile takes each, a calm one some, so that what it missed still comes to light.
+// Whether a tile takes a sample in this frame. Frames that draw only some tiles alternate. A noisy
+// tile uses each of its turns, a calm one only some, so that details that it missed still appear.
 bool isDrawn(ivec2 tile) {
   seedRandom(uvec3(tile, 0u));
   float turn = fract(random() - uTurn.x);
@@ -30,8 +30,8 @@ History historyAt(ivec2 pixel, vec2 at) {
   vec4 far = uToBox * vec4(2.0 * at / uPart.zw - 1.0, 1.0, 1.0);
   vec3 dir = normalize(far.xyz / far.w - uEyeAt);
   float away = distance(uEyeAt, 0.5 * uSize);
-  bool isMet;
-  vec2 was = seek(uEyeAt, dir, uToBefore, uEyeBefore, uPart, away, isMet) - 0.5;
+  bool isHit;
+  vec2 was = seek(uEyeAt, dir, uToBefore, uEyeBefore, uPart, away, isHit) - 0.5;
   vec2 corner = floor(was);
   vec2 share = was - corner;
   float expected = distance(uEyeAt + away * dir, uEyeBefore);
@@ -42,8 +42,8 @@ History historyAt(ivec2 pixel, vec2 at) {
     vec2 tap = corner + side;
     if (any(lessThan(tap, vec2(0.0))) || any(greaterThanEqual(tap, uPart.zw))) continue;
     ivec2 source = ivec2(tap + uPart.xy);
-    float met = metAt(source);
-    if (isMet && met > 0.0 && abs(met - expected) > 0.02 * length(uSize)) continue;
+    float hit = hitDistanceAt(source);
+    if (isHit && hit > 0.0 && abs(hit - expected) > 0.02 * length(uSize)) continue;
     vec2 near = mix(1.0 - share, share, side);
     float weight = near.x * near.y;
     sum.sums += weight * texelFetch(uSums, source, 0);

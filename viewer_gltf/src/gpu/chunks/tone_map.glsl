@@ -1,11 +1,11 @@
-// What comes after the light: tone map, and hue, saturation and lightness of the encoded colour.
+// Steps after the lighting: tone map, then hue, saturation and lightness of the encoded colour.
 
-// Curve of film, fitted by Narkowicz 2015 to the Academy's.
+// Film curve, fitted by Narkowicz 2015 to that of the Academy (ACES).
 vec3 filmic(vec3 c) {
   return clamp(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14), 0.0, 1.0);
 }
 
-// Hue in turns, saturation and lightness 0..1 (Joblove & Greenberg 1978).
+// Hue in turns; saturation and lightness 0 to 1 (Joblove & Greenberg 1978).
 vec3 hslOf(vec3 c) {
   float high = max(c.r, max(c.g, c.b));
   float low = min(c.r, min(c.g, c.b));
@@ -23,7 +23,7 @@ vec3 rgbOf(vec3 hsl) {
   return hsl.z + hsl.y * (base - 0.5) * (1.0 - abs(2.0 * hsl.z - 1.0));
 }
 
-// `change`: turns of hue, factor to saturation, added lightness.
+// `change`: added hue in turns, factor of the saturation, added lightness.
 vec3 toned(vec3 c, vec3 change) {
   vec3 hsl = hslOf(clamp(c, 0.0, 1.0));
   hsl.x = fract(hsl.x + change.x);

@@ -1,5 +1,5 @@
-// Light that is brighter than the screen keeps its hue: it is scaled down, and the more of it there
-// was, the nearer it comes to white. Light that the screen can show is left as it is.
+// Scales down light that is brighter than the screen, keeping its hue; the brighter it is, the more
+// it tends to white. Light that the screen can show is unchanged.
 vec3 withinGamut(vec3 light) {
   light = max(light, 0.0);
   float peak = max(light.r, max(light.g, light.b));

@@ -1,4 +1,4 @@
-// For the fragment shaders of three's own materials.
+// Insertions into the fragment shaders of three.js's own materials.
 #insert start
 #include <chunks/both_eyes_fragment>
 

@@ -1,4 +1,5 @@
-// For the vertex shaders of three's own materials: each of two instances goes to its eye's part of the picture.
+// Insertions into the vertex shaders of three.js's own materials: each of the two instances goes to
+// its eye's part of the frame.
 #insert start
 #include <chunks/both_eyes_vertex>
 

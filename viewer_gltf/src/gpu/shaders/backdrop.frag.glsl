@@ -1,13 +1,13 @@
-// The place of the specimen on a flat screen: a background that grows lighter upwards, a pool of light on
-// the ground, and in it the specimen's soft shadow.
+// The backdrop of the specimen on a flat screen: a background that grows lighter upwards, a pool of
+// light on the ground, and the specimen's soft shadow in it.
 precision highp float;
 
-uniform vec3 uFar;  // sRGB: far away on the ground ...
-uniform vec3 uHigh;  // ... high up ...
-uniform vec3 uPool;  // ... and on the ground beside the specimen
-uniform float uShade;  // 0..1: share of the light that the shadow takes
-uniform vec4 uFoot;  // m, the room: x and z of what stands on the ground, low and high
-uniform float uGround;  // m: height of the ground
+uniform vec3 uFar;  // sRGB: far away on the ground
+uniform vec3 uHigh;  // sRGB: high up
+uniform vec3 uPool;  // sRGB: on the ground beside the specimen
+uniform float uShade;  // share of the light that the shadow takes, 0 to 1
+uniform vec4 uFoot;  // x and z range of what stands on the ground, metres of the scene: low, high
+uniform float uGround;  // height of the ground, metres
 uniform vec3 cameraPosition;
 
 in vec3 vRay;
@@ -27,7 +27,7 @@ void main() {
     float far = length(off) / (6.0 * blur);
     color = mix(color, uPool, exp(-far * far)) * (1.0 - uShade * share.x * share.y);
   }
-  // a gradient of few steps of 8 bits would show as bands
+  // dithering: a gradient of few steps of 8 bits would show as bands
   float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
   oColor = vec4(decoded(color + (noise - 0.5) / 255.0), 1.0);
 }

@@ -1,4 +1,4 @@
-// A triangle over the whole picture, and the ray of each of its pixels in the room.
+// A triangle over the whole frame, and the ray of each of its pixels in the scene.
 uniform mat4 projectionMatrix;
 uniform mat4 viewMatrix;
 in vec3 position;

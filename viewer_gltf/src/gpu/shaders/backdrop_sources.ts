@@ -1,4 +1,7 @@
-/** The text of the shaders of the flat screen's background, in a part of the page that comes later. */
+/**
+ * The text of the shaders of the flat screen's background, in a part of the page that is loaded
+ * later.
+ */
 import { CHUNKS } from "../glsl_chunks";
 import { includeChunks } from "../glsl_include";
 import backdrop from "./backdrop.frag.glsl?raw";

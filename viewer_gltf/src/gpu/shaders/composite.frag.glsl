@@ -1,12 +1,12 @@
-// Lay the marched picture over the scene. Within the disc, where it takes the place of surfaces
-// (CROSSING), by as much as the disc shows there: the surfaces themselves do the same.
+// Composites the marched image over the scene. In the disc, where it replaces surfaces (CROSSING),
+// it is weighted by the disc; the surfaces' own shaders do the same.
 precision highp float;
 
 #ifdef CROSSING
 uniform bool uIsCrossing;
-uniform mat4 uToRoom[2];  // each eye's, from clip space
-uniform vec3 uEyeAt[2];  // m
-uniform float uRim;  // m: what no surface covers is weighed as if it lay so far
+uniform mat4 uToRoom[2];  // from each eye's clip space to the scene
+uniform vec3 uEyeAt[2];  // metres
+uniform float uRim;  // metres: distance at which pixels without a surface are weighted
 uniform vec3 uApex;
 uniform vec3 uAxis;
 uniform vec2 uDisc;

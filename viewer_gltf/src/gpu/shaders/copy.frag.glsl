@@ -1,4 +1,4 @@
-// Two pictures as they are.
+// Copies two images.
 precision highp float;
 
 uniform sampler2D uFirst;

@@ -1,10 +1,11 @@
-// The picture's light, encoded for the screen. Where the room shows through (SEE_THROUGH), with its
-// opacity, which its light is times already. For a moment after a jump there is a share of the picture before it.
+// The frame's light, encoded for the screen. If the user's room shows through (SEE_THROUGH), the
+// opacity is kept; the light is premultiplied by it. For a moment after a jump, a share of the
+// earlier frame is mixed in.
 precision highp float;
 
 uniform sampler2D uLight;  // linear
 uniform sampler2D uBefore;  // linear
-uniform float uShareBefore;  // 0..1
+uniform float uShareBefore;  // 0 to 1
 
 out vec4 oColor;
 

@@ -1,10 +1,10 @@
-// Two marched pictures. Where blocks were left out, each pixel is the mean of those about it that were
-// not, so that grain does not flicker at the rim of sight.
+// Two marched images. Where blocks were skipped, each pixel becomes the mean of its neighbours that
+// were marched, so that noise does not flicker at the edge of the field of view.
 precision highp float;
 
 uniform sampler2D uFirst;
 uniform sampler2D uSecond;
-uniform vec4 uPart;  // what the eye has of them: x, y, width, height, pixels
+uniform vec4 uPart;  // the eye's part of the images: x, y, width, height, pixels
 
 #include <chunks/periphery>
 
@@ -23,7 +23,8 @@ void main() {
   if (!isSparse(pixel, uPart)) return;
   oFirst = oSecond = vec4(0.0);
   float total = 0.0;
-  for (int reach = 1; reach < 3 && total == 0.0; reach++) {  // 2: in the part's corners
+  // A reach of 2 is needed in the corners of the part.
+  for (int reach = 1; reach < 3 && total == 0.0; reach++) {
     for (int k = 0; k < 9; k++) {
       ivec2 side = ivec2(k % 3, k / 3) - 1;
       ivec2 tap = pixel + reach * side;

@@ -1,4 +1,4 @@
-// One picture as it is.
+// Copies one image.
 precision highp float;
 
 uniform sampler2D uLight;

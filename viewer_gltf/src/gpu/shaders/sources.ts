@@ -1,4 +1,4 @@
-/** The text of the shaders that lay one picture over another, and bring it to the screen. */
+/** The text of the shaders that composite images and encode the frame for the screen. */
 import { CHUNKS } from "../glsl_chunks";
 import { includeChunks } from "../glsl_include";
 import composite from "./composite.frag.glsl?raw";

@@ -14,7 +14,7 @@ uniform float uAway;  // um, to the middle of the box
 
 out vec4 oColor;
 
-float metAt(ivec2 pixel) {
+float hitDistanceAt(ivec2 pixel) {
   return uEdge * texelFetch(uGuide, pixel, 0).r;
 }
 
@@ -25,8 +25,8 @@ void main() {
   vec4 far = uToBox * vec4(2.0 * at / uPart.zw - 1.0, 1.0, 1.0);
   vec3 dir = normalize(far.xyz / far.w - uEyeAt);
   float away = uAway;
-  bool isMet;
-  vec2 there = seek(uEyeAt, dir, uFromBox, uEyeThere, uPart, away, isMet);
+  bool isHit;
+  vec2 there = seek(uEyeAt, dir, uFromBox, uEyeThere, uPart, away, isHit);
   ivec2 low = ivec2(uPart.xy);
   ivec2 high = ivec2(uPart.xy + uPart.zw) - 1;
   vec2 corner = floor(there - 0.5);

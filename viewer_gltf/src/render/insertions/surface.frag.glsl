@@ -1,5 +1,5 @@
-// For the fragment shader of three's standard material. A part of some surfaces may declare functions, and change
-// `diffuseColor`.
+// Insertions into the fragment shader of three.js's standard material. A part may declare functions
+// for some surfaces and change `diffuseColor`.
 #insert start
 #include <surface>
 #include <part/fragment_declared>

@@ -1,5 +1,5 @@
-// For the vertex shader of three's standard material. A part of some surfaces may declare functions, place
-// `transformed` elsewhere, and change `gl_Position` at the end.
+// Insertions into the vertex shader of three.js's standard material. A part may declare functions
+// for some surfaces, move `transformed`, and change `gl_Position` at the end.
 #insert start
 varying vec3 vRoom;
 #include <chunks/both_eyes_vertex>

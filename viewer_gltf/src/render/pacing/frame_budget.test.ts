@@ -1,11 +1,11 @@
 import { expect, it } from "vitest";
-import { Pace } from "./frame_budget";
+import { FrameBudget } from "./frame_budget";
 
-/** A context without a clock for the GPU's work. */
+/** A context without timer queries for the GPU. */
 const gl = { getExtension: () => null } as unknown as WebGL2RenderingContext;
 
-it("calls frames late while a picture moves more slowly than the display, and no longer", () => {
-  const pace = new Pace(gl);
+it("reports late frames only while a moving view is slower than the display", () => {
+  const pace = new FrameBudget(gl);
   const draw = (isMoving: boolean, interval_ms: number, frames: number) => {
     for (let i = 0; i < frames; i++) {
       pace.begin(isMoving, interval_ms, 60);

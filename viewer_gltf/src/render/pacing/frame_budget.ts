@@ -1,4 +1,4 @@
-/** Keeps a moving picture in the frame's budget; a still one is drawn as well as can be. */
+/** Keeps a moving view within the frame's budget; a view at rest is drawn in full quality. */
 
 import { GpuTimer, type TimedContext } from "../../gpu/gpu_timer";
 import {
@@ -13,15 +13,16 @@ import {
 } from "../../state/quality_controller";
 
 const RATE_HZ = 60;
-/** Time between two late frames, as a multiple of a frame's time. */
+/**
+ * Interval between two frames above which they are late, as a multiple of the display's interval.
+ */
 const LATE = 1.3;
 
-export class Pace {
-  /** Between the last two frames, smoothed. */
+export class FrameBudget {
+  /** Time between the last two frames, smoothed. */
   frame_ms = 0;
-  /** Whether the frames of a picture that moves now come later than the display could show them. */
+  /** Whether the frames of a moving view come later than the display could show them. */
   isLate = false;
-  /** The settings of the last frame. */
   settings: QualitySettings;
   private readonly timer: GpuTimer | null;
   private quality: Quality;
@@ -38,10 +39,10 @@ export class Pace {
   }
 
   /**
-   * What to draw the next frame with.
+   * Starts a frame and returns its quality settings.
    *
    * @param isMoving whether another frame follows by itself
-   * @param rate_hz of the display, where it is known
+   * @param rate_hz rate of the display, if known
    */
   begin(isMoving: boolean, interval_ms: number, rate_hz = RATE_HZ): QualitySettings {
     this.isLate = false;
@@ -50,7 +51,7 @@ export class Pace {
       const { timing } = this.quality;
       const budget_ms = frameBudget_ms(rate_hz, timing);
       const work_ms = timing === "work" ? (this.timer?.poll() ?? null) : interval_ms;
-      // where frames are late, or no answer comes, the GPU's own time means nothing
+      // if frames are late or the timer has no answer, the GPU's own time is not reliable
       this.isLate = this.frame_ms > LATE * (1000 / rate_hz);
       const spent_ms = this.isLate ? Math.max(work_ms ?? 0, interval_ms) : work_ms;
       if (spent_ms !== null) this.quality = advanceQuality(this.quality, spent_ms, budget_ms);

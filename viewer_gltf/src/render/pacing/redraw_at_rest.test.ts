@@ -1,7 +1,10 @@
 import { describe, expect, it } from "vitest";
-import { RestPace } from "./redraw_at_rest";
+import { RedrawAtRest } from "./redraw_at_rest";
 
-/** A GPU with pictures of this length; the milliseconds at which one was asked for. */
+/**
+ * A GPU that takes `picture_ms` for an image. Returns the times, ms, at which images were
+ * requested.
+ */
 function run(picture_ms: number, until_ms: number): number[] {
   let now = 0;
   let doneAt = 0;
@@ -11,7 +14,7 @@ function run(picture_ms: number, until_ms: number): number[] {
     deleteSync: () => undefined,
     flush: () => undefined,
   };
-  const pace = new RestPace(gl);
+  const pace = new RedrawAtRest(gl);
   const asked: number[] = [];
   for (; now < until_ms; now += 10) {
     if (!pace.isDue(now)) continue;
@@ -22,28 +25,28 @@ function run(picture_ms: number, until_ms: number): number[] {
   return asked;
 }
 
-describe("a picture at rest, for which things come", () => {
-  it("is drawn at once, and then as often as the display can where that is little work", () => {
+describe("a view at rest while data arrive", () => {
+  it("is drawn at once, and then at the rate of the display if that is little work", () => {
     expect(run(5, 40)).toEqual([0, 10, 20, 30]);
     expect(run(40, 100)).toEqual([0, 40, 80]);
   });
 
-  it("leaves half of the time to what comes", () => {
+  it("leaves half of the time to loading", () => {
     expect(run(400, 2000)).toEqual([0, 800, 1600]);
   });
 
-  it("is not put off by more than a second, however long one took", () => {
+  it("waits for at most a second after a frame, even a very slow one", () => {
     expect(run(60_000, 62_000)).toEqual([0, 61_000]);
   });
 
-  it("waits for nothing of a context that is gone", () => {
+  it("does not wait for a lost context", () => {
     const gl = {
       fenceSync: () => ({}) as WebGLSync,
       getSyncParameter: () => 0,
       deleteSync: () => undefined,
       flush: () => undefined,
     };
-    const pace = new RestPace(gl);
+    const pace = new RedrawAtRest(gl);
     pace.submit(0);
     expect(pace.isDue(5000)).toBe(false);
     pace.forget();

@@ -1,25 +1,28 @@
 /**
- * When a picture at rest is drawn anew while things come for it: the one before is done then, and if
- * that took long, as long again has gone by. So what loads has half of the time, whatever draws.
+ * Decides when a view at rest is drawn again while data arrive: when the last image is done, and
+ * after a further wait as long as that image took. So loading gets half of the time on any GPU.
  */
 import type { FencedContext } from "./samples_per_frame";
 
-/** Time of a quick picture, ms: it keeps nothing waiting. */
+/** Milliseconds. After an image as quick as this there is no further wait. */
 const LITTLE_MS = 50;
-/** Longest time that a picture counts, ms: a page that slept did not draw for as long. */
+/**
+ * Milliseconds. Longest time that counts for one image, since a page that slept did not draw all
+ * that time.
+ */
 const MAX_MS = 1000;
 const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;
 const SIGNALED = 0x9119;
 
-export class RestPace {
+export class RedrawAtRest {
   private fence: WebGLSync | null = null;
   private began_ms = 0;
   private due_ms = 0;
 
   constructor(private readonly gl: FencedContext) {}
 
-  /** Whether another picture may be asked for. To be called in every frame of the display. */
+  /** Whether another image may be requested. Call it in every frame of the display. */
   isDue(now_ms: number): boolean {
     const { fence, gl } = this;
     if (fence !== null && gl.getSyncParameter(fence, SYNC_STATUS) === SIGNALED) {
@@ -31,7 +34,6 @@ export class RestPace {
     return this.fence === null && now_ms >= this.due_ms;
   }
 
-  /** A picture at rest has been asked for. */
   submit(now_ms: number): void {
     this.began_ms = now_ms;
     if (this.fence !== null) this.gl.deleteSync(this.fence);
@@ -39,7 +41,7 @@ export class RestPace {
     this.gl.flush();
   }
 
-  /** The context was lost, and with it what was waited for. */
+  /** Forgets the image that was waited for, after the context was lost. */
   forget(): void {
     this.fence = null;
   }

@@ -1,14 +1,15 @@
 /**
- * How many samples a frame of a path-traced picture at rest takes: as many as keep the page alive. A
- * browser takes more work than the GPU has done; so each frame waits until the one before is done.
+ * Number of samples that a frame of a path-traced view at rest takes: as many as keep the page
+ * responsive. A browser accepts more work than the GPU can do, so each frame waits until the last
+ * one is done.
  */
 
-/** Longest frame at rest, ms: the page still answers at once. */
+/** Milliseconds. Longest frame at rest, so that the page still reacts at once. */
 const FRAME_MS = 60;
 const MAX_SAMPLES = 16;
 const MIN_SAMPLES = 1 / 64;
 
-/** The part of WebGL 2 in use, so that tests need none. */
+/** The part of WebGL 2 in use, so that tests need no GPU. */
 export type FencedContext = Pick<
   WebGL2RenderingContext,
   "fenceSync" | "getSyncParameter" | "deleteSync" | "flush"
@@ -17,15 +18,14 @@ const SYNC_GPU_COMMANDS_COMPLETE = 0x9117;
 const SYNC_STATUS = 0x9114;
 const SIGNALED = 0x9119;
 
-export class GatherPace {
-  /** Samples of every pixel in the next frame; below 1, of so many pixels. */
+export class SamplesPerFrame {
+  /** Samples per pixel in the next frame; below 1 it is the share of the pixels that are drawn. */
   passes = 1 / 8;
   private fence: WebGLSync | null = null;
   private began_ms = 0;
 
   constructor(private readonly gl: FencedContext) {}
 
-  /** Whether the frame before is done. */
   isReady(now_ms: number): boolean {
     const { fence, gl } = this;
     if (fence === null) return true;
@@ -38,7 +38,6 @@ export class GatherPace {
     return true;
   }
 
-  /** A frame at rest has been asked for. */
   submit(now_ms: number): void {
     this.began_ms = now_ms;
     if (this.fence !== null) this.gl.deleteSync(this.fence);
@@ -46,7 +45,7 @@ export class GatherPace {
     this.gl.flush();
   }
 
-  /** The context was lost, and with it what was waited for. */
+  /** Forgets the frame that was waited for, after the context was lost. */
   forget(): void {
     this.fence = null;
   }

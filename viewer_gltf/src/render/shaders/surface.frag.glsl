@@ -1,4 +1,5 @@
-// The functions that surfaces call beside three's standard material. ../insertions/surface.frag.glsl has the calls.
+// Functions that surfaces call in addition to three.js's standard material.
+// ../insertions/surface.frag.glsl has the calls.
 varying vec3 vRoom;
 #include <chunks/both_eyes_fragment>
 #include <chunks/clip_planes>
@@ -7,7 +8,8 @@ varying vec3 vRoom;
 #include <chunks/surface_share>
 #include <chunks/marched_light>
 
-// The inside of a solid that is cut open, or that ends at the open tile, is drawn flat: as the plane there.
+// Where a solid is cut open, or ends at the open tile, its inside is drawn flat, with the normal of
+// the section.
 vec3 insideNormal(vec3 normal, vec3 eye) {
   vec3 flatNormal = cutNormal(eye, vRoom);
   if (flatNormal == vec3(0.0)) flatNormal = openNormal(eye, vRoom);
@@ -15,8 +17,8 @@ vec3 insideNormal(vec3 normal, vec3 eye) {
   return normalize((viewMatrix * vec4(flatNormal, 0.0)).xyz);
 }
 
-// Light, times its opacity. In the disc both pictures, of surface and of volume, are mixed: one laid over
-// the other would be dark between.
+// Returns light multiplied by its opacity. At the disc's rim the surface and the volume are mixed:
+// drawing one over the other would darken the rim.
 vec4 blended(vec4 light, float alpha) {
   float taken = shareTaken(vRoom);
   float own = uOpacity * alpha * (1.0 - taken);

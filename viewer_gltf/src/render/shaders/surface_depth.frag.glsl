@@ -1,4 +1,5 @@
-// Writes depth alone, cut as the surfaces are; with SHARED, where anything of the surface is left.
+// Writes depth only, clipped like the surfaces; with SHARED, only where some of the surface is
+// left.
 varying vec3 vRoom;
 #include <chunks/both_eyes_fragment>
 #include <chunks/clip_planes>

@@ -1,5 +1,5 @@
-// Writes depth alone. A part of some surfaces may place `transformed` elsewhere, and change
-// `gl_Position` at the end.
+// Writes depth only. A part may move `transformed` for some surfaces, and change `gl_Position` at
+// the end.
 varying vec3 vRoom;
 #include <chunks/both_eyes_vertex>
 #include <part/vertex_declared>

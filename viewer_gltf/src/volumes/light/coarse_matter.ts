@@ -1,27 +1,26 @@
 /**
- * How much of the light goes through each cell of a coarse grid round all volumes, under the present
- * transfer functions: what shades is made from it. Pure arrays.
- *
- * Cells are cubes of the world, at most MAX_CELLS, x fastest. Each is looked at in eight places.
+ * The share of light that passes each cell of a coarse grid around all volumes, under the current
+ * transfer functions. Occlusion and shadows are computed from it. Cells are cubes of the world, at
+ * most MAX_CELLS, x fastest. Each is sampled at eight places.
  */
 
 import type { Size3 } from "../../bundle/ktx2";
 import type { Box } from "../../math/box";
 import type { Vec3 } from "../../math/vec3";
 
-/** Most cells of the grid: with a byte for openness and one for light, 512 KiB of the GPU's memory. */
+/** Largest number of cells: with one byte each for openness and light, 512 KiB of GPU memory. */
 export const MAX_CELLS = 64 ** 3;
-/** Cells beyond the volumes' box, so that a sample at its face looks up what lies before it. */
+/** Cells around the volumes' box, so that a lookup at its face finds the space in front of it. */
 const MARGIN = 1;
-/** Where a cell is looked at, in its edges from its middle. */
+/** Offsets of the samples from a cell's middle, in edges of the cell. */
 const ASIDE = [-0.25, 0.25] as const;
-/** The most of a voxel's light that the march takes. */
+/** Largest share of light that one voxel takes in the ray march. */
 const MAX_OPACITY = 0.999;
 
 export type Grid = Readonly<{
   /** The low corner, um, world. */
   low: Vec3;
-  /** Of a cell, um. */
+  /** Edge of a cell, um. */
   edge: number;
   /** Cells along x, y, z. */
   size: Size3;
@@ -29,32 +28,35 @@ export type Grid = Readonly<{
 
 /** The volumes of one tile, at a coarse mip level. */
 export type TileMatter = Readonly<{
-  /** Of each channel: intensities, x fastest, and the opacity (0..255) of a voxel at each of 256. */
+  /**
+   * Intensities of each channel, x fastest, and the opacity (0 to 255) of a voxel at each of 256
+   * intensities.
+   */
   channels: readonly Readonly<{ texels: Uint8Array; opacities: Uint8Array }>[];
   /** Texels along x, y, z. */
   size: Size3;
-  /** Texels to the whole of the finest level, which a last one may reach beyond. */
+  /** Size of the finest level in texels of this level; the last texel may extend beyond it. */
   whole: Vec3;
-  /** Of the tile's box in the texture, 0..1. */
+  /** The tile's box in the texture, 0 to 1. */
   low: Vec3;
   high: Vec3;
-  /** From the world, um, to places in the texture: column by column. */
+  /** Matrix from the world, um, to texture coordinates, column by column. */
   toTexture: readonly number[];
-  /** The path that the opacities hold for, um. */
+  /** Length of path for which the opacities hold, um. */
   voxel_um: number;
 }>;
 
-/** What a cut leaves, um, world. */
+/** The clip, um, world. */
 export type Cut = Readonly<{
   box: Box;
   /** Unit normal and offset. */
   plane: Plane;
-  /** What lies beyond all of them is gone. */
+  /** Points beyond all of these planes are removed. */
   corner: readonly Plane[];
 }>;
 type Plane = readonly [number, number, number, number];
 
-/** The finest grid round a box that has no more cells than there may be. */
+/** The finest grid around a box that has at most `most` cells. */
 export function gridRound({ min, max }: Box, most = MAX_CELLS): Grid {
   const sides = min.map((v, i) => Math.max(max[i] - v, 1e-6));
   const cellsAt = (edge: number) => sides.map((side) => Math.ceil(side / edge - 1e-6) + 2 * MARGIN);
@@ -68,7 +70,7 @@ export function gridRound({ min, max }: Box, most = MAX_CELLS): Grid {
   return { low, edge, size: [x, y, z] };
 }
 
-/** The share of light, 0..1, that goes straight through each cell. */
+/** The share of light, 0 to 1, that passes straight through each cell. */
 export function throughCells(
   grid: Grid,
   tiles: readonly TileMatter[],
@@ -105,9 +107,10 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
     ),
   );
   const [xs, ys, zs] = places;
-  // a function of its own: one that is called often is compiled sooner than a loop that is long
+  // a separate function, because a function that is called often is compiled sooner than a long
+  // loop
   const addRow = (row: number, u0: number, v0: number, w0: number) => {
-    if (m[1] === 0 && (v0 < lowY || v0 >= highY)) return; // beside the tile all along
+    if (m[1] === 0 && (v0 < lowY || v0 >= highY)) return; // the whole row is outside the tile
     if (m[2] === 0 && (w0 < lowZ || w0 >= highZ)) return;
     for (let i = 0; i < xs.length; i++) {
       const u = m[0] * xs[i] + u0;
@@ -116,7 +119,8 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
       if (v < lowY || v >= highY) continue;
       const w = m[2] * xs[i] + w0;
       if (w < lowZ || w >= highZ) continue;
-      // between texels, whose middles lie at a half; beyond the last that one's own
+      // Interpolation between texels, whose middles lie at a half; beyond the last texel its value
+      // is used.
       const tx = Math.min(sx - 1, Math.max(0, u * wx - 0.5));
       const ty = Math.min(sy - 1, Math.max(0, v * wy - 0.5));
       const tz = Math.min(sz - 1, Math.max(0, w * wz - 0.5));
@@ -137,7 +141,7 @@ function addTile(through: Float32Array, grid: Grid, tile: TileMatter): void {
   });
 }
 
-/** The light that all channels let through at a place between texels. */
+/** The share of light that all channels transmit at a place between texels. */
 function clearnessOf(
   { channels, size: [sx, sy, sz] }: TileMatter,
   tables: readonly Float32Array[],
@@ -168,7 +172,10 @@ function clearnessOf(
   };
 }
 
-/** 1 where between a texel and the next ones along the axes some channel may take light: mostly none does. */
+/**
+ * 1 where any channel may take light between a texel and the next ones along the axes; mostly none
+ * does.
+ */
 function dimmingTexels(
   { channels, size: [sx, sy, sz] }: TileMatter,
   tables: readonly Float32Array[],
@@ -187,7 +194,10 @@ function dimmingTexels(
   return found;
 }
 
-/** The same of a row: by the least and the most of each texel and its neighbours, `down` and `back` from it. */
+/**
+ * Computes one row of it from the smallest and largest value of each texel and its neighbours,
+ * `down` and `back` from it.
+ */
 function markRow(
   found: Uint8Array,
   texels: Uint8Array,
@@ -216,7 +226,9 @@ function markRow(
   }
 }
 
-/** By intensity the next one, or itself, that takes light; 256: there is none. */
+/**
+ * For each intensity, the lowest intensity from it upwards that takes light; 256 if there is none.
+ */
 function nextDimming(table: Float32Array): Uint16Array {
   const next = new Uint16Array(256);
   for (let v = 255, last = 256; v >= 0; v--) {
@@ -226,7 +238,6 @@ function nextDimming(table: Float32Array): Uint16Array {
   return next;
 }
 
-/** What is cut away lets all light through. */
 function clear(through: Float32Array, { low, edge, size: [nx, ny, nz] }: Grid, cut: Cut): void {
   const { min, max } = cut.box;
   for (let z = 0, at = 0; z < nz; z++) {

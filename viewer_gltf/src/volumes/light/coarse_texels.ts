@@ -1,4 +1,6 @@
-/** Texels of coarse mip levels for the shading: of levels that have come already, decoded once more. */
+/**
+ * Texels of coarse mip levels for the shading, decoded again from levels that are already loaded.
+ */
 import { DecodeError, decodeTexels } from "../../bundle/decode";
 import { texels } from "../../voxels/mip_levels";
 import type { VolumeSource } from "../../voxels/volume_source";
@@ -18,7 +20,7 @@ export class CoarseTexels {
     return this.underWay > 0;
   }
 
-  /** The texels of a level that has come; null: they will be there with `onChange`, or never. */
+  /** The texels of a loaded level; null until `onChange` is called, or if decoding fails. */
   get(source: VolumeSource, level: number): Uint8Array | null {
     const kept = this.kept.get(source);
     if (kept?.level === level) return kept.texels;
@@ -28,7 +30,6 @@ export class CoarseTexels {
     return null;
   }
 
-  /** Forget all but these. */
   keep(sources: ReadonlySet<VolumeSource>): void {
     for (const source of this.kept.keys()) if (!sources.has(source)) this.kept.delete(source);
   }
@@ -42,7 +43,7 @@ export class CoarseTexels {
       entry.texels = await decodeTexels([{ bytes, name }], texels(levels[entry.level]));
     } catch (error) {
       if (!(error instanceof DecodeError)) throw error;
-      this.onError(error); // the level was drawn before: it can't be spoilt
+      this.onError(error); // the level was drawn before, so it is not damaged
     } finally {
       this.underWay--;
     }

@@ -1,8 +1,10 @@
 /**
- * The depth that light gives to volumes: what encloses a place dims it, and what lies on the lamp's way
- * throws a shadow there. Of all volumes together, as a 3D texture that the march looks up once for each
- * sample that it lights. It is made in a worker, from coarse mip levels, whenever matter, cut or lamp have
- * changed; until the new one is there, the last one stays.
+ * Shading of volumes by each other: surrounding matter dims a place (ambient occlusion), and matter on
+ * the way to the lamp throws a shadow.
+ *
+ * The shading of all volumes is one 3D texture, which the march looks up once for each sample that it
+ * lights. A worker computes it from coarse mip levels whenever matter, clip or lamp change. Until it
+ * is done, the last texture stays.
  */
 import {
   ClampToEdgeWrapping,
@@ -27,14 +29,13 @@ import { type Cut, type Grid, gridRound, type TileMatter } from "./coarse_matter
 import type { CoarseTexels } from "./coarse_texels";
 import { type Shading, ShadingClient } from "./shading_client";
 
-/** Most texels in the coarse levels of all volumes together. */
+/** Largest number of texels in the coarse levels of all volumes together. */
 const MAX_TEXELS = 2 ** 23;
-/** As far as the meshes' occlusion looks: so many of the coarsest voxel spacing. */
+/** Radius of the occlusion in coarsest voxel spacings; the same as for meshes. */
 const REACH_VOXELS = 8;
-/** Steps of the lamp's direction from the middle of a cube's face to its edge: 2 degrees. */
+/** Steps of the lamp's direction from the middle of a cube's face to its edge: 2 degrees each. */
 const LAMP_STEPS = 24;
 
-/** A tile that is marched. */
 export type Marched = Readonly<{ march: TileMarch; packed: Packed; resident: Resident }>;
 
 export class DepthShading {
@@ -42,8 +43,8 @@ export class DepthShading {
   private texture: Data3DTexture | null = null;
   private grid: Grid | null = null;
   private strength = 0;
-  /** What the last request was made of. */
-  private asked: readonly unknown[] = [];
+  /** The values that the last request depended on. */
+  private requested: readonly unknown[] = [];
   private lamp = "";
 
   constructor(
@@ -59,25 +60,25 @@ export class DepthShading {
     return this.client.isBusy || this.coarse.isLoading;
   }
 
-  /** 0: none, and nothing is made. */
+  /** Sets the strength of the shading; 0 turns it off and computes nothing. */
   set(strength: number): void {
     this.strength = strength;
     this.frame.uDepthShading.value = this.texture === null ? 0 : strength;
   }
 
   /**
-   * Before every frame.
+   * Updates the shading. Call it before every frame.
    *
-   * @param towards the lamp: its direction in the world
+   * @param towards direction to the lamp in the world
    */
   follow(marched: readonly Marched[], clip: MarchClip, towards: Vector3): void {
     if (this.strength === 0 || marched.length === 0) return;
     const isLeaving = ({ packed, resident }: Marched) =>
       packed.channels.some((id) => !resident.texture.kept.has(id));
-    if (marched.some(isLeaving)) return; // another set of channels is under way
+    if (marched.some(isLeaving)) return; // another set of channels is being loaded
     const lamp = snapped(towards);
     const tiles = this.matterOf(marched);
-    if (tiles === null) return; // it comes with `onChange`
+    if (tiles === null) return; // `onChange` is called when the matter is available
     const cut = cutOf(clip);
     const key = [
       ...marched.flatMap(({ march, packed }) => [
@@ -88,21 +89,22 @@ export class DepthShading {
       ...tiles.flatMap((tile) => tile.channels.map(({ texels }) => texels)),
       JSON.stringify(cut),
     ];
-    const isSame = key.length === this.asked.length && key.every((v, i) => v === this.asked[i]);
+    const isSame =
+      key.length === this.requested.length && key.every((v, i) => v === this.requested[i]);
     if (isSame && lamp.join() === this.lamp) return;
     this.lamp = lamp.join();
     if (isSame) {
       this.client.ask({ matter: null, towards: lamp });
       return;
     }
-    this.asked = key;
+    this.requested = key;
     const grid = gridOver(marched);
     const radius_um =
       REACH_VOXELS * Math.max(...marched.map(({ march }) => coarsestSpacing(march.volume)));
     this.client.ask({ matter: { grid, tiles, cut, radius_um }, towards: lamp });
   }
 
-  /** The tiles' matter; null where texels are still to be decoded. */
+  /** The matter of the tiles; null while texels are being decoded. */
   private matterOf(marched: readonly Marched[]): readonly TileMatter[] | null {
     const { edge } = gridOver(marched);
     const count = marched.reduce((sum, { packed }) => sum + packed.channels.length, 0);
@@ -155,14 +157,14 @@ export class DepthShading {
     this.onChange();
   }
 
-  /** Tell a march where the texture lies. */
+  /** Passes the position of the texture to a march. */
   place(march: TileMarch): void {
     if (this.grid !== null) march.placeShading(this.grid.low, this.grid.size, this.grid.edge);
   }
 
-  /** The volumes have gone. */
+  /** Forgets the volumes after they were removed. */
   forget(): void {
-    this.asked = [];
+    this.requested = [];
     this.coarse.keep(new Set());
   }
 
@@ -184,7 +186,6 @@ function shadingTexture(texels: Uint8Array<ArrayBuffer>, { size }: Grid): Data3D
   return texture;
 }
 
-/** Round the boxes of all tiles. */
 function gridOver(marched: readonly Marched[]): Grid {
   const [min, max] = [new Vector3().setScalar(1e30), new Vector3().setScalar(-1e30)];
   for (const { march } of marched) march.growBox(min, max);
@@ -192,8 +193,9 @@ function gridOver(marched: readonly Marched[]): Grid {
 }
 
 /**
- * The mip level for cells of an edge, um: the coarsest whose texels are no larger, of those that have come
- * of all channels and are no more than `most` texels; else the finest of these. null: none is.
+ * Returns the mip level for cells with an edge in um. Levels count if they are loaded for all
+ * channels and have at most `most` texels. The result is the coarsest of these with texels no
+ * larger than the edge, otherwise the finest of these. Null if there is none.
  */
 function levelFor(sources: readonly VolumeSource[], edge: number, most: number): number | null {
   const { levels } = sources[0].volume;
@@ -211,7 +213,9 @@ function coarsestSpacing({ bounds_um, size, apron }: TileVolume): number {
   );
 }
 
-/** Half-way between the extremes of each brick: of what is streamed, all that is at hand. */
+/**
+ * The middle of each brick's range of intensities, which is all that is known of streamed volumes.
+ */
 function middles({ bricks }: Packed, channel: number): Uint8Array {
   const ranges = bricks[channel];
   const made = MIDDLES.get(ranges);
@@ -222,7 +226,7 @@ function middles({ bricks }: Packed, channel: number): Uint8Array {
   MIDDLES.set(ranges, found);
   return found;
 }
-/** The same ones for the same ranges: others ask for other shades. */
+/** Cache, because a different array would trigger new shading. */
 const MIDDLES = new WeakMap<Uint8Array, Uint8Array>();
 
 function cutOf({ min, max, plane, corner }: MarchClip): Cut {
@@ -233,7 +237,7 @@ function cutOf({ min, max, plane, corner }: MarchClip): Cut {
   };
 }
 
-/** From the world, um, to texture coordinates. */
+/** Matrix from the world, um, to texture coordinates. */
 function worldToTexture({ volume, toBox }: TileMarch): Matrix4 {
   const { low, high } = textureCorners(volume);
   const { min, max } = volume.bounds_um;
@@ -245,7 +249,7 @@ function worldToTexture({ volume, toBox }: TileMarch): Matrix4 {
     .multiply(toBox);
 }
 
-/** A direction on a lattice: a head that trembles asks for nothing, and a view has one lamp. */
+/** Rounds a direction to a lattice, so that a trembling head triggers no new shading. */
 function snapped(towards: Vector3): Vec3 {
   const most = Math.max(...towards.toArray().map(Math.abs));
   const on = towards.toArray().map((v) => Math.round((v / most) * LAMP_STEPS) / LAMP_STEPS);

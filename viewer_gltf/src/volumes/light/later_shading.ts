@@ -1,4 +1,4 @@
-/** The shading of volumes. Its code comes with the first volumes that are shaded. */
+/** The shading of volumes. Its code is loaded with the first shaded volumes. */
 import type { Vector3 } from "three";
 import type { MarchClip } from "../../gpu/clip_uniforms";
 import type { MarchFrame } from "../../voxels/march_frame";
@@ -21,10 +21,10 @@ export class LaterShading {
   }
 
   /**
-   * Shade what is marched.
+   * Shades the marched volumes.
    *
-   * @param strength 0: not at all
-   * @param lamp the direction towards it, world
+   * @param strength 0 turns the shading off
+   * @param lamp direction to the lamp in the world
    */
   follow(drawn: readonly Marched[], strength: number, clip: MarchClip, lamp: Vector3): void {
     if (strength > 0 && drawn.length > 0 && this.code === "none") void this.load();
@@ -41,7 +41,7 @@ export class LaterShading {
       this.shading = new DepthShading(frame, coarse, onChange, onError);
       this.code = "there";
     } catch (error) {
-      this.code = "failed"; // volumes are drawn unshaded
+      this.code = "failed"; // volumes are drawn without shading
       onError(error);
     }
     onChange();
@@ -51,7 +51,7 @@ export class LaterShading {
     this.shading?.place(march);
   }
 
-  /** Drop what is on the GPU. */
+  /** Forgets the volumes after their GPU resources were released. */
   forget(): void {
     this.shading?.forget();
   }

@@ -8,7 +8,7 @@ const SIDE = 24;
 const SIZE: Size3 = [SIDE, SIDE, SIDE];
 const MIDDLE = (SIDE - 1) / 2;
 
-/** The share of light that goes through each cell of a cube, by its place. */
+/** The share of light that passes each cell of a cube, from its coordinates. */
 function cells(through: (x: number, y: number, z: number) => number): Float32Array {
   return Float32Array.from({ length: SIDE ** 3 }, (_, i) =>
     through(i % SIDE, Math.floor(i / SIDE) % SIDE, Math.floor(i / SIDE ** 2)),
@@ -18,27 +18,27 @@ function cells(through: (x: number, y: number, z: number) => number): Float32Arr
 const at = (x: number, y: number, z: number) => (z * SIDE + y) * SIDE + x;
 const unit = (v: Vec3): Vec3 => v.map((each) => each / Math.hypot(...v)) as unknown as Vec3;
 
-describe("what reaches a cell of the light", () => {
-  it("is all of it where there is nothing", () => {
+describe("the light that reaches a cell", () => {
+  it("is all of the light in empty space", () => {
     const empty = cells(() => 1);
     const texels = asTexels(openness(empty, SIZE, 5), lampLight(empty, SIZE, unit([-1, 2, 3])));
     expect(texels.every((byte) => byte === 255)).toBe(true);
   });
 
-  it("is the slab's exp(-depth) behind a slab, straight and aslant", () => {
-    const depth = 0.3; // of a cell
+  it("is exp(-depth) behind a slab, straight and at an angle", () => {
+    const depth = 0.3; // optical depth of a cell
     const slab = cells((_x, _y, z) => (z >= 14 && z < 18 ? Math.exp(-depth) : 1));
     for (const towards of [[0, 0, 1], unit([0.4, -0.3, 1]), unit([-0.6, 0.6, 0.9])] as Vec3[]) {
       const lit = lampLight(slab, SIZE, towards);
       const behind = Math.exp((-4 * depth) / towards[2]);
       expect(lit[at(12, 12, 12)]).toBeCloseTo(behind, 5);
-      expect(lit[at(12, 12, 20)]).toBe(1); // before it
-      const half = Math.exp((-2.5 * depth) / towards[2]); // in the middle of its third cell
+      expect(lit[at(12, 12, 20)]).toBe(1); // in front of the slab
+      const half = Math.exp((-2.5 * depth) / towards[2]); // in the middle of the slab's third cell
       expect(lit[at(12, 12, 15)]).toBeCloseTo(half, 5);
     }
   });
 
-  it("comes from each side alike", () => {
+  it("is the same from each side", () => {
     const ball = (x: number, y: number, z: number) =>
       Math.hypot(x - MIDDLE, y - MIDDLE, z - MIDDLE) < 4 ? 0.2 : 1;
     const through = cells(ball);
@@ -55,7 +55,7 @@ describe("what reaches a cell of the light", () => {
     for (const each of shade) expect(each).toBeCloseTo(shade[0], 9);
   });
 
-  it("is all of the surroundings before a flat wall, less in a corner, least in a hollow", () => {
+  it("is full in front of a flat wall, less in a corner and least in a cavity", () => {
     const open = (solid: (x: number, y: number, z: number) => boolean) =>
       openness(
         cells((...p) => (solid(...p) ? 0 : 1)),
@@ -64,24 +64,25 @@ describe("what reaches a cell of the light", () => {
       );
     const wall = open((_x, _y, z) => z < 10);
     expect(wall[at(12, 12, 10)]).toBeGreaterThan(0.97);
-    expect(wall[at(12, 12, 16)]).toBe(1); // farther than the radius
+    expect(wall[at(12, 12, 16)]).toBe(1); // farther away than the radius
     const corner = open((x, _y, z) => z < 10 || x < 10);
     const radius = (x: number, y: number, z: number) =>
       Math.hypot(x - MIDDLE, y - MIDDLE, z - MIDDLE);
     const shell = open((...p) => radius(...p) > 2 && radius(...p) < 6);
     expect(corner[at(10, 12, 10)]).toBeLessThan(0.9);
     expect(shell[at(12, 12, 12)]).toBeLessThan(corner[at(10, 12, 10)]);
-    expect(shell[at(12, 12, 18)]).toBeGreaterThan(0.97); // its outside
+    expect(shell[at(12, 12, 18)]).toBeGreaterThan(0.97); // outside the shell
     expect(shell[at(12, 12, 18)]).toBeGreaterThan(1.5 * shell[at(12, 12, 12)]);
   });
 
-  it("is the surroundings' by the same falling weights in all directions", () => {
+  it("falls with the distance of occluders by the same weights in all directions", () => {
     const far = 3;
     const seen = ([x, y, z]: Vec3) => {
       const one = cells((...p) => (p.join() === [12 + x, 12 + y, 12 + z].join() ? 0 : 1));
       return openness(one, SIZE, 5)[at(12, 12, 12)];
     };
-    // a single cell hides its direction's weight; OPEN is what is left of it before a wall
+    // a single cell takes away the weight of its direction; OPEN is the share left in front of a
+    // wall
     const left = 1 - (1 / 21) * (1 - (far - 0.5) / 5);
     const axes: Vec3[] = [
       [far, 0, 0],
@@ -92,7 +93,7 @@ describe("what reaches a cell of the light", () => {
     for (const place of axes) expect(seen(place)).toBeCloseTo(Math.min(1, left / 0.72), 5);
   });
 
-  it("is the same each time", () => {
+  it("is the same in each run", () => {
     const through = cells((x, y, z) => ((x * 7 + y * 3 + z * 5) % 11) / 11);
     const make = () =>
       asTexels(openness(through, SIZE, 4.5), lampLight(through, SIZE, unit([1, -2, 0.5])));
@@ -101,7 +102,7 @@ describe("what reaches a cell of the light", () => {
 });
 
 describe("the grid of cells", () => {
-  it("has no more cells than it may, and as fine ones as that leaves", () => {
+  it("has at most the allowed number of cells, and no larger cells than needed", () => {
     for (const max of [
       [10, 10, 10],
       [67, 27, 13],
@@ -121,7 +122,7 @@ describe("the grid of cells", () => {
 
   const grid = gridRound({ min: [0, 0, 0], max: [16, 16, 16] }, 18 ** 3);
 
-  /** A tile of 16 um with rows against y, as those of a bundle run, of one value. */
+  /** A tile of 16 um with one value, whose rows run against y as in a bundle. */
   function tile(value: number, opacity: number): TileMatter {
     const opacities = new Uint8Array(256);
     opacities[value] = opacity;
@@ -136,21 +137,21 @@ describe("the grid of cells", () => {
     };
   }
 
-  it("lets through what the march does over a cell's length", () => {
+  it("transmits as much as the march over the length of a cell", () => {
     expect(grid.edge).toBeCloseTo(1, 2);
     const through = throughCells(grid, [tile(9, 51)], null);
     const [n] = grid.size;
     expect(through[(8 * n + 8) * n + 8]).toBeCloseTo(0.8 ** (2 * grid.edge), 5);
-    expect(through[0]).toBe(1); // the margin
+    expect(through[0]).toBe(1); // in the margin
     const both = throughCells(grid, [tile(9, 51), tile(9, 51)], null);
     expect(both[(8 * n + 8) * n + 8]).toBeCloseTo(1 - 2 * (1 - 0.8 ** (2 * grid.edge)), 5);
   });
 
-  it("looks rows up against y", () => {
+  it("reads rows against y", () => {
     const given = tile(9, 255);
     const { texels } = given.channels[0];
     texels.forEach((_, i) => {
-      texels[i] = Math.floor(i / 8) % 8 < 4 ? 9 : 0; // the first rows are the highest y
+      texels[i] = Math.floor(i / 8) % 8 < 4 ? 9 : 0; // the first rows have the highest y
     });
     const through = throughCells(grid, [given], null);
     const [n] = grid.size;
@@ -158,7 +159,7 @@ describe("the grid of cells", () => {
     expect(through[(8 * n + 14) * n + 8]).toBeCloseTo(0, 3);
   });
 
-  it("is empty where it is cut away", () => {
+  it("is empty where it is clipped", () => {
     const box = { min: [0, 0, 0], max: [16, 16, 8] } as const;
     const through = throughCells(grid, [tile(9, 255)], {
       box,
@@ -171,9 +172,9 @@ describe("the grid of cells", () => {
     });
     const [n] = grid.size;
     expect(through[(4 * n + 8) * n + 4]).toBeCloseTo(0, 3);
-    expect(through[(12 * n + 8) * n + 4]).toBe(1); // beyond the box
-    expect(through[(4 * n + 8) * n + 12]).toBe(1); // above the plane
+    expect(through[(12 * n + 8) * n + 4]).toBe(1); // outside the box
+    expect(through[(4 * n + 8) * n + 12]).toBe(1); // beyond the plane
     expect(through[(2 * n + 2) * n + 1]).toBe(1); // in the corner
-    expect(through[(2 * n + 2) * n + 4]).toBeCloseTo(0, 3); // beside it
+    expect(through[(2 * n + 2) * n + 4]).toBeCloseTo(0, 3); // beside the corner
   });
 });

@@ -1,23 +1,31 @@
 /**
- * What of the light reaches each cell of a coarse grid: of the surroundings (ambient occlusion, within a
- * radius), and of a lamp (shadows). Pure arrays.
+ * The light that reaches each cell of a coarse grid: from the surroundings (ambient occlusion
+ * within a radius) and from a lamp (shadows). Plain arrays.
  *
- * The surroundings as local ambient occlusion (Hernell, Ljung & Ynnerman 2010), with the meshes' own
- * weights: a hit counts less the farther it is. The lamp plane by plane, as half-angle slicing does it
- * (Kniss et al. 2003): each plane across the lamp's way takes over what the one before lets through.
+ * The surroundings use local ambient occlusion (Hernell, Ljung & Ynnerman 2010) with the same
+ * weights as the meshes: a hit counts less if it is farther away. The lamp's light is computed
+ * plane by plane, like half-angle slicing (Kniss et al. 2003): each plane across the lamp's
+ * direction receives the light that the previous plane transmits.
  */
 import type { Size3 } from "../../bundle/ktx2";
 import type { Vec3 } from "../../math/vec3";
 
-/** Weights of 26 directions on a sphere, along axes, edges and corners: Lebedev's, of degree 7. */
+/**
+ * Weights of 26 directions on a sphere, along axes, edges and corners: the Lebedev rule of degree
+ * 7.
+ */
 const WEIGHTS = [0, 1 / 21, 4 / 105, 9 / 280] as const;
-/** The share of the surroundings that a point before a flat wall sees, a cell away: it counts as open. */
+/**
+ * Share of the surroundings that a point one cell in front of a flat wall sees; it counts as fully
+ * open.
+ */
 const OPEN = 0.72;
 
 /**
- * The share of the surroundings, 0..1, that is seen from each cell; before a flat wall it is 1.
+ * Returns the share of the surroundings, 0 to 1, that is seen from each cell; 1 in front of a flat
+ * wall.
  *
- * @param through share of the light that goes through each cell, x fastest
+ * @param through share of light that passes each cell, x fastest
  * @param radius in cells
  */
 export function openness(through: Float32Array, size: Size3, radius: number): Float32Array {
@@ -25,7 +33,8 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
   const pad = Math.ceil(radius);
   const row = nx + 2 * pad;
   const plane = row * (ny + 2 * pad);
-  // a border that lets all through spares every test for the grid's end; by length of a step
+  // A transparent border saves all tests for the end of the grid. There is one array for each
+  // length of a step.
   const padded = [1, Math.SQRT2, Math.sqrt(3)].map((length) => {
     const cells = new Float32Array(plane * (nz + 2 * pad)).fill(1);
     for (let z = 0, from = 0; z < nz; z++) {
@@ -46,14 +55,14 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
         const length = Math.sqrt(kind);
         const cells = padded[kind - 1];
         const step = dz * plane + dy * row + dx;
-        // a hit counts by how near the cell's front is
+        // a hit counts by the nearness of the cell's front
         const near = Float32Array.from({ length: Math.floor(radius / length) }, (_, k) =>
           Math.max(0, 1 - ((k + 0.5) * length) / radius),
         );
         for (let z = 0, to = 0; z < nz; z++) {
           for (let y = 0; y < ny; y++, to += nx) {
             const at = (z + pad) * plane + (y + pad) * row + pad;
-            seeRow(seen, to, nx, isDimmed, cells, at, step, near, WEIGHTS[kind]);
+            addRow(seen, to, nx, isDimmed, cells, at, step, near, WEIGHTS[kind]);
           }
         }
       }
@@ -63,7 +72,7 @@ export function openness(through: Float32Array, size: Size3, radius: number): Fl
   return seen;
 }
 
-/** The share of light that goes a way through each cell of a row, in edges. */
+/** The share of light that passes each cell of a row along a step of this length, in cell edges. */
 function copyRow(
   cells: Float32Array,
   to: number,
@@ -74,12 +83,12 @@ function copyRow(
 ): void {
   for (let x = 0; x < count; x++) {
     const clear = through[from + x];
-    cells[to + x] = clear === 1 ? 1 : clear ** length; // most are, and powers take long
+    cells[to + x] = clear === 1 ? 1 : clear ** length; // most cells are clear, and powers are slow
   }
 }
 
-/** Add what the cells of a row see in one direction. */
-function seeRow(
+/** Adds the light that the cells of a row receive from one direction. */
+function addRow(
   seen: Float32Array,
   to: number,
   count: number,
@@ -104,7 +113,7 @@ function seeRow(
   }
 }
 
-/** 1 where a cell that takes light lies within so many cells along each axis: elsewhere nothing is hidden. */
+/** 1 where any cell within `reach` along each axis takes light; elsewhere nothing is occluded. */
 function dimmedWithin(through: Float32Array, size: Size3, reach: number): Uint8Array {
   let found = new Uint8Array(through.length);
   for (let i = 0; i < found.length; i++) found[i] = through[i] === 1 ? 0 : 1;
@@ -124,9 +133,9 @@ function dimmedWithin(through: Float32Array, size: Size3, reach: number): Uint8A
 }
 
 /**
- * The share of a far lamp's light, 0..1, that comes to the middle of each cell.
+ * Returns the share of a distant lamp's light, 0 to 1, that reaches the middle of each cell.
  *
- * @param towards the lamp, of unit length
+ * @param towards unit direction to the lamp
  */
 export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Float32Array {
   const strides = [1, size[0], size[0] * size[1]] as const;
@@ -134,13 +143,14 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
   const [p, q] = [0, 1, 2].filter((axis) => axis !== along);
   const [np, nq, planes] = [size[p], size[q], size[along]];
   const forward = towards[along] > 0; // then the last plane is lit first
-  // where the way to the lamp meets the plane before, in cells aside
+  // where the way to the lamp crosses the previous plane, in cells to the side
   const length = 1 / Math.abs(towards[along]);
   const [aside, up] = [towards[p] * length, towards[q] * length];
   const [di, dj] = [Math.floor(aside), Math.floor(up)];
   const [fi, fj] = [aside - di, up - dj];
   const lit = new Float32Array(through.length);
-  let before = new Float32Array(np * nq).fill(1); // what leaves the cells of the plane before
+  // Light that leaves the cells of the previous plane.
+  let before = new Float32Array(np * nq).fill(1);
   let leaving = new Float32Array(np * nq);
   const at = (i: number, j: number) =>
     i < 0 || j < 0 || i >= np || j >= nq ? 1 : before[j * np + i];
@@ -164,7 +174,7 @@ export function lampLight(through: Float32Array, size: Size3, towards: Vec3): Fl
   return lit;
 }
 
-/** Both, interleaved, as bytes. */
+/** Interleaves both as bytes. */
 export function asTexels(open: Float32Array, lit: Float32Array): Uint8Array<ArrayBuffer> {
   const texels = new Uint8Array(2 * open.length);
   for (let i = 0; i < open.length; i++) {

@@ -1,11 +1,12 @@
 /**
- * Asks the worker for what shades. While a function is dragged or the view turns, more is asked for than
- * it can make: it has one request at a time, and the newest takes the place of the one that waits.
+ * Requests shading from a worker. While a function is dragged or the view turns, there are more
+ * requests than the worker can answer. So it gets one request at a time, and the newest replaces
+ * the one that waits.
  */
 import type { Grid } from "./coarse_matter";
 import type { Matter, ShadingRequest } from "./shading_maker";
 
-/** The part of a Worker that the client uses, so that tests need none. */
+/** The part of a Worker that the client uses, so that tests need no worker. */
 export type ShadingPort = Pick<
   Worker,
   "postMessage" | "terminate" | "onmessage" | "onerror" | "onmessageerror"
@@ -21,11 +22,11 @@ export class ShadingClient {
   private port: ShadingPort | null = null;
   private running: Grid | null = null;
   private waiting: ShadingRequest | null = null;
-  /** Of the last matter that was sent. */
+  /** Grid of the last matter that was sent. */
   private grid: Grid | null = null;
   private hasFailed = false;
 
-  /** @param onFault once: from then on nothing is shaded anew */
+  /** @param onFault called once; after that there is no new shading */
   constructor(
     private readonly onShading: (shading: Shading) => void,
     private readonly onFault: (error: Error) => void,
@@ -61,7 +62,7 @@ export class ShadingClient {
       if (grid !== null) this.onShading({ grid, texels: data });
     };
     port.onerror = (event) => {
-      event.preventDefault(); // reported, so not printed on the console again
+      event.preventDefault(); // reported, so it need not be printed on the console too
       this.fail(event.message || "the worker's script did not load");
     };
     port.onmessageerror = () => this.fail("its answer can't be read");
@@ -71,7 +72,7 @@ export class ShadingClient {
   private fail(reason: string): void {
     this.hasFailed = true;
     this.running = this.waiting = null;
-    this.onFault(new Error(`volumes can't shade one another: ${reason}`));
+    this.onFault(new Error(`volumes are drawn without shading: ${reason}`));
   }
 
   dispose(): void {

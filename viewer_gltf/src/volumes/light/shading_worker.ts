@@ -1,4 +1,4 @@
-/** Module worker: what shades, off the thread that draws. See `shading_client.ts`. */
+/** Module worker that computes shading away from the main thread. See `shading_client.ts`. */
 import { ShadingMaker, type ShadingRequest } from "./shading_maker";
 
 const maker = new ShadingMaker();

@@ -1,7 +1,7 @@
-// March the volume of one tile, up to CHANNELS channels together, front to back. What lies in front
-// of the nearest translucent surface, a pane, and what lies behind it come out apart: the pane itself
-// is drawn between them.
-// Space of the ray: um from the box's low corner, y up, so anisotropic voxels need no care.
+// Marches the volume of one tile, up to CHANNELS channels together, front to back. The part in
+// front of the nearest translucent surface (the pane) and the part behind it are separate outputs,
+// because the pane is drawn between them.
+// The ray is in um from the box's low corner, y up, so anisotropic voxels need no special care.
 // After Engel et al., Real-Time Volume Graphics (2006): opacity correction, early termination.
 precision highp float;
 precision highp sampler3D;
@@ -9,65 +9,68 @@ precision highp sampler2DArray;
 precision highp usampler3D;
 
 uniform vec3 uSize;  // um
-uniform vec3 uTexLow;  // texture coordinates at the box's low corner ...
-uniform vec3 uTexHigh;  // ... and at its high corner
-uniform vec3 uTexels;  // of mip level 0
-uniform float uVoxel;  // um: the opacities of the transfer functions hold for a path this long
-uniform float uDensity;  // ... times this
+uniform vec3 uTexLow;  // texture coordinates at the box's low corner
+uniform vec3 uTexHigh;  // texture coordinates at the box's high corner
+uniform vec3 uTexels;  // texels of mip level 0
+uniform float uVoxel;  // um: length of path for which the opacities of the transfer functions hold
+uniform float uDensity;  // factor of uVoxel
 uniform float uMinStep;  // um
-uniform vec4 uFloor;  // intensities of each channel up to which its table shows nothing
-uniform vec4 uContrast;  // factor to the gradients of each channel, by which they are shaded
+uniform vec4 uFloor;  // for each channel: intensities up to this are invisible
+uniform vec4 uContrast;  // for each channel: factor of the gradients used for shading
 #ifdef MAXIMUM
-uniform vec4 uWindowLow;  // intensities of each channel that are dark ...
-uniform vec4 uWindowHigh;  // ... and bright
+uniform vec4 uWindowLow;  // for each channel: intensity that is dark
+uniform vec4 uWindowHigh;  // for each channel: intensity that is bright
 #endif
 uniform int uSteps;  // for the whole ray, at most MAX_STEPS
-uniform int uSpare;  // of these, one for each other tile
-uniform vec3 uAllLow;  // um, the same space: the box around all tiles that are marched ...
-uniform vec3 uAllHigh;  // ... which share the ray's steps by length
-uniform float uBrickSlack;  // bricks by which a coarse mip level smears beyond its brick
+uniform int uSpare;  // steps reserved for the other tiles, one each
+uniform vec3 uAllLow;  // um, the same space: low corner of the box around all marched tiles
+uniform vec3 uAllHigh;  // high corner; these tiles share the ray's steps by length
+uniform float uBrickSlack;  // bricks by which a coarse mip level spreads beyond its brick
 uniform vec3 uColor[CHANNELS];  // linear RGB
 #ifdef DISC
-uniform bvec4 uInDisc;  // which channels show in the disc alone
+uniform bvec4 uInDisc;  // channels that are shown only in the disc
 uniform bool uAllInDisc;
-uniform vec3 uApex;  // um: the disc is a cone from here ...
-uniform vec3 uAxis;  // ... along this unit vector
+uniform vec3 uApex;  // um: apex of the disc's cone
+uniform vec3 uAxis;  // its axis, a unit vector
 uniform vec2 uDisc;  // cosines of its inner and outer radius
-uniform float uReach;  // cosine of what is marched of it: a little more, for pixels that mix others
-uniform bool uIsCrossing;  // all that is marched shows in the disc alone
+// Cosine of the marched radius, slightly larger for pixels that mix with others.
+uniform float uReach;
+uniform bool uIsCrossing;  // whether all marched channels are shown only in the disc
 #endif
-uniform float uPresence;  // 0..1: volumes fade in once they have come
+uniform float uPresence;  // 0 to 1: volumes fade in when they are loaded
 uniform vec3 uClipLow;  // um: nothing outside is drawn
 uniform vec3 uClipHigh;
-uniform vec4 uClipPlane;  // xyz unit normal, w um: nothing with dot(normal, p) > w is drawn
-uniform vec4 uCorner[3];  // nothing with that for all three is drawn
+uniform vec4 uClipPlane;  // xyz unit normal, w um: points with dot(normal, p) > w are not drawn
+uniform vec4 uCorner[3];  // points for which this holds for all three planes are not drawn
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // with STREAM_BRICK
-uniform sampler3D uOldVolume;  // what the volume takes the place of, at another mip level
-uniform float uFresh;  // 0..1: share of the new one
-uniform sampler3D uOccupancy;  // bricks to the nearest visible one / 255
-uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor to the colour, A opacity a voxel
+uniform sampler3D uOldVolume;  // the volume before, at another mip level
+uniform float uFresh;  // share of the new volume, 0 to 1
+uniform sampler3D uOccupancy;  // distance to the nearest visible brick, in bricks / 255
+uniform sampler2D uLut;  // 256 x CHANNELS: RGB factor of the colour, A opacity per voxel
 #ifdef TWO_D
-uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by value and steepness
+uniform sampler2DArray uTables2d;  // 256 x 64 x CHANNELS: the same by intensity and steepness
 #endif
 uniform sampler2D uSceneDepth;
 uniform sampler2D uPaneDepth;
 uniform bool uHasPane;  // whether any surface is translucent
-uniform vec3 uKeyLight;  // what a white surface sends on that faces the lamp ...
-uniform vec3 uFillLight;  // ... the weaker one ...
-uniform vec3 uSkyLight;  // ... the sky, and the ground
-uniform vec3 uGroundLight;
-uniform float uGloss;  // of the lamp's light, at most
-uniform sampler3D uReached;  // light that comes to each cell round all volumes: around, and the lamp's
+uniform vec3 uKeyLight;  // light that a white surface reflects when it faces the key light
+uniform vec3 uFillLight;  // the same for the fill light
+uniform vec3 uSkyLight;  // the same for the sky
+uniform vec3 uGroundLight;  // the same for the ground
+uniform float uGloss;  // largest share of the key light in a highlight
+// Light that reaches each cell around all volumes: x from all around, y from the lamp.
+uniform sampler3D uReached;
 uniform mat4 uToShading;  // from the box, um, to its texture coordinates
 uniform float uShadingCell;  // um
-uniform float uDepthShading;  // 0..1: by how much it counts
+uniform float uDepthShading;  // strength of the shading, 0 to 1
 uniform sampler2D uNoise;  // blue noise
-uniform float uPhase;  // 0..1: by how much it is shifted in this frame
-uniform vec4 uEye;  // the eye's part of the picture: x, y, width, height, pixels ...
-uniform vec4 uPart;  // ... and of what is drawn here, which may have fewer
+uniform float uPhase;  // shift of the noise in this frame, 0 to 1
+uniform vec4 uEye;  // the eye's part of the frame: x, y, width, height, pixels
+uniform vec4 uPart;  // its part of the image that is drawn here, which may have fewer pixels
 
-// At a sample that is covered: else rays at a tile's rim would miss the tile and leave a seam.
+// At a covered sample, because otherwise rays at a tile's edge would miss the tile and leave a
+// seam.
 centroid in vec3 vPosition;
 flat in vec3 vEye;
 flat in vec3 vLight;
@@ -76,8 +79,8 @@ flat in vec3 vUp;
 flat in vec2 vDepth;
 centroid in float vViewZ;
 
-layout(location = 0) out vec4 oColor;  // linear, premultiplied: up to the pane, or all
-layout(location = 1) out vec4 oBehind;  // beyond the pane
+layout(location = 0) out vec4 oColor;  // linear, premultiplied: up to the pane, or everything
+layout(location = 1) out vec4 oBehind;  // behind the pane
 
 #include <chunks/intersect_box>
 #include <chunks/clip_span>
@@ -104,25 +107,29 @@ layout(location = 1) out vec4 oBehind;  // beyond the pane
 const float NOWHERE = 1e30;
 
 #ifdef SUM
-// Light of what is opaque all along the mean edge of all tiles that are marched. The screen shows thin and
-// deep things: a tenth of it is a third as bright, and few specimens are more than half full.
+// Light of opaque matter over the mean edge of all marched tiles. Screens show thin and thick
+// structures: a tenth of the light looks a third as bright, and few specimens are more than half
+// full.
 const float SUM_LIGHT = 4.0;
 #endif
 #ifdef MAXIMUM
-// The largest value of each channel in its colour, from the first that its table shows to the window's
-// end, where half-way is half as bright on the screen, as on a microscope's; as opaque as it is bright.
+// The largest value of each channel in the channel's colour, from the first visible intensity to
+// the end of the window. Half-way is half as bright on the screen, as in a microscope's image. The
+// opacity equals the brightness.
 vec4 brightest(vec4 largest) {
   vec4 low = max(uWindowLow, uFloor);
   vec4 share = clamp((largest - low) / max(uWindowHigh - low, 1e-3), 0.0, 1.0);
-  share = pow(share, vec4(2.2));  // the screen's
+  share = pow(share, vec4(2.2));  // the gamma of the screen
   vec3 color = vec3(0.0);
-  // channels as tiles are blended: else a border would show where two tiles hold one each
+  // The maximum, like the blending of tiles; otherwise a border would show between two tiles with
+  // one channel each.
   for (int c = 0; c < CHANNELS; c++) color = max(color, share[c] * uColor[c]);
   return vec4(color, min(1.0, max(max(share.x, share.y), max(share.z, share.w))));
 }
 #endif
 
-// A ray that ended early is opaque: what was left out behind looks as what is in front.
+// A ray that ended early is made opaque: the skipped part behind counts as equal to the part in
+// front.
 vec4 shown(vec4 sum) {
 #if defined(MAXIMUM) || defined(SUM)
   return sum;
@@ -148,7 +155,7 @@ void main() {
   if (uAllInDisc) span = coneSpan(span, vEye, dir);
 #endif
   vec3 scene = sceneDistances(back);
-  // From here on t counts from where the ray comes in: far from the eye, floats would be too coarse.
+  // From here on t starts where the ray enters: far from the eye, floats would be too coarse.
   vec3 start = vEye + span.x * dir;
   float edge = min(span.y, scene.x) - span.x;
   float end = min(span.y, scene.y) - span.x;
@@ -176,24 +183,25 @@ void main() {
   float light = SUM_LIGHT * uVoxel / pow(across.x * across.y * across.z, 1.0 / 3.0);
 #endif
   float t = 0.0;
-  float exit = 0.0;  // of the bricks that are known
+  float exit = 0.0;  // end of the bricks that are known
   int i = 0;
 #if defined(MAXIMUM) || defined(SUM)
-  const float FULL = 2.0;  // no sample veils another
+  const float FULL = 2.0;  // no sample hides another
 #else
   const float FULL = OPAQUE;
 #endif
-  // In legs, to the pane, the edge and the end: so no sample asks what it passes.
-  bool isPast = false;  // the edge
+  // The loop runs in legs: to the pane, to the edge and to the end, so that samples need not test
+  // what they pass.
+  bool isPast = false;  // whether the edge is passed
   for (int leg = 0; leg < 3; leg++) {
     float stop = min(isPast ? end : edge, pane);
     for (; i < steps && t < stop && sum.a < FULL; i++) {
-      // What remains of the ray over what remains of the budget: it always reaches the end.
+      // The rest of the ray divided by the rest of the budget, so that it always reaches the end.
       float dt = max(uMinStep, (end - t) / float(steps - i));
-      // A loop of its own: rays beside each other then sample together, whatever they skipped.
+      // A separate loop, so that neighbouring rays sample together, however much they skipped.
       while (t >= exit) {
         vec2 block = blockAhead(brickStart, brickDir, invBrickDir, t);
-        // By whole steps, so that samples lie where they would without skips.
+        // By whole steps, so that samples lie where they would lie without skipping.
         float skip = block.y * floor((block.x - t) / dt) * dt;
         exit = skip > 0.0 ? t + skip : block.x;
         if (skip <= 0.0) break;
@@ -230,7 +238,7 @@ void main() {
         sum.rgb += light * s.a * s.rgb;
 #else
         if (s.a > 0.0) {
-#ifndef UNLIT  // for the benchmark, whose peers are timed without their light
+#ifndef UNLIT  // for the benchmark, which times other programs without lighting
           vec3 gradient = -face;
           if (t >= uVoxel || face == vec3(0.0)) {
             gradient = gradientAt(p, texPerUm, uContrast * shares);

@@ -1,17 +1,17 @@
-// The volume's box, a unit cube around the origin that modelViewMatrix brings to the eye's space.
-// Its back faces are drawn, so that the ray is there also when the eye is inside.
+// The volume's box, a unit cube around the origin that modelViewMatrix transforms into the eye's
+// space. Its back faces are drawn, so that there is a ray even if the eye is inside.
 uniform vec3 uSize;  // um, edges of the box
 
 centroid out vec3 vPosition;  // um, from the box's low corner
 flat out vec3 vEye;  // um, the same space
-flat out vec3 vLight;  // towards the lamp, the same space, unit length
-flat out vec3 vFill;  // towards the weaker lamp
-flat out vec3 vUp;  // towards the sky
+flat out vec3 vLight;  // unit vector towards the lamp, the same space
+flat out vec3 vFill;  // unit vector towards the fill light
+flat out vec3 vUp;  // unit vector towards the sky
 flat out vec2 vDepth;  // third row of the projection: clip z = x * view z + y
 centroid out float vViewZ;
 
-uniform vec3 uLight;  // towards the lamp, space of the eye
-uniform vec3 uFill;  // towards the weaker lamp
+uniform vec3 uLight;  // towards the lamp, in the eye's space
+uniform vec3 uFill;  // towards the fill light, in the eye's space
 
 void main() {
   vec4 view = modelViewMatrix * vec4(position, 1.0);

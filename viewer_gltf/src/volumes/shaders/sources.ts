@@ -1,4 +1,4 @@
-/** The text of the ray-march, its chunks put in. */
+/** The text of the ray march with its chunks included. */
 import { CHUNKS } from "../../gpu/glsl_chunks";
 import { includeChunks } from "../../gpu/glsl_include";
 import fragment from "./raymarch.frag.glsl?raw";

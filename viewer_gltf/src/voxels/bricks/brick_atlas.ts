@@ -1,6 +1,7 @@
 /**
- * The volumes of one tile as bricks that come by view: an atlas of bricks, and of every cell of STREAM_BRICK^3
- * texels where in the atlas it is to be found (virtual texturing). Stands in for `TileTexture`.
+ * The volumes of one tile as bricks that are streamed by view. An atlas holds the bricks, and an
+ * index gives the brick of each cell of STREAM_BRICK^3 texels (virtual texturing). The class has
+ * the interface of `TileTexture`.
  */
 import {
   ClampToEdgeWrapping,
@@ -14,27 +15,27 @@ import {
 import { brickCounts } from "../skip_bricks";
 import type { Packed } from "../tile_texture";
 import type { VolumeSource } from "../volume_source";
-import type { Brick, BrickLink, Taker } from "./client";
+import type { Brick, BrickLink, BrickReceiver } from "./client";
 import { drawnNodes, NOTHING, rangesOf, STORED, STORED_BYTES, type Table } from "./tree";
 
-/** Most slots along an edge of an atlas: one byte holds a slot's coordinate. */
+/** Largest number of slots along an edge of an atlas: one byte holds a slot's coordinate. */
 const MAX_SLOTS = 254;
-/** Pause between updates with new bricks, ms: each update makes the tables of skips anew. */
+/**
+ * Milliseconds between updates with new bricks, since each update computes the empty-space tables
+ * again.
+ */
 const SHOW_EVERY_MS = 250;
-/** A cell that is the same throughout. */
+/** Level that marks a cell with one uniform value. */
 const UNIFORM = 255;
 
 type Tree = {
-  readonly taker: Taker;
+  readonly receiver: BrickReceiver;
   table: Table | null;
   present: Uint8Array;
-  /** Of each node that has come: its slot. */
   readonly slots: Map<number, number>;
-  /** Bricks that came before the atlas was made. */
   waiting: Brick[];
 };
 
-/** Copies a brick into an atlas, on the GPU. */
 export type Uploader = (atlas: Data3DTexture, slot: readonly number[], texels: Uint8Array) => void;
 
 export class BrickTile {
@@ -48,7 +49,7 @@ export class BrickTile {
   private index: Data3DTexture | null = null;
   private side: readonly [number, number, number] = [0, 0, 0];
   private used = 0;
-  /** Nodes of this level and coarser have room in the atlas. */
+  /** Nodes of this level and coarser ones fit in the atlas. */
   private finest = 0;
   private isStale = false;
   private shown_ms = 0;
@@ -60,7 +61,7 @@ export class BrickTile {
     private readonly limits: Readonly<{ bytes: number; side: number }>,
     private readonly upload: Uploader,
     private readonly onChange: () => void,
-    /** It can't be had as bricks. */
+    /** Called if the tile is not available as bricks. */
     private readonly onRefused: () => void,
   ) {}
 
@@ -69,7 +70,7 @@ export class BrickTile {
     return this.link.isBusy || this.isStale || isComing;
   }
 
-  /** Whether all that the view wants of it has come, and shows. */
+  /** Whether all bricks that the view needs are loaded and shown. */
   get isComplete(): boolean {
     return this.shown !== null && !this.isLoading && !this.link.isAway;
   }
@@ -84,17 +85,20 @@ export class BrickTile {
   }
 
   hasFailed(): boolean {
-    return false; // whole tiles are refused
+    return false; // tiles are refused as a whole
   }
 
   retryFailed(): void {}
 
-  /** Of each channel: what is left out can't be seen if nothing up to this intensity shows. */
+  /**
+   * For each channel: data that was left out is invisible if nothing up to this intensity is
+   * visible.
+   */
   get thresholds(): readonly number[] {
     return [...this.trees.values()].map(({ table }) => table?.threshold ?? -1);
   }
 
-  /** All levels come by view. */
+  /** Wants these volumes; their levels are streamed by view. */
   want(
     sources: ReadonlyMap<string, VolumeSource>,
     _levels?: readonly number[],
@@ -106,21 +110,21 @@ export class BrickTile {
     if (isSame) return;
     this.closeAll();
     for (const [id, { volume }] of sources) {
-      const taker: Taker = {
-        onTable: (table) => this.begin(id, taker, table),
-        onBricks: (bricks) => this.take(id, taker, bricks),
-        // what has come stays when the connection goes
+      const receiver: BrickReceiver = {
+        onTable: (table) => this.begin(id, receiver, table),
+        onBricks: (bricks) => this.take(id, receiver, bricks),
+        // bricks that are loaded stay when the connection is lost
         onRefused: () => {
           if (this.shown === null) this.onRefused();
         },
       };
-      const tree: Tree = { taker, table: null, present: NONE, slots: new Map(), waiting: [] };
+      const tree: Tree = { receiver, table: null, present: NONE, slots: new Map(), waiting: [] };
       this.trees.set(id, tree);
-      this.link.open(this.tile, id, volume.file.sha256, taker);
+      this.link.open(this.tile, id, volume.file.sha256, receiver);
     }
   }
 
-  /** Show what has come since, now and then; whether more is to be shown. */
+  /** Shows newly loaded bricks from time to time. Returns whether more bricks wait to be shown. */
   advance(_dt_s: number, now_ms = performance.now()): boolean {
     if (!this.isStale) return false;
     if (now_ms - this.shown_ms < SHOW_EVERY_MS) return true;
@@ -130,16 +134,16 @@ export class BrickTile {
     return false;
   }
 
-  private treeOf(id: string, taker: Taker): Tree | null {
+  private treeOf(id: string, receiver: BrickReceiver): Tree | null {
     const tree = this.trees.get(id);
-    return tree?.taker === taker ? tree : null;
+    return tree?.receiver === receiver ? tree : null;
   }
 
-  private begin(id: string, taker: Taker, table: Table): void {
-    const tree = this.treeOf(id, taker);
+  private begin(id: string, receiver: BrickReceiver, table: Table): void {
+    const tree = this.treeOf(id, receiver);
     if (tree === null) return;
     if (tree.table !== null) {
-      // on a new connection: of the same volume all is here, of another nothing is
+      // after a reconnection: the same volume is complete here, of another one nothing is
       if (tree.table.nodes[0]?.hash !== table.nodes[0]?.hash) this.onRefused();
       return;
     }
@@ -174,7 +178,7 @@ export class BrickTile {
     this.atlas.minFilter = this.atlas.magFilter = LinearFilter;
     this.atlas.wrapS = this.atlas.wrapT = this.atlas.wrapR = ClampToEdgeWrapping;
     this.atlas.unpackAlignment = 1;
-    this.atlas.source.dataReady = false; // bricks are put into it one by one
+    this.atlas.source.dataReady = false; // bricks are copied into it one by one
     this.atlas.needsUpdate = true;
     const [cx, cy, cz] = tables[0].cells;
     const cells = new Uint8Array(4 * cx * cy * cz * tables.length);
@@ -186,8 +190,8 @@ export class BrickTile {
     this.index.unpackAlignment = 4;
   }
 
-  private take(id: string, taker: Taker, bricks: readonly Brick[]): void {
-    const tree = this.treeOf(id, taker);
+  private take(id: string, receiver: BrickReceiver, bricks: readonly Brick[]): void {
+    const tree = this.treeOf(id, receiver);
     if (tree === null) return;
     if (this.atlas === null) tree.waiting.push(...bricks);
     else this.place(tree, bricks);
@@ -213,7 +217,7 @@ export class BrickTile {
     return [slot % x, Math.floor(slot / x) % y, Math.floor(slot / (x * y))];
   }
 
-  /** The index, and the ranges of what is drawn. */
+  /** Builds the index and the ranges of the drawn bricks. */
   private pack(): void {
     const { atlas, index } = this;
     if (atlas === null || index === null) return;
@@ -241,7 +245,7 @@ export class BrickTile {
       }
       bricks.push(rangesOf(table, drawn, brickCounts(table.size)));
     }
-    if (!isWhole) return; // the root of each comes first, and soon
+    if (!isWhole) return; // the root of each channel comes first and soon
     index.needsUpdate = true;
     const finest = Number.isFinite(level) ? level : 0;
     this.shown = { channels: ids, level: finest, texture: atlas, bricks, index };
@@ -249,7 +253,7 @@ export class BrickTile {
   }
 
   private closeAll(): void {
-    for (const [id, { taker }] of this.trees) this.link.close(this.tile, id, taker);
+    for (const [id, { receiver }] of this.trees) this.link.close(this.tile, id, receiver);
     this.trees.clear();
     this.atlas?.dispose();
     this.index?.dispose();

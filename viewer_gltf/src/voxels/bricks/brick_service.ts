@@ -1,4 +1,4 @@
-/** Volumes as bricks by view, from a host that has them. */
+/** Volumes as bricks streamed by view, from a host that offers them. */
 import { Data3DTexture, RedFormat, Vector3, type WebGLRenderer } from "three";
 import { BrickTile } from "./brick_atlas";
 import { BrickLink } from "./client";
@@ -7,7 +7,7 @@ import { STORED } from "./tree";
 
 export class BrickService {
   private readonly link: BrickLink;
-  /** Tiles that can't be had so: their volumes come as files. */
+  /** Tiles that are not available as bricks; their volumes are loaded as files. */
   private readonly refused = new Set<string>();
   private readonly brick = new Data3DTexture(null, STORED, STORED, STORED);
   private readonly corner = new Vector3();
@@ -27,7 +27,7 @@ export class BrickService {
     return this.link.isBusy;
   }
 
-  /** null: the tile comes as files. */
+  /** The tile as bricks; null if it is loaded as files. */
   tile(
     tile: string,
     limits: Readonly<{ bytes: number; side: number }>,
@@ -42,7 +42,7 @@ export class BrickService {
     return new BrickTile(tile, this.link, limits, this.upload, onChange, refuse);
   }
 
-  /** From now on the tile comes as files. */
+  /** Loads the tile as files from now on. */
   refuse(tile: string): void {
     this.refused.add(tile);
   }

@@ -1,30 +1,33 @@
 /**
- * Tables and bricks of earlier visits, in the browser's own database, under the hash of what they
- * hold. Where there is no database, nothing is kept and nothing fails.
+ * Cache of brick tables and bricks in the browser's database, under the hash of their content.
+ * Without a database nothing is stored and nothing fails.
  */
 
 const NAME = "stereocell-bricks";
 const VERSION = 1;
-/** Most bytes in the cache: beyond it the oldest tables and their bricks go. */
+/** Bytes. Beyond this size, the oldest tables and their bricks are deleted. */
 const LIMIT_BYTES = 512 * 1024 * 1024;
 
 export type KeptTable = Readonly<{
-  /** SHA-256 of the volume's file, and the channel: another's functions leave out other bricks. */
+  /**
+   * SHA-256 of the volume's file, and the channel: the functions of another channel leave out other
+   * bricks.
+   */
   volume: string;
   hash: string;
   bytes: Uint8Array<ArrayBuffer>;
-  /** Of its bricks that are kept. */
+  /** Bytes of its stored bricks. */
   brick_bytes: number;
   used_ms: number;
 }>;
-/** `table`: hash of the one that it came with. */
+/** `table`: hash of the table to which the brick belongs. */
 export type KeptBrick = Readonly<{
   hash: string;
   table: string;
   bytes: Uint8Array<ArrayBuffer>;
 }>;
 
-function asked<T>(request: IDBRequest<T>): Promise<T> {
+function resultOf<T>(request: IDBRequest<T>): Promise<T> {
   return new Promise((resolve, reject) => {
     request.onsuccess = () => resolve(request.result);
     request.onerror = () => reject(request.error);
@@ -38,7 +41,7 @@ function finished(work: IDBTransaction): Promise<void> {
   });
 }
 
-/** The keys of a table's bricks: an array is greater than any text. */
+/** The keys of a table's bricks: in IndexedDB an array is greater than any text. */
 function ofTable(table: string): IDBKeyRange {
   return IDBKeyRange.bound([table], [table, []]);
 }
@@ -53,7 +56,7 @@ export class BrickCache {
         request.result.createObjectStore("tables", { keyPath: "volume" });
         request.result.createObjectStore("bricks", { keyPath: ["table", "hash"] });
       };
-      return new BrickCache(await asked(request));
+      return new BrickCache(await resultOf(request));
     } catch {
       return new BrickCache(null); // a private window, or a browser that forbids it
     }
@@ -62,15 +65,14 @@ export class BrickCache {
   async table(volume: string): Promise<KeptTable | null> {
     return this.safely(null, async (database) => {
       const found = database.transaction("tables").objectStore("tables").get(volume);
-      return ((await asked(found)) as KeptTable | undefined) ?? null;
+      return ((await resultOf(found)) as KeptTable | undefined) ?? null;
     });
   }
 
-  /** The bricks that came with a table. */
   async bricks(table: string): Promise<readonly KeptBrick[]> {
     return this.safely([], (database) => {
       const bricks = database.transaction("bricks").objectStore("bricks");
-      return asked(bricks.getAll(ofTable(table))) as Promise<KeptBrick[]>;
+      return resultOf(bricks.getAll(ofTable(table))) as Promise<KeptBrick[]>;
     });
   }
 
@@ -91,7 +93,7 @@ export class BrickCache {
       const work = database.transaction(["tables", "bricks"], "readwrite");
       const tables = work.objectStore("tables");
       for (const brick of bricks) work.objectStore("bricks").put(brick);
-      const table = (await asked(tables.get(volume))) as KeptTable | undefined;
+      const table = (await resultOf(tables.get(volume))) as KeptTable | undefined;
       if (table !== undefined) {
         const more = bricks.reduce((sum, { bytes }) => sum + bytes.length, 0);
         tables.put({ ...table, brick_bytes: table.brick_bytes + more });
@@ -104,7 +106,7 @@ export class BrickCache {
   private async makeRoom(but: string): Promise<void> {
     const { database } = this;
     if (database === null) return;
-    const tables = (await asked(
+    const tables = (await resultOf(
       database.transaction("tables").objectStore("tables").getAll(),
     )) as KeptTable[];
     let sum = tables.reduce((total, { brick_bytes }) => total + brick_bytes, 0);
@@ -126,7 +128,7 @@ export class BrickCache {
     await finished(work);
   }
 
-  /** A database that is full, or was taken away, is as good as none. */
+  /** Runs a task; a database that is full or was removed counts as none. */
   private async safely<T>(none: T, work: (database: IDBDatabase) => Promise<T>): Promise<T> {
     if (this.database === null) return none;
     try {

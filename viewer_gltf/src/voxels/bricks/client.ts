@@ -1,13 +1,12 @@
-/** The messages between the thread that draws and its worker for `/bricks`. */
+/** Messages between the main thread and its worker for `/bricks`. */
 import { TemporaryError } from "../../bundle/errors";
 import { noteWait } from "../../bundle/retry";
 import { type BrickView, TEXEL_PX } from "./protocol";
 import { parseTable, STORED_BYTES, type Table } from "./tree";
 
-export type LinkAsk =
+export type LinkRequest =
   | Readonly<{ type: "connect"; address: string }>
   | Readonly<{ type: "open"; tile: string; channel: string; source: string }>
-  /** Nothing of this volume is wanted any more. */
   | Readonly<{ type: "close"; tile: string; channel: string }>
   | (Readonly<{ type: "view"; texel_px: number; budget: number }> & BrickView);
 
@@ -23,39 +22,37 @@ export type LinkMessage =
     }>
   | Readonly<{ type: "done" }>
   | Readonly<{ type: "refused"; tile: string; channel: string; text: string }>
-  /** The answer could not be read; the connection begins anew. */
+  /** The answer could not be read; the connection is made again. */
   | Readonly<{ type: "fault"; text: string }>
-  /** The host does not answer, and is tried again; or it answers again. */
+  /** The host does not answer and is tried again, or it answers again. */
   | Readonly<{ type: "away"; isAway: boolean }>
-  /** No connection any more. */
   | Readonly<{ type: "lost"; reason: string }>;
 
 export type Brick = Readonly<{ node: number; texels: Uint8Array<ArrayBuffer> }>;
 
-/** A client that draws one volume. */
-export type Taker = Readonly<{
+/** The receiver of one volume's bricks. */
+export type BrickReceiver = Readonly<{
   onTable: (table: Table) => void;
   onBricks: (bricks: readonly Brick[]) => void;
   onRefused: (text: string) => void;
 }>;
 
-/** Shortest pause between two requests of a view, ms. */
+/** Milliseconds between two requests of a view, at least. */
 const VIEW_EVERY_MS = 200;
-/** Most bytes of bricks for one view: bricks with the largest error come first. */
+/** Bytes of bricks for one view, at most; bricks with the largest error come first. */
 const BUDGET_BYTES = 64 * 1024 * 1024;
 
 export class BrickLink {
   isBusy = false;
   private readonly worker: Worker;
-  private readonly takers = new Map<string, Taker>();
+  private readonly receivers = new Map<string, BrickReceiver>();
   private last = "";
   private asked_ms = 0;
   /** Whether there is a connection, or may be one soon. */
   isOpen = true;
-  /** Whether the host does not answer at present. What has come stays, and nothing is awaited. */
+  /** Whether the host does not answer now. Loaded bricks stay, and nothing is waited for. */
   isAway = false;
 
-  /** @param address of the websocket */
   constructor(
     address: string,
     private readonly onDone: () => void,
@@ -68,27 +65,27 @@ export class BrickLink {
     this.post({ type: "connect", address });
   }
 
-  /** Take what comes of a volume, from the start: also what came before. */
-  open(tile: string, channel: string, source: string, taker: Taker): void {
-    this.takers.set(`${tile}/${channel}`, taker);
+  /** Receives the bricks of a volume from the start, including those that were loaded before. */
+  open(tile: string, channel: string, source: string, receiver: BrickReceiver): void {
+    this.receivers.set(`${tile}/${channel}`, receiver);
     this.isBusy = !this.isAway;
-    this.last = ""; // the same view then asks for more
+    this.last = ""; // so the same view requests more bricks
     this.post({ type: "open", tile, channel, source });
   }
 
-  close(tile: string, channel: string, taker: Taker): void {
+  close(tile: string, channel: string, receiver: BrickReceiver): void {
     const name = `${tile}/${channel}`;
-    if (this.takers.get(name) !== taker) return;
-    this.takers.delete(name);
+    if (this.receivers.get(name) !== receiver) return;
+    this.receivers.delete(name);
     this.post({ type: "close", tile, channel });
   }
 
-  /** Sets the present view; to be called in every frame. */
+  /** Sets the current view. Call it in every frame. */
   look(view: BrickView, now_ms: number): void {
     if (
       !this.isOpen ||
       this.isAway ||
-      this.takers.size === 0 ||
+      this.receivers.size === 0 ||
       now_ms - this.asked_ms < VIEW_EVERY_MS
     )
       return;
@@ -104,7 +101,7 @@ export class BrickLink {
     switch (message.type) {
       case "tree": {
         const name = `${message.tile}/${message.channel}`;
-        this.takers.get(name)?.onTable(parseTable(message.table, `/bricks: ${name}`));
+        this.receivers.get(name)?.onTable(parseTable(message.table, `/bricks: ${name}`));
         break;
       }
       case "bricks": {
@@ -112,7 +109,7 @@ export class BrickLink {
           node,
           texels: message.texels.subarray(i * STORED_BYTES, (i + 1) * STORED_BYTES),
         }));
-        this.takers.get(`${message.tile}/${message.channel}`)?.onBricks(bricks);
+        this.receivers.get(`${message.tile}/${message.channel}`)?.onBricks(bricks);
         break;
       }
       case "done":
@@ -120,7 +117,7 @@ export class BrickLink {
         this.onDone();
         break;
       case "refused":
-        this.takers.get(`${message.tile}/${message.channel}`)?.onRefused(message.text);
+        this.receivers.get(`${message.tile}/${message.channel}`)?.onRefused(message.text);
         break;
       case "fault":
         this.onError(new TemporaryError(message.text, { notice: message.text }));
@@ -130,7 +127,8 @@ export class BrickLink {
         break;
       case "lost":
         this.isOpen = this.isBusy = false;
-        for (const taker of this.takers.values()) taker.onRefused("the connection was lost");
+        for (const receiver of this.receivers.values())
+          receiver.onRefused("the connection was lost");
         break;
     }
   }
@@ -140,18 +138,18 @@ export class BrickLink {
     else this.isOpen = true;
     if (isAway === this.isAway) return;
     this.isAway = isAway;
-    this.last = ""; // the same view asks again
+    this.last = ""; // so the same view is requested again
     noteWait(isAway);
     this.onDone();
   }
 
-  private post(ask: LinkAsk): void {
-    this.worker.postMessage(ask);
+  private post(request: LinkRequest): void {
+    this.worker.postMessage(request);
   }
 
   dispose(): void {
     if (this.isAway) noteWait(false);
     this.worker.terminate();
-    this.takers.clear();
+    this.receivers.clear();
   }
 }

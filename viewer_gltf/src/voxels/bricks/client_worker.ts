@@ -1,24 +1,23 @@
 /**
- * Module worker: the websocket `/bricks`, the cache, and the decoder. The thread that draws gets
- * tables and unpacked bricks, and is asked for nothing else.
+ * Module worker with the websocket `/bricks`, the cache and the decoder. It sends tables and
+ * unpacked bricks to the main thread.
  */
 import { ZSTDDecoder } from "zstddec";
 import { BrickCache, type KeptBrick } from "./cache";
-import type { LinkAsk, LinkMessage } from "./client";
+import type { LinkMessage, LinkRequest } from "./client";
 import { BRICKS_FRAME, type Frame, parseFrame, type ServerMessage, TABLE_FRAME } from "./protocol";
 import { haveBits, hexOf, parseTable, STORED_BYTES, type Table } from "./tree";
 
 /** Bricks in one write to the cache. */
 const BATCH = 64;
-/** Most volumes that one message may name. */
 const MAX_AT_ONCE = 64;
+/** Milliseconds before each attempt to connect again. */
 const RETRY_MS = [500, 1000, 2000, 5000, 10_000];
 
 type Tree = {
   readonly name: string;
   readonly tile: string;
   readonly channel: string;
-  /** Its key in the cache. */
   readonly volume: string;
   readonly hash: string;
   readonly raw: Uint8Array<ArrayBuffer>;
@@ -35,21 +34,21 @@ let address = "";
 let socket: WebSocket | null = null;
 let tries = 0;
 let hasOpened = false;
-/** The requested volumes, to request them again on another connection. */
+/** The wanted volumes, to be requested again on a new connection. */
 const volumes = new Map<string, Volume>();
-/** ... and of these, what this connection was asked for. */
-const askedFor = new Set<string>();
+/** The volumes that were requested on this connection. */
+const requested = new Set<string>();
 const trees = new Map<number, Tree>();
-let view: Extract<LinkAsk, { type: "view" }> | null = null;
+let view: Extract<LinkRequest, { type: "view" }> | null = null;
 let viewId = 0;
-/** Answers are taken one after the other. */
+/** Answers are processed one after the other. */
 let turn: Promise<void> = decoder.init();
 
 function post(message: LinkMessage, transfer: Transferable[] = []): void {
   self.postMessage(message, { transfer });
 }
 
-function say(message: object): void {
+function send(message: object): void {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 }
 
@@ -57,7 +56,7 @@ function connect(): void {
   const made = new WebSocket(address);
   made.binaryType = "arraybuffer";
   socket = made;
-  made.onopen = () => say({ type: "hello", version: 1 });
+  made.onopen = () => send({ type: "hello", version: 1 });
   made.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
     turn = turn.then(() => take(data)).catch((error: unknown) => fail(error));
   };
@@ -65,8 +64,8 @@ function connect(): void {
     if (socket !== made) return;
     socket = null;
     trees.clear();
-    askedFor.clear();
-    // a host that never answered has no bricks after all
+    requested.clear();
+    // a host that never answered does not offer bricks
     const isHost = hasOpened || tries === 0;
     if (hasOpened && tries > 0) post({ type: "away", isAway: true });
     if (!isHost || tries === RETRY_MS.length) post({ type: "lost", reason });
@@ -81,16 +80,16 @@ function fail(error: unknown): void {
 }
 
 async function take(data: string | ArrayBuffer): Promise<void> {
-  if (typeof data === "string") await hear(JSON.parse(data) as ServerMessage);
+  if (typeof data === "string") await handleText(JSON.parse(data) as ServerMessage);
   else {
     const frame = parseFrame(data);
     if (frame.kind === TABLE_FRAME) await takeTable(frame);
     else if (frame.kind === BRICKS_FRAME) await takeBricks(frame);
-    say({ type: "ack", sequence: frame.sequence });
+    send({ type: "ack", sequence: frame.sequence });
   }
 }
 
-async function hear(message: ServerMessage): Promise<void> {
+async function handleText(message: ServerMessage): Promise<void> {
   if (message.type === "welcome") {
     tries = 0;
     hasOpened = true;
@@ -114,7 +113,8 @@ async function hear(message: ServerMessage): Promise<void> {
     trees.set(tree, made);
     if (!table_follows) {
       const kept = await (await cache).table(`${source}/${channel}`);
-      if (kept === null || kept.hash !== hash) throw new Error(`${made.name}: its table is gone`);
+      if (kept === null || kept.hash !== hash)
+        throw new Error(`${made.name}: its table is missing in the cache`);
       made.raw.set(kept.bytes);
       made.filled = table_bytes;
       await begin(tree, made);
@@ -127,7 +127,7 @@ async function hear(message: ServerMessage): Promise<void> {
     for (const tree of trees.values()) await flush(tree);
     if (message.view !== viewId || message.reason === "cancelled") return;
     if (message.reason === "budget")
-      ask(); // the same view goes on
+      requestView(); // the same view continues
     else if (readyTrees().length >= volumes.size) post({ type: "done" });
   }
 }
@@ -143,18 +143,19 @@ async function takeTable({ parts }: Frame): Promise<void> {
     if (tree === undefined) continue;
     const part = decoder.decode(bytes, tree.raw.length - at);
     if (at !== tree.filled || at + part.length > tree.raw.length) {
-      throw new Error(`${tree.name}: its table came out of order`);
+      throw new Error(`${tree.name}: its table arrived out of order`);
     }
     tree.raw.set(part, at);
     tree.filled += part.length;
     if (tree.filled < tree.raw.length) continue;
-    if ((await hashOf(tree.raw)) !== tree.hash) throw new Error(`${tree.name}: broken table`);
+    if ((await hashOf(tree.raw)) !== tree.hash)
+      throw new Error(`${tree.name}: its table is damaged`);
     await (await cache).keepTable(tree.volume, tree.hash, tree.raw);
     await begin(number, tree);
   }
 }
 
-/** A table is whole: hand over what the cache has of its bricks. */
+/** Called when a table is complete: passes on its bricks from the cache. */
 async function begin(number: number, tree: Tree): Promise<void> {
   const table = parseTable(tree.raw, tree.name);
   tree.table = table;
@@ -172,21 +173,20 @@ async function begin(number: number, tree: Tree): Promise<void> {
       tree.present.bits[node] = 1;
       found.push({ node, bytes });
     });
-    handOver(tree, found);
-    say({ type: "have", tree: number, nodes: haveBits(tree.present.bits) });
+    sendBricks(tree, found);
+    send({ type: "have", tree: number, nodes: haveBits(tree.present.bits) });
   }
-  ask();
+  requestView();
 }
 
 type Kept = Readonly<{ node: number; bytes: Uint8Array }>;
 
-/** Unpack bricks for the thread that draws. */
-function handOver({ tile, channel, name }: Tree, bricks: readonly Kept[]): void {
+function sendBricks({ tile, channel, name }: Tree, bricks: readonly Kept[]): void {
   const nodes = new Uint32Array(bricks.length);
   const texels = new Uint8Array(bricks.length * STORED_BYTES);
   bricks.forEach(({ node, bytes }, i) => {
     const unpacked = decoder.decode(bytes, STORED_BYTES);
-    if (unpacked.length !== STORED_BYTES) throw new Error(`${name}: a brick is broken`);
+    if (unpacked.length !== STORED_BYTES) throw new Error(`${name}: a brick is damaged`);
     nodes[i] = node;
     texels.set(unpacked, i * STORED_BYTES);
   });
@@ -200,13 +200,13 @@ async function takeBricks({ parts }: Frame): Promise<void> {
     const expected = tree?.table?.nodes[node]?.hash;
     if (tree === undefined || expected === undefined) continue;
     const copy = bytes.slice();
-    if ((await hashOf(copy)) !== expected) throw new Error(`${tree.name}: a brick is broken`);
+    if ((await hashOf(copy)) !== expected) throw new Error(`${tree.name}: a brick is damaged`);
     tree.present.bits[node] = 1;
     tree.unkept.push({ hash: expected, table: tree.hash, bytes: copy });
     byTree.set(tree, [...(byTree.get(tree) ?? []), { node, bytes: copy }]);
   }
   for (const [tree, bricks] of byTree) {
-    handOver(tree, bricks);
+    sendBricks(tree, bricks);
     if (tree.unkept.length >= BATCH) await flush(tree);
   }
 }
@@ -220,11 +220,11 @@ async function flush(tree: Tree): Promise<void> {
 
 type Volume = Readonly<{ tile: string; channel: string; source: string }>;
 
-/** Ask for trees that this connection was not asked for. */
+/** Requests the volumes that were not requested on this connection. */
 async function open(wanted: readonly Volume[]): Promise<void> {
-  const fresh = wanted.filter(({ tile, channel }) => !askedFor.has(`${tile}/${channel}`));
+  const fresh = wanted.filter(({ tile, channel }) => !requested.has(`${tile}/${channel}`));
   if (fresh.length === 0 || socket?.readyState !== WebSocket.OPEN) return;
-  for (const { tile, channel } of fresh) askedFor.add(`${tile}/${channel}`);
+  for (const { tile, channel } of fresh) requested.add(`${tile}/${channel}`);
   const asked = await Promise.all(
     fresh.map(async ({ tile, channel, source }) => {
       const kept = await (await cache).table(`${source}/${channel}`);
@@ -232,11 +232,11 @@ async function open(wanted: readonly Volume[]): Promise<void> {
     }),
   );
   for (let from = 0; from < asked.length; from += MAX_AT_ONCE) {
-    say({ type: "open", volumes: asked.slice(from, from + MAX_AT_ONCE) });
+    send({ type: "open", volumes: asked.slice(from, from + MAX_AT_ONCE) });
   }
 }
 
-/** Ask for a tree, or hand over anew what is kept of one that is open. */
+/** Requests a volume, or sends again the loaded bricks of one that is open. */
 async function openOne(volume: Volume): Promise<void> {
   const isOf = ({ tile, channel }: Tree) => tile === volume.tile && channel === volume.channel;
   const found = [...trees].find(([, tree]) => isOf(tree));
@@ -247,21 +247,24 @@ async function openOne(volume: Volume): Promise<void> {
   }
 }
 
-/** Trees with a table here, of volumes that are wanted; the server knows which of their bricks the cache has. */
+/**
+ * Trees of wanted volumes whose table is loaded; the server knows which of their bricks are in the
+ * cache.
+ */
 function readyTrees(): readonly number[] {
   return [...trees]
     .filter(([, { isBegun, tile, channel }]) => isBegun && volumes.has(`${tile}/${channel}`))
     .map(([number]) => number);
 }
 
-/** Ask for what the view wants of all trees that are open. */
-function ask(): void {
+/** Requests the bricks that the view needs of all open trees. */
+function requestView(): void {
   if (view === null) return;
   const ready = readyTrees();
   if (ready.length === 0) return;
   const { clip, eye, gaze, pixels_per_radian, texel_px, budget } = view;
   viewId++;
-  say({
+  send({
     type: "view",
     id: viewId,
     trees: ready.slice(-64),
@@ -274,7 +277,7 @@ function ask(): void {
   });
 }
 
-self.addEventListener("message", ({ data }: MessageEvent<LinkAsk>) => {
+self.addEventListener("message", ({ data }: MessageEvent<LinkRequest>) => {
   if (data.type === "connect") {
     address = data.address;
     connect();
@@ -286,6 +289,6 @@ self.addEventListener("message", ({ data }: MessageEvent<LinkAsk>) => {
     volumes.delete(`${data.tile}/${data.channel}`);
   } else {
     view = data;
-    ask();
+    requestView();
   }
 });

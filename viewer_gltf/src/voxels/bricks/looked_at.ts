@@ -1,4 +1,4 @@
-/** Which tiles a view shows too coarsely, the one in the middle of the view first. Pure. */
+/** The tiles that a view shows too coarsely, the one in the middle of the view first. */
 import { Box3, Matrix4, Vector3, Vector4 } from "three";
 import type { Bounds } from "../../bundle/generated/bundle";
 import { type BrickView, TEXEL_PX } from "./protocol";
@@ -6,11 +6,13 @@ import { type BrickView, TEXEL_PX } from "./protocol";
 export type CoarseTile = Readonly<{
   id: string;
   bounds_um: Bounds;
-  /** Longest edge of a texel, um. */
   texel_um: number;
 }>;
 
-/** The tiles in sight whose texels are longer than TEXEL_PX on the screen, by their angle to the gaze. */
+/**
+ * The visible tiles whose texels are longer than TEXEL_PX on the screen, by their angle to the
+ * gaze.
+ */
 export function tilesToSharpen(tiles: readonly CoarseTile[], view: BrickView): readonly string[] {
   const eye = new Vector3(...view.eye);
   const gaze = new Vector3(...view.gaze);
@@ -29,7 +31,10 @@ export function tilesToSharpen(tiles: readonly CoarseTile[], view: BrickView): r
     .map(({ id }) => id);
 }
 
-/** Whether a box is in a frustum, or may be: false if all of its corners lie beyond one of its planes. */
+/**
+ * Whether a box may be in a frustum: false if all of its corners lie beyond one of the frustum's
+ * planes.
+ */
 function isInSight({ min, max }: Bounds, clip: Matrix4): boolean {
   const corners = Array.from({ length: 8 }, (_, i) =>
     new Vector4(

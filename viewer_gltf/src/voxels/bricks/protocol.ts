@@ -1,13 +1,15 @@
-/** Frames and messages of `/bricks`; see docs/brick-stream.md. Pure. */
+/** Frames and messages of `/bricks`; see docs/brick-stream.md. */
 import { BundleError } from "../../bundle/errors";
 
 export const TABLE_FRAME = 1;
 export const BRICKS_FRAME = 2;
 
-/** Longest edge of a texel on the screen, px: beyond it the client asks for finer ones. */
+/**
+ * Pixels. Longest edge of a texel on the screen; if it is longer, the client requests finer texels.
+ */
 export const TEXEL_PX = 1;
 
-/** The camera, in the world, um. */
+/** The camera in the world, um. */
 export type BrickView = Readonly<{
   /** Projection x view, column-major. */
   clip: readonly number[];
@@ -19,7 +21,6 @@ export type BrickView = Readonly<{
 type Part = Readonly<{ tree: number; at: number; bytes: Uint8Array<ArrayBuffer> }>;
 export type Frame = Readonly<{ kind: number; sequence: number; parts: readonly Part[] }>;
 
-/** The server's text messages. */
 export type ServerMessage =
   | Readonly<{ type: "welcome" }>
   | Readonly<{
@@ -38,10 +39,10 @@ export type ServerMessage =
 const HEAD = 16;
 const PART = 12;
 
-/** Throws BundleError. */
+/** Reads a binary frame. Throws BundleError. */
 export function parseFrame(data: ArrayBuffer): Frame {
   const view = new DataView(data);
-  const fault = () => new BundleError("/bricks: expected a frame of version 1");
+  const fault = () => new BundleError("/bricks: a frame is damaged or not of version 1");
   if (data.byteLength < HEAD || view.getUint8(1) !== 1) throw fault();
   const count = view.getUint32(12, true);
   let from = HEAD + count * PART;

@@ -8,7 +8,7 @@ const source = (finer: boolean) =>
   ({ volume: finer ? { finer_size: [64, 64, 64] } : {} }) as unknown as VolumeSource;
 const SOURCES = new Map([["A", source(true)]]);
 
-/** A texture that shows once it is told so. */
+/** A texture that shows a level when the test says so. */
 function texture() {
   const made = {
     shown: null as { level: number } | null,
@@ -52,9 +52,9 @@ function setUp(sources = SOURCES) {
 }
 
 describe("a tile with finer volumes", () => {
-  it("shows its files first, and what is finer once all of it has come", () => {
+  it("shows its files first, and the finer volumes when they are all loaded", () => {
     const { tile, coarse, finer } = setUp();
-    expect(tile.canSharpen).toBe(false); // the files come first
+    expect(tile.canSharpen).toBe(false); // the files are loaded first
     coarse.show(0);
     expect(tile.canSharpen).toBe(true);
     tile.sharpen();
@@ -71,7 +71,7 @@ describe("a tile with finer volumes", () => {
     expect(tile.bytes).toBe(20);
   });
 
-  it("shows its files where what is finer is refused, and asks no more", () => {
+  it("shows its files if finer volumes are refused, and does not request them again", () => {
     const { tile, coarse, finer, asked } = setUp();
     coarse.show(0);
     tile.sharpen();
@@ -81,13 +81,13 @@ describe("a tile with finer volumes", () => {
     expect(tile.shown).toBe(coarse.shown);
   });
 
-  it("shows its files while other channels are wanted, and sharpens them anew", () => {
+  it("shows its files when other channels are wanted, and sharpens them again", () => {
     const { tile, coarse, finer } = setUp();
     coarse.show(0);
     tile.sharpen();
     finer[0].show(0);
     tile.advance(0.1);
-    tile.want(SOURCES, []); // the same, and nothing more of it
+    tile.want(SOURCES, []); // the same channels, no new levels
     expect(tile.shown).toBe(finer[0].shown);
     tile.want(new Map([...SOURCES, ["B", source(true)]]), [0]);
     expect(finer[0].isDisposed).toBe(true);
@@ -102,7 +102,7 @@ describe("a tile with finer volumes", () => {
   });
 });
 
-it("asks for nothing where there is nothing finer", () => {
+it("requests nothing if there is nothing finer", () => {
   const { tile, coarse } = setUp(new Map([["A", source(false)]]));
   coarse.show(0);
   expect(tile.canSharpen).toBe(false);

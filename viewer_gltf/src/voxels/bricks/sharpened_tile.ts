@@ -1,6 +1,7 @@
 /**
- * The volumes of one tile of a source that is not built: coarse ones from files, until finer ones have come as
- * bricks, which the host makes of the source when it is asked for them. Stands in for `TileTexture`.
+ * The volumes of one tile of a source that is not built: coarse volumes from files, then finer ones
+ * as bricks, which the host makes from the source on request. It has the interface of
+ * `TileTexture`.
  */
 import type { Packed, TileTexture } from "../tile_texture";
 import type { VolumeSource } from "../volume_source";
@@ -8,11 +9,13 @@ import type { BrickTile } from "./brick_atlas";
 
 export class SharpenedTile {
   private finer: BrickTile | null = null;
-  /** Whether the finer volumes are drawn. */
   private isSharp = false;
   private isRefused = false;
 
-  /** @param make returns the finer volumes, of which nothing has come yet; null: there are none any more */
+  /**
+   * @param make returns the finer volumes, before anything is loaded; null if there are none any
+   *   more
+   */
   constructor(
     private readonly coarse: TileTexture,
     private readonly make: (onRefused: () => void) => BrickTile | null,
@@ -39,12 +42,11 @@ export class SharpenedTile {
     return this.coarse.isLoading || this.isSharpening;
   }
 
-  /** Whether finer volumes are on their way, or come by view. */
   get isSharpening(): boolean {
     return this.finer?.isLoading === true;
   }
 
-  /** Whether finer volumes may be asked for now: there are some, and the coarse ones show. */
+  /** Whether finer volumes may be requested now: they exist, and the coarse ones are shown. */
   get canSharpen(): boolean {
     const hasFiner = [...this.kept.values()].some(({ volume }) => volume.finer_size !== undefined);
     const isIdle = this.finer === null && !this.isRefused && !this.coarse.isLoading;
@@ -59,7 +61,10 @@ export class SharpenedTile {
     return this.coarse.kept;
   }
 
-  /** Of each channel: what is left out of what is drawn can't be seen if nothing up to this intensity shows. */
+  /**
+   * For each channel: data that was left out is invisible if nothing up to this intensity is
+   * visible.
+   */
   get thresholds(): readonly number[] {
     return this.isSharp ? (this.finer?.thresholds ?? []) : [];
   }
@@ -72,7 +77,10 @@ export class SharpenedTile {
     this.coarse.retryFailed();
   }
 
-  /** Load these channels and levels of the coarse volumes. Of other channels than before nothing finer has come. */
+  /**
+   * Loads these channels and levels of the coarse volumes. If the channels changed, no finer volume
+   * is loaded yet.
+   */
   want(sources: ReadonlyMap<string, VolumeSource>, levels: readonly number[], finest = 0): void {
     const names = [...sources.keys()];
     const isSame = names.join() === [...this.kept.keys()].join();
@@ -83,15 +91,14 @@ export class SharpenedTile {
     this.coarse.want(sources, levels, finest);
   }
 
-  /** Ask for the finer volumes. */
   sharpen(): void {
-    this.finer = this.make(() => this.blur());
+    this.finer = this.make(() => this.showCoarse());
     if (this.finer === null) this.isRefused = true;
     else this.finer.want(this.kept);
   }
 
-  /** From now on, and until other channels are wanted, the coarse volumes are drawn. */
-  blur(): void {
+  /** Draws the coarse volumes from now on, until other channels are wanted. */
+  showCoarse(): void {
     this.isRefused = true;
     this.dropFiner();
     this.onChange();
@@ -100,7 +107,8 @@ export class SharpenedTile {
   advance(dt_s: number): boolean {
     const isFading = this.coarse.advance(dt_s);
     const isStale = this.finer?.advance(dt_s) === true;
-    // the coarse volumes are drawn until all has come that the view wants: the first bricks are coarser than they are
+    // The coarse volumes are drawn until all bricks for the view are loaded, since the first bricks
+    // are coarser.
     if (!this.isSharp && this.finer?.isComplete === true) {
       this.isSharp = true;
       this.onChange();

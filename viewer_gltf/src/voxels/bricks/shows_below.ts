@@ -1,10 +1,12 @@
-/** Bricks leave out voxels that no function showed when they were asked for. */
+/**
+ * Bricks leave out voxels that were invisible under all functions when the bricks were requested.
+ */
 import { type Appearance, floorOf } from "../march_tables";
 import type { TileTexture } from "../tile_texture";
 import { BrickTile } from "./brick_atlas";
 import { SharpenedTile } from "./sharpened_tile";
 
-/** Whether functions show what bricks leave out. */
+/** Whether the functions show voxels that the bricks leave out. */
 export function showsBelow(
   texture: TileTexture | BrickTile | SharpenedTile,
   appearances: readonly Appearance[],

@@ -11,7 +11,7 @@ const hex = (text: string) =>
   );
 
 // The example of docs/brick-stream.md, written by hand: 20 x 3 x 2 texels, threshold 40; a root of
-// level 1, a leaf, an empty node. Hashes and lengths are made up here.
+// level 1, a leaf and an empty node. Hashes and lengths are arbitrary.
 const HEADER = `89534342564 80d0a 0100 4000 10010201 14000000 03000000 02000000 03000000 02000000
   2800 0000 6400000000000000 000102030405060708090a0b0c0d0e0f`;
 const ROOT = `01000398 000000000000 07c8490 00000 00000000 32000000 ${"11".repeat(16)}`;
@@ -19,8 +19,8 @@ const LEAF = `000000bc 000000000000 07c80000 0000 00000000 32000000 ${"22".repea
 const EMPTY = `00010007 010000000000 07070000 0000 00000000 00000000 ${"00".repeat(16)}`;
 const BYTES = hex(HEADER + ROOT + LEAF + EMPTY);
 
-describe("a table of bricks", () => {
-  it("is read as it was written by hand", () => {
+describe("a brick table", () => {
+  it("is read from bytes written by hand", () => {
     const table = parseTable(BYTES, "x");
     expect(table.size).toEqual([20, 3, 2]);
     expect(table.cells).toEqual([2, 1, 1]);
@@ -47,7 +47,7 @@ describe("a table of bricks", () => {
     ]);
   });
 
-  it("is refused where it is none, cut short, or no tree", () => {
+  it("is rejected if it is not a table, is truncated, or is not a tree", () => {
     const changed = (at: number, value: number) => {
       const bytes = BYTES.slice();
       bytes[at] = value;
@@ -66,10 +66,10 @@ describe("a table of bricks", () => {
     }
   });
 
-  it("draws each cell from the finest node that has come", () => {
+  it("draws each cell from the finest loaded node", () => {
     const table = parseTable(BYTES, "x");
     const drawn = (...present: number[]) => [...drawnNodes(table, Uint8Array.from(present))];
-    expect(drawn(0, 0, 0)).toEqual([NOTHING, 2]); // what is empty is known from the table
+    expect(drawn(0, 0, 0)).toEqual([NOTHING, 2]); // empty nodes are known from the table
     expect(drawn(1, 0, 0)).toEqual([0, 2]);
     expect(drawn(1, 1, 0)).toEqual([1, 2]);
     const counts = brickCounts(table.size);
@@ -91,7 +91,7 @@ describe("a frame of bricks", () => {
   const FRAME = `02010000 07000000 09000000 02000000
     03000000 05000000 02000000 00000000 01010000 01000000 aabb cc`;
 
-  it("is read as it was written by hand", () => {
+  it("is read from bytes written by hand", () => {
     expect(parseFrame(hex(FRAME).buffer)).toEqual({
       kind: BRICKS_FRAME,
       sequence: 7,
@@ -102,7 +102,7 @@ describe("a frame of bricks", () => {
     });
   });
 
-  it("is refused where it is cut short, too long or of another version", () => {
+  it("is rejected if it is truncated, too long or of another version", () => {
     const bytes = hex(FRAME);
     for (let length = 0; length < bytes.length; length++) {
       expect(() => parseFrame(bytes.slice(0, length).buffer)).toThrow(BundleError);

@@ -1,14 +1,14 @@
 /**
- * A tree of bricks, from its table; see docs/brick-stream.md. Pure.
+ * A tree of bricks, read from its table; see docs/brick-stream.md.
  *
- * Nodes lie breadth first. A cell is the box of one leaf; what is drawn in it is the finest node
- * that has come, or the constant of an empty one.
+ * Nodes are stored breadth first. A cell is the box of one leaf. It is drawn from the finest loaded
+ * node, or from the constant of an empty node.
  */
 import { BundleError } from "../../bundle/errors";
 import { SKIP_BRICK, STREAM_BRICK } from "../../bundle/generated/constants";
 import type { Size3 } from "../../bundle/ktx2";
 
-/** Texels along an edge of a node's stored brick, with its apron. */
+/** Texels along an edge of a node's stored brick, including its apron. */
 export const STORED = STREAM_BRICK + 2;
 export const STORED_BYTES = STORED ** 3;
 const MAGIC = [0x89, 0x53, 0x43, 0x42, 0x56, 0x48, 0x0d, 0x0a];
@@ -20,17 +20,17 @@ const EMPTY = 1;
 type Node = Readonly<{
   level: number;
   isEmpty: boolean;
-  /** Of an empty node, everywhere. */
+  /** Value of an empty node everywhere. */
   constant: number;
   at: Size3;
-  /** Nothing that is sampled in its box, from its brick or a finer one, leaves this range. */
+  /** Range of all values that are sampled in the node's box, from its brick or from finer ones. */
   range: readonly [number, number];
-  /** Of its brick, hexadecimal; "" if it is empty. */
+  /** Hash of its brick, hexadecimal; "" if it is empty. */
   hash: string;
 }>;
 
 export type Table = Readonly<{
-  /** Texels of the volume, with its apron. */
+  /** Texels of the volume, including its apron. */
   size: Size3;
   /** Leaves along x, y, z. */
   cells: Size3;
@@ -39,12 +39,12 @@ export type Table = Readonly<{
   bricks: number;
 }>;
 
-/** Throws BundleError. */
+/** Reads a brick table. Throws BundleError. */
 export function parseTable(bytes: Uint8Array, name: string): Table {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const isTable = bytes.length >= HEADER && MAGIC.every((value, i) => bytes[i] === value);
   if (!isTable || view.getUint16(8, true) !== VERSION || view.getUint16(10, true) !== HEADER) {
-    throw new BundleError(`${name}: expected a table of bricks, version ${VERSION}`);
+    throw new BundleError(`${name}: not a brick table of version ${VERSION}`);
   }
   const size: Size3 = [0, 1, 2].map((k) => view.getUint32(16 + 4 * k, true)) as [
     number,
@@ -54,12 +54,12 @@ export function parseTable(bytes: Uint8Array, name: string): Table {
   const count = view.getUint32(28, true);
   if (bytes[12] !== STREAM_BRICK || bytes[13] !== 1 || bytes[15] !== 1) {
     throw new BundleError(
-      `${name}: expected bricks of ${STREAM_BRICK} texels with an apron of 1, zstd`,
+      `${name}: bricks have another format; expected ${STREAM_BRICK} texels with an apron of 1, zstd`,
     );
   }
   if (bytes.length !== HEADER + count * RECORD) {
     throw new BundleError(
-      `${name}: expected ${HEADER + count * RECORD} bytes, found ${bytes.length}`,
+      `${name}: table has ${bytes.length} bytes; expected ${HEADER + count * RECORD}`,
     );
   }
   const nodes: Node[] = [];
@@ -78,7 +78,7 @@ export function parseTable(bytes: Uint8Array, name: string): Table {
     });
     next += bitsOf(bytes[at + 2]);
   }
-  if (next !== count) throw new BundleError(`${name}: its nodes are no tree`);
+  if (next !== count) throw new BundleError(`${name}: its nodes do not form a tree`);
   const cells = size.map((n) => Math.ceil(n / STREAM_BRICK)) as [number, number, number];
   const threshold = view.getInt16(36, true);
   return { size, cells, threshold, nodes, bricks: view.getUint32(32, true) };
@@ -94,7 +94,7 @@ function bitsOf(mask: number): number {
   return count;
 }
 
-/** A set of nodes as the message `have` encodes it. */
+/** Encodes a set of nodes as in the message `have`. */
 export function haveBits(present: Uint8Array): string {
   const bits = new Uint8Array(Math.ceil(present.length / 8));
   present.forEach((is, n) => {
@@ -105,18 +105,18 @@ export function haveBits(present: Uint8Array): string {
   return btoa(text);
 }
 
-/** Mark of a cell without a node to draw it from. */
+/** Marks a cell that cannot be drawn from any node. */
 export const NOTHING = 0xffffffff;
 
 /**
- * Of every cell (x fastest) the finest node there is: one with a brick here, or an empty one;
- * NOTHING where none has.
+ * Returns for each cell (x fastest) the finest node from which it can be drawn, one with a loaded
+ * brick or an empty one; NOTHING if there is none.
  *
- * @param present one byte a node: whether its brick has come
+ * @param present one byte for each node: whether its brick is loaded
  */
 export function drawnNodes({ cells, nodes }: Table, present: Uint8Array): Uint32Array {
   const drawn = new Uint32Array(cells[0] * cells[1] * cells[2]).fill(NOTHING);
-  // breadth first: finer nodes come later, and take the cells of their parents
+  // breadth first: finer nodes come later and replace their parents' cells
   nodes.forEach((node, n) => {
     if (!node.isEmpty && present[n] === 0) return;
     const edge = 1 << node.level;
@@ -133,8 +133,8 @@ export function drawnNodes({ cells, nodes }: Table, present: Uint8Array): Uint32
 }
 
 /**
- * Smallest and largest intensity of every brick of SKIP_BRICK^3 texels, interleaved, as the march's and the
- * path tracer's tables want them: of the node that is drawn there.
+ * Smallest and largest intensity of each brick of SKIP_BRICK^3 texels in the drawn nodes,
+ * interleaved, as the tables of the march and the path tracer need them.
  */
 export function rangesOf(
   { cells, nodes }: Table,

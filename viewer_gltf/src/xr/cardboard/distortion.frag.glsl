@@ -1,12 +1,13 @@
 uniform sampler2D uEyes;  // encoded colours, as the canvas has them
 
 in vec2 vUv;
-in vec2 vPicture;
+in vec2 vImage;
 out vec4 oColor;
 
-const float EDGE = 0.02;  // of the picture's width and height, over which it fades to black
+// Share of the image's width and height over which the edge fades to black.
+const float EDGE = 0.02;
 
 void main() {
-  vec2 inside = smoothstep(0.0, EDGE, min(vPicture, 1.0 - vPicture));
+  vec2 inside = smoothstep(0.0, EDGE, min(vImage, 1.0 - vImage));
   oColor = vec4(texture(uEyes, vUv).rgb * inside.x * inside.y, 1.0);
 }

@@ -1,8 +1,9 @@
 /**
- * Puts the two eyes' pictures on the canvas so that the lenses make them straight: a grid over each
- * picture, its vertices moved by the lens's inverse. The distortion is evaluated once for each
- * vertex of a layout, not for each pixel of a frame; between them it is linear, which with 40 cells
- * a side is off by at most 0.42 pixels of a phone 2532 pixels wide (Cardboard v2; v1 0.23).
+ * Draws both eyes' images on the canvas, distorted so that the lenses make them straight again.
+ * A grid lies over each image, and its vertices are moved by the inverse of the lens's distortion.
+ * The grid is computed once for each layout. Between vertices the distortion is taken as linear:
+ * with 40 cells a side the error is at most 0.42 pixels on a phone 2532 pixels wide (Cardboard v2;
+ * v1 0.23).
  */
 import {
   BufferGeometry,
@@ -21,9 +22,10 @@ import vertex from "./distortion.vert.glsl?raw";
 import { eyeTangents, type Screen, type Side, toScreen } from "./lens";
 import type { Profile } from "./viewer_profile";
 
+/** Cells of the grid along each side of an eye's image. */
 const CELLS = 40;
 const SIDES: readonly Side[] = ["left", "right"];
-/** Length of the line between the eyes, as a share of the height: it aligns phone and viewer. */
+/** Length of the line between the eyes, as a share of the height. Users align the phone by it. */
 const LINE_HEIGHT = 0.15;
 const LINE_COLOR = 0x606060;
 
@@ -31,7 +33,7 @@ export class DistortionPass {
   private readonly scene = new Scene();
   private readonly camera = new Camera();
   private readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
-  private readonly kept = new Color();
+  private readonly clearColor = new Color();
 
   constructor() {
     const material = new ShaderMaterial({
@@ -43,17 +45,18 @@ export class DistortionPass {
       depthWrite: false,
     });
     this.mesh = new Mesh(new BufferGeometry(), material);
-    this.mesh.frustumCulled = false; // its positions are those of the screen already
+    this.mesh.frustumCulled = false; // the positions are already in clip space
     this.scene.background = new Color(0);
     this.scene.add(this.mesh);
   }
 
+  /** Computes the grid for other lenses or another screen. */
   setLens(profile: Profile, screen: Screen): void {
     this.mesh.geometry.dispose();
     this.mesh.geometry = meshOf(profile, screen);
   }
 
-  /** @param eyes left eye in the left half, right eye in the right */
+  /** @param eyes image of the left eye in the left half, of the right eye in the right half */
   render(renderer: WebGLRenderer, eyes: WebGLRenderTarget): void {
     this.mesh.material.uniforms.uEyes.value = eyes.texture;
     renderer.setRenderTarget(null);
@@ -63,9 +66,9 @@ export class DistortionPass {
 
   private drawLine(renderer: WebGLRenderer): void {
     const { width, height } = renderer.domElement;
-    const ratio = renderer.getPixelRatio(); // three's rectangles are in CSS pixels
+    const ratio = renderer.getPixelRatio(); // three.js's rectangles are in CSS pixels
     const thickness = Math.max(2, Math.round(ratio));
-    renderer.getClearColor(this.kept);
+    renderer.getClearColor(this.clearColor);
     const alpha = renderer.getClearAlpha();
     renderer.setScissor(
       (Math.floor(width / 2) - thickness / 2) / ratio,
@@ -76,7 +79,7 @@ export class DistortionPass {
     renderer.setScissorTest(true);
     renderer.setClearColor(LINE_COLOR, 1);
     renderer.clear(true, false, false);
-    renderer.setClearColor(this.kept, alpha);
+    renderer.setClearColor(this.clearColor, alpha);
     renderer.setScissorTest(false);
   }
 
@@ -89,7 +92,7 @@ export class DistortionPass {
 function meshOf(profile: Profile, screen: Screen): BufferGeometry {
   const positions: number[] = [];
   const uvs: number[] = [];
-  const pictures: number[] = [];
+  const images: number[] = [];
   const indices: number[] = [];
   SIDES.forEach((side, eye) => {
     const { left, right, bottom, top } = eyeTangents(profile, screen, side);
@@ -103,7 +106,7 @@ function meshOf(profile: Profile, screen: Screen): BufferGeometry {
         const [across, along] = toScreen(profile, screen, side, x, y);
         positions.push(2 * across - 1, 2 * along - 1, 0);
         uvs.push((eye + u) / 2, v);
-        pictures.push(u, v);
+        images.push(u, v);
         if (row === CELLS || column === CELLS) continue;
         const at = first + row * (CELLS + 1) + column;
         const above = at + CELLS + 1;
@@ -114,7 +117,7 @@ function meshOf(profile: Profile, screen: Screen): BufferGeometry {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
   geometry.setAttribute("uv", new Float32BufferAttribute(uvs, 2));
-  geometry.setAttribute("aPicture", new Float32BufferAttribute(pictures, 2));
+  geometry.setAttribute("aImage", new Float32BufferAttribute(images, 2));
   geometry.setIndex(indices);
   return geometry;
 }

@@ -13,8 +13,8 @@ function frustumOf(camera: EyeCameras["both"] | EyeCameras["eyes"][number]["came
   );
 }
 
-describe("the eyes' cameras", () => {
-  it("are as far apart as the lenses, across the head", () => {
+describe("the cameras of the two eyes", () => {
+  it("are as far apart as the lenses, along the head's x axis", () => {
     const cameras = new EyeCameras();
     cameras.fit(CARDBOARD_V2, SCREEN, 844, 390);
     const turn = new Matrix4().makeRotationY(0.7).setPosition(1, 2, 3);
@@ -32,7 +32,7 @@ describe("the eyes' cameras", () => {
     ).toBeCloseTo(0, 12);
   });
 
-  it("have a half of the target each, whatever its width", () => {
+  it("have one half of the render target each, also for an odd width", () => {
     const cameras = new EyeCameras();
     cameras.fit(CARDBOARD_V1, SCREEN, 845, 390);
     expect(cameras.eyes.map(({ viewport }) => viewport.toArray())).toEqual([
@@ -41,7 +41,7 @@ describe("the eyes' cameras", () => {
     ]);
   });
 
-  it("are both within the one that culls for them", () => {
+  it("lie within the frustum that is used for culling", () => {
     const lens = { ...CARDBOARD_V2, fov_deg: { outer: 55, inner: 35, bottom: 40, top: 45 } };
     const cameras = new EyeCameras();
     cameras.fit(lens, SCREEN, 844, 390);

@@ -1,4 +1,7 @@
-/** The two eyes' cameras: one for each half of the target, and one that holds both for culling. */
+/**
+ * The cameras of the two eyes, one for each half of the render target, and one camera around both
+ * for culling.
+ */
 import { ArrayCamera, type Matrix4, PerspectiveCamera, Vector4 } from "three";
 import { eyeTangents, type Screen, type Side, type Tangents } from "./lens";
 import type { Profile } from "./viewer_profile";
@@ -13,7 +16,9 @@ export class EyeCameras {
   readonly eyes: readonly Eye[];
   readonly both: ArrayCamera;
   private apart_m = 0;
-  /** How far behind the eyes the frustum begins that holds both of theirs. */
+  /**
+   * Distance from the eyes back to the apex of the frustum that encloses both eyes' frusta, metres.
+   */
   private behind_m = 0;
 
   constructor() {
@@ -28,7 +33,10 @@ export class EyeCameras {
     this.both.matrixAutoUpdate = false;
   }
 
-  /** @param width of the target, of which each eye has half, and `height`: pixels; `apart_m`: the eyes */
+  /**
+   * @param width of the render target, in pixels; each eye has half of it
+   * @param apart_m distance between the two cameras, metres
+   */
   fit(
     profile: Profile,
     screen: Screen,
@@ -49,7 +57,7 @@ export class EyeCameras {
     project(this.both, NEAR_M + this.behind_m, FAR_M + this.behind_m, outer);
   }
 
-  /** @param head the pose between the eyes, metres */
+  /** @param head pose of the point between the eyes, metres */
   follow(head: Matrix4): void {
     for (const { side, camera } of this.eyes) {
       place(camera, head, ((side === "left" ? -1 : 1) * this.apart_m) / 2, 0);
@@ -58,14 +66,14 @@ export class EyeCameras {
   }
 }
 
-/** The pose of the head, moved along its own x and z. */
+/** Places a camera at the head's pose, moved along the head's own x and z. */
 function place(camera: PerspectiveCamera, head: Matrix4, x_m: number, z_m: number): void {
   camera.matrix.makeTranslation(x_m, 0, z_m).premultiply(head);
   camera.matrix.decompose(camera.position, camera.quaternion, camera.scale);
   camera.updateMatrixWorld(true);
 }
 
-/** A frustum by the tangents of its sides. */
+/** Sets an asymmetric frustum from the tangents of its four sides. */
 function project(camera: PerspectiveCamera, near_m: number, far_m: number, sides: Tangents): void {
   camera.near = near_m;
   camera.far = far_m;

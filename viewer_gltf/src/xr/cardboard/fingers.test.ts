@@ -5,14 +5,14 @@ const HEIGHT = 400;
 const kinds = (gestures: readonly { kind: string }[]) => gestures.map(({ kind }) => kind);
 
 describe("fingers on the split screen", () => {
-  it("tap when they are up again, and not before", () => {
+  it("tap when they are lifted, not when they go down", () => {
     const fingers = new Fingers();
     expect(kinds(fingers.down(1, { x: 50, y: 50 }))).toEqual(["press"]);
-    expect(fingers.move(1, { x: 56, y: 54 }, HEIGHT)).toEqual([]); // a thumb rolls
+    expect(fingers.move(1, { x: 56, y: 54 }, HEIGHT)).toEqual([]); // a thumb rolls a little
     expect(kinds(fingers.up(1))).toEqual(["tap", "release"]);
   });
 
-  it("tap nothing once they have gone their way, also back to where they came from", () => {
+  it("do not tap after a drag, even one that returns to its start", () => {
     const fingers = new Fingers();
     fingers.down(1, { x: 50, y: 50 });
     expect(kinds(fingers.move(1, { x: 90, y: 50 }, HEIGHT))).toEqual(["release", "drag"]);
@@ -20,7 +20,7 @@ describe("fingers on the split screen", () => {
     expect(fingers.up(1)).toEqual([]);
   });
 
-  it("drag by shares of the screen's height, all of their way", () => {
+  it("drag by shares of the screen's height, counted from where they went down", () => {
     const fingers = new Fingers();
     fingers.down(1, { x: 50, y: 50 });
     let [x, y] = [0, 0];
@@ -35,7 +35,7 @@ describe("fingers on the split screen", () => {
     expect(y).toBeCloseTo(35 / HEIGHT, 12);
   });
 
-  it("pinch by two: the ratio of their distances, and the way of their middle", () => {
+  it("pinch: two fingers give the ratio of their distances and the motion of their midpoint", () => {
     const fingers = new Fingers();
     fingers.down(1, { x: 100, y: 100 });
     expect(kinds(fingers.down(2, { x: 200, y: 100 }))).toEqual(["release"]);
@@ -56,10 +56,10 @@ describe("fingers on the split screen", () => {
       expect.closeTo(10 / HEIGHT, 12),
       expect.closeTo(40 / HEIGHT, 12),
     ]);
-    expect([...fingers.up(1), ...fingers.up(2)]).toEqual([]); // neither taps
+    expect([...fingers.up(1), ...fingers.up(2)]).toEqual([]); // no finger taps after a pinch
   });
 
-  it("begin anew after the browser has taken one, and go on by the one that is left", () => {
+  it("start again after the browser cancels one, and go on with the one that is left", () => {
     const fingers = new Fingers();
     fingers.down(1, { x: 0, y: 0 });
     expect(kinds(fingers.cancel(1))).toEqual(["release"]);
@@ -72,7 +72,7 @@ describe("fingers on the split screen", () => {
     ]);
   });
 
-  it("that don't touch do nothing", () => {
+  it("do nothing while they do not touch", () => {
     expect(new Fingers().move(1, { x: 500, y: 0 }, HEIGHT)).toEqual([]);
   });
 });

@@ -1,26 +1,27 @@
 /**
- * Fingers on the split screen: one that goes down and up again taps, which is a Cardboard's button;
- * one that goes its way drags, two pinch. Nothing is tapped before the finger is up. px.
+ * Gestures of fingers on the split screen, in pixels.
+ * A finger that goes down and up again taps, which stands for a Cardboard's button. A finger that
+ * moves drags, and two fingers pinch. A tap is reported only when the finger is lifted.
  */
 export type Place = Readonly<{ x: number; y: number }>;
 
-/** Ways are shares of the screen's height, to the right and down. */
+/** Motions are shares of the screen's height, to the right and down. */
 export type Gesture =
-  /** A finger rests on the screen; until `release` it may go on resting. */
+  /** `press`: a finger rests on the screen, until `release` or `tap`. */
   | Readonly<{ kind: "press" | "release" | "tap" }>
   | Readonly<{ kind: "drag"; x: number; y: number }>
-  /** `factor`: of the fingers' distance. */
+  /** `factor`: ratio of the fingers' distance after and before. */
   | Readonly<{ kind: "pinch"; factor: number; x: number; y: number }>;
 
-/** Way of a finger that still taps, px: a thumb rolls. */
+/** Pixels that a finger may move and still tap, since a thumb rolls. */
 const TAP_PX = 10;
-/** Least distance of two fingers, px: closer ones give no factor. */
+/** Pixels. Two fingers closer than this change no size: the ratio of their distances would jump. */
 const NEAR_PX = 10;
 
 export class Fingers {
-  /** Where each is, in the order in which they came. */
+  /** Position of each finger by its id, in the order in which they went down. */
   private readonly at = new Map<number, Place>();
-  /** Where the only finger went down, while it rests there. */
+  /** Where the only finger went down; null after it has moved, or with a second finger. */
   private rest: Place | null = null;
 
   down(id: number, at: Place): readonly Gesture[] {
@@ -32,10 +33,9 @@ export class Fingers {
     return this.leaveRest();
   }
 
-  /** @param height_px of the screen */
   move(id: number, to: Place, height_px: number): readonly Gesture[] {
     const from = this.at.get(id);
-    if (from === undefined) return []; // a mouse without a button
+    if (from === undefined) return []; // a mouse that moves without a button
     const { rest } = this;
     if (rest !== null && Math.hypot(to.x - rest.x, to.y - rest.y) <= TAP_PX) return [];
     const before = this.pair;
@@ -57,7 +57,7 @@ export class Fingers {
     return [{ kind: "tap" }, ...this.leaveRest()];
   }
 
-  /** The browser takes the finger for itself. */
+  /** The browser has taken over the finger, for example to scroll. */
   cancel(id: number): readonly Gesture[] {
     this.at.delete(id);
     return this.leaveRest();
@@ -69,7 +69,7 @@ export class Fingers {
     return [{ kind: "release" }];
   }
 
-  /** The first two: their middle, and how far they are apart. */
+  /** The first two fingers: their midpoint and their distance; null if there are fewer. */
   private get pair(): (Place & { readonly apart: number }) | null {
     const [a, b] = this.at.values();
     if (a === undefined || b === undefined) return null;
@@ -77,21 +77,23 @@ export class Fingers {
   }
 }
 
-/** Calls `onGesture` for what fingers, or a mouse, do on an element, until `signal`. */
+/**
+ * Calls `onGesture` for gestures of fingers or a mouse on an element, until `signal` is aborted.
+ */
 export function listenForFingers(
   element: HTMLElement,
   onGesture: (gesture: Gesture) => void,
   signal: AbortSignal,
 ): void {
   const fingers = new Fingers();
-  const tell = (gestures: readonly Gesture[]) => {
+  const reportAll = (gestures: readonly Gesture[]) => {
     for (const gesture of gestures) onGesture(gesture);
   };
   const at = ({ clientX: x, clientY: y }: PointerEvent): Place => ({ x, y });
   const on = (
     type: "pointerdown" | "pointermove" | "pointerup" | "pointercancel",
     read: (event: PointerEvent) => readonly Gesture[],
-  ) => element.addEventListener(type, (event) => tell(read(event)), { signal });
+  ) => element.addEventListener(type, (event) => reportAll(read(event)), { signal });
   on("pointerdown", (event) => fingers.down(event.pointerId, at(event)));
   on("pointermove", (event) => {
     return fingers.move(event.pointerId, at(event), Math.max(1, element.clientHeight));

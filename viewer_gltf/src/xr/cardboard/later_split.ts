@@ -1,4 +1,4 @@
-/** The split screen of a phone. Its code comes when it is first wanted. */
+/** The split screen of a phone. Its code is loaded when stereo is first started. */
 import type { WebGLRenderer } from "three";
 import { notLoaded } from "../screen/later_screen";
 import type { Gesture } from "./fingers";
@@ -7,7 +7,7 @@ import { askInTap } from "./user_gesture";
 import type { Profile } from "./viewer_profile";
 
 export type SplitHandlers = Readonly<{
-  /** Loads what stereo draws and listens with. */
+  /** Loads the code that draws stereo and handles input. */
   prepare: () => Promise<unknown>;
   onStart: () => void;
   onEnd: () => void;
@@ -16,7 +16,7 @@ export type SplitHandlers = Readonly<{
 
 export class LaterSplit {
   private session: SplitSession | null = null;
-  /** A split screen that is being asked for. */
+  /** A split screen that is starting: the browser may be asking the user. */
   private starting: Promise<readonly string[]> | null = null;
 
   constructor(
@@ -25,14 +25,14 @@ export class LaterSplit {
     private options: SplitOptions,
   ) {}
 
-  /** The session that shows; null: the screen is not split. */
+  /** The session that is shown, or null if the screen is not split. */
   get running(): SplitSession | null {
     return this.session?.isRunning ? this.session : null;
   }
 
   /**
-   * Must be called from a tap. Throws BundleError in words if the browser or the user refuses. Returns what could not
-   * be had.
+   * Starts the split screen. Must be called from a tap. Returns a message for each feature that the
+   * browser refused. Throws BundleError if it refuses one that stereo needs.
    */
   start(profile: Profile): Promise<readonly string[]> {
     this.starting ??= this.askAndSplit(profile).finally(() => {
@@ -61,13 +61,12 @@ export class LaterSplit {
     return new SplitSession(this.renderer, onStart, onEnd, onGesture, this.options);
   }
 
-  /** Another screen, or other eyes than the lenses are made for. */
+  /** Changes the size of the screen or the distance between the eyes. */
   set(options: SplitOptions): void {
     this.options = options;
     this.session?.set(options);
   }
 
-  /** The phone is in another viewer. */
   setProfile(profile: Profile): void {
     this.session?.setProfile(profile);
   }

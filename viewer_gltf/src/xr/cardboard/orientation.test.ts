@@ -24,63 +24,63 @@ function expectVector(found: readonly number[], wanted: readonly number[]): void
   });
 }
 
-describe("the phone's turn", () => {
-  it("held across, its top to the left, upright and to the north, is none", () => {
+describe("the orientation of the head, read from the phone", () => {
+  it("is the identity in landscape, top to the left, upright and facing north", () => {
     const q = toQuaternion(reading(90, 0, -90), 90);
     expectVector(ahead(q), [0, 0, -1]);
     expectVector(up(q), [0, 1, 0]);
   });
 
-  it("held across the other way, its top to the right, is none too", () => {
+  it("is the identity in landscape with the phone's top to the right", () => {
     const q = toQuaternion(reading(270, 0, 90), 270);
     expectVector(ahead(q), [0, 0, -1]);
     expectVector(up(q), [0, 1, 0]);
   });
 
-  it("held upright is none with the screen at 0", () => {
+  it("is the identity in portrait with the screen at 0 degrees", () => {
     const q = toQuaternion(reading(0, 90, 0), 0);
     expectVector(ahead(q), [0, 0, -1]);
     expectVector(up(q), [0, 1, 0]);
   });
 
-  it("flat on a table looks at the floor", () => {
+  it("faces the floor when the phone lies flat on a table", () => {
     const q = toQuaternion(reading(0, 0, 0), 0);
     expectVector(ahead(q), [0, -1, 0]);
-    expectVector(up(q), [0, 0, -1]); // its upper edge to the north
+    expectVector(up(q), [0, 0, -1]); // the phone's upper edge points north
   });
 
-  it("to the left is counterclockwise from above: from north to west", () => {
+  it("turns from north to west when the phone turns left", () => {
     const q = toQuaternion(reading(180, 0, -90), 90);
     expectVector(ahead(q), [-1, 0, 0]);
     expectVector(up(q), [0, 1, 0]);
   });
 
-  it("upwards raises the view", () => {
-    // Across, the screen tilted to the floor by 30 degrees: its back looks up.
+  it("raises the view when the phone tilts up", () => {
+    // In landscape, the screen tilted to the floor by 30 degrees: its back points up.
     const half = Math.sqrt(3) / 2;
     const q = toQuaternion(reading(270, 180, 60), 90);
     expectVector(ahead(q), [0, 0.5, -half]);
     expectVector(up(q), [0, half, 0.5]);
   });
 
-  it("is smooth where the angles jump, at the horizon", () => {
+  it("is continuous at the horizon, where the angles jump", () => {
     const below = toQuaternion(reading(90, 0, -89.9), 90);
     const above = toQuaternion(reading(270, 180, 89.9), 90);
     expect((below.angleTo(above) * 180) / Math.PI).toBeCloseTo(0.2, 6);
   });
 });
 
-describe("the way ahead", () => {
+describe("the direction that counts as ahead", () => {
   const turned = (yaw_deg: number) => toQuaternion(reading(90 + yaw_deg, 0, -90), 90);
-  /** After a phone has rested so, for a second. */
-  const rested = (head: Quaternion, isAcross = true, heading = FREE_HEADING) => {
-    const first = followHeading(heading, head, isAcross, 0);
-    return followHeading(first, head, isAcross, 1000);
+  /** Heading after the phone has rested for a second. */
+  const rested = (head: Quaternion, isLandscape = true, heading = FREE_HEADING) => {
+    const first = followHeading(heading, head, isLandscape, 0);
+    return followHeading(first, head, isLandscape, 1000);
   };
 
-  it("is where the phone has rested for half a second, level and across, and stays there", () => {
+  it("is fixed where the phone rests for half a second, level and in landscape", () => {
     let heading = followHeading(FREE_HEADING, turned(70), true, 0);
-    heading = followHeading(heading, turned(70.5), true, REST_MS - 10); // heads tremble
+    heading = followHeading(heading, turned(70.5), true, REST_MS - 10); // a head trembles
     expect(heading.isHeld).toBe(false);
     heading = followHeading(heading, turned(70), true, REST_MS);
     expect(heading.isHeld).toBe(true);
@@ -90,7 +90,7 @@ describe("the way ahead", () => {
     expectVector(left.toArray(), [-1, 0, 0]);
   });
 
-  it("goes along while hands lift the phone to the eyes, though it is level on the way", () => {
+  it("follows the phone while hands lift it to the eyes, even if it is level on the way", () => {
     let heading = FREE_HEADING;
     for (let time_ms = 0; time_ms <= 1500; time_ms += 20) {
       heading = followHeading(heading, turned(time_ms / 20), true, time_ms);
@@ -107,7 +107,7 @@ describe("the way ahead", () => {
     expect((heading.yaw_rad * 180) / Math.PI).toBeCloseTo(75, 9);
   });
 
-  it("goes along as long as the phone is in a hand", () => {
+  it("follows the phone while it is held in a hand", () => {
     expect(rested(turned(10), false).isHeld).toBe(false);
     const flat = toQuaternion(reading(30, 0, 0), 0);
     const heading = rested(flat);
@@ -115,7 +115,7 @@ describe("the way ahead", () => {
     expect((heading.yaw_rad * 180) / Math.PI).toBeCloseTo(30, 9);
   });
 
-  it("keeps the horizon: only the heading is taken out", () => {
+  it("changes only the heading, so the horizon stays level", () => {
     const tilted = toQuaternion(reading(270 + 50, 180, 60), 90); // 30 degrees up
     const heading = rested(tilted);
     const pose = new Euler().setFromRotationMatrix(headPose(tilted, heading), "YXZ");
@@ -124,26 +124,26 @@ describe("the way ahead", () => {
     expect(pose.z).toBeCloseTo(0, 9);
   });
 
-  it("turns about the neck: the eyes go where the nose goes", () => {
+  it("moves the eyes around the neck when the head turns", () => {
     const heading = rested(turned(0));
     const eyes = new Vector3().setFromMatrixPosition(headPose(turned(90), heading));
-    expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from before the neck to left of it
+    expectVector(eyes.toArray(), [-0.08, 0, 0.08]); // from in front of the neck to left of it
   });
 });
 
-describe("a head's turn that is predicted", () => {
+describe("the predicted turn of the head", () => {
   const turned = (yaw_deg: number, time_ms: number) => ({
     head: new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), (yaw_deg * Math.PI) / 180),
     time_ms,
   });
   const yaw_deg = (q: Quaternion) => (2 * Math.atan2(q.y, q.w) * 180) / Math.PI;
 
-  it("goes on as fast as it was, by a frame", () => {
+  it("continues at the last speed for one frame", () => {
     expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 16))).toBeCloseTo(13.6, 3);
     expect(yaw_deg(predictTurn(turned(12, 0), turned(10, 20), 16))).toBeCloseTo(8.4, 3);
   });
 
-  it("is the last report where there is no speed to be had of it", () => {
+  it("is the last report if no speed can be computed from it", () => {
     const last = turned(12, 20);
     for (const before of [null, turned(12, 4), turned(10, 18), turned(10, -200), turned(-30, 0)]) {
       expect(yaw_deg(predictTurn(before, last, 16))).toBeCloseTo(12, 6);
@@ -151,7 +151,7 @@ describe("a head's turn that is predicted", () => {
     expect(yaw_deg(predictTurn(turned(10, 0), last, -5))).toBeCloseTo(12, 6);
   });
 
-  it("goes on for 50 ms at most, and goes back where nothing more is reported", () => {
+  it("continues for at most 50 ms, and returns to the last report if no more reports come", () => {
     expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 90))).toBeCloseTo(17, 1);
     expect(yaw_deg(predictTurn(turned(10, 0), turned(12, 20), 500))).toBeCloseTo(12, 6);
   });

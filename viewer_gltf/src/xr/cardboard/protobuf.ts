@@ -1,16 +1,15 @@
 /**
- * The wire format of protocol buffers, as much of it as a viewer profile needs: a message without
- * nested ones. Fields that nobody asks for are passed over, whatever their type.
+ * Reads the part of the protocol-buffer wire format that a lens profile needs: a message without
+ * nested messages. Other fields are skipped, whatever their type.
  */
 export type Fields = Readonly<{
-  /** Floats of a field, packed or one by one; none if it is absent. */
+  /** Floats of a field, packed or single; empty if the field is absent. */
   floats: (field: number) => readonly number[];
-  /** The last whole number of a field. */
   whole: (field: number) => number | undefined;
   text: (field: number) => string;
 }>;
 
-/** Throws RangeError where the bytes end too soon or make no message. */
+/** Throws RangeError if the bytes are truncated or are not a message. */
 export function readFields(bytes: Uint8Array<ArrayBuffer>): Fields {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const floats = new Map<number, number[]>();
@@ -22,7 +21,7 @@ export function readFields(bytes: Uint8Array<ArrayBuffer>): Fields {
     let value = 0;
     for (let scale = 1; scale <= 2 ** 63; scale *= 128) {
       const byte = view.getUint8(at++);
-      value += (byte & 127) * scale; // no shift: those are 32 bits wide
+      value += (byte & 127) * scale; // a shift would keep 32 bits only
       if (byte < 128) return value;
     }
     throw new RangeError("a varint of more than ten bytes");
@@ -66,7 +65,7 @@ export function readFields(bytes: Uint8Array<ArrayBuffer>): Fields {
   return {
     floats: (field) => {
       const packed = texts.get(field);
-      // A field of another kind than floats is as good as absent.
+      // A field that does not hold floats counts as absent.
       if (packed === undefined || packed.length % 4 !== 0) return floats.get(field) ?? [];
       const packedView = new DataView(packed.buffer, packed.byteOffset, packed.byteLength);
       return Array.from({ length: packed.length / 4 }, (_, i) =>

@@ -4,8 +4,8 @@ import { canScan, scanCode } from "./scan_qr";
 const video = (readyState = 4) => ({ readyState }) as HTMLVideoElement;
 const noAbort = new AbortController().signal;
 
-/** A browser with a detector that returns one answer a call. */
-function see(answers: string[][], formats = ["qr_code"]): void {
+/** Stubs a browser whose detector returns one answer for each call. */
+function stubDetector(answers: string[][], formats = ["qr_code"]): void {
   vi.stubGlobal(
     "BarcodeDetector",
     class {
@@ -19,7 +19,7 @@ describe("scanning a viewer's code", () => {
   afterEach(() => void vi.unstubAllGlobals());
 
   it("waits for the first code that the camera sees", async () => {
-    see([[], [], ["https://g.co/cardboard"]]);
+    stubDetector([[], [], ["https://g.co/cardboard"]]);
     expect(await canScan()).toBe(true);
     expect(await scanCode(video(), noAbort)).toBe("https://g.co/cardboard");
   });
@@ -27,17 +27,17 @@ describe("scanning a viewer's code", () => {
   it("asks for the code's address where the browser can't scan", async () => {
     expect(await canScan()).toBe(false);
     await expect(scanCode(video(), noAbort)).rejects.toThrow(/can't read QR codes.*paste/);
-    see([], ["ean_13"]);
+    stubDetector([], ["ean_13"]);
     expect(await canScan()).toBe(false);
   });
 
-  it("reports that a code is another's", async () => {
-    see([["https://example.org/menu"]]);
+  it("rejects a code that is not a Cardboard viewer's", async () => {
+    stubDetector([["https://example.org/menu"]]);
     await expect(scanCode(video(), noAbort)).rejects.toThrow("not a Cardboard viewer's code");
   });
 
-  it("stops when the caller aborts it, before the camera's first frame too", async () => {
-    see([["https://g.co/cardboard"]]);
+  it("stops when the caller aborts it, even before the camera's first frame", async () => {
+    stubDetector([["https://g.co/cardboard"]]);
     const stop = new AbortController();
     const scanned = scanCode(video(0), stop.signal);
     stop.abort(new Error("closed"));

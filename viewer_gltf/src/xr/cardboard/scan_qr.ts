@@ -1,7 +1,7 @@
 /**
- * A viewer's code read by the camera, where the browser itself finds QR codes: `BarcodeDetector`,
- * which Chrome has on Android and Safari has not. Elsewhere the code's address is pasted, which the
- * camera app of every phone gives.
+ * Reads a Cardboard viewer's QR code with the camera, in browsers that have `BarcodeDetector`
+ * (Chrome on Android has it, Safari does not). In other browsers users paste the code's address,
+ * which the camera app of every phone shows.
  */
 import { ProfileError, parseProfile } from "./viewer_profile";
 
@@ -11,15 +11,16 @@ type DetectorClass = {
   getSupportedFormats: () => Promise<string[]>;
 };
 
+/** Milliseconds between two looks at the video. */
 const PAUSE_ms = 150;
 const NO_SCANNER =
-  "This browser can't read QR codes: scan the viewer's code with the phone's camera app, copy the " +
+  "This browser can't read QR codes. Scan the viewer's code with the phone's camera app, copy the " +
   "address that it shows, and paste it here.";
 
 async function findDetector(): Promise<Detector | null> {
   const { BarcodeDetector } = globalThis as { BarcodeDetector?: DetectorClass };
   if (BarcodeDetector === undefined) return null;
-  // Chrome on a desktop may have the class and no format that it can read.
+  // Chrome on a desktop may have the class but no format that it can read.
   const formats = await BarcodeDetector.getSupportedFormats();
   return formats.includes("qr_code") ? new BarcodeDetector({ formats: ["qr_code"] }) : null;
 }
@@ -29,15 +30,15 @@ export async function canScan(): Promise<boolean> {
 }
 
 /**
- * The text of the first viewer's code that the video shows. Throws ProfileError where there is no
- * scanner, or the code is another's; the signal's reason where it is aborted.
+ * Returns the text of the first QR code that the video shows. Throws ProfileError if the browser
+ * has no scanner or the code is not a Cardboard viewer's, and the signal's reason if it is aborted.
  */
 export async function scanCode(video: HTMLVideoElement, signal: AbortSignal): Promise<string> {
   const detector = await findDetector();
   if (detector === null) throw new ProfileError(NO_SCANNER);
   for (;;) {
     signal.throwIfAborted();
-    // Before its first frame a video is refused.
+    // The detector rejects a video that has no frame yet.
     const codes = video.readyState >= 2 ? await detector.detect(video) : [];
     if (codes[0] !== undefined) {
       parseProfile(codes[0].rawValue);

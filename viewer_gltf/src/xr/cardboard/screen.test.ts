@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { holdScreen, type ScreenHost } from "./screen";
 
-/** A page that can do all, or some, of it. */
+/** A page of a browser that offers all or some of the features. */
 function fakePage({ canFill = true, canLock = true, canWake = true } = {}) {
   const log: string[] = [];
   const document = Object.assign(new EventTarget(), {
@@ -50,8 +50,8 @@ function fakePage({ canFill = true, canLock = true, canWake = true } = {}) {
   };
 }
 
-describe("the screen", () => {
-  it("is held, and given back once", async () => {
+describe("the phone's screen", () => {
+  it("is held in full screen, and released once", async () => {
     const { log, element, host } = fakePage();
     const hold = await holdScreen(element, () => log.push("left"), host);
     expect(hold.problems).toEqual([]);
@@ -64,14 +64,15 @@ describe("the screen", () => {
   it("reports each refused feature on its own", async () => {
     const { element, host } = fakePage({ canFill: false, canLock: false, canWake: false });
     const { problems } = await holdScreen(element, () => undefined, host);
-    expect(problems).toHaveLength(2); // a phone that can't be locked is turned by hand: see turn_sign.ts
+    // A phone that can't be locked is turned by hand: see turn_sign.ts.
+    expect(problems).toHaveLength(2);
     expect(problems.join(" ")).toMatch(/home screen.*dim/);
     const android = fakePage({ canWake: false });
     const { problems: few } = await holdScreen(android.element, () => undefined, android.host);
     expect(few).toEqual([expect.stringContaining("dim")]);
   });
 
-  it("is kept awake again when the page comes back", async () => {
+  it("is kept awake again when the page becomes visible", async () => {
     const { log, document, element, host } = fakePage();
     const hold = await holdScreen(element, () => undefined, host);
     document.visibilityState = "hidden";
@@ -87,7 +88,7 @@ describe("the screen", () => {
   it("reports when the user leaves full screen", async () => {
     const { log, document, element, host } = fakePage();
     const hold = await holdScreen(element, () => log.push("left"), host);
-    document.dispatchEvent(new Event("fullscreenchange")); // it was entered
+    document.dispatchEvent(new Event("fullscreenchange")); // full screen was entered
     expect(log).not.toContain("left");
     document.fullscreenElement = null;
     document.dispatchEvent(new Event("fullscreenchange"));

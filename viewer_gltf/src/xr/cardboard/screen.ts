@@ -1,11 +1,11 @@
 /**
- * The phone's screen while it is in a viewer: full, held across, and awake. Each is a favour that
- * some browser doesn't do (an iPhone's Safari has no full screen and no lock), so none is needed:
- * each refused feature is reported.
+ * Holds the phone's screen while the phone is in a viewer: full screen, landscape, awake. Some
+ * browsers lack some of these features (Safari on an iPhone has no full screen and no orientation
+ * lock), so none is required. Each refused feature is reported.
  */
 export type ScreenHold = Readonly<{ problems: readonly string[]; release: () => void }>;
 
-/** The parts of the page that are used, so that tests can be other browsers. */
+/** The parts of the page that are used, so that tests can stand in for other browsers. */
 export type ScreenHost = Readonly<{
   document: Document;
   navigator: { wakeLock?: Pick<WakeLock, "request"> };
@@ -16,14 +16,15 @@ type OldElement = { webkitRequestFullscreen?: () => void };
 type OldDocument = { webkitFullscreenElement?: Element | null; webkitExitFullscreen?: () => void };
 
 const NO_FULL_SCREEN =
-  "This browser gives no full screen to a page: on an iPhone, add the page to the home screen, " +
+  "This browser can't show a page in full screen. On an iPhone, add the page to the home screen " +
   "and open it from there.";
-const NO_WAKE_LOCK = "This browser can't keep the screen on: the phone may dim after a while.";
+const NO_WAKE_LOCK = "This browser can't keep the screen on. The phone may dim after a while.";
 
 /**
- * Must be called from a tap. Never rejects.
+ * Holds the screen, and returns the features that the browser refused. Must be called from a tap.
+ * Never rejects.
  *
- * @param onLeave called when the user leaves full screen by other means than `release`
+ * @param onLeave called when the user leaves full screen without `release`
  */
 export async function holdScreen(
   element: HTMLElement,
@@ -47,23 +48,24 @@ export async function holdScreen(
       return true;
     } catch (error) {
       if (!(error instanceof DOMException)) throw error;
-      return false; // a low battery
+      return false; // for example with a low battery
     }
   };
-  const awake = stayAwake(); // Safari wants the tap for it, which full screen uses up
+  // The wake lock comes first: Safari requires a tap for it, and full screen uses the tap up.
+  const awake = stayAwake();
 
-  // A home screen's page is full without asking.
+  // A page opened from the home screen is in full screen already.
   const isFull = await enterFullScreen(element);
   if (!isFull && !matches("(display-mode: standalone)")) problems.push(NO_FULL_SCREEN);
   for (const type of isFull ? ["fullscreenchange", "webkitfullscreenchange"] : []) {
     document.addEventListener(type, () => fullElement(document) === null && onLeave(), { signal });
   }
 
-  // Android locks in full screen only.
-  await succeeds(orientation?.lock?.call(orientation, "landscape")); // else the turn sign asks for it
+  // Android locks the orientation in full screen only. Without a lock, the turn sign asks the user.
+  await succeeds(orientation?.lock?.call(orientation, "landscape"));
 
   if (!(await awake)) problems.push(NO_WAKE_LOCK);
-  // A page that was hidden has lost its lock.
+  // A hidden page loses its wake lock.
   const renew = () => void (document.visibilityState === "visible" && stayAwake());
   document.addEventListener("visibilitychange", renew, { signal });
 
@@ -89,7 +91,7 @@ async function enterFullScreen(element: HTMLElement & OldElement): Promise<boole
 
 function leaveFullScreen(document: Document & OldDocument): void {
   if (typeof document.exitFullscreen === "function") {
-    void document.exitFullscreen().catch(() => undefined); // the user was quicker
+    void document.exitFullscreen().catch(() => undefined); // the user has left full screen already
   } else document.webkitExitFullscreen?.();
 }
 
@@ -97,7 +99,7 @@ function fullElement(document: Document & OldDocument): Element | null {
   return document.fullscreenElement ?? document.webkitFullscreenElement ?? null;
 }
 
-/** Whether what was asked for is there, and was not refused. */
+/** Whether the browser has the feature and did not refuse it. */
 async function succeeds(asked: Promise<void> | undefined): Promise<boolean> {
   if (asked === undefined) return false;
   return asked.then(

@@ -1,22 +1,22 @@
 /**
- * Stereo for a phone in a Cardboard, in a browser without WebXR (Safari on an iPhone):
- * split screen, lens distortion, the head's turn.
+ * Stereo on a phone in a Cardboard, for browsers without WebXR (Safari on an iPhone): a split
+ * screen, lens distortion, and a view that follows the head.
  *
- * Why not a polyfill. webxr-polyfill 2.0.3 with cardboard-vr-display 1.0.19 (both Apache-2.0) were
- * run with three 0.187 on WebGL 2, the browser's own WebXR removed. three has its XRWebGLLayer path
- * still (it takes layers only where XRWebGLBinding exists), so a session starts and two eyes are
- * drawn. But:
- * - Its distorter draws with vertexAttribPointer into whatever vertex array is bound (submitFrame
- *   in cardboard-distorter.js restores program, buffers and texture only), and in WebGL 2 that is
- *   three's of the mesh drawn last. That mesh is gone from then on, in stereo and after it: 65
- *   "no buffer is bound to enabled attribute" in the second after the end. Reported to both
- *   projects in 2023 (webxr-polyfill 170, three 26166); open in one, declined by the other.
- * - It patches enable, viewport, bindFramebuffer... of the context, although three caches its
- *   state; its frame buffer has no anti-aliasing and 16 bits of depth.
- * - It never asks Safari for the orientation, so that the head stands still since iOS 13; it knows
- *   the two viewers of 2014 and 2015, and reads no code; it fetches its table of phones from
- *   another host, which our Content-Security-Policy forbids, and that table ends in 2020.
- * - 51 kB gzip; this folder, which draws through three alone, is 7.
+ * Why no polyfill is used: webxr-polyfill 2.0.3 with cardboard-vr-display 1.0.19 (both Apache-2.0)
+ * were tried with three.js 0.187 on WebGL 2, with the browser's own WebXR removed. A session starts
+ * and both eyes are drawn, because three.js uses XRWebGLLayer where XRWebGLBinding is absent. But:
+ * - Its distorter sets vertex attributes without binding a vertex array of its own: submitFrame in
+ *   cardboard-distorter.js restores the program, buffers and texture only. In WebGL 2 it overwrites
+ *   the vertex array of the mesh that three.js drew last.
+ * - That mesh is no longer drawn, in stereo and after it. The second after the session logged 65
+ *   times "no buffer is bound to enabled attribute". The fault was reported to both projects in
+ *   2023 (webxr-polyfill 170, three.js 26166). One issue is open, the other was declined.
+ * - It patches enable, viewport, bindFramebuffer and others of the context, although three.js
+ *   caches its state. Its frame buffer has no anti-aliasing and 16 bits of depth.
+ * - It does not ask Safari for the orientation, so the view has not followed the head since iOS 13.
+ * - It knows the two Cardboard viewers of 2014 and 2015, and does not read QR codes. It fetches a
+ *   table of phones, which ends in 2020, from a host that our Content-Security-Policy forbids.
+ * - Its gzipped code has 51 kB; this folder has 7 kB.
  */
 import { type ArrayCamera, Matrix4, Vector2, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { BundleError } from "../../bundle/errors";
@@ -27,23 +27,26 @@ import { cssPixelsPerInch, screenOf } from "./lens";
 import { HeadSensor, ORIENTATION_ABSENT, ORIENTATION_REFUSED } from "./orientation";
 import type { ScreenHold } from "./screen";
 import { TurnSign } from "./turn_sign";
-import type { Asked } from "./user_gesture";
+import type { StereoPermissions } from "./user_gesture";
 import { CARDBOARD_V2, type Profile } from "./viewer_profile";
 
-/** From a report to the screen's light a frame goes by, ms. */
+/** Milliseconds from reading the sensor until the frame is seen: one frame. */
 const FRAME_MS = 1000 / 60;
 
 export type SplitOptions = Readonly<{
-  /** CSS pixels in an inch of this screen; null: guessed from the browser's name. */
+  /** CSS pixels per inch of this screen; null: estimated from the browser's name. */
   cssPixelsPerInch: number | null;
-  /** Between the two pictures' points of view, m; absent: as the lenses. */
+  /** Distance between the two cameras, metres; absent: the distance between the lenses. */
   apart_m?: number;
 }>;
 
 export class SplitSession {
-  /** Between the eyes: the pose in the room, metres; at first at the origin, looking along -z. */
+  /**
+   * Pose of the point between the eyes in the scene, metres; at first at the origin, looking along
+   * -z.
+   */
   readonly head = new Matrix4();
-  /** The undistorted pictures, the left eye's on the left, as large as the canvas's buffer. */
+  /** The undistorted images, the left eye's in the left half; as large as the canvas's buffer. */
   readonly target: WebGLRenderTarget;
   private readonly cameras = new EyeCameras();
   private readonly pass = new DistortionPass();
@@ -59,23 +62,23 @@ export class SplitSession {
     private readonly onGesture: (gesture: Gesture) => void,
     private options: SplitOptions = { cssPixelsPerInch: null },
   ) {
-    // It takes a finished picture, encoded as on the canvas.
+    // The target gets a finished frame, whose colours are encoded like the canvas's, so it needs no
+    // depth.
     this.target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   }
 
-  /** The phone is in another viewer. */
   setProfile(profile: Profile): void {
     this.profile = profile;
     this.layout = "";
   }
 
-  /** Another screen, or other eyes than the lenses are made for. */
+  /** Changes the size of the screen or the distance between the eyes. */
   set(options: SplitOptions): void {
     this.options = options;
     this.layout = "";
   }
 
-  /** Both eyes in one, as in WebXR: render with it into `target`. */
+  /** Camera of both eyes, as in WebXR; render with it into `target`. */
   get camera(): ArrayCamera {
     return this.cameras.both;
   }
@@ -88,20 +91,23 @@ export class SplitSession {
     return this.running?.hasStarted ?? false;
   }
 
-  /** The features that this browser refused, in words; empty if there are none. */
+  /** A message for each feature that the browser refused. */
   get problems(): readonly string[] {
     return this.running?.problems ?? [];
   }
 
-  /** With what was asked for in a tap. Throws BundleError if the orientation is refused. */
-  async start(profile: Profile, asked: Asked): Promise<void> {
+  /**
+   * Starts the session with the permissions that were asked for in a tap. Throws BundleError if the
+   * orientation is refused.
+   */
+  async start(profile: Profile, asked: StereoPermissions): Promise<void> {
     if (this.running !== null) return;
     this.profile = profile;
     this.layout = "";
     const running = new Running(asked, () => this.end(), this.onGesture);
     this.running = running;
     const [found, { problems }] = await Promise.all([asked.orientation, asked.screen]);
-    if (this.running !== running) return; // ended while the browser asked
+    if (this.running !== running) return; // ended while the browser was asking the user
     if (found === "refused") {
       this.running = null;
       running.dispose();
@@ -123,19 +129,22 @@ export class SplitSession {
     if (running.hasStarted) this.onEnd();
   }
 
-  /** Look along -z again, wherever the head is. */
+  /** Makes the direction in which the head looks now the direction ahead, along -z. */
   recentre(): void {
     this.running?.sensor.recentre();
   }
 
-  /** Read the head's turn, and move the eyes with it. Once a frame, before anything is drawn. */
+  /**
+   * Reads the orientation of the head and moves the eyes' cameras. Call it once a frame, before
+   * drawing.
+   */
   update(): void {
     this.fit();
     this.running?.sensor.pose(this.head, performance.now() + FRAME_MS);
     this.cameras.follow(this.head);
   }
 
-  /** Show `target` on the canvas, as the lenses need it. */
+  /** Draws `target` on the canvas, distorted for the lenses. */
   present(): void {
     this.pass.render(this.renderer, this.target);
   }
@@ -146,7 +155,7 @@ export class SplitSession {
     this.pass.dispose();
   }
 
-  /** Lay the pictures out anew if the canvas has another size. */
+  /** Computes the layout of the two images again if the canvas has another size. */
   private fit(): void {
     const { width, height } = this.renderer.getDrawingBufferSize(this.size);
     const layout = `${width} ${height} ${this.renderer.getPixelRatio()}`;
@@ -163,27 +172,34 @@ export class SplitSession {
   }
 }
 
-/** Changes that last as long as one session, and are undone with it. */
+/** The state of one session, and the changes to the page that end with it. */
 class Running {
   readonly sensor = new HeadSensor();
   readonly sign: TurnSign;
   problems: readonly string[] = [];
-  /** False while the browser asks the user for the orientation, and while the phone is upright. */
+  /** False while the browser asks the user for permission, and while the phone is upright. */
   hasStarted = false;
   private readonly stage: HTMLElement;
   private readonly hold: Promise<ScreenHold>;
   private readonly stopped = new AbortController();
   private readonly style: string;
-  /** Its own number, since a page that was loaded again keeps the state of its last session. */
+  /**
+   * Number of this session's step in the history. It is random because a reloaded page keeps the
+   * step of its last session.
+   */
   private readonly step = Math.random();
 
-  constructor({ stage, screen }: Asked, end: () => void, onGesture: (gesture: Gesture) => void) {
+  constructor(
+    { stage, screen }: StereoPermissions,
+    end: () => void,
+    onGesture: (gesture: Gesture) => void,
+  ) {
     const { signal } = this.stopped;
     this.stage = stage;
     this.hold = screen;
     this.style = stage.style.cssText;
-    // Over the whole page, where a browser has no full screen. What a notch hides of one eye's picture,
-    // the other's leaves out too: the lenses' middle stays the screen's.
+    // Covers the page even if the browser has no full screen. Both sides get the border that the
+    // wider notch needs, so that the middle between the lenses stays the middle of the screen.
     const zIndex = "2147483647";
     const notch = "max(env(safe-area-inset-left), env(safe-area-inset-right))";
     Object.assign(stage.style, {
@@ -199,11 +215,11 @@ class Running {
     listenForFingers(stage, onGesture, signal);
     const onKey = (event: KeyboardEvent) => {
       if (event.key !== "Escape") return;
-      event.preventDefault(); // on the page the key means another step back
+      event.preventDefault(); // on the page, Escape would also leave the chosen tile
       end();
     };
     addEventListener("keydown", onKey, { signal, capture: true });
-    // A step in the history, so that the back gesture leaves the viewer and not the page.
+    // A step in the history lets the back gesture leave stereo instead of the page.
     history.pushState({ split: this.step }, "");
     addEventListener("popstate", end, { signal });
   }
@@ -215,7 +231,8 @@ class Running {
     this.sign.dispose();
     this.stage.style.cssText = this.style;
     void this.hold.then(({ release }) => release());
-    // Not if the user went back, nor if the page has written another address over the step.
+    // The step is left alone if the user went back, or if the page has written another address over
+    // it.
     if ((history.state as { split?: number } | null)?.split === this.step) history.back();
   }
 }

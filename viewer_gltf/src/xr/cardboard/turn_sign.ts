@@ -1,10 +1,13 @@
-/** The sign over an upright phone: it has to lie on its side before the screen can be split. */
+/**
+ * The sign that covers an upright phone: the phone must be turned on its side before the screen is
+ * split.
+ */
 import { element } from "../../dom/element";
 
 const SVG = "http://www.w3.org/2000/svg";
 const WORDS = "Turn the phone on its side";
-const MORE = "If the picture stays upright, switch off the phone's rotation lock.";
-/** An upright phone, and beside it one that lies; the arrow leads from one to the other. */
+const MORE = "If the image stays upright, switch off the phone's rotation lock.";
+/** Icon: an upright phone, a phone on its side, and an arrow from the first to the second. */
 const SHAPES: readonly (readonly [name: string, attributes: Readonly<Record<string, string>>])[] = [
   ["rect", { x: "16", y: "14", width: "36", height: "68", rx: "6", opacity: "0.45" }],
   ["rect", { x: "62", y: "62", width: "68", height: "36", rx: "6" }],
@@ -41,7 +44,6 @@ export class TurnSign {
   private readonly root = element("div", { role: "status" });
   private readonly stopped = new AbortController();
 
-  /** @param onLeave the user does not want stereo after all */
   constructor(stage: HTMLElement, onLeave: () => void) {
     const words = element("div", {}, {}, WORDS);
     const more = element("div", {}, {}, MORE);
@@ -49,7 +51,7 @@ export class TurnSign {
     more.style.fontSize = "1rem";
     Object.assign(this.root.style, COVER);
     Object.assign(leave.style, BUTTON);
-    this.root.append(picture(), words, more, leave);
+    this.root.append(image(), words, more, leave);
     const { signal } = this.stopped;
     leave.addEventListener("click", onLeave, { signal });
     upright().addEventListener("change", () => this.update(), { signal });
@@ -57,7 +59,7 @@ export class TurnSign {
     this.update();
   }
 
-  /** Resolves as soon as the phone lies on its side, or the sign is taken away. */
+  /** Resolves when the phone lies on its side or the sign is removed. */
   turned(): Promise<void> {
     return new Promise((resolve) => {
       const { signal } = this.stopped;
@@ -78,11 +80,11 @@ export class TurnSign {
   }
 }
 
-function picture(): SVGElement {
+function image(): SVGElement {
   const svg = document.createElementNS(SVG, "svg");
-  const look = { viewBox: "0 0 146 112", width: "180", "aria-hidden": "true", fill: "none" };
+  const frame = { viewBox: "0 0 146 112", width: "180", "aria-hidden": "true", fill: "none" };
   const line = { stroke: "#5aa9ff", "stroke-width": "4", "stroke-linecap": "round" };
-  setAll(svg, { ...look, ...line, "stroke-linejoin": "round" });
+  setAll(svg, { ...frame, ...line, "stroke-linejoin": "round" });
   for (const [name, attributes] of SHAPES) {
     const shape = document.createElementNS(SVG, name);
     setAll(shape, attributes);

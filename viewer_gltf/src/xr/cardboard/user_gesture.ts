@@ -1,31 +1,32 @@
 /**
- * What browsers grant only in the call of a tap itself. It is asked before anything is waited for,
- * even for the rest of this folder, which is fetched when it is first wanted.
+ * Permissions that browsers grant only within the call of a tap. They are asked for before anything
+ * is awaited, even before the rest of this folder is loaded.
  */
 import { holdScreen, type ScreenHold } from "./screen";
 
 export type OrientationAnswer = "granted" | "refused" | "absent";
 
-export type Asked = Readonly<{
-  /** What is held, and is to cover the page. */
+export type StereoPermissions = Readonly<{
+  /** The element that fills the screen and covers the page. */
   stage: HTMLElement;
   orientation: Promise<OrientationAnswer>;
   screen: Promise<ScreenHold>;
 }>;
 
 /**
- * Must be called from a tap. Safari's question comes first, since a tap is used up.
+ * Asks for the permissions of stereo. Must be called from a tap. Safari's question about the
+ * orientation comes first, because a tap permits only one question.
  *
  * @param onLeave called when the user leaves full screen
  */
-export function askInTap(canvas: HTMLElement, onLeave: () => void): Asked {
+export function askInTap(canvas: HTMLElement, onLeave: () => void): StereoPermissions {
   const stage = canvas.parentElement ?? canvas;
   return { stage, orientation: askOrientation(), screen: holdScreen(stage, onLeave) };
 }
 
 type AskingEvent = { requestPermission?: () => Promise<PermissionState> };
 
-/** Ask to read the orientation. Safari asks the user, and only within a tap's own call. */
+/** Asks to read the orientation. Safari asks the user, and only within the call of a tap. */
 export async function askOrientation(scope: object = globalThis): Promise<OrientationAnswer> {
   const { DeviceOrientationEvent } = scope as { DeviceOrientationEvent?: AskingEvent };
   if (DeviceOrientationEvent === undefined) return "absent";

@@ -5,7 +5,7 @@ const V2 =
   "CgZHb29nbGUSEkNhcmRib2FyZCBJL08gMjAxNR0rGBU9JQHegj0qEAAASEIAAEhCAABIQgAASEJYADUpXA89OggeZnc-Ej6aPlAAYAM";
 const XIAOMI =
   "CgZYaWFvbWkSCk1pIFZSIFBsYXkddEYUPSW28309KhAAAHBCAABwQgAAcEIAAHBCWAA12qz6PDoI7FG4PgrXI7xQAGAD";
-/** The SDK's own message of Cardboard v1. */
+/** The message of Cardboard v1 in the SDK. */
 const V1 =
   "0a0c476f6f676c652c20496e632e120c43617264626f6172642076311d31082c3d258fc2753d2a10" +
   "0000204200002042000020420000204235295c0f3d3a08c1cae13e77be1f3e58006001";
@@ -26,11 +26,12 @@ const message = (parts: Record<string, string>) =>
     .join("");
 
 function near(found: number, wanted: number): void {
-  expect(found / wanted).toBeCloseTo(1, 3); // floats of 32 bits, printed with four digits
+  // Floats of 32 bits, which the sources print with four digits.
+  expect(found / wanted).toBeCloseTo(1, 3);
 }
 
-describe("a viewer's code", () => {
-  it("of Cardboard v2, as published, is the one built in", () => {
+describe("the code of a Cardboard viewer", () => {
+  it("gives the built-in profile for the published code of Cardboard v2", () => {
     const profile = parseProfile(`http://google.com/cardboard/cfg?p=${V2}`);
     expect(profile).toMatchObject({
       vendor: "Google",
@@ -48,7 +49,7 @@ describe("a viewer's code", () => {
     });
   });
 
-  it("of Cardboard v1, in the SDK's bytes, is the one built in", () => {
+  it("gives the built-in profile for the SDK's bytes of Cardboard v1", () => {
     const profile = parseProfile(toBase64(V1));
     near(profile.screenToLens_m, CARDBOARD_V1.screenToLens_m);
     near(profile.interLens_m, CARDBOARD_V1.interLens_m);
@@ -58,7 +59,7 @@ describe("a viewer's code", () => {
     expect(profile).toMatchObject({ vendor, model, fov_deg, alignment, button });
   });
 
-  it("of another maker has its own numbers", () => {
+  it("gives the numbers of another maker's viewer", () => {
     const profile = parseProfile(`https://www.google.com/cardboard/cfg?p=${XIAOMI}`);
     expect(profile).toMatchObject({ vendor: "Xiaomi", model: "Mi VR Play", alignment: "bottom" });
     near(profile.screenToLens_m, 0.0362);
@@ -69,7 +70,7 @@ describe("a viewer's code", () => {
     expect(profile.fov_deg.outer).toBe(60);
   });
 
-  it("is the same however it is pasted", () => {
+  it("gives the same profile in every form in which users paste it", () => {
     const wanted = parseProfile(V2);
     for (const text of [
       `  https://google.com/cardboard/cfg?p=${V2}\n`,
@@ -81,7 +82,7 @@ describe("a viewer's code", () => {
     }
   });
 
-  it("of a viewer of 2014 is an address without numbers", () => {
+  it("gives Cardboard v1 for the address without numbers of 2014", () => {
     for (const text of [
       "http://g.co/cardboard",
       "https://google.com/cardboard/",
@@ -91,7 +92,7 @@ describe("a viewer's code", () => {
     }
   });
 
-  it("takes floats one by one, and passes over what it doesn't know", () => {
+  it("reads floats that are not packed, and skips unknown fields", () => {
     const single = `2d${floats(41)}2d${floats(42)}2d${floats(43)}2d${floats(44)}`;
     const unknown = `a00601${"a906"}${floats(1, 2)}ba060161`; // a varint, a double, a string
     const code = toBase64(message({ fov: single, unknown, alignment: "5802" }));
@@ -100,38 +101,47 @@ describe("a viewer's code", () => {
     expect(profile.alignment).toBe("top");
   });
 
-  it("of a viewer that centres the phone needs no tray", () => {
+  it("needs no tray height for a viewer that centres the phone", () => {
     const profile = parseProfile(toBase64(message({ tray: "", alignment: "5801" })));
     expect(profile.alignment).toBe("center");
   });
 
   it.each([
     ["", "is empty"],
-    ["https://example.org/cardboard", "not a Cardboard viewer's code: https://example.org"],
+    ["https://example.org/cardboard", "not a Cardboard viewer's code"],
     ["hello", "not a Cardboard viewer's code: hello"],
     ["https://goo.gl/6tWJAX", "goo.gl/6tWJAX is a short link"],
     ["https://google.com/cardboard/cfg", "no parameter p"],
     ["https://google.com/cardboard/cfg?p=%%%", "damaged or cut off"],
     [V2.slice(0, 60), "damaged or cut off"],
     [toBase64(message({ extra: "07" })), "damaged or cut off"],
-    [toBase64(message({ screen: "" })), "screen to lens: expected 0.01 to 0.2 m, found none"],
-    [toBase64(message({ lenses: `25${floats(Number.NaN)}` })), "lenses: expected 0.03 to 0.1 m"],
-    [toBase64(message({ fov: `2a08${floats(40, 40)}` })), "field of view, bottom"],
-    [toBase64(message({ fov: `2a10${floats(40, 95, 40, 40)}` })), "5 to 85 degrees, found 95"],
-    [toBase64(message({ distortion: `3a04${floats(-2)}` })), "folds the picture: -2.00"],
-    [toBase64(message({ distortion: `3a04${floats(Number.NaN)}` })), "folds the picture: NaN"],
-  ])("that is bad is refused with a reason: %j", (text, words) => {
+    [
+      toBase64(message({ screen: "" })),
+      "distance from screen to lens is missing; expected 0.01 to 0.2 m",
+    ],
+    [
+      toBase64(message({ lenses: `25${floats(Number.NaN)}` })),
+      "distance between the lenses is NaN; expected 0.03 to 0.1 m",
+    ],
+    [toBase64(message({ fov: `2a08${floats(40, 40)}` })), "field of view at the bottom"],
+    [
+      toBase64(message({ fov: `2a10${floats(40, 95, 40, 40)}` })),
+      "is 95.0; expected 5 to 85 degrees",
+    ],
+    [toBase64(message({ distortion: `3a04${floats(-2)}` })), "distortion is -2.00"],
+    [toBase64(message({ distortion: `3a04${floats(Number.NaN)}` })), "distortion is NaN"],
+  ])("is rejected with a reason: %j", (text, words) => {
     expect(() => parseProfile(text)).toThrow(words);
     expect(() => parseProfile(text)).toThrow(expect.objectContaining({ name: "ProfileError" }));
   });
 
-  it("that can't be read is reported with a reason", () => {
+  it("is reported with a reason if it can't be read", () => {
     expect(faultOfCode("")).toContain("empty");
     expect(faultOfCode("https://example.org/")).toContain("not a Cardboard viewer's code");
     expect(faultOfCode("https://g.co/cardboard")).toBe("");
   });
 
-  it("never throws anything else, however it is cut or bent", () => {
+  it("throws only ProfileError for damaged bytes", () => {
     const bytes = Buffer.from(V2, "base64url");
     let seed = 1;
     const random = (below: number) => {
@@ -139,10 +149,10 @@ describe("a viewer's code", () => {
       return seed % below;
     };
     for (let i = 0; i < 3000; i++) {
-      const bent = Buffer.from(bytes.subarray(0, 30 + random(bytes.length - 29)));
-      for (let n = random(4); n >= 0; n--) bent[random(bent.length)] = random(256);
+      const damaged = Buffer.from(bytes.subarray(0, 30 + random(bytes.length - 29)));
+      for (let n = random(4); n >= 0; n--) damaged[random(damaged.length)] = random(256);
       try {
-        parseProfile(bent.toString("base64url"));
+        parseProfile(damaged.toString("base64url"));
       } catch (error) {
         expect(error).toMatchObject({ name: "ProfileError" });
       }

@@ -1,7 +1,8 @@
 /**
- * The viewer profile: a Cardboard's lenses by its maker, printed on it as a QR code. The
- * code is an address; its parameter `p` is base64url of the protocol buffer `DeviceParams`, by
- * the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
+ * The lens profile: a Cardboard viewer's lenses, as its maker prints them on the viewer in a QR
+ * code.
+ * The code holds an address. Its parameter `p` is base64url of the protocol buffer `DeviceParams`,
+ * with the field numbers of Google's Cardboard SDK (proto/cardboard_device.proto, Apache-2.0).
  */
 import { BundleError } from "../../bundle/errors";
 import { type Alignment, isIncreasing, type LensModel } from "./lens_model";
@@ -11,12 +12,12 @@ type Button = "none" | "magnet" | "touch" | "indirect-touch";
 
 export type Profile = LensModel & Readonly<{ vendor: string; model: string; button: Button }>;
 
-/** A fault of a profile's code, in words for the page. */
+/** The code of a Cardboard viewer can't be read; the message is shown on the page. */
 export class ProfileError extends BundleError {
   override readonly name = "ProfileError";
 }
 
-/** Numbers of the SDK's own v1 profile (sdk/qrcode/cardboard_v1). */
+/** The v1 profile of the SDK (sdk/qrcode/cardboard_v1). */
 export const CARDBOARD_V1: Profile = {
   vendor: "Google, Inc.",
   model: "Cardboard v1",
@@ -30,8 +31,8 @@ export const CARDBOARD_V1: Profile = {
 };
 
 /**
- * Numbers of the code that Google prints on the viewer of 2015. (The browser polyfills hold others,
- * 39 mm, 64 mm, 60 degrees, 0.34 and 0.55, which no published code has.)
+ * The code that Google prints on the viewer of 2015. The browser polyfills use other numbers (39
+ * mm, 64 mm, 60 degrees, 0.34 and 0.55), which are in no published code.
  */
 export const CARDBOARD_V2: Profile = {
   vendor: "Google",
@@ -49,9 +50,12 @@ export const BUILT_IN = { v1: CARDBOARD_V1, v2: CARDBOARD_V2 } as const;
 
 const ALIGNMENTS: readonly Alignment[] = ["bottom", "center", "top"];
 const BUTTONS: readonly Button[] = ["none", "magnet", "touch", "indirect-touch"];
-const HOW = "Paste what the code says: https://google.com/cardboard/cfg?p=...";
+const HOW = "Paste the address that the code contains: https://google.com/cardboard/cfg?p=...";
 
-/** The profile of a code's text: its address, or the part after `p=`. Throws ProfileError. */
+/**
+ * Returns the profile for the text of a code: its address, or the part after `p=`. Throws
+ * ProfileError.
+ */
 export function parseProfile(text: string): Profile {
   const pasted = text.replace(/\s+/g, "");
   if (pasted === "") throw new ProfileError(`The viewer's code is empty. ${HOW}`);
@@ -63,8 +67,8 @@ export function parseProfile(text: string): Profile {
   const path = address?.pathname.replace(/\/$/, "");
   if (host === "goo.gl") {
     throw new ProfileError(
-      `${host}${path} is a short link, which can't be followed from here: open it in a browser, ` +
-        "and paste the long address that it leads to, google.com/cardboard/cfg?p=...",
+      `${host}${path} is a short link, which can't be followed from here. Open it in a browser ` +
+        "and paste the long address that it leads to: google.com/cardboard/cfg?p=...",
     );
   }
   const isGoogle = host === "google.com" || host === "g.co" || host === "vr.google.com";
@@ -73,12 +77,12 @@ export function parseProfile(text: string): Profile {
   }
   const params = address?.searchParams.get("p");
   if (params) return readParams(params.replaceAll(" ", "+"));
-  // Viewers of 2014 have no numbers in their code: it is the address of the project alone.
+  // The code of a viewer of 2014 has no numbers: it is the address of the project alone.
   if (path === "/cardboard") return CARDBOARD_V1;
   throw new ProfileError(`The viewer's code has no parameter p: ${shortened(pasted)}. ${HOW}`);
 }
 
-/** The fault of a code's text, in words; "": none. */
+/** Returns the message about a code that can't be read; "" if it can be read. */
 export function faultOfCode(code: string): string {
   try {
     parseProfile(code);
@@ -91,7 +95,7 @@ export function faultOfCode(code: string): string {
 
 function readAddress(text: string): URL | null {
   try {
-    return new URL(text); // URL.parse is younger than many a phone's browser
+    return new URL(text); // not URL.parse, which the browsers of many phones lack
   } catch {
     return null;
   }
@@ -103,7 +107,8 @@ function readParams(base64: string): Profile {
     const standard = base64.replaceAll("-", "+").replaceAll("_", "/").replace(/=+$/, "");
     fields = readFields(Uint8Array.from(atob(standard), (c) => c.charCodeAt(0)));
   } catch (error) {
-    // atob throws its own error where it finds no base64, the reader where the bytes end too soon.
+    // atob throws DOMException for text that is not base64, the reader RangeError for truncated
+    // bytes.
     if (!(error instanceof DOMException || error instanceof RangeError)) throw error;
     throw new ProfileError(`The viewer's code is damaged or cut off: ${shortened(base64)}. ${HOW}`);
   }
@@ -111,23 +116,23 @@ function readParams(base64: string): Profile {
     within(fields.floats(field)[0], name, least, most, "m");
   const angles = fields.floats(5);
   const angle_deg = (i: number, name: string) =>
-    within(angles[i], `field of view, ${name}`, 5, 85, "degrees");
+    within(angles[i], `field of view ${name}`, 5, 85, "degrees");
   const profile: Profile = {
     vendor: fields.text(1),
     model: fields.text(2),
-    screenToLens_m: length_m(3, "screen to lens", 0.01, 0.2),
-    interLens_m: length_m(4, "between the lenses", 0.03, 0.1),
+    screenToLens_m: length_m(3, "distance from screen to lens", 0.01, 0.2),
+    interLens_m: length_m(4, "distance between the lenses", 0.03, 0.1),
     fov_deg: {
-      outer: angle_deg(0, "outer"),
-      inner: angle_deg(1, "inner"),
-      bottom: angle_deg(2, "bottom"),
-      top: angle_deg(3, "top"),
+      outer: angle_deg(0, "on the outer side"),
+      inner: angle_deg(1, "on the inner side"),
+      bottom: angle_deg(2, "at the bottom"),
+      top: angle_deg(3, "at the top"),
     },
     alignment: ALIGNMENTS[fields.whole(11) ?? 0] ?? "bottom",
     trayToLens_m:
       fields.whole(11) === 1 && fields.floats(6).length === 0
-        ? CARDBOARD_V1.trayToLens_m // a centred phone rests on no tray
-        : length_m(6, "tray to lens", 0.005, 0.1),
+        ? CARDBOARD_V1.trayToLens_m // a centred phone does not rest on a tray
+        : length_m(6, "distance from tray to lens", 0.005, 0.1),
     distortion: fields.floats(7),
     button: BUTTONS[fields.whole(12) ?? 1] ?? "magnet",
   };
@@ -136,7 +141,9 @@ function readParams(base64: string): Profile {
   const corner = Math.hypot(tan(Math.max(outer, inner)), tan(Math.max(bottom, top)));
   if (!isIncreasing(profile.distortion, corner)) {
     const found = profile.distortion.map((k) => k.toPrecision(3)).join(", ");
-    throw new ProfileError(`The viewer's code has a distortion that folds the picture: ${found}.`);
+    throw new ProfileError(
+      `The viewer's code: distortion is ${found}; expected one without folds in the image.`,
+    );
   }
   return profile;
 }
@@ -148,11 +155,11 @@ function within(
   most: number,
   unit: string,
 ): number {
-  // A NaN is not within anything either.
+  // NaN fails both comparisons.
   if (value !== undefined && value >= least && value <= most) return value;
-  const found = value === undefined ? "none" : value.toPrecision(3);
+  const found = value === undefined ? "missing" : value.toPrecision(3);
   throw new ProfileError(
-    `The viewer's code, ${name}: expected ${least} to ${most} ${unit}, found ${found}.`,
+    `The viewer's code: ${name} is ${found}; expected ${least} to ${most} ${unit}.`,
   );
 }
 

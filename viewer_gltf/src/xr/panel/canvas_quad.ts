@@ -1,4 +1,7 @@
-/** A flat opaque thing in the room with a picture on it, painted anew only when it differs. */
+/**
+ * A flat opaque rectangle in the scene with a canvas on it, which is painted again only when it
+ * changes.
+ */
 import {
   CanvasTexture,
   LinearFilter,
@@ -10,33 +13,37 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import { leaveUncut } from "../../gpu/unclipped_material";
-import type { RoomRay } from "../../interaction/ray_pointer";
+import { keepUnclipped } from "../../gpu/unclipped_material";
+import type { SceneRay } from "../../interaction/ray_pointer";
 import { holds, type Mark, type Rect } from "../../panel/canvas/draw_list";
 import { PX_PER_M } from "../../panel/canvas/page";
 import { paint } from "../../panel/canvas/paint";
 
 const LIT = 0xffffff;
-/** Opacity of the light on a target. Light is mixed linearly, so that 0.04 looks like a fifth of white. */
+/**
+ * Opacity of the light on a target. Light is blended linearly, so 0.04 looks like a fifth of white.
+ */
 const LIT_OPACITY = 0.04;
-/** Distance before the quad, m. */
+/** Metres between the quad and the light in front of it. */
 const LIT_M = 0.001;
-/** Anisotropy of the texture, samples: the user may see the text aslant. */
+/** Anisotropy of the texture, samples, for text that is seen at an angle. */
 const ANISOTROPY = 4;
 
-/** px on the quad. */
+/** A point on the quad in px, and its distance from the ray's origin. */
 export type Spot = Readonly<{ x: number; y: number; distance_m: number }>;
 
 export class CanvasQuad {
   readonly mesh: Mesh<PlaneGeometry, MeshBasicMaterial>;
-  /** How often it was painted. */
+  /** How often the canvas was painted; for tests. */
   paints = 0;
   private readonly lit: Mesh<PlaneGeometry, MeshBasicMaterial>;
   private readonly texture: CanvasTexture | null;
   private painted = "";
   private readonly toQuad = new Matrix4();
 
-  /** @param context of the canvas that is painted; null or `undefined`: none, as in a test, or a new one */
+  /**
+   * @param context of the canvas that is painted; undefined: a new canvas; null: none, as in tests
+   */
   constructor(
     readonly width: number,
     readonly height: number,
@@ -49,7 +56,7 @@ export class CanvasQuad {
       new MeshBasicMaterial({ map: this.texture, toneMapped: false }),
     );
     this.mesh.visible = false;
-    leaveUncut(this.mesh);
+    keepUnclipped(this.mesh);
     this.lit = new Mesh(
       new PlaneGeometry(1, 1),
       new MeshBasicMaterial({
@@ -64,7 +71,7 @@ export class CanvasQuad {
     this.mesh.add(this.lit);
   }
 
-  /** Draw it over all that has a lower render order, also over what is nearer. */
+  /** Draws the quad over everything with a lower render order, even if that is nearer. */
   drawOver(renderOrder: number): void {
     for (const [i, mesh] of [this.mesh, this.lit].entries()) {
       mesh.material.transparent = true;
@@ -73,7 +80,10 @@ export class CanvasQuad {
     }
   }
 
-  /** Where a part of it is in the room. @param across, down shares of the rect, from its upper left corner */
+  /**
+   * Returns a point of a rect on the quad in the scene.
+   * @param across, down shares of the rect, from its upper left corner
+   */
   pointOf({ x, y, width, height }: Rect, across = 0.5, down = 0.5): Vector3 {
     return this.mesh.localToWorld(
       new Vector3(
@@ -84,7 +94,7 @@ export class CanvasQuad {
     );
   }
 
-  /** True if the picture differs from what was painted before. */
+  /** Paints the marks. Returns false if they were painted already. */
   show(marks: readonly Mark[]): boolean {
     const text = JSON.stringify(marks);
     if (text === this.painted) return false;
@@ -97,28 +107,28 @@ export class CanvasQuad {
     return true;
   }
 
-  /** Put its middle there, to be seen from `eye`. */
+  /** Moves the quad's middle to a point, facing `eye`. */
   place(at: Vector3, eye: Vector3): void {
     this.mesh.position.copy(at);
     this.mesh.lookAt(eye);
     this.mesh.updateMatrixWorld();
   }
 
-  /** Where a ray meets its front; null: not at all, or it is not shown. */
-  meet({ origin, direction }: RoomRay): Spot | null {
+  /** Returns where a ray hits the front of the quad; null if it misses or the quad is hidden. */
+  intersect({ origin, direction }: SceneRay): Spot | null {
     if (!this.mesh.visible) return null;
     this.toQuad.copy(this.mesh.matrixWorld).invert();
     const from = origin.clone().applyMatrix4(this.toQuad);
     const to = direction.clone().transformDirection(this.toQuad);
     if (from.z <= 0 || to.z >= 0) return null;
-    const distance_m = -from.z / to.z; // the quad is not scaled
+    const distance_m = -from.z / to.z; // in metres, because the quad is not scaled
     const x = (from.x + distance_m * to.x) * this.pxPerM + this.width / 2;
     const y = this.height / 2 - (from.y + distance_m * to.y) * this.pxPerM;
     const whole: Rect = { x: 0, y: 0, width: this.width, height: this.height };
     return holds(whole, { x, y }) ? { x, y, distance_m } : null;
   }
 
-  /** Light up what is pointed at; null: nothing. Costs no painting. */
+  /** Lights up a rect of the quad, without painting; null: no light. */
   light(rect: Rect | null): void {
     this.lit.visible = rect !== null;
     if (rect === null) return;

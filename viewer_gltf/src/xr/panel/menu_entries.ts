@@ -1,8 +1,11 @@
-/** The controls of the panel in the room, by their direction from the head. */
+/** The controls of the headset panel by their direction from the head. */
 import { MathUtils, type Matrix4, Vector3 } from "three";
 import { bearingOf, headBearing } from "./placement";
 
-/** A control of the panel in the room: how far to the right of where the head faces, and above its level. */
+/**
+ * A control of the headset panel: its angle to the right of where the head faces, and above the
+ * horizon.
+ */
 export type MenuEntry = Readonly<{
   id: string;
   label: string;
@@ -10,7 +13,7 @@ export type MenuEntry = Readonly<{
   up_deg: number;
 }>;
 
-/** @param places the controls, each with its place in the room, metres */
+/** @param places position of each control in the scene, metres */
 export function menuEntries(
   places: readonly Readonly<{ id: string; label: string; at: Vector3 }>[],
   head: Matrix4,

@@ -1,6 +1,7 @@
 /**
- * A notice in stereo: a label under the place that the head looks at when it comes. It stays
- * there in the room, since a label that moves with the head makes sick, and goes by itself.
+ * A notice in stereo: a label below the place at which the head looks when it appears. The label
+ * stays there in the scene, since a label that moves with the head causes sickness, and disappears
+ * by itself.
  */
 import { type Matrix4, Vector3 } from "three";
 import { CanvasQuad } from "./canvas_quad";
@@ -25,15 +26,18 @@ import {
   pointAt,
 } from "./placement";
 
-/** Distance from the head, m: mostly before the specimen, and not so near that eyes cross. */
+/**
+ * Metres from the head: usually in front of the specimen, but far enough for comfortable
+ * convergence.
+ */
 export const NOTICE_DISTANCE_M = 0.9;
-/** Render order: over volumes, marks and a specimen that is held closer; under the ring. */
+/** Draw order: after volumes, marks and a specimen that is held closer, before the dwell ring. */
 const RENDER_ORDER = 1900;
 
-export class RoomNotice {
+export class StereoNotice {
   private readonly quad: CanvasQuad;
   private announcements: Announcements = NO_ANNOUNCEMENTS;
-  /** It comes with the next frame, which knows where the head looks. */
+  /** True until the next frame, which knows where the head looks and places the notice. */
   private wantsPlace = false;
 
   /** @param isPainted false: nothing is painted, as in a test without a browser */
@@ -48,7 +52,6 @@ export class RoomNotice {
     return this.quad.mesh;
   }
 
-  /** The texts that can be read now. */
   get texts(): readonly string[] {
     return this.announcements.texts;
   }
@@ -65,10 +68,10 @@ export class RoomNotice {
   }
 
   /**
-   * Once a frame; whether it looks otherwise than before.
+   * Updates the notice for one frame. Returns whether it looks different from the last frame.
    *
-   * @param rows the middle of the upper edge of the open menu's rows, over which a notice is laid if the gaze is not
-   *   far below it; null: the menu is closed
+   * @param rows middle of the upper edge of the open menu's rows; the notice lies above it unless
+   *   the gaze is far below; null: the menu is closed
    */
   update(dt_s: number, head: Matrix4, rows: Vector3 | null = null): boolean {
     const wasShown = this.mesh.visible;

@@ -19,20 +19,20 @@ function after(announcements: Announcements, seconds: number): readonly string[]
   return now.texts;
 }
 
-describe("notices in stereo", () => {
-  it("goes by itself after six seconds", () => {
+describe("a notice in stereo", () => {
+  it("disappears by itself after five seconds", () => {
     expect(after(announced("a"), ANNOUNCED_S - 0.25)).toEqual(["a"]);
     expect(after(announced("a"), ANNOUNCED_S)).toEqual([]);
     expect(advanceAnnouncements(NO_ANNOUNCEMENTS, 1)).toBe(NO_ANNOUNCEMENTS);
   });
 
-  it("is read one after the other, the newest at once", () => {
+  it("appears at once, and the oldest disappears first", () => {
     expect(announced("a", "b").texts).toEqual(["a", "b"]);
     expect(after(announced("a", "b"), ANNOUNCED_S)).toEqual(["b"]);
     expect(after(announced("a", "b"), 2 * ANNOUNCED_S)).toEqual([]);
   });
 
-  it("is the newest three, each once", () => {
+  it("is one of at most three, without repeats", () => {
     expect(announced("a", "b", "c", "d").texts).toEqual(["b", "c", "d"]);
     expect(announced("a", "b", "a").texts).toEqual(["b", "a"]);
     const again = announce(advanceAnnouncements(announced("a"), 5), "a");
@@ -41,16 +41,16 @@ describe("notices in stereo", () => {
     expect(after(third, 1)).toEqual(["b", "c"]);
   });
 
-  it("has letters as large as there is room for", () => {
+  it("has letters as large as fit", () => {
     const sizesOf = (...texts: readonly string[]) =>
       noticeMarks(texts).flatMap((mark) => (mark.kind === "text" ? [mark.size] : []));
-    // over 2 degrees, of which a phone of 280 pixels an eye makes 6 pixels
+    // more than 2 degrees, which are 6 pixels on a phone with 280 pixels for each eye
     expect(Math.min(...sizesOf(howItWorks("before-eyes")))).toBeGreaterThan(60);
     expect(sizesOf("Quality: low", "Choosing by gaze: off")).toEqual([80, 80]);
     expect(sizesOf("a word ".repeat(60))).toEqual([48]);
   });
 
-  it("fits the plane, however long", () => {
+  it("fits the quad, even with long texts", () => {
     const long = "a word ".repeat(60);
     for (const texts of [["short"], [long], [long, "short", long], [long, long, long]]) {
       const marks = noticeMarks(texts);

@@ -1,27 +1,27 @@
 /**
- * Notices before the eyes in stereo, where nobody sees the page: a few texts under each other,
- * the newest last. One after the other goes by itself. Pure.
+ * Queue of notices in stereo, where the page cannot be seen. A few texts lie under each other, the
+ * newest last. The oldest disappears first.
  */
 import { type Mark, type Rect, text } from "../../panel/canvas/draw_list";
 
-/** Time for the oldest notice, s: then it goes, and the next one has as long. */
+/** Seconds that the oldest notice stays; then the next one stays as long. */
 export const ANNOUNCED_S = 5;
 const MAX_NOTICES = 3;
 
 export type Announcements = Readonly<{
   texts: readonly string[];
-  /** How long the oldest has been the oldest. */
+  /** How long the first text has been the oldest, s. */
   elapsed_s: number;
 }>;
 export const NO_ANNOUNCEMENTS: Announcements = { texts: [], elapsed_s: 0 };
 
-/** A repeated text becomes the newest again. */
+/** Adds a text at the end. A repeated text moves to the end. */
 export function announce({ texts, elapsed_s }: Announcements, newest: string): Announcements {
   const others = texts.filter((each) => each !== newest).slice(1 - MAX_NOTICES);
   return { texts: [...others, newest], elapsed_s: others[0] === texts[0] ? elapsed_s : 0 };
 }
 
-/** Returns the same object while there is no notice. */
+/** Advances the time. Returns the same object if there are no notices. */
 export function advanceAnnouncements(announcements: Announcements, dt_s: number): Announcements {
   const { texts } = announcements;
   if (texts.length === 0) return announcements;
@@ -30,10 +30,13 @@ export function advanceAnnouncements(announcements: Announcements, dt_s: number)
   return texts.length === 1 ? NO_ANNOUNCEMENTS : { texts: texts.slice(1), elapsed_s: 0 };
 }
 
-/** Width of a notice, px: half of a Cardboard's field of view, 0.9 m away. */
+/** Width of a notice, px: half of a Cardboard's field of view at 0.9 m. */
 export const NOTICE_WIDTH = 1040;
 const PAD = 16;
-/** Letters as large as all texts have room for, px: on a phone's half of a screen small ones can't be read. */
+/**
+ * Letter sizes, px; the largest that fits all texts is used, since small letters are illegible on
+ * half a phone's screen.
+ */
 const SIZES = [80, 60, 48] as const;
 const SMALLEST = SIZES[SIZES.length - 1];
 const MAX_LINES = 4;
@@ -44,7 +47,10 @@ function pitchOf(size: number): number {
   return Math.ceil(1.15 * size);
 }
 
-/** A letter is about half as wide as it is high, and words break early. */
+/**
+ * Number of lines, estimated: a letter is about half as wide as it is high, and lines break at
+ * words.
+ */
 function linesOf(words: string, size: number): number {
   const letters = Math.floor((NOTICE_WIDTH - 4 * PAD) / (0.58 * size));
   return words.split("\n").reduce((sum, line) => sum + Math.ceil(line.length / letters), 0);
@@ -59,13 +65,13 @@ function sizeFor(texts: readonly string[]): number {
   return SIZES.find(fits) ?? SMALLEST;
 }
 
-/** Height of the texts from the upper edge, px. */
+/** Height of the texts, measured from the upper edge, px. */
 export function textsHeight(texts: readonly string[]): number {
   const rects = noticeMarks(texts).map(({ rect }) => rect.y + rect.height);
   return Math.max(0, ...rects);
 }
 
-/** From the top of the plane; what is not covered stays clear. */
+/** The marks of the texts from the top of the quad; the rest of the quad stays clear. */
 export function noticeMarks(texts: readonly string[]): readonly Mark[] {
   const size = sizeFor(texts);
   let y = 0;

@@ -1,9 +1,9 @@
 /**
- * The panel in the room: one page of the layout at a time on a quad, and the bar below the specimen, which is
- * always there and opens it.
+ * The headset panel: a quad that shows one page of the panel at a time, and the bar below the
+ * specimen, which is always there and opens the panel.
  */
 import { Group, type Matrix4, Vector3 } from "three";
-import type { RoomRay, Target } from "../../interaction/ray_pointer";
+import type { SceneRay, Target } from "../../interaction/ray_pointer";
 import { BAR_HEIGHT, BAR_WIDTH, barOf } from "../../panel/canvas/bar";
 import type { CanvasChange, CanvasRequest, Region } from "../../panel/canvas/draw_list";
 import { CONTENT, HEIGHT, type Page, pageOf, WIDTH } from "../../panel/canvas/page";
@@ -34,73 +34,77 @@ import {
   type Setting,
 } from "./placement";
 
-/** Time between readings of values outside the state (frame time, gazed tile), s. */
+/**
+ * Seconds between readings of values outside the state, such as the frame time and the gazed tile.
+ */
 const REFRESH_S = 0.5;
-export type RoomPanelOptions = Readonly<{
+export type HeadsetPanelOptions = Readonly<{
   buildPanel: (view: PanelView) => Layout;
-  onWish: (wish: Action | Command) => void;
+  onRequest: (request: Action | Command) => void;
   onLeave: () => void;
-  /** The phone is in a viewer of other lenses. */
   onLenses: (lenses: Lenses) => void;
-  /** Reports why a request can't be granted. */
+  /** Called with the reason why a request can't be carried out. */
   onAnnounce: (text: string) => void;
-  /** The last choice is undone. */
   onUndo: () => void;
-  /** The specimen is taken hold of by the gaze along a ray; then it is carried along others. */
-  onCarry: (ray: RoomRay, isStart: boolean) => void;
-  /** Absent: true. False: nothing is painted, as in a test without a browser. */
+  /**
+   * Called when the gaze picks up the specimen along a ray, and then with each ray that carries it.
+   */
+  onCarry: (ray: SceneRay, isStart: boolean) => void;
+  /** False: nothing is painted, as in a test without a browser. Absent: true. */
   isPainted?: boolean;
 }>;
 
-export class RoomPanel {
+export class HeadsetPanel {
   readonly group = new Group();
   readonly quad: CanvasQuad;
   private readonly menu: PanelSurface;
   private readonly bar: PanelSurface;
   private page: Page | null = null;
   private view: PanelView = START_VIEW;
-  private readonly pages = new PanelPages(() => this.giveCards());
+  private readonly pages = new PanelPages(() => this.resetCards());
   private state: ViewerState | null = null;
   private isStale = true;
   private rested_s = 0;
-  /** null until the first frame gives the head's direction. */
+  /** Heading of the bar, radians; null until the first frame gives the head's direction. */
   private barYaw: number | null = null;
-  /** It opens with the next frame, which knows where the eye is: over the bar, or where the head faces. */
+  /**
+   * Set until the next frame opens the panel, which knows the eye: above the bar, or where the head
+   * faces.
+   */
   private wantsPlace: "bar" | "head" | null = null;
-  /** The last request: a button that is held still asks for nothing more. */
+  /** The last request as JSON, so that a held button does not repeat it. */
   private dragged = "";
   private lastMode = START_VOLUMES.mode;
-  /** Whether the last choice can be undone by the bar. */
   canUndo = false;
-  /** The specimen is carried: the bar would be in the way. */
+  /** True while the specimen is carried, which hides the bar. */
   isCarrying = false;
 
-  constructor(private readonly options: RoomPanelOptions) {
+  constructor(private readonly options: HeadsetPanelOptions) {
     const context = options.isPainted === false ? null : undefined;
-    const choose = (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) =>
+    const choose = (region: Region, spot: Spot, ray: SceneRay, isPress: boolean) =>
       this.choose(region, spot, ray, isPress);
-    const freshen = () => {
+    const refreshIfStale = () => {
       if (this.isStale && this.state !== null) this.refresh(this.state);
     };
     this.quad = new CanvasQuad(WIDTH, HEIGHT, context);
-    this.menu = new PanelSurface("menu", this.quad, choose, freshen);
+    this.menu = new PanelSurface("menu", this.quad, choose, refreshIfStale);
     this.bar = new PanelSurface(
       "bar",
       new CanvasQuad(BAR_WIDTH, BAR_HEIGHT, context),
       choose,
-      freshen,
+      refreshIfStale,
     );
     this.group.name = "panel";
     this.group.visible = false;
     this.group.add(this.menu.quad.mesh, this.bar.quad.mesh);
   }
 
-  /** In the order in which rays meet them. */
+  /** The targets in the order in which rays are tested. */
   get targets(): readonly Target[] {
     return [this.menu, this.bar];
   }
 
-  /** The page's own panel has chosen it, and this one shows it. */
+  /** Takes over a change of view that was made in the page's panel. */
   take(view: Partial<PanelView>): void {
     this.view = { ...this.view, ...view };
     this.isStale = true;
@@ -110,20 +114,20 @@ export class RoomPanel {
     return this.quad.mesh.visible;
   }
 
-  /** The middle of the upper edge of the open menu's rows in the room; null: the menu is closed. */
+  /** Middle of the upper edge of the open menu's rows in the scene; null if the menu is closed. */
   get upperEdge(): Vector3 | null {
     return this.isOpen ? this.quad.pointOf(CONTENT, 0.5, 0) : null;
   }
 
-  /** The regions of the menu to point at now, for tests and for a program that reads them aloud. */
+  /** The regions that can be pointed at now, for tests and for programs that read them aloud. */
   get regions(): readonly Region[] {
     return this.isOpen ? [...this.menu.shown.regions, ...this.bar.shown.regions] : [];
   }
 
-  /** What the specimen stands before. */
+  /** The surroundings of the specimen. */
   setting: Setting = "before-eyes";
 
-  /** Stereo has begun, or has ended. */
+  /** Shows the bar when stereo begins, hides everything when it ends. */
   setShown(isShown: boolean): void {
     this.group.visible = isShown;
     this.barYaw = null;
@@ -141,7 +145,7 @@ export class RoomPanel {
     else this.wantsPlace = "head";
   }
 
-  /** Whether it looks otherwise than before. */
+  /** Updates the panel for one frame. Returns whether it looks different from the last frame. */
   update(dt_s: number, head: Matrix4, state: ViewerState): boolean {
     const eye = new Vector3().setFromMatrixPosition(head);
     const bearing = headBearing(head);
@@ -154,7 +158,7 @@ export class RoomPanel {
       this.wantsPlace = null;
       isChanged = true;
     }
-    // the bar hangs under the panel while that is open
+    // the bar hangs below the open panel
     if (this.isOpen) this.barYaw = bearingOf(this.quad.mesh.position.clone().sub(eye)).yaw;
     const under: Bearing = { yaw: this.barYaw, pitch: barPitch(setting, this.isOpen) };
     this.bar.quad.place(pointAt(under, eye, panelDistance_m(setting)), eye);
@@ -172,28 +176,30 @@ export class RoomPanel {
     return isMenuNew || isBarNew || isChanged;
   }
 
-  /** Light up what is pointed at. */
   light(key: string | null): void {
     const id = key?.startsWith(PANEL) ? key.slice(PANEL.length) : null;
     this.pages.fan.point(id);
     for (const surface of [this.menu, this.bar]) surface.light(id);
   }
 
-  /** The bar and what the panel has now, each with a point of it in the room: of a slider at 0.3 of it. */
+  /**
+   * The controls of bar and panel, each with a point on it in the scene; on a slider at 0.3 of its
+   * width.
+   */
   get places(): readonly PlacedTarget[] {
     if (!this.group.visible) return []; // a flat screen
     return [...(this.isOpen ? this.menu.places : []), ...this.bar.places];
   }
 
-  /** What was ahead is another way of the room now: the panel stays where it is to the head. */
-  comeAlong(from: Matrix4, to: Matrix4): void {
+  /** Keeps the panel in place relative to the head after the direction ahead has changed. */
+  keepPlace(from: Matrix4, to: Matrix4): void {
     this.barYaw = null;
     const { position } = this.quad.mesh;
     position.applyMatrix4(from.clone().invert()).applyMatrix4(to);
     this.quad.place(position, new Vector3().setFromMatrixPosition(to));
   }
 
-  /** Where the middle of a region is in the room; for tests. */
+  /** A point of a region in the scene, by default its middle; for tests. */
   pointOf(id: string, across = 0.5, down = 0.5): Vector3 | null {
     return this.menu.pointOf(id, across, down) ?? this.bar.pointOf(id, across, down);
   }
@@ -209,8 +215,8 @@ export class RoomPanel {
     this.pages.begin();
   }
 
-  /** The page that is opened has cards for the channels that are shown now. */
-  private giveCards(): void {
+  /** Gives cards to the channels that are shown now, when another page is opened. */
+  private resetCards(): void {
     this.view = { ...this.view, channelsWithCard: null };
     this.isStale = true;
   }
@@ -227,8 +233,11 @@ export class RoomPanel {
     return this.menu.show(this.page);
   }
 
-  /** Beyond a region's ends is at its ends: a slider is dragged past them. */
-  private choose(region: Region, spot: Spot, ray: RoomRay, isPress: boolean): void {
+  /**
+   * Carries out the request of a region at a spot. Spots beyond the region count as its edge, since
+   * sliders are dragged past their ends.
+   */
+  private choose(region: Region, spot: Spot, ray: SceneRay, isPress: boolean): void {
     if (region.isCarry) {
       this.options.onCarry(ray, isPress);
       return;
@@ -236,34 +245,34 @@ export class RoomPanel {
     const { x, y, width, height } = region.rect;
     const inside = (share: number) => Math.min(1, Math.max(0, share));
     const at = [inside((spot.x - x) / width), inside((spot.y - y) / height)] as const;
-    const wish = isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
-    const words = JSON.stringify(wish);
-    if (wish === null || (!isPress && words === this.dragged)) return;
-    this.dragged = words;
+    const request = isPress && region.press !== undefined ? region.press(...at) : region.to(...at);
+    const json = JSON.stringify(request);
+    if (request === null || (!isPress && json === this.dragged)) return;
+    this.dragged = json;
     this.isStale = true;
-    this.grant(wish);
+    this.carryOut(request);
   }
 
-  private grant(wish: CanvasRequest): void {
+  private carryOut(request: CanvasRequest): void {
     const { options } = this;
-    if (typeof wish === "string") options.onWish(wish);
-    else if ("panel" in wish) {
-      this.view = changePanel(this.view, wish);
-      if (wish.panel === "lenses") options.onLenses(wish.lenses);
-    } else if ("type" in wish) options.onWish(wish);
-    else this.act(wish);
+    if (typeof request === "string") options.onRequest(request);
+    else if ("panel" in request) {
+      this.view = changePanel(this.view, request);
+      if (request.panel === "lenses") options.onLenses(request.lenses);
+    } else if ("type" in request) options.onRequest(request);
+    else this.change(request);
   }
 
-  private act(wish: CanvasChange): void {
+  private change(change: CanvasChange): void {
     const { options } = this;
-    if (wish.canvas === "group") this.take({ picked: wish.group });
-    if (this.pages.follow(wish)) return;
-    switch (wish.canvas) {
+    if (change.canvas === "group") this.take({ picked: change.group });
+    if (this.pages.follow(change)) return;
+    switch (change.canvas) {
       case "open":
         this.wantsPlace = "bar";
         break;
       case "announce":
-        options.onAnnounce(wish.text);
+        options.onAnnounce(change.text);
         break;
       case "undo":
         options.onUndo();
@@ -275,7 +284,7 @@ export class RoomPanel {
         options.onLeave();
         break;
       case "carry":
-        break; // see choose
+        break; // handled in `choose`
     }
   }
 }

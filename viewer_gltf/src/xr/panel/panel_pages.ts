@@ -1,4 +1,4 @@
-/** The page of the panel in the room that is open, and the ways between its pages. */
+/** The open page of the headset panel, and navigation between its pages. */
 import type { CanvasChange } from "../../panel/canvas/draw_list";
 import { type CanvasView, START_CANVAS } from "../../panel/canvas/page";
 import { SwatchFan } from "./swatch_fan";
@@ -6,22 +6,21 @@ import { SwatchFan } from "./swatch_fan";
 export class PanelPages {
   readonly fan = new SwatchFan();
   private shown: CanvasView = START_CANVAS;
-  /** The page of the section from which a group was opened. */
+  /** The page number of the section from which a group was opened. */
   private sectionPage = 0;
 
-  /** @param onNew another section or group is open */
+  /** @param onNew called when another section or group opens */
   constructor(private readonly onNew: () => void) {}
 
   get view(): CanvasView {
     return this.shown;
   }
 
-  /** Opens the section that the panel begins with. */
   begin(): void {
     this.go(START_CANVAS);
   }
 
-  /** Goes on with the colours that lie beside a swatch. Returns whether others lie there now. */
+  /** Advances the colours beside a swatch. Returns whether others are shown now. */
   advance(dt_s: number): boolean {
     const fanned = this.fan.advance(dt_s, this.shown.fanned);
     if (fanned === this.shown.fanned) return false;
@@ -29,7 +28,7 @@ export class PanelPages {
     return true;
   }
 
-  /** Follows a change. Returns whether it was one of pages. */
+  /** Applies a change of page. Returns false if the change is of another kind. */
   follow(change: CanvasChange): boolean {
     const { shown } = this;
     switch (change.canvas) {

@@ -1,10 +1,13 @@
-/** A quad of the panel in the room with targets on it: the page, or the bar. */
+/** A quad of the headset panel with targets on it: the menu, or the bar. */
 import type { Vector3 } from "three";
-import type { Hit, RoomRay, Target } from "../../interaction/ray_pointer";
+import type { Hit, SceneRay, Target } from "../../interaction/ray_pointer";
 import { holds, type Mark, type Region } from "../../panel/canvas/draw_list";
 import type { CanvasQuad, Spot } from "./canvas_quad";
 
-/** Over a specimen that is brought nearer than the panel, by which it is brought; under a notice. */
+/**
+ * Draw order: over a specimen that is nearer than the panel, since the panel moves it; under
+ * notices.
+ */
 const RENDER_ORDER = 1800;
 export const PANEL = "panel:";
 
@@ -19,26 +22,31 @@ function placeOf({ rect: { x, y, width, height } }: Region): string {
 export class PanelSurface implements Target {
   readonly isOnTop = true;
   shown: Shown = { marks: [], regions: [] };
-  /** The places of the targets, and the number of times that they have changed. */
+  /** Ids and rects of the targets, and the number of times that they have changed. */
   private arrangement = "";
   private changes = 0;
 
   constructor(
     private readonly name: string,
     readonly quad: CanvasQuad,
-    private readonly onChoose: (region: Region, spot: Spot, ray: RoomRay, isPress: boolean) => void,
-    /** Lays the targets out again, if a choice has changed them. */
-    private readonly freshen: () => void,
+    private readonly onChoose: (
+      region: Region,
+      spot: Spot,
+      ray: SceneRay,
+      isPress: boolean,
+    ) => void,
+    /** Lays out the targets again if a choice has made them out of date. */
+    private readonly refreshIfStale: () => void,
   ) {
     quad.drawOver(RENDER_ORDER);
   }
 
-  /** Changes whenever a target appears, disappears or moves. */
+  /** A key that changes whenever a target appears, disappears or moves. */
   get layout(): string {
     return `${this.name} ${this.quad.mesh.visible} ${this.changes}`;
   }
 
-  /** Whether it looks otherwise than before. */
+  /** Shows other marks and targets. Returns whether it looks different from before. */
   show(shown: Shown): boolean {
     this.shown = shown;
     const arrangement = shown.regions.map((each) => `${each.id} ${placeOf(each)}`).join("\n");
@@ -47,12 +55,11 @@ export class PanelSurface implements Target {
     return this.quad.show(shown.marks);
   }
 
-  /** Light up what is pointed at. */
   light(id: string | null): void {
     this.quad.light(this.shown.regions.find((region) => region.id === id)?.rect ?? null);
   }
 
-  /** Its targets, each with a point of it in the room: of a slider at 0.3 of its width. */
+  /** The targets, each with a point on it in the scene; on a slider at 0.3 of its width. */
   get places(): readonly PlacedTarget[] {
     return this.shown.regions.flatMap(({ id, label, isSlide }) => {
       const at = this.pointOf(id, isSlide ? 0.3 : 0.5, 0.5);
@@ -60,15 +67,18 @@ export class PanelSurface implements Target {
     });
   }
 
-  /** A point of a region in the room, by shares of its width and height; null: the region is not shown. */
+  /**
+   * A point of a region in the scene, by shares of its width and height; null if the region is not
+   * shown.
+   */
   pointOf(id: string, across: number, down: number): Vector3 | null {
     const region = this.shown.regions.find((each) => each.id === id);
     if (region === undefined || !this.quad.mesh.visible) return null;
     return this.quad.pointOf(region.rect, across, down);
   }
 
-  meet(ray: RoomRay): Hit | null {
-    const spot = this.quad.meet(ray);
+  intersect(ray: SceneRay): Hit | null {
+    const spot = this.quad.intersect(ray);
     if (spot === null) return null;
     const region = this.shown.regions.find(({ rect }) => holds(rect, spot));
     const { distance_m } = spot;
@@ -78,22 +88,22 @@ export class PanelSurface implements Target {
     if (repeats !== undefined) return { ...hit, repeats, isStep: true };
     if (isCarry) return { ...hit, hold: "carry" };
     if (!region.isSlide) return hit;
-    // what is first taken hold of can be carried by the gaze alone
+    // a region that must be picked up first can also be carried by the gaze
     return { ...hit, hold: region.press === undefined ? "slide" : "carry" };
   }
 
-  choose({ key }: Hit, ray: RoomRay): void {
-    if (key !== null) this.grant(key, ray, true);
+  choose({ key }: Hit, ray: SceneRay): void {
+    if (key !== null) this.chooseAt(key, ray, true);
   }
 
-  drag(key: string, ray: RoomRay): void {
-    this.freshen(); // what was taken hold of is part of it by now
-    this.grant(key, ray, false);
+  drag(key: string, ray: SceneRay): void {
+    this.refreshIfStale(); // the target may have been laid out again since it was picked up
+    this.chooseAt(key, ray, false);
   }
 
-  private grant(key: string, ray: RoomRay, isPress: boolean): void {
+  private chooseAt(key: string, ray: SceneRay, isPress: boolean): void {
     const region = this.shown.regions.find(({ id }) => PANEL + id === key);
-    const spot = this.quad.meet(ray);
+    const spot = this.quad.intersect(ray);
     if (region === undefined || (spot === null && !region.isCarry)) return;
     this.onChoose(region, spot ?? { x: 0, y: 0, distance_m: 0 }, ray, isPress);
   }

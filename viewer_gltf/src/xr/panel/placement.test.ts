@@ -17,10 +17,10 @@ import {
 const DEG = Math.PI / 180;
 const EYE = new Vector3(0.3, 1.6, -0.2);
 const LEVEL = { yaw: 0, pitch: 0 };
-/** Half the angle of so many px of a texture, radians. */
+/** Half the angle of a length on a texture, px, in radians. */
 const half = (px: number, setting: Setting) =>
   Math.atan(px / PX_PER_M / 2 / panelDistance_m(setting));
-/** Lower and upper edge, radians. */
+/** Pitch of the lower and the upper edge, radians. */
 const edges = (pitch: number, height_px: number, setting: Setting) =>
   [pitch - half(height_px, setting), pitch + half(height_px, setting)] as const;
 const panelEdges = (setting: Setting) =>
@@ -28,8 +28,8 @@ const panelEdges = (setting: Setting) =>
 const barEdges = (setting: Setting, isOpen: boolean) =>
   edges(barPitch(setting, isOpen), BAR_HEIGHT, setting);
 
-describe("the panel's place", () => {
-  it("is straight below the gaze, also of one who has turned round", () => {
+describe("the panel's position", () => {
+  it("is straight below the gaze, even after the user has turned around", () => {
     for (const yaw of [0, 0.7, 3, -2.5]) {
       for (const pitch of [0.2, 0, -0.5]) {
         expect(panelBearing({ yaw, pitch }, 0)).toEqual({
@@ -40,11 +40,11 @@ describe("the panel's place", () => {
     }
   });
 
-  it("is where the button was for one who looks straight down, with no heading", () => {
+  it("has the bar's heading if the user looks straight down and has no heading", () => {
     expect(panelBearing({ yaw: 2, pitch: -85 * DEG }, 0.3).yaw).toBe(0.3);
   });
 
-  it("comes back as the bearing that it was given", () => {
+  it("converts back to the same bearing", () => {
     const at = pointAt({ yaw: 0.7, pitch: -0.4 }, EYE, 1.2);
     expect(at.distanceTo(EYE)).toBeCloseTo(1.2, 12);
     const { yaw, pitch } = bearingOf(at.sub(EYE));
@@ -53,7 +53,7 @@ describe("the panel's place", () => {
 });
 
 describe("a notice", () => {
-  it("is under the gaze, but for one at the floor", () => {
+  it("is below the gaze, unless the gaze is at the floor", () => {
     expect(noticeBearing({ yaw: 1, pitch: 0.2 })).toEqual({
       yaw: 1,
       pitch: expect.closeTo(0.2 - 20 * DEG, 12),
@@ -64,12 +64,12 @@ describe("a notice", () => {
 });
 
 describe("the bar", () => {
-  it("hangs where a level gaze finds it", () => {
+  it("hangs 30 degrees below a level gaze", () => {
     expect(barPitch("before-eyes", false)).toBeCloseTo(-30 * DEG, 12);
   });
 
   it.each(["before-eyes", "over-table", "in-hand"] as const)(
-    "is out of the open panel's way, and close under it: %s",
+    "is below the open panel and close to it: %s",
     (setting) => {
       const [, upper] = barEdges(setting, true);
       const [lower] = panelEdges(setting);
@@ -78,19 +78,19 @@ describe("the bar", () => {
     },
   );
 
-  it("stays while the head turns a little, or looks down", () => {
+  it("stays while the head turns a little or looks down", () => {
     expect(followHead(0, { yaw: 0.25, pitch: 0 }, 1)).toBe(0);
     expect(followHead(0, { yaw: 2, pitch: -0.8 }, 1)).toBe(0);
   });
 
-  it("follows a head that has turned away, the short way round", () => {
+  it("follows a head that has turned away, by the shorter way", () => {
     let yaw = 3;
     for (let i = 0; i < 200; i++) yaw = followHead(yaw, { yaw: -2.5, pitch: 0 }, 0.05);
     expect(Math.abs(yaw)).toBeGreaterThan(2.5);
     expect(Math.abs(yaw + 2.5)).toBeLessThan(16 * DEG);
   });
 
-  it("goes with a head that walks round a table, which looks down at the specimen", () => {
+  it("follows a user who walks around a table and looks down at the specimen", () => {
     for (const setting of ["over-table", "in-hand"] as const) {
       const yaw = followHead(0, { yaw: 1.5, pitch: -36 * DEG }, 1, setting);
       expect(yaw, setting).toBeGreaterThan(1);
@@ -100,7 +100,10 @@ describe("the bar", () => {
   });
 });
 
-/** A cube on the table, as large as the specimen may be: its near lower edge, and the upper one of its middle, radians. */
+/**
+ * Pitches, radians, of the largest cube on the table: its near lower edge, and its upper edge in
+ * the middle.
+ */
 function cubeOnTable(): readonly [lower: number, upper: number] {
   const halfEdge_m = (LONGEST_EDGE_M * ROOM_SIZE) / 2;
   const at = (up_m: number, away_m: number) =>
@@ -111,7 +114,7 @@ function cubeOnTable(): readonly [lower: number, upper: number] {
 describe("a specimen on a table", () => {
   const [lower, upper] = cubeOnTable();
 
-  it("is hidden neither by panel nor by bar before a head, which reaches both", () => {
+  it("is not hidden by the panel or the bar in a headset, and both are within reach", () => {
     for (const isOpen of [false, true]) {
       expect(barEdges("over-table", isOpen)[0]).toBeGreaterThan(upper);
     }
@@ -119,12 +122,12 @@ describe("a specimen on a table", () => {
     expect(panelEdges("over-table")[1]).toBeLessThan(37 * DEG);
   });
 
-  it("is not hidden by the bar on a phone's screen, whose picture holds bar and panel", () => {
+  it("is not hidden by the bar on a phone's screen, which shows bar and panel", () => {
     for (const isOpen of [false, true]) {
       expect(barEdges("in-hand", isOpen)[1]).toBeLessThan(lower);
     }
     const middle = Math.atan2(-UNDER_EYES_M, ROOM_DISTANCE_M);
-    // an upright phone's camera shows about 65 x 35 degrees
+    // the camera of an upright phone shows about 65 x 35 degrees
     expect(barEdges("in-hand", true)[0]).toBeGreaterThan(middle - 32.5 * DEG);
     expect(panelEdges("in-hand")[1]).toBeLessThan(middle + 32.5 * DEG);
     for (const width of [WIDTH, BAR_WIDTH]) {

@@ -1,34 +1,44 @@
-/** Where in the room the panel and the bar are, as directions from the eye. Radians. Pure. */
+/** Where the panel, the bar and notices are in the scene, as directions from the eye in radians. */
 import { type Matrix4, Vector3 } from "three";
 
-/** From the eye: to the right of -z, and up. */
+/** Direction from the eye: yaw to the right of -z, and pitch upwards. */
 export type Bearing = Readonly<{ yaw: number; pitch: number }>;
 
 const DEG = Math.PI / 180;
-/** Distance of the panel and of the bar from the eye, m: what they measure in legibility.test.ts is seen from there. */
+/**
+ * Metres from the eye to the panel and the bar. The sizes in legibility.test.ts hold at this
+ * distance.
+ */
 export const PANEL_DISTANCE_M = 1.2;
 
-/** The specimen stands before the eyes in the dark, or over a table in the user's own room, seen by eyes or on a screen. */
+/**
+ * `before-eyes`: dark scene; `over-table`: the user's own room through a headset; `in-hand`: the
+ * user's own room on a screen.
+ */
 export type Setting = "before-eyes" | "over-table" | "in-hand";
 
 type Places = Readonly<{
   /** Pitch of the panel's middle, radians. */
   panel: number;
-  /** Pitch of the bar, radians, while the panel is closed, and while it is open. */
+  /** Pitch of the bar's middle, radians, while the panel is closed and while it is open. */
   bar: readonly [closed: number, open: number];
-  /** Pitches of a head, radians, that looks for the bar, so that the bar waits: from and to. */
+  /**
+   * Range of head pitches, radians, at which a user looks for the bar, so that the bar stands
+   * still.
+   */
   waits: readonly [number, number];
-  /** Distance of both from the eye, m. */
+  /** Metres from the eye to both. */
   distance_m: number;
 }>;
 
 /**
- * - Before the eyes the bar is as far below a level gaze as eyes and neck go without thinking. The panel begins
- *   below the specimen's middle, so that every tile can still be gazed at, and the bar hangs under it.
- * - A specimen on a table fills what a head that looks down can reach. So panel and bar are over it, and the bar stays
- *   where it is.
- * - A screen in a hand shows the table alone. So the panel is before it, as small as that picture needs, and the bar is
- *   at the table's near edge.
+ * - `before-eyes`: the bar is as far below a level gaze as eyes and neck move without effort. The
+ *   panel begins below the specimen's middle, so that the gaze still reaches every tile. The bar
+ *   hangs below the panel.
+ * - `over-table`: the specimen fills the view of a user who looks down, so panel and bar are above
+ *   it, and the bar stays in place.
+ * - `in-hand`: the screen shows only the table. The panel is in front of it, small enough for the
+ *   screen, and the bar is at the near edge of the table.
  */
 const PLACES: Readonly<Record<Setting, Places>> = {
   "before-eyes": {
@@ -50,20 +60,26 @@ const PLACES: Readonly<Record<Setting, Places>> = {
     distance_m: 2,
   },
 };
-/** A head that looks steeper, radians, up or down, has no clear heading. */
+/** Radians. A head that looks up or down more steeply has no clear heading. */
 const STEEP = 75 * DEG;
-/** The head turns this far, radians, before the bar follows. */
+/** Radians that the head turns before the bar follows. */
 const SLACK = 15 * DEG;
+/** Share of the remaining angle that the bar turns, per second. */
 const FOLLOW_PER_S = 4;
 
-/** From the gaze down to a notice's middle, radians: the notice covers nothing of interest. */
+/**
+ * Radians from the gaze down to a notice's middle, so that the notice does not cover what is looked
+ * at.
+ */
 const NOTICE_BELOW = 20 * DEG;
-/** Lowest pitch of a notice, radians: a user who looks at the floor reads it there. */
+/** Lowest pitch of a notice, radians, unless the gaze itself is lower. */
 const NOTICE_LOWEST = -60 * DEG;
 
-/** Between a notice and the menu's rows below it, radians. */
+/** Radians between a notice and the menu's rows below it. */
 const NOTICE_GAP = 0.5 * DEG;
-/** Most that a notice lies above the gaze, radians: farther up, lenses of a Cardboard show text unsharp. */
+/**
+ * Radians. Largest angle of a notice above the gaze: farther up, a Cardboard's lenses blur text.
+ */
 const MOST_ABOVE = 25 * DEG;
 
 export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
@@ -71,15 +87,15 @@ export function noticeBearing({ yaw, pitch }: Bearing): Bearing {
 }
 
 /**
- * Where the middle of a notice goes that must cover nothing from a place on down: the texts end just above it.
+ * Returns where the middle of a notice goes so that its texts end just above a place.
  *
- * @param end from the notice's middle up to the lower end of its texts, radians
+ * @param end angle from the notice's middle up to the lower end of its texts, radians
  */
 export function noticeAbove({ yaw, pitch }: Bearing, end: number): Bearing {
   return { yaw, pitch: pitch + NOTICE_GAP - end };
 }
 
-/** Whether a notice at the upper edge of the menu's rows is seen without a turn of the head. */
+/** Whether a notice at the upper edge of the menu's rows is visible without turning the head. */
 export function isNear(edge: Bearing, gaze: Bearing): boolean {
   return edge.pitch - gaze.pitch < MOST_ABOVE;
 }
@@ -109,12 +125,12 @@ export function headBearing(head: Matrix4): Bearing {
   return bearingOf(new Vector3(0, 0, -1).transformDirection(head));
 }
 
-/** -pi..pi */
+/** The same angle within -pi to pi. */
 function wrapped(angle: number): number {
   return Math.atan2(Math.sin(angle), Math.cos(angle));
 }
 
-/** Where the panel's middle goes: above or below the gaze, whichever way its user has turned. */
+/** Direction of the panel's middle: at the setting's pitch, in the user's heading. */
 export function panelBearing(
   { yaw, pitch }: Bearing,
   barYaw: number,
@@ -123,7 +139,10 @@ export function panelBearing(
   return { yaw: Math.abs(pitch) < STEEP ? yaw : barYaw, pitch: PLACES[setting].panel };
 }
 
-/** The bar stays where it is until the head has turned away, and while it is looked for. */
+/**
+ * Returns the bar's new yaw. The bar follows once the head has turned away, but stands still while
+ * the user looks for it.
+ */
 export function followHead(
   yaw: number,
   head: Bearing,

@@ -1,7 +1,7 @@
-// Both eyes' pictures in one, for red-cyan glasses: see dubois.ts.
+// Combines both eyes' images into one, for red-cyan glasses; see dubois.ts.
 precision highp float;
 
-uniform sampler2D uEyes;  // sRGB; the left eye's picture is the left half
+uniform sampler2D uEyes;  // sRGB; the left eye's image is the left half
 uniform mat3 uLeft;
 uniform mat3 uRight;
 

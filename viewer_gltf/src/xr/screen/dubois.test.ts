@@ -10,7 +10,7 @@ const pixel = (hex: string) =>
   [1, 3, 5].map((i) => Number.parseInt(hex.slice(i, i + 2), 16)) as unknown as Rgb;
 
 it.each(["#000000", "#404040", "#808080", "#c0c0c0", "#ffffff"])(
-  "shows %s as that grey where both eyes see it",
+  "shows the grey %s unchanged if both eyes see it",
   (hex) => {
     const grey = fromHex(hex);
     const shown = toHex(sum(times(LEFT, grey), times(RIGHT, grey)));

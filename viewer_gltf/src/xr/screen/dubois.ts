@@ -1,14 +1,15 @@
 /**
- * Red-cyan anaglyphs by Dubois's projection: of all colours that the glasses can show, each pixel takes the pair
- * that looks most like what the two eyes should see. Greys stay grey, and each eye sees least of the other's picture.
+ * Red-cyan anaglyphs by Dubois's projection. From the colours that the glasses can show, each pixel
+ * takes the pair that looks most like the colours for the two eyes. Greys stay grey, and each eye
+ * sees as little as possible of the other eye's image.
  *
  * References
  * ----------
  * Dubois (2001). A projection method to generate anaglyph stereo images. ICASSP, vol. 3, 1661-1664.
- * doi:10.1109/ICASSP.2001.941256. The numbers are those that its author gives for red-cyan glasses and sRGB screens.
+ * doi:10.1109/ICASSP.2001.941256. The matrices are the author's for red-cyan glasses and sRGB screens.
  */
 
-/** From a linear colour of one eye to its share of the anaglyph, row by row. */
+/** Matrix, row by row, from a linear colour of one eye to that eye's share of the anaglyph. */
 export type Projection = readonly (readonly [number, number, number])[];
 
 export const LEFT: Projection = [

@@ -13,7 +13,7 @@ function cameraAt(z: number): PerspectiveCamera {
   return camera;
 }
 
-/** By how many pixels a point lies further to the right for the left eye than for the right one. */
+/** Pixels by which a point lies further to the right for the left eye than for the right eye. */
 function disparity_px(point: Vector3, z: number, pupils_m = PUPILS_M): number {
   const eyes = new ScreenEyes();
   eyes.follow(cameraAt(z), new Vector3(0.1, 0, 0), pupils_m, [WIDTH, HEIGHT]);
@@ -33,23 +33,23 @@ it.each([
   [-0.7, 1.8],
   [0.1, 0.6],
   [-0.2, 3.1],
-])("puts a point at z = %f before a camera at z = %f where two eyes see it", (z, camera_z) => {
-  // similar triangles: apart * (1 / distance - 1 / distance of the plane), in focal lengths
+])("gives a point at z = %f the parallax of two eyes at z = %f", (z, camera_z) => {
+  // similar triangles: eye distance * (1 / distance - 1 / distance of the plane), in focal lengths
   const apart_m = (PUPILS_M * camera_z) / 1.8;
   const expected = FOCAL_PX * apart_m * (1 / (camera_z - z) - 1 / camera_z);
   expect(disparity_px(new Vector3(0.3, -0.1, z), camera_z)).toBeCloseTo(expected, 6);
 });
 
-it("has no parallax in the plane through what is looked at, nor with eyes in one place", () => {
+it("has no parallax in the plane through the focus, or if both eyes are in one place", () => {
   expect(disparity_px(new Vector3(-0.4, 0.2, 0), 1.1)).toBeCloseTo(0, 9);
   expect(disparity_px(new Vector3(-0.4, 0.2, 0.4), 1.1, 0)).toBeCloseTo(0, 9);
 });
 
-it("shows nothing further apart than a thirtieth of the picture behind the screen", () => {
+it("keeps the parallax behind the screen below a thirtieth of the width", () => {
   expect(-disparity_px(new Vector3(0, 0, -15), 1.8)).toBeLessThan(WIDTH / 30);
 });
 
-it("gives each eye its half of the target", () => {
+it("gives each eye its half of the render target", () => {
   const eyes = new ScreenEyes();
   eyes.follow(cameraAt(1), new Vector3(), PUPILS_M, [WIDTH, HEIGHT]);
   expect(eyes.pairs.map(([, viewport]) => viewport.toArray())).toEqual([

@@ -1,11 +1,17 @@
-/** Two eyes before a screen: both look through it at the same plane, which has no parallax. */
+/**
+ * The cameras of two eyes in front of a screen. Both look through it at the same plane, which has
+ * no parallax.
+ */
 import { Matrix4, PerspectiveCamera, Vector3, Vector4 } from "three";
 
-/** Distance, m, at which the eyes are as far apart as the user's pupils: that of the opening view. */
+/**
+ * Metres. At this distance, that of the opening view, the cameras are as far apart as the user's
+ * pupils.
+ */
 const OPENING_M = 1.8;
 
 export class ScreenEyes {
-  /** The left eye first, each with its part of the target, pixels. */
+  /** The left eye first; each camera with its viewport in the render target, pixels. */
   readonly pairs: readonly (readonly [PerspectiveCamera, Vector4])[] = [0, 1].map(() => {
     const camera = new PerspectiveCamera();
     camera.matrixAutoUpdate = false;
@@ -15,12 +21,13 @@ export class ScreenEyes {
   private readonly aside = new Matrix4();
 
   /**
-   * Nearer to what is looked at, the eyes come together: so depth looks alike at any distance.
+   * Places the two cameras. Their distance shrinks with the distance to the focus, so that depth
+   * looks alike at any distance.
    *
-   * @param camera between the eyes
+   * @param camera midway between the eyes
    * @param focus a point of the plane that has no parallax
-   * @param pupils_m distance of the user's pupils
-   * @param size of one eye's picture, pixels; the right eye's lies right of the left one's
+   * @param pupils_m distance between the user's pupils, metres
+   * @param size of one eye's image, pixels; the right eye's lies to the right of the left eye's
    */
   follow(
     camera: PerspectiveCamera,
@@ -36,7 +43,8 @@ export class ScreenEyes {
       eye.matrixWorld.multiplyMatrices(camera.matrixWorld, this.aside.makeTranslation(x_m, 0, 0));
       eye.projectionMatrix.copy(camera.projectionMatrix);
       const { elements } = eye.projectionMatrix;
-      elements[8] -= (elements[0] * x_m) / distance_m; // an eye's frustum ends at the screen's sides
+      // This shift makes both eyes' frusta end at the screen's sides.
+      elements[8] -= (elements[0] * x_m) / distance_m;
     });
   }
 }

@@ -1,4 +1,6 @@
-/** Stereo on the page's own screen: red-cyan for glasses, or both pictures side by side. */
+/**
+ * Stereo on the page's own screen: an anaglyph for red-cyan glasses, or two images side by side.
+ */
 import {
   Camera,
   Matrix3,
@@ -20,20 +22,23 @@ const matrixOf = (projection: Projection) => ({
   value: new Matrix3().fromArray(projection.flat()).transpose(),
 });
 
-export class ScreenPictures {
+export class ScreenImages {
   private readonly eyes = new ScreenEyes();
-  /** Both pictures of an anaglyph, the left eye's on the left, encoded as on the canvas. */
+  /**
+   * Images of both eyes for an anaglyph, the left eye's on the left, with colours encoded like the
+   * canvas's.
+   */
   private readonly target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
   private readonly pass = new ScreenPass(includeChunks(anaglyph, CHUNKS), {
     uEyes: { value: this.target.texture },
     uLeft: matrixOf(LEFT),
     uRight: matrixOf(RIGHT),
   });
-  private readonly nobody = new Camera();
+  private readonly anyCamera = new Camera();
 
   constructor(private readonly renderer: WebGLRenderer) {}
 
-  /** Where the eyes are in this frame: see ScreenEyes. */
+  /** Places the eyes for this frame; see ScreenEyes. */
   follow(
     eyes: Eyes,
     camera: PerspectiveCamera,
@@ -48,13 +53,12 @@ export class ScreenPictures {
     eyes.follow(this.eyes.pairs);
   }
 
-  /** Draw a frame as an anaglyph. */
   present(draw: () => void): void {
     const { renderer } = this;
     renderer.setRenderTarget(this.target);
     draw();
     renderer.setRenderTarget(null);
-    renderer.render(this.pass.scene, this.nobody);
+    renderer.render(this.pass.scene, this.anyCamera);
   }
 
   dispose(): void {

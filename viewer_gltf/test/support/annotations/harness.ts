@@ -305,7 +305,7 @@ class Bench {
 
   /** Returns the handle that the gaze hits straight ahead; null: none. */
   meet(): Hit | null {
-    return this.marks.target.meet(gazeOf(this.camera.matrixWorld));
+    return this.marks.target.intersect(gazeOf(this.camera.matrixWorld));
   }
 
   /** Drags a handle to the present direction of the gaze. */

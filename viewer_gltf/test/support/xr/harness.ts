@@ -17,7 +17,7 @@ import {
 } from "three";
 import { BothEyes } from "../../../src/gpu/both_eyes";
 import { Cuts } from "../../../src/gpu/clip_planes";
-import { leaveUncut } from "../../../src/gpu/unclipped_material";
+import { keepUnclipped } from "../../../src/gpu/unclipped_material";
 import type { Target } from "../../../src/interaction/ray_pointer";
 import type { Ray } from "../../../src/math/vec3";
 import { depthMaterial } from "../../../src/render/blend_material";
@@ -62,7 +62,7 @@ class Stand {
   readonly drags: At[] = [];
   private readonly handle: Target = {
     isOnTop: true,
-    meet: ({ origin, direction }) => {
+    intersect: ({ origin, direction }) => {
       const toHandle = new Vector3(...HANDLE_m).sub(origin);
       const distance_m = toHandle.dot(direction);
       const beside = Math.sqrt(Math.max(0, toHandle.lengthSq() - distance_m ** 2));
@@ -337,7 +337,7 @@ function leftOfTheUncut(): readonly (readonly [number, number])[] {
     scene.add(plane);
     return plane;
   });
-  leaveUncut(planes[0]);
+  keepUnclipped(planes[0]);
   const target = new WebGLRenderTarget(side_px, side_px);
   const rgba = new Uint8Array(4 * side_px ** 2);
   const counts = [0, 1].map((first) => {
