@@ -287,7 +287,8 @@ def _bind(host: str, port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         listener.close()
         raise StereoCellError(
-            f"port {port}: {error}; choose another, or 0 for a free one"
+            f"port {port}: {error.strerror if isinstance(error, OSError) else error}; choose another "
+            "by --port, or --port 0 for a free one"
         ) from error
     return listener
 
