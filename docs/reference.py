@@ -32,13 +32,14 @@ FORMATS: dict[str, tuple[str, str, str]] = {
     "objects": (
         "Bundle: objects",
         "objects",
-        "`OUT/bundle/channels/<channel>/objects.json`, of a label map: [Objects](../objects.md).",
+        "`OUT/bundle/channels/<channel>/objects.json`, of a label map: "
+        "[Objects in stage and bundle](../objects-format.md).",
     ),
     "transfer2d": (
         "Bundle: transfer functions",
         "transfer2d",
         "`OUT/bundle/channels/<channel>/transfer2d.json`. How a table is made of the shapes: "
-        "[Two-dimensional transfer functions](../transfer-functions.md).",
+        "[Tables of two-dimensional transfer functions](../transfer-tables.md).",
     ),
     "brick-stream": (
         "Brick stream",
@@ -55,7 +56,7 @@ FORMATS: dict[str, tuple[str, str, str]] = {
         "Slices",
         "slices",
         "`slices.json`, beside the PNG files that `stereocell slices` writes: "
-        "[DICOM and NIfTI](../dicom.md).",
+        "[Slices as PNG](../slices.md).",
     ),
     "inbox": ("Inbox", "inbox", "`FOLDER/inbox.json`. See [The inbox](../inbox.md)."),
 }
@@ -71,6 +72,34 @@ def pages() -> dict[str, str]:
         "commands.md": commands_page(),
         "settings.md": settings_page(),
     }
+
+
+# Links to pages that are made
+
+# A page in the repository can't link to a page that only the site has. It links to a line of
+# reference.md instead, and the hook replaces that link by one to the page itself.
+TARGETS = {
+    **{name: f"formats/{name}.md" for name in FORMATS},
+    "stage": "formats/stage.md",
+    "commands": "commands.md",
+    "settings": "settings.md",
+    "notebook": "notebook.md",
+}
+_LINK = re.compile(r"\]\((?:\.\./)*reference\.md#([\w-]+)\)")
+
+
+def with_made_pages(markdown: str, path: str) -> str:
+    """Return a page that links to the pages that are made, not to lines of reference.md.
+
+    path  of the page, below docs/, such as `formats/index.md`
+    """
+    up = "../" * path.count("/")
+    return _LINK.sub(lambda link: f"]({up}{TARGETS[link[1]]})", markdown)
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Replace the links of a page: MkDocs calls this."""
+    return with_made_pages(markdown, page.file.src_uri)
 
 
 # JSON Schemas

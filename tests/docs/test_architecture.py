@@ -1,4 +1,4 @@
-"""docs/architecture.md has the layers that `make lint` holds, and names what is there."""
+"""The pages on architecture have the layers that `make lint` checks, and name existing packages."""
 
 import re
 import tomllib
@@ -8,10 +8,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+DOCS = ROOT / "docs"
 PYTHON = ROOT / "pipeline" / "stereocell"
 VIEWER = ROOT / "viewer_gltf" / "src"
-PYTHON_LAYERS, VIEWER_LAYERS, WAY = re.findall(r"^```\n(.*?)^```", PAGE, re.M | re.S)
+
+
+def pictures(page: str) -> list[str]:
+    return re.findall(r"^```\n(.*?)^```", (DOCS / page).read_text("utf-8"), re.M | re.S)
+
+
+PYTHON_LAYERS, VIEWER_LAYERS = pictures("architecture.md")
+(WAY,) = pictures("data-flow.md")
 
 
 def names(picture: str) -> list[str]:
@@ -20,9 +27,8 @@ def names(picture: str) -> list[str]:
     return [name for line in lines for name in line.split()]
 
 
-def table(title: str) -> list[str]:
-    section = PAGE.partition(f"## {title}")[2].partition("\n## ")[0]
-    return re.findall(r"^\| `(\w+)` \|", section, re.M)
+def table(page: str) -> list[str]:
+    return re.findall(r"^\| `(\w+)` \|", (DOCS / page).read_text("utf-8"), re.M)
 
 
 def test_python_s_layers_are_those_that_lint_holds() -> None:
@@ -42,12 +48,12 @@ def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
 
 
 @pytest.mark.parametrize(
-    ("title", "folder"), [("Packages of Python", PYTHON), ("Folders of the viewer", VIEWER)]
+    ("page", "folder"), [("packages.md", PYTHON), ("viewer-folders.md", VIEWER)]
 )
-def test_each_package_has_its_line(title: str, folder: Path) -> None:
+def test_each_package_has_its_line(page: str, folder: Path) -> None:
     there = {p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("__")}
     there |= {"api"} if folder == PYTHON else set()
-    found = table(title)
+    found = table(page)
     assert len(found) == len(set(found))
     assert set(found) == there
 

@@ -1,8 +1,8 @@
-"""What the docs show works as they show it: code, commands, links, tables, the workflow.
+"""The docs work as they are printed: code, commands, links, tables, the workflow.
 
 Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages, in one
-folder with small sources under the names that the docs use; what is in PARSED is only held against
-the program's own parser, `make` against the Makefile by `make -n`, `dask` against its own help.
+folder with small sources under the names that the docs use. Commands in PARSED are only parsed by
+the program's own parser, `make` by `make -n`, and `dask` is compared with its own help.
 """
 
 import json
@@ -43,7 +43,7 @@ DOCS = ROOT / "docs"
 FIRST = [DOCS / name for name in ("index.md", "own-data.md", "blender.md")]  # the others need these
 PAGES = [*FIRST, *sorted({*DOCS.rglob("*.md"), ROOT / "README.md"} - set(FIRST))]
 
-# Only parsed: what it takes that is not at hand here, and where it is run
+# Commands that are only parsed: what they need that is not available here, and where they are run
 PARSED = {
     "view": "does not end: serve/test_server.py",
     "serve": "does not end: serve/test_server.py, serve/test_brick_session.py",
@@ -58,10 +58,11 @@ PARSED = {
     "build CT_FOLDER": "the same: read/formats/dicom/test_segmentation.py",
     "build seg.dcm": "the same",
 }
-# ... and run, but on less
+# Parts of commands that are run on less data
 SMALLER = {
-    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,64,64",
+    "sample cycif sample.ome.zarr": "sample cycif sample.ome.zarr --grid 1x1 --tile-size 8,64,64",
     "--grid 5x2": "--grid 2x1",
+    "--tile r1_c2": "--tile r0_c0",
 }
 
 
@@ -160,14 +161,15 @@ def test_commands_run(
                 code = cli.main(shlex.split(words)[1:])
             assert code == 0, f"{page.name}: {command}: {capsys.readouterr().err}"
             ran.append(options.command)
-    # those that are left out of this test are named in PARSED, and no others
+    # Only commands in PARSED are left out.
     assert set(ran) == set(cli.COMMANDS) - {"view", "serve", "tissue"}
-    assert set(drawn) == {Path("out/mine")}
-    assert len(drawn) == 1 + [c for p in PAGES for c in commands(p, "stereocell")].count(
+    reports = [c for p in PAGES for c in commands(p, "stereocell")].count(
         "stereocell report out/mine"
     )
+    assert drawn == [Path("out/sample"), *[Path("out/mine")] * reports]
     for folder in ("head", "second", "frames", "brain"):  # of the page about DICOM
         assert (sources / f"out/{folder}/bundle/manifest.json").is_file()
+    assert (sources / "out/sample/report/index.html").is_file()
     assert (sources / "out/mine/report/index.html").is_file()
     _runs_the_workflow(sources)
 
@@ -255,13 +257,13 @@ def test_python_runs(sources: Path) -> None:
     names: dict[str, object] = {}
     for text in texts:
         exec(compile(text, "docs/python.md", "exec"), names)
-    assert (sources / "out" / "mine" / "bundle" / "manifest.json").is_file()
+    assert (sources / "out" / "python" / "bundle" / "manifest.json").is_file()
 
 
 def test_the_reader_that_is_shown_works_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "cube.py").write_text(blocks(DOCS / "extending.md", "python")[0])
+    (tmp_path / "cube.py").write_text(blocks(DOCS / "extending-reader.md", "python")[0])
     monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
     known_formats.cache_clear()
     try:
@@ -302,13 +304,41 @@ def test_files_that_are_named_exist() -> None:
             assert (ROOT / name).exists(), f"{page.name}: {name}"
 
 
-def test_links_lead_somewhere(reference: Any) -> None:
-    made = {DOCS / path for path in [*reference.pages(), "notebook.md"]}
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page that GitHub and the site both know."""
+    text = re.sub(r"(?ms)^ *```.*?^ *```", "", page.read_text("utf-8"))
+    found = set(re.findall(r'<a id="([\w-]+)">', text))
+    for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
+        plain = re.sub(r"[^\w\s-]", "", title.lower()).strip()
+        if "  " not in plain:  # the site joins two spaces, GitHub does not
+            found.add(plain.replace(" ", "-"))
+    return found
+
+
+def test_links_lead_to_files_and_headings_of_the_repository() -> None:
+    known: dict[Path, set[str]] = {}
     for page in PAGES:
-        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8")):
-            if "://" not in target:
-                path = (page.parent / target.strip()).resolve()
-                assert path.exists() or path in made, f"{page.name}: {target}"
+        text = re.sub(r"(?ms)^ *```.*?^ *```", "", page.read_text("utf-8"))
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", text):
+            if "://" in target:
+                continue
+            path = (page.parent / target).resolve() if target else page
+            assert path.exists(), f"{page.name}: {target}"
+            if anchor:
+                known.setdefault(path, anchors(path))
+                assert anchor in known[path], f"{page.name}: {target}#{anchor}"
+
+
+def test_links_to_pages_that_are_made_lead_to_them_in_the_site(reference: Any) -> None:
+    made = {*reference.pages(), "notebook.md"}
+    assert set(reference.TARGETS.values()) == made
+    text = "[a](reference.md#settings), [b](../reference.md#plan), [c](reference.md)"
+    assert reference.with_made_pages(text, "one.md") == (
+        "[a](settings.md), [b](formats/plan.md), [c](reference.md)"
+    )
+    assert "](../formats/plan.md)" in reference.with_made_pages(text, "formats/index.md")
+    shown = re.findall(r"reference\.md#([\w-]+)", (DOCS / "reference.md").read_text("utf-8"))
+    assert set(shown) == set(reference.TARGETS)
 
 
 def test_every_field_of_every_schema_is_in_the_reference(reference: Any) -> None:

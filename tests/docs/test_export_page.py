@@ -7,7 +7,7 @@ import pytest
 
 from stereocell.export.write import ENDINGS
 
-PAGE = Path(__file__).parents[2] / "docs" / "export.md"
+PAGE = Path(__file__).parents[2] / "docs" / "export-formats.md"
 
 
 def test_the_table_of_endings_is_that_of_the_command() -> None:

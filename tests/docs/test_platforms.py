@@ -1,4 +1,4 @@
-"""The table of systems in docs/install.md fits the requirements (`make platforms`)."""
+"""The table in docs/systems.md fits the requirements (`make platforms`)."""
 
 import re
 import tomllib
@@ -24,7 +24,7 @@ def platforms() -> ModuleType:
 
 
 def made(platforms: ModuleType) -> str:
-    page = (ROOT / "docs" / "install.md").read_text("utf-8")
+    page = (ROOT / "docs" / "systems.md").read_text("utf-8")
     return str(page.split(platforms.BEGIN)[1].split(platforms.END)[0])
 
 

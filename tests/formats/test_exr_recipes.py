@@ -1,4 +1,4 @@
-"""What docs/unity-unreal.md says of slice atlases: slicing one so gives the tile's volume back.
+"""What docs/unity-volumes.md says of slice atlases: slicing one so gives the tile's volume back.
 
 The atlas is read by three.js, whose EXR reader shares no code with the library that wrote it.
 """
@@ -148,7 +148,7 @@ def test_voxels_lie_where_the_recipe_says(atlas: Atlas) -> None:
 
 
 def test_the_recipe_names_the_numbers_by_which_it_was_followed() -> None:
-    recipe = (ROOT / "docs" / "unity-unreal.md").read_text("utf-8")
+    recipe = (ROOT / "docs" / "unity-volumes.md").read_text("utf-8")
     formulas = [
         "x = low.x + (i - 1) sx      y = high.y - (j - 1) sy      z = low.z + (k - 1) sz",
         "u = (i + 0.5) / nx      v = 1 - (j + 0.5) / ny      w = (k + 0.5) / D",

@@ -22,7 +22,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_layers_are_found() -> None:
     pages = {place.partition(":")[0] for place in LAYERS}
-    assert {"README.md", "docs/blender.md", "docs/stage.md"} <= pages
+    assert {"docs/blender.md", "docs/stage-layers.md", "docs/transfer-functions.md"} <= pages
 
 
 @pytest.mark.parametrize("place", LAYERS)
@@ -41,5 +41,5 @@ def test_a_printed_layer_goes_into_a_bundle(stage_path: Path, tmp_path: Path, pl
     channel = load(tmp_path / "bundle" / "manifest.json")["channels"][0]
     if "inputs:color = " in LAYERS[place]:
         assert channel["color"] == [1, 0.1, 0.1]
-    if '"arcs"' in LAYERS[place]:
+    if '"sharp"' in LAYERS[place]:
         assert channel["transfer_function"] == "sharp"

@@ -11,7 +11,7 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const CODE_GZIP_BYTES = 380_000;
-const TOLD_IN = ["docs/viewer.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
+const TOLD_IN = ["docs/viewer-drawing.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
 /** Page, code, style and bundle, from a host that compresses nothing. */
 const ON_THE_WIRE_BYTES = 430_000;
 /** Of ten tiles, as the demo has. */
