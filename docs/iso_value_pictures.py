@@ -3,8 +3,8 @@
     python docs/iso_value_pictures.py SAMPLE FOLDER
 
 SAMPLE is the volume of `stereocell sample cycif`. Builds of a part of it go into FOLDER, and
-pictures of their surfaces into docs/pictures: one by the iso-value that a build finds, one by a
-lower value, one by a higher value, and one with a wrong voxel spacing.
+pictures of their surfaces into docs/pictures. One has the iso-value that a build finds, one a lower
+value, one a higher value, and one a wrong voxel spacing.
 """
 
 import sys
@@ -16,7 +16,7 @@ from PIL import Image
 from stereocell.cli.__main__ import main as run
 
 PICTURES = Path(__file__).parent / "pictures"
-QUALITY = 75  # of WebP, 0 to 100
+QUALITY = 75  # quality of WebP, 0 to 100
 MAX_SIZE = (900, 1100)  # pixels; a picture of contours is larger
 PART = ("--preset", "cycif", "--channels", "Hoechst", "--region", "0:48,0:96,0:192")
 BUILDS: Mapping[str, Sequence[str]] = {

@@ -127,8 +127,10 @@ def _lines(found: Mapping[tuple[str, str, str], Found], day: date) -> Iterator[s
     yield ""
     yield "The requirements that were resolved:"
     yield ""
+    yield "| of | requirements |"
+    yield "|---|---|"
     for row, lines in asked.items():
-        yield f"- {row}: {', '.join(f'`{line}`' for line in lines)}"
+        yield f"| {row} | {', '.join(f'`{line}`' for line in lines)} |"
 
 
 def main() -> None:

@@ -25,7 +25,8 @@ FORMATS: dict[str, tuple[str, str, str]] = {
     "units": (
         "Units",
         "units",
-        "What the phases keep for each other in `OUT` and `OUT/units/`; `OUT/stage/files.json`.",
+        "Files of `OUT` and `OUT/units/` that one phase writes for the next, and "
+        "`OUT/stage/files.json`.",
     ),
     "bundle": ("Bundle", "bundle", "`OUT/bundle/manifest.json` and `files.json`."),
     "volumes": ("Bundle: volumes", "volumes", "`OUT/bundle/channels/<channel>/volumes.json`."),
@@ -237,9 +238,9 @@ def stage_page() -> str:
         "# Stage",
         "`OUT/stage/stage.usda` is USD: coordinates in micrometres (`metersPerUnit` 1e-6), Y up, "
         "`/Specimen/Tiles/<tile>` with variants of detail and representation, "
-        "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. What an "
-        "edit of it does: [The stage](../stage.md). Attributes beyond USD's own are of two applied "
-        "schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON Schema, "
+        "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. "
+        "[The stage](../stage.md) says how to edit it. Attributes beyond USD's own are of two "
+        "applied schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON Schema, "
         "`schemas/channel.schema.json`.",
     ]
     for prim in layer.rootPrims:
@@ -273,7 +274,7 @@ def commands_page() -> str:
         for action in cli._parser()._actions
         if isinstance(action, argparse._SubParsersAction)
     )
-    parts = ["# Commands", "What `stereocell COMMAND --help` says."]
+    parts = ["# Commands", "This page has the text that `stereocell COMMAND --help` prints."]
     for name, parser in commands.items():
         parser.formatter_class = lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=96)
         parts += [f"## {name}", f"```text\n{parser.format_help()}```"]
@@ -286,8 +287,8 @@ def settings_page() -> str:
 
     parts = [
         "# Settings",
-        "What `stereocell settings` prints. A file of these, or of some of them, goes to "
-        "`--config`; flags go before the file, and the file before the preset.",
+        "This page has the text that `stereocell settings` prints. A file of these, or of some of "
+        "them, goes to `--config`; flags go before the file, and the file before the preset.",
         "```toml\n"
         + settings_module.to_toml(settings_module.Settings(), header=settings_module.TEMPLATE)
         + "```",
