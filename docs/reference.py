@@ -240,8 +240,8 @@ def stage_page() -> str:
         "`/Specimen/Tiles/<tile>` with variants of detail and representation, "
         "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. "
         "[The stage](../stage.md) says how to edit it. Attributes beyond USD's own are of two "
-        "applied schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON Schema, "
-        "`schemas/channel.schema.json`.",
+        "applied schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON "
+        "Schema, `schemas/channel.schema.json`.",
     ]
     for prim in layer.rootPrims:
         if not prim.attributes:
