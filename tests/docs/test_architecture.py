@@ -22,7 +22,7 @@ PYTHON_LAYERS, VIEWER_LAYERS = pictures("architecture.md")
 
 
 def names(picture: str) -> list[str]:
-    """Return the packages of a picture, from the top: what stands left of two spaces' gap."""
+    """Return the packages of a picture, from the top: the words in its left column."""
     lines = [line[:40] for line in picture.splitlines() if not line.startswith(" ---")]
     return [name for line in lines for name in line.split()]
 
@@ -31,13 +31,13 @@ def table(page: str) -> list[str]:
     return re.findall(r"^\| `(\w+)` \|", (DOCS / page).read_text("utf-8"), re.M)
 
 
-def test_python_s_layers_are_those_that_lint_holds() -> None:
+def test_the_picture_has_the_layers_of_python_that_lint_checks() -> None:
     tool = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]
     (layers,) = [c["layers"] for c in tool["contracts"] if c["type"] == "layers"]
     assert names(PYTHON_LAYERS) == layers
 
 
-def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
+def test_the_picture_has_the_layers_of_the_viewer_that_lint_checks() -> None:
     code = (ROOT / "viewer_gltf" / "scripts" / "layers.ts").read_text("utf-8")
     layers = [one.strip('"').lower() for one in re.findall(r'^  ("\w+"|PARTS),$', code, re.M)]
     parts = {file.parent.name for file in VIEWER.glob("*/part.ts")} - set(layers)
@@ -58,11 +58,11 @@ def test_each_package_has_its_line(page: str, folder: Path) -> None:
     assert set(found) == there
 
 
-def test_the_way_of_a_tile_leads_through_files_that_are_there() -> None:
+def test_the_way_of_a_tile_names_files_that_exist() -> None:
     packages = [p.name for p in (*PYTHON.iterdir(), *VIEWER.iterdir()) if p.is_dir()]
     steps = re.findall(rf"\b(?:{'|'.join(packages)})/[\w/*]+", WAY)
     assert len(steps) > 15
     for step in steps:
         files = [*PYTHON.glob(f"{step}*"), *VIEWER.glob(f"{step}*")]
-        made = step.startswith(("bundle/index", "units/"))  # what a build leaves
+        made = step.startswith(("bundle/index", "units/"))  # files of a build
         assert made or files, step

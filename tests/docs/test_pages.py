@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("formats/*.md")])
 DECISIONS = sorted(DOCS.glob("decisions/*.md"))
-MAX_BYTES = 6000  # of a page
+MAX_BYTES = 6000  # size of a page
 MAX_PICTURE_BYTES = 60_000
 # Pages whose tables a program or a test makes
 GENERATED = {"edit-table.md", "input-formats.md", "keys.md", "licences.md", "systems.md"}

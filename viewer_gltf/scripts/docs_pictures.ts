@@ -18,11 +18,11 @@ const PICTURES = new URL("../../docs/pictures/", import.meta.url).pathname;
 
 type Picture = Readonly<{
   sample: "demo" | "cells" | "mri-demo";
-  /** Of the page, CSS pixels. */
+  /** Width and height of the page, CSS pixels. */
   size?: readonly [number, number];
   /** Words of the page's address. */
   query?: string;
-  /** What a user does before the picture is taken. */
+  /** The actions of a user before the picture is taken. */
   act?: (viewer: ViewerPage) => Promise<void>;
 }>;
 
