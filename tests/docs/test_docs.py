@@ -1,7 +1,7 @@
 """The docs work as they are printed: code, commands, links, tables, the workflow.
 
-Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages. One folder
-has small sources under the names that the docs use. Commands in PARSED are only parsed by
+Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages. One
+folder has small sources under the names that the docs use. Commands in PARSED are only parsed by
 the program's own parser, `make` by `make -n`, and `dask` is compared with its own help.
 """
 
