@@ -5,6 +5,7 @@ import shutil
 import socket
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(0)
     spaced = {"axes": "ZYX", "spacing": 0.5, "unit": "um"}
 
-    def write(name: str, voxels: np.ndarray, **more: object) -> None:
+    def write(name: str, voxels: Any, **more: Any) -> None:
         tifffile.imwrite(place / name, voxels, **more)
 
     imagej = {"imagej": True, "resolution": (5.0, 5.0), "metadata": spaced}
