@@ -56,7 +56,7 @@ TILES = tuple(spheres.tile(column, APPEARANCES) for column in (0, 1))
 CD31 = "/Specimen/Channels/CD31"
 
 
-# The table. By hand, for values and gradients 0, 1/4, 1/2, 3/4, 1; see docs/transfer-tables.md.
+# The table. By hand, for values and gradients 0, 1/4, 1/2, 3/4, 1; see docs/transfer-functions.md.
 
 
 def test_a_rectangle_fades_to_its_edges_but_not_to_the_planes() -> None:

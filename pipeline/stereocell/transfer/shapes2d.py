@@ -3,7 +3,7 @@
 A function is a list of shapes, the widgets of Kniss, Kindlmann & Hansen, IEEE TVCG 8(3), 2002: a
 rectangle, or a triangle that stands on its tip at gradient 0, which is the region that Levoy, IEEE
 CG&A 8(3), 1988, keeps of an iso-surface: as thick at every steepness. `evaluate2d` makes a table of
-them; docs/transfer-tables.md states it as a formula, and the viewer computes the same bytes.
+them; docs/transfer-functions.md states it as a formula, and the viewer computes the same bytes.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
 /**
  * Two-dimensional transfer functions: shapes in the joint histogram of value and gradient magnitude, the table
  * that a shader reads, and what an editor does with them. Plain data and pure functions. The table
- * has the bytes that the pipeline's evaluate2d has; docs/transfer-tables.md states the formula.
+ * has the bytes that the pipeline's evaluate2d has; docs/transfer-functions.md states the formula.
  */
 import {
   COLUMNS,

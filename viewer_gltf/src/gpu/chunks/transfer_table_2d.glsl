@@ -1,5 +1,5 @@
 // Two-dimensional transfer functions: value and gradient magnitude (Kniss, Kindlmann & Hansen 2002);
-// docs/transfer-tables.md describes the numbers.
+// docs/transfer-functions.md describes the numbers.
 
 uniform vec4 uGradientMax;  // of each channel: the step of intensity over two voxels that is 1 to its table
 
