@@ -76,7 +76,7 @@ ifneq ($(wildcard ../shared/data),)
 export STEREOCELL_DATA ?= $(abspath ../shared/data)
 endif
 
-.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs notebook lock platforms licences format-table clean browser mono
+.PHONY: help setup demo plan units stage bundle view serve report check lint record-steps test test-python test-viewer test-pages test-built test-bundles test-here test-fast test-newest test-newest-here test-exhaustive blender test-blender test-dcc torture careless bench bench-live bench-start bench-size bench-scale bench-scene bench-breadth bench-iso bench-level-score bench-threshold bench-tissue bench-unit bench-cells bench-wrap bench-serve bench-viewer bench-fps object-store wheel docs docs-pictures notebook lock platforms licences format-table clean browser mono
 
 help: ## Show this help
 	@echo "StereoCell: volumes to USD stage, web bundle and stereo view. make TARGET [NAME=VALUE ...]"
@@ -409,8 +409,16 @@ out/wheel/constraints.txt: requirements.lock
 	@mkdir -p $(@D)
 	sed -n '/^[A-Za-z0-9]/s/ *\\$$//p' $< > $@
 
-docs: $(READY) ## Make the documentation as a site: out/docs
+docs: $(READY) $(if $(DRAW),docs-pictures) ## Make the documentation as a site: out/docs (DRAW=1 draws its pictures again)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+# Chromium draws the pages of three samples; the command draws the pictures of wrong and right iso-values
+docs-pictures: setup browser
+	$(MAKE) demo OUT=out/demo
+	$(MAKE) demo SAMPLE=cells OUT=out/cells
+	$(MAKE) demo SAMPLE=mri OUT=out/mri-demo
+	cd $(VIEWER) && npm run --silent docs-pictures -- ../out
+	$(BIN)/python docs/iso_value_pictures.py out/samples/cycif.ome.zarr out/iso-values
 
 notebook: setup ## Run docs/jupyter.ipynb and store it with its pictures
 	$(BIN)/python docs/run_jupyter.py
@@ -419,13 +427,13 @@ lock: setup ## Write requirements.lock again from pyproject.toml
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --no-header --no-annotate --group dev pyproject.toml -o requirements.lock
 
-platforms: setup ## Resolve the requirements for each system and Python, and write the table of docs/install.md
+platforms: setup ## Resolve the requirements for each system and Python, and write the table of docs/systems.md
 	$(BIN)/python docs/platforms.py
 
 licences: $(READY) ## Write docs/licences.md from the packages that are installed
 	$(BIN)/python docs/licences.py
 
-format-table: $(READY) ## Write the table of formats in docs/own-data.md from the formats' rows
+format-table: $(READY) ## Write the table of formats in docs/input-formats.md from the formats' rows
 	$(BIN)/python docs/format_table.py
 
 clean: ## Remove .venv, the viewer's packages and build, and caches; builds in out/ stay

@@ -1,11 +1,11 @@
-"""Write the table of formats into docs/own-data.md, from each format's row: `make format-table`."""
+"""Write the table in docs/input-formats.md from each format's row: `make format-table`."""
 
 from pathlib import Path
 
 from stereocell.read.format import Format
 from stereocell.read.known_formats import known_formats
 
-PAGE = Path(__file__).parent / "own-data.md"
+PAGE = Path(__file__).parent / "input-formats.md"
 BEGIN, END = "<!-- begin of `make format-table` -->\n", "<!-- end of `make format-table` -->\n"
 _HEAD = ("format", "input", "flags", "read from it")
 _OPTIONS = ("series", "axes", "pattern")

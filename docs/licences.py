@@ -33,10 +33,12 @@ CLASSIFIERS = {
 _LINE = re.compile(r'^  "(?P<line>[^"]+)", +# (?P<why>.+)$', re.MULTILINE)
 _EXTRA = re.compile(r"^(?P<extra>[a-z0-9-]+) = \[.*\] +# (?P<why>.+)$", re.MULTILINE)
 _ABOUT = """\
+This page lists the licences of all packages that StereoCell uses. `make licences` makes it from
+their own metadata.
+
 StereoCell is under Apache-2.0. It contains none of these packages: `pip` installs them beside it,
 each under its own licence. No package of an installation without extras is under the GPL; a test
-checks that. Packages under the LGPL are used unchanged. `make licences` makes this page from the
-packages' own metadata."""
+checks that. Packages under the LGPL are used unchanged."""
 _LONGEST = 60  # characters of a licence's name; longer ones are the licence's text
 
 
@@ -153,7 +155,7 @@ def _lines() -> Iterator[str]:
     yield ""
     yield "## Packages that these require"
     yield ""
-    yield "These are installed on Linux without extras; other systems may add a few."
+    yield "On Linux these packages are installed without extras. Other systems may add a few."
     yield ""
     yield "| package | licence |"
     yield "|---|---|"
@@ -161,6 +163,8 @@ def _lines() -> Iterator[str]:
     for name in sorted(closure(one.requirement for one in core)):
         if name not in own:
             yield f"| {name} | {licence_of(name)} |"
+    yield ""
+    yield "Next: [Install](install.md), or [what an installation takes](installation-size.md)."
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Resolve the requirements for each system and Python, by wheels alone: `make platforms`.
 
-It writes the table between the markers of docs/install.md. A cell resolves if the versions that pip
+It writes the table between the markers of docs/systems.md. A cell resolves if the versions that pip
 would choose all have wheels. An older version with a wheel does not count, because pip would
 compile the newer one. The command asks the package registry, and takes five minutes.
 """
@@ -16,7 +16,7 @@ from datetime import date
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "install.md"
+PAGE = ROOT / "docs" / "systems.md"
 BEGIN, END = "<!-- made by `make platforms` -->", "<!-- end of what it made -->"
 CORE = "StereoCell itself"
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
@@ -127,8 +127,10 @@ def _lines(found: Mapping[tuple[str, str, str], Found], day: date) -> Iterator[s
     yield ""
     yield "The requirements that were resolved:"
     yield ""
+    yield "| of | requirements |"
+    yield "|---|---|"
     for row, lines in asked.items():
-        yield f"- {row}: {', '.join(f'`{line}`' for line in lines)}"
+        yield f"| {row} | {', '.join(f'`{line}`' for line in lines)} |"
 
 
 def main() -> None:

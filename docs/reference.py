@@ -25,20 +25,22 @@ FORMATS: dict[str, tuple[str, str, str]] = {
     "units": (
         "Units",
         "units",
-        "What the phases keep for each other in `OUT` and `OUT/units/`; `OUT/stage/files.json`.",
+        "Files of `OUT` and `OUT/units/` that one phase writes for the next, and "
+        "`OUT/stage/files.json`.",
     ),
     "bundle": ("Bundle", "bundle", "`OUT/bundle/manifest.json` and `files.json`."),
     "volumes": ("Bundle: volumes", "volumes", "`OUT/bundle/channels/<channel>/volumes.json`."),
     "objects": (
         "Bundle: objects",
         "objects",
-        "`OUT/bundle/channels/<channel>/objects.json`, of a label map: [Objects](../objects.md).",
+        "`OUT/bundle/channels/<channel>/objects.json`, of a label map: "
+        "[Objects in stage and bundle](../objects-format.md).",
     ),
     "transfer2d": (
         "Bundle: transfer functions",
         "transfer2d",
         "`OUT/bundle/channels/<channel>/transfer2d.json`. How a table is made of the shapes: "
-        "[Two-dimensional transfer functions](../transfer-functions.md).",
+        "[Tables of two-dimensional transfer functions](../transfer-tables.md).",
     ),
     "brick-stream": (
         "Brick stream",
@@ -55,7 +57,7 @@ FORMATS: dict[str, tuple[str, str, str]] = {
         "Slices",
         "slices",
         "`slices.json`, beside the PNG files that `stereocell slices` writes: "
-        "[DICOM and NIfTI](../dicom.md).",
+        "[Slices as PNG](../slices.md).",
     ),
     "inbox": ("Inbox", "inbox", "`FOLDER/inbox.json`. See [The inbox](../inbox.md)."),
 }
@@ -71,6 +73,34 @@ def pages() -> dict[str, str]:
         "commands.md": commands_page(),
         "settings.md": settings_page(),
     }
+
+
+# Links to pages that are made
+
+# A page in the repository can't link to a page that only the site has. It links to a line of
+# reference.md instead, and the hook replaces that link by one to the page itself.
+TARGETS = {
+    **{name: f"formats/{name}.md" for name in FORMATS},
+    "stage": "formats/stage.md",
+    "commands": "commands.md",
+    "settings": "settings.md",
+    "notebook": "notebook.md",
+}
+_LINK = re.compile(r"\]\((?:\.\./)*reference\.md#([\w-]+)\)")
+
+
+def with_made_pages(markdown: str, path: str) -> str:
+    """Return a page that links to the pages that are made, not to lines of reference.md.
+
+    path  of the page, below docs/, such as `formats/index.md`
+    """
+    up = "../" * path.count("/")
+    return _LINK.sub(lambda link: f"]({up}{TARGETS[link[1]]})", markdown)
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Replace the links of a page: MkDocs calls this."""
+    return with_made_pages(markdown, page.file.src_uri)
 
 
 # JSON Schemas
@@ -208,10 +238,10 @@ def stage_page() -> str:
         "# Stage",
         "`OUT/stage/stage.usda` is USD: coordinates in micrometres (`metersPerUnit` 1e-6), Y up, "
         "`/Specimen/Tiles/<tile>` with variants of detail and representation, "
-        "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. What an "
-        "edit of it does: [The stage](../stage.md). Attributes beyond USD's own are of two applied "
-        "schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON Schema, "
-        "`schemas/channel.schema.json`.",
+        "`/Specimen/Channels/<channel>` with each channel's look, `/Specimen/Cameras`. "
+        "[The stage](../stage.md) says how to edit it. Attributes beyond USD's own are of two "
+        "applied schemas, made from `schemas/usd/schema.usda`; the channel's has a twin as JSON "
+        "Schema, `schemas/channel.schema.json`.",
     ]
     for prim in layer.rootPrims:
         if not prim.attributes:
@@ -244,7 +274,7 @@ def commands_page() -> str:
         for action in cli._parser()._actions
         if isinstance(action, argparse._SubParsersAction)
     )
-    parts = ["# Commands", "What `stereocell COMMAND --help` says."]
+    parts = ["# Commands", "This page has the text that `stereocell COMMAND --help` prints."]
     for name, parser in commands.items():
         parser.formatter_class = lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=96)
         parts += [f"## {name}", f"```text\n{parser.format_help()}```"]
@@ -257,8 +287,8 @@ def settings_page() -> str:
 
     parts = [
         "# Settings",
-        "What `stereocell settings` prints. A file of these, or of some of them, goes to "
-        "`--config`; flags go before the file, and the file before the preset.",
+        "This page has the text that `stereocell settings` prints. A file of these, or of some of "
+        "them, goes to `--config`; flags go before the file, and the file before the preset.",
         "```toml\n"
         + settings_module.to_toml(settings_module.Settings(), header=settings_module.TEMPLATE)
         + "```",

@@ -30,7 +30,7 @@ def run(path: Path) -> Any:
         for output in cell.get("outputs", ()):
             widget = output.get("data", {}).get("application/vnd.jupyter.widget-view+json")
             if widget:
-                widget["model_id"] = "none"  # of a kernel that is gone
+                widget["model_id"] = "none"  # the model belonged to a kernel that has ended
     notebook.metadata.pop("widgets", None)
     return notebook
 

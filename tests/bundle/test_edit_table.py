@@ -27,7 +27,7 @@ def test_an_edit_is_taken_refused_or_reported(bundle, edit, case):
 
 
 def test_the_docs_have_the_table():
-    page = Path(__file__).parents[2] / "docs/stage.md"
+    page = Path(__file__).parents[2] / "docs/edit-table.md"
     assert "\n".join(markdown()) in page.read_text("utf-8")
 
 

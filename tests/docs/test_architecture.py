@@ -1,4 +1,4 @@
-"""docs/architecture.md has the layers that `make lint` holds, and names what is there."""
+"""The pages on architecture have the layers that `make lint` checks, and name existing packages."""
 
 import re
 import tomllib
@@ -8,30 +8,36 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+DOCS = ROOT / "docs"
 PYTHON = ROOT / "pipeline" / "stereocell"
 VIEWER = ROOT / "viewer_gltf" / "src"
-PYTHON_LAYERS, VIEWER_LAYERS, WAY = re.findall(r"^```\n(.*?)^```", PAGE, re.M | re.S)
+
+
+def pictures(page: str) -> list[str]:
+    return re.findall(r"^```\n(.*?)^```", (DOCS / page).read_text("utf-8"), re.M | re.S)
+
+
+PYTHON_LAYERS, VIEWER_LAYERS = pictures("architecture.md")
+(WAY,) = pictures("data-flow.md")
 
 
 def names(picture: str) -> list[str]:
-    """Return the packages of a picture, from the top: what stands left of two spaces' gap."""
+    """Return the packages of a picture, from the top: the words in its left column."""
     lines = [line[:40] for line in picture.splitlines() if not line.startswith(" ---")]
     return [name for line in lines for name in line.split()]
 
 
-def table(title: str) -> list[str]:
-    section = PAGE.partition(f"## {title}")[2].partition("\n## ")[0]
-    return re.findall(r"^\| `(\w+)` \|", section, re.M)
+def table(page: str) -> list[str]:
+    return re.findall(r"^\| `(\w+)` \|", (DOCS / page).read_text("utf-8"), re.M)
 
 
-def test_python_s_layers_are_those_that_lint_holds() -> None:
+def test_the_picture_has_the_layers_of_python_that_lint_checks() -> None:
     tool = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]
     (layers,) = [c["layers"] for c in tool["contracts"] if c["type"] == "layers"]
     assert names(PYTHON_LAYERS) == layers
 
 
-def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
+def test_the_picture_has_the_layers_of_the_viewer_that_lint_checks() -> None:
     code = (ROOT / "viewer_gltf" / "scripts" / "layers.ts").read_text("utf-8")
     layers = [one.strip('"').lower() for one in re.findall(r'^  ("\w+"|PARTS),$', code, re.M)]
     parts = {file.parent.name for file in VIEWER.glob("*/part.ts")} - set(layers)
@@ -42,21 +48,21 @@ def test_the_viewer_s_layers_are_those_that_lint_holds() -> None:
 
 
 @pytest.mark.parametrize(
-    ("title", "folder"), [("Packages of Python", PYTHON), ("Folders of the viewer", VIEWER)]
+    ("page", "folder"), [("packages.md", PYTHON), ("viewer-folders.md", VIEWER)]
 )
-def test_each_package_has_its_line(title: str, folder: Path) -> None:
+def test_each_package_has_its_line(page: str, folder: Path) -> None:
     there = {p.name for p in folder.iterdir() if p.is_dir() and not p.name.startswith("__")}
     there |= {"api"} if folder == PYTHON else set()
-    found = table(title)
+    found = table(page)
     assert len(found) == len(set(found))
     assert set(found) == there
 
 
-def test_the_way_of_a_tile_leads_through_files_that_are_there() -> None:
+def test_the_way_of_a_tile_names_files_that_exist() -> None:
     packages = [p.name for p in (*PYTHON.iterdir(), *VIEWER.iterdir()) if p.is_dir()]
     steps = re.findall(rf"\b(?:{'|'.join(packages)})/[\w/*]+", WAY)
     assert len(steps) > 15
     for step in steps:
         files = [*PYTHON.glob(f"{step}*"), *VIEWER.glob(f"{step}*")]
-        made = step.startswith(("bundle/index", "units/"))  # what a build leaves
+        made = step.startswith(("bundle/index", "units/"))  # files of a build
         assert made or files, step

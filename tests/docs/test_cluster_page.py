@@ -62,7 +62,7 @@ def scheduler_of_the_page(folder: Path) -> Iterator[str]:
 
 def test_the_page_begins_with_the_warning() -> None:
     assert PAGE.startswith(
-        "# Clusters and object storage\n\n> **Everybody who can reach a Dask scheduler's port can "
+        "# Clusters\n\n> **Everybody who can reach a Dask scheduler's port can "
         "run any code as you**"
     )
     commands = [line for line in PAGE.splitlines() if line.startswith(("dask ", "stereocell "))]

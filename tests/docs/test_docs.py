@@ -1,8 +1,8 @@
-"""What the docs show works as they show it: code, commands, links, tables, the workflow.
+"""The docs work as they are printed: code, commands, links, tables, the workflow.
 
-Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages, in one
-folder with small sources under the names that the docs use; what is in PARSED is only held against
-the program's own parser, `make` against the Makefile by `make -n`, `dask` against its own help.
+Every `stereocell` in a block of the README or of docs/ is run, in the order of the pages. One
+folder has small sources under the names that the docs use. Commands in PARSED are only parsed by
+the program's own parser, `make` by `make -n`, and `dask` is compared with its own help.
 """
 
 import json
@@ -43,7 +43,7 @@ DOCS = ROOT / "docs"
 FIRST = [DOCS / name for name in ("index.md", "own-data.md", "blender.md")]  # the others need these
 PAGES = [*FIRST, *sorted({*DOCS.rglob("*.md"), ROOT / "README.md"} - set(FIRST))]
 
-# Only parsed: what it takes that is not at hand here, and where it is run
+# Commands that are only parsed: what they need that is not available here, and where they are run
 PARSED = {
     "view": "does not end: serve/test_server.py",
     "serve": "does not end: serve/test_server.py, serve/test_brick_session.py",
@@ -58,22 +58,23 @@ PARSED = {
     "build CT_FOLDER": "the same: read/formats/dicom/test_segmentation.py",
     "build seg.dcm": "the same",
 }
-# ... and run, but on less
+# Parts of commands that are run on less data
 SMALLER = {
-    "sample cycif my.ome.zarr": "sample cycif tissue.ome.zarr --grid 1x1 --tile-size 8,64,64",
+    "sample cycif sample.ome.zarr": "sample cycif sample.ome.zarr --grid 1x1 --tile-size 8,64,64",
     "--grid 5x2": "--grid 2x1",
+    "--tile r1_c2": "--tile r0_c0",
 }
 
 
 def blocks(page: Path, language: str = r"\w*") -> list[str]:
-    """Return what stands in the page's fences."""
+    """Return the texts of the page's code blocks."""
     return re.findall(
         rf"^ *```{language}\n(.*?)^ *```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE
     )
 
 
 def commands(page: Path, program: str) -> Iterator[str]:
-    """Yield the page's commands without what precedes the program and remarks behind it."""
+    """Yield the page's commands of a program, without a prompt and without remarks."""
     for block in blocks(page):
         for line in block.splitlines():
             if found := re.match(rf"(?:\$ )?(?:\.venv/bin/)?({program} .*)", line):
@@ -85,7 +86,7 @@ def is_parsed_only(command: str) -> bool:
 
 
 def parse(command: str) -> Any:
-    """Return the command's options. Fails where the program does not take it."""
+    """Return the command's options. The test fails if the program refuses the command."""
     try:
         return cli._parser().parse_args(shlex.split(command.partition(" > ")[0])[1:])
     except UsageError as error:
@@ -94,7 +95,7 @@ def parse(command: str) -> Any:
 
 @pytest.fixture
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to be in, with sources and the files that the pages tell to write."""
+    """The working folder, with sources and the files that the pages ask the reader to write."""
     monkeypatch.chdir(tmp_path)
     body = phantoms.f_phantom()
     voxels = np.stack([body, body[:, :, ::-1]])
@@ -160,20 +161,21 @@ def test_commands_run(
                 code = cli.main(shlex.split(words)[1:])
             assert code == 0, f"{page.name}: {command}: {capsys.readouterr().err}"
             ran.append(options.command)
-    # those that are left out of this test are named in PARSED, and no others
+    # Only commands in PARSED are left out.
     assert set(ran) == set(cli.COMMANDS) - {"view", "serve", "tissue"}
-    assert set(drawn) == {Path("out/mine")}
-    assert len(drawn) == 1 + [c for p in PAGES for c in commands(p, "stereocell")].count(
+    reports = [c for p in PAGES for c in commands(p, "stereocell")].count(
         "stereocell report out/mine"
     )
-    for folder in ("head", "second", "frames", "brain"):  # of the page about DICOM
+    assert drawn == [Path("out/sample"), *[Path("out/mine")] * reports]
+    for folder in ("head", "second", "frames", "brain"):  # builds of the page about DICOM
         assert (sources / f"out/{folder}/bundle/manifest.json").is_file()
+    assert (sources / "out/sample/report/index.html").is_file()
     assert (sources / "out/mine/report/index.html").is_file()
     _runs_the_workflow(sources)
 
 
 def _runs_the_workflow(folder: Path) -> None:
-    """The example for CI, its last step in a shell as a runner starts it."""
+    """Run the last step of the example for CI in a shell, as a runner does."""
     workflow = yaml.safe_load((DOCS / "examples" / "check-bundle.yml").read_text("utf-8"))
     job = workflow["jobs"]["check"]
     *_, install, check = job["steps"]
@@ -194,7 +196,7 @@ def _runs_the_workflow(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() -> None:
+def test_commands_in_sentences_and_commands_that_are_not_run_are_parsed() -> None:
     used = set()
     for page in PAGES:
         spans = re.findall(r"`(?:\.venv/bin/)?(stereocell [a-z]+ [^`]+)`", page.read_text("utf-8"))
@@ -202,11 +204,11 @@ def test_commands_in_sentences_and_those_that_are_not_run_are_the_program_s() ->
             if "..." not in command:
                 parse(" ".join(command.split()))
             used |= {start for start in PARSED if command.startswith(f"stereocell {start}")}
-    assert used == set(PARSED)  # what the docs no longer show is no excuse
+    assert used == set(PARSED)  # every entry of PARSED is still in the docs
 
 
 @pytest.mark.slow
-def test_other_programs_are_those_that_other_tests_run() -> None:
+def test_commands_of_other_programs_are_run_by_other_tests() -> None:
     """docs/test_cluster_page.py runs `dask`, `mkdir`, `python` and `export`, and
     system/test_empty_environment.py runs `pip install` of a wheel.
 
@@ -216,12 +218,12 @@ def test_other_programs_are_those_that_other_tests_run() -> None:
     others = {line.split()[0] for line in found if line.strip() and line.lstrip()[0] != "#"}
     others -= {"stereocell", ".venv/bin/stereocell", "make"}
     assert others == {"dask", "export", "mkdir", "pip", "python", "uvx", "pipx"}
-    told = " ".join(line for line in found if line.startswith("dask "))
+    printed = " ".join(line for line in found if line.startswith("dask "))
     for command in ("scheduler", "worker"):
         takes = subprocess.run(
             [sys.executable, "-m", "dask", command, "--help"], capture_output=True, text=True
         ).stdout
-        (line,) = re.findall(rf"dask {command} (.*?)(?:\s{{3,}}#|$|dask)", told)
+        (line,) = re.findall(rf"dask {command} (.*?)(?:\s{{3,}}#|$|dask)", printed)
         flags = re.findall(r"--[a-z-]+", line)
         assert flags
         assert all(re.search(rf"{flag}\b", takes) for flag in flags), line
@@ -255,13 +257,11 @@ def test_python_runs(sources: Path) -> None:
     names: dict[str, object] = {}
     for text in texts:
         exec(compile(text, "docs/python.md", "exec"), names)
-    assert (sources / "out" / "mine" / "bundle" / "manifest.json").is_file()
+    assert (sources / "out" / "python" / "bundle" / "manifest.json").is_file()
 
 
-def test_the_reader_that_is_shown_works_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "cube.py").write_text(blocks(DOCS / "extending.md", "python")[0])
+def test_the_printed_reader_works_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cube.py").write_text(blocks(DOCS / "extending-reader.md", "python")[0])
     monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
     known_formats.cache_clear()
     try:
@@ -271,7 +271,7 @@ def test_the_reader_that_is_shown_works_at_once(
         dataset = stereocell.open_volume(path, spacing_um=(0.5, 0.2, 0.2))
         assert dataset.name == "f"
         assert (dataset.read(0, dataset.levels[0].box, 0).voxels == body).all()
-        # The record of steps does not have the reader yet.
+        # The record of steps lacks the reader still.
         out = tmp_path / "out"
         assert cli.main(["plan", str(path), "-o", str(out), "--spacing-um", "0.5,0.2,0.2"]) == 0
         made = json.loads((out / "provenance.json").read_bytes())
@@ -287,7 +287,7 @@ def test_the_reader_that_is_shown_works_at_once(
         sys.modules.pop("stereocell.read.formats.cube", None)
 
 
-def test_functions_that_are_named_exist() -> None:
+def test_named_functions_exist() -> None:
     text = (DOCS / "python.md").read_text("utf-8")
     named = re.findall(r"`([a-z][\w.]*)\.(\w+)`", text.partition("| step |")[2])
     assert len(named) > 12
@@ -295,20 +295,48 @@ def test_functions_that_are_named_exist() -> None:
         assert callable(getattr(import_module(f"stereocell.{module}"), function))
 
 
-def test_files_that_are_named_exist() -> None:
+def test_named_files_exist() -> None:
     path = re.compile(r"`((?:tests|schemas|usd_assets|pipeline|viewer_gltf)/[\w/.]+)`")
     for page in PAGES:
         for name in path.findall(page.read_text("utf-8")):
             assert (ROOT / name).exists(), f"{page.name}: {name}"
 
 
-def test_links_lead_somewhere(reference: Any) -> None:
-    made = {DOCS / path for path in [*reference.pages(), "notebook.md"]}
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page that GitHub and the site both know."""
+    text = re.sub(r"(?ms)^ *```.*?^ *```", "", page.read_text("utf-8"))
+    found = set(re.findall(r'<a id="([\w-]+)">', text))
+    for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
+        plain = re.sub(r"[^\w\s-]", "", title.lower()).strip()
+        if "  " not in plain:  # the site joins two spaces, GitHub does not
+            found.add(plain.replace(" ", "-"))
+    return found
+
+
+def test_links_lead_to_files_and_headings_of_the_repository() -> None:
+    known: dict[Path, set[str]] = {}
     for page in PAGES:
-        for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8")):
-            if "://" not in target:
-                path = (page.parent / target.strip()).resolve()
-                assert path.exists() or path in made, f"{page.name}: {target}"
+        text = re.sub(r"(?ms)^ *```.*?^ *```", "", page.read_text("utf-8"))
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", text):
+            if "://" in target:
+                continue
+            path = (page.parent / target).resolve() if target else page
+            assert path.exists(), f"{page.name}: {target}"
+            if anchor:
+                known.setdefault(path, anchors(path))
+                assert anchor in known[path], f"{page.name}: {target}#{anchor}"
+
+
+def test_links_to_pages_that_are_made_lead_to_them_in_the_site(reference: Any) -> None:
+    made = {*reference.pages(), "notebook.md"}
+    assert set(reference.TARGETS.values()) == made
+    text = "[a](reference.md#settings), [b](../reference.md#plan), [c](reference.md)"
+    assert reference.with_made_pages(text, "one.md") == (
+        "[a](settings.md), [b](formats/plan.md), [c](reference.md)"
+    )
+    assert "](../formats/plan.md)" in reference.with_made_pages(text, "formats/index.md")
+    shown = re.findall(r"reference\.md#([\w-]+)", (DOCS / "reference.md").read_text("utf-8"))
+    assert set(shown) == set(reference.TARGETS)
 
 
 def test_every_field_of_every_schema_is_in_the_reference(reference: Any) -> None:

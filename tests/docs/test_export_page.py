@@ -7,7 +7,7 @@ import pytest
 
 from stereocell.export.write import ENDINGS
 
-PAGE = Path(__file__).parents[2] / "docs" / "export.md"
+PAGE = Path(__file__).parents[2] / "docs" / "export-formats.md"
 
 
 def test_the_table_of_endings_is_that_of_the_command() -> None:
@@ -27,7 +27,7 @@ def test_no_installed_viewer_reads_voxels_of_gltf() -> None:
     }
     for name, folder in readers.items():
         if not folder.is_dir():
-            pytest.skip(f"{name} is not at hand: make setup")
+            pytest.skip(f"{name} is missing: make setup")
         texts = [file.read_text("utf-8") for file in folder.rglob("*.js")]
         assert any("KHR_texture_transform" in text for text in texts), name  # the right folder
         assert not any("EXT_voxels" in text for text in texts), name

@@ -1,4 +1,4 @@
-"""The page on your own data has the table of the formats that are read."""
+"""The page of formats has the table of all that are read."""
 
 import sys
 from importlib import import_module

@@ -23,7 +23,7 @@ SHOWN = ROOT / "docs" / "jupyter.ipynb"
 
 
 def test_the_notebook_is_stored_without_outputs() -> None:
-    """So that a diff of it reads, and what is shown is what this version does."""
+    """A diff of it can then be read, and the site shows the results of this version."""
     cells = json.loads(NOTEBOOK.read_text("utf-8"))["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
     assert len(code) > 6
@@ -58,7 +58,7 @@ def test_the_viewer_s_notebook_is_stored_with_its_pictures_and_no_more() -> None
 @pytest.mark.exhaustive
 @pytest.mark.skipif(viewer_dist() is None, reason="the viewer is not built")
 def test_the_viewer_s_notebook_gives_what_it_is_stored_with(tmp_path: Path) -> None:
-    """It is stored by `make notebook`."""
+    """The command `make notebook` stores it."""
     again = tmp_path / "jupyter.ipynb"
     quiet = {**os.environ, "IPYTHONDIR": str(tmp_path / "ipython"), "TMPDIR": str(tmp_path)}
     command = [sys.executable, str(ROOT / "docs" / "run_jupyter.py"), str(again)]
@@ -67,8 +67,10 @@ def test_the_viewer_s_notebook_gives_what_it_is_stored_with(tmp_path: Path) -> N
     stored, run = json.loads(SHOWN.read_text("utf-8")), json.loads(again.read_text("utf-8"))
     for before, after in zip(pictures(stored), pictures(run), strict=True):
         assert before.shape == after.shape
-        assert np.abs(before.astype(int) - after).mean() < 2  # of 255: processors round differently
-    # nor is anything else another, but for the pictures' bytes
+        assert (
+            np.abs(before.astype(int) - after).mean() < 2
+        )  # out of 255: processors round differently
+    # All other content is equal, except the pictures' bytes.
     for notebook in (stored, run):
         for data in outputs(notebook):
             data.pop("image/png", None)
@@ -87,7 +89,7 @@ def test_the_site_builds_strictly_and_has_the_notebook_s_pictures(tmp_path: Path
     pictures = re.findall(r'src="(notebook-\d+\.png)"', page)
     assert len(pictures) == 5
     assert all((site / name).stat().st_size > 5000 for name in pictures)
-    # what the cells found: every mesh on the page is sound, and the iso-value is sure
+    # The cells found that every mesh on the page is sound, and that the iso-value is sure.
     assert re.findall(r"triangles, (\d+) faults", page) == ["0"] * 4
     confidence = re.search(r"confidence (\d\.\d+)", page)
     assert confidence

@@ -61,6 +61,16 @@ def test_what_a_killed_command_left_is_removed(sphere_stage: Path, tmp_path: Pat
     assert {one.name for one in tmp_path.iterdir()} == {"s.glb", ".t.glb.0123abcd.partial"}
 
 
+def test_the_folder_of_the_file_is_made_as_by_the_other_commands(
+    sphere_stage: Path, tmp_path: Path
+) -> None:
+    export_stage(sphere_stage, tmp_path / "for" / "printing" / "s.stl", options=ExportOptions())
+    assert [one.name for one in (tmp_path / "for" / "printing").iterdir()] == ["s.stl"]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"file: can't be made: "):
+        export_stage(sphere_stage, tmp_path / "file" / "s.stl", options=ExportOptions())
+
+
 def test_a_failure_half_way_leaves_the_older_file(
     sphere_stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

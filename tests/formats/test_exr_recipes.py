@@ -1,4 +1,4 @@
-"""Slicing an atlas by the recipes in docs/unity-unreal.md returns the volume of the tile.
+"""Slicing an atlas by the recipes in docs/unity-volumes.md returns the volume of the tile.
 
 The atlas is read by three.js, whose EXR reader shares no code with the library that wrote it.
 """
@@ -148,7 +148,7 @@ def test_voxels_lie_where_the_recipe_states(atlas: Atlas) -> None:
 
 
 def test_the_recipe_states_the_formulas_that_this_test_uses() -> None:
-    recipe = (ROOT / "docs" / "unity-unreal.md").read_text("utf-8")
+    recipe = (ROOT / "docs" / "unity-volumes.md").read_text("utf-8")
     formulas = [
         "x = low.x + (i - 1) sx      y = high.y - (j - 1) sy      z = low.z + (k - 1) sz",
         "u = (i + 0.5) / nx      v = 1 - (j + 0.5) / ny      w = (k + 0.5) / D",

@@ -111,7 +111,7 @@ def test_a_viewers_pace_is_served_by_the_server_itself(out: Path) -> None:
 
 
 def test_the_documented_limits_are_the_servers() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "brick-stream.md").read_text("utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "server.md").read_text("utf-8")
     section = text.split("## What the server refuses")[1].split("\n## ")[0]
     for name, shown in {
         "TARGET_BYTES": "8 KiB of address",

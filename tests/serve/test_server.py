@@ -405,7 +405,7 @@ def test_a_taken_port_is_named(bundle: Path) -> None:
     with socket.socket() as taken:
         taken.bind((LOCALHOST, 0))
         taken.listen()
-        with pytest.raises(StereoCellError, match="choose another"):
+        with pytest.raises(StereoCellError, match="choose another by --port"):
             BundleServer(bundle.parent, taken.getsockname()[1], lan=False)
     with pytest.raises(StereoCellError, match="port 70000: "):
         BundleServer(bundle.parent, 70000, lan=False)

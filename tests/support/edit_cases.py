@@ -1,7 +1,8 @@
 """Edits of a stage as artists make them, and what becomes of each: taken, refused or reported.
 
 Each edit is made by USD's own API in a layer over the stage of two tiles (`support.bundles`). The
-table in docs/stage.md is printed by `PYTHONPATH=pipeline:tests python tests/support/edit_cases.py`.
+table in docs/edit-table.md is printed by
+`PYTHONPATH=pipeline:tests python tests/support/edit_cases.py`.
 """
 
 from collections.abc import Callable

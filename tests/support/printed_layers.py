@@ -18,8 +18,8 @@ def find_layers() -> dict[str, str]:
 
 
 def write_layer(layer: str, path: Path, stage: Path, channel: str) -> Path:
-    """Write a printed layer over another stage: its channel is another, its function `sharp`."""
+    """Write a printed layer over another stage: its channel is another."""
     assert "@out/mine/stage/stage.usda@" in layer
     named = layer.replace("out/mine/stage/stage.usda", str(stage)).replace("CD31", channel)
-    path.write_text(named.replace('"arcs"', '"sharp"'))
+    path.write_text(named)
     return path

@@ -34,6 +34,14 @@ def _refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return lines[0].removeprefix("stereocell: ")
 
 
+def test_python_runs_the_package_as_the_command() -> None:
+    answer = subprocess.run(
+        [sys.executable, "-m", "stereocell", "plan"], capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 2
+    assert answer.stderr.startswith("stereocell: ")
+
+
 @pytest.mark.parametrize(
     ("flags", "message"),
     [

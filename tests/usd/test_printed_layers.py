@@ -22,7 +22,7 @@ def stage_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_layers_are_found() -> None:
     pages = {place.partition(":")[0] for place in LAYERS}
-    assert {"README.md", "docs/blender.md", "docs/stage.md"} <= pages
+    assert {"docs/blender.md", "docs/stage-layers.md", "docs/transfer-functions.md"} <= pages
 
 
 @pytest.mark.parametrize("place", LAYERS)
@@ -37,9 +37,13 @@ def test_a_printed_layer_is_valid(stage_path: Path, tmp_path: Path, place: str) 
 @pytest.mark.parametrize("place", LAYERS)
 def test_a_printed_layer_goes_into_a_bundle(stage_path: Path, tmp_path: Path, place: str) -> None:
     layer = write_layer(LAYERS[place], tmp_path / "edited.usda", stage_path, F_ID)
-    write_bundle(layer, tmp_path / "bundle", None, engine=Engine(0))
+    lines: list[str] = []
+    write_bundle(layer, tmp_path / "bundle", None, engine=Engine(0), report_line=lines.append)
+    lost = [line for line in lines if "is not taken over" in line]
+    assert bool(lost) == ("ND_volume" in LAYERS[place]), lost  # a shader for other renderers
     channel = load(tmp_path / "bundle" / "manifest.json")["channels"][0]
     if "inputs:color = " in LAYERS[place]:
         assert channel["color"] == [1, 0.1, 0.1]
-    if '"arcs"' in LAYERS[place]:
+    if '"sharp"' in LAYERS[place]:
         assert channel["transfer_function"] == "sharp"
+        assert "sharp" in channel["transfer_functions_2d"]["names"]

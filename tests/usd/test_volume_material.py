@@ -1,4 +1,4 @@
-"""The layer of docs/stage.md that gives volumes a MaterialX shader reaches every tile's look."""
+"""The layer of docs/stage-volumes.md gives the volumes of all tiles a MaterialX shader."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from pxr import Usd, UsdShade
 from stereocell.usd.validate import validate_stage
 from support.stages import COLORS, F_ID, TILES, leaf, write_whole
 
-DOCS = Path(__file__).parents[2] / "docs" / "stage.md"
+DOCS = Path(__file__).parents[2] / "docs" / "stage-volumes.md"
 
 
 @pytest.fixture(scope="module")

@@ -24,8 +24,8 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(write_tiles(tmp_path_factory.mktemp("stage")))
 
 
-def test_the_readme_has_a_layer() -> None:
-    assert any(one.id == "README.md-0" for one in EXAMPLES)
+def test_the_page_on_blender_has_a_layer() -> None:
+    assert any(one.id == "blender.md-0" for one in EXAMPLES)
 
 
 @pytest.mark.parametrize("text", EXAMPLES)

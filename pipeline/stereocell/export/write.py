@@ -167,9 +167,9 @@ def _export(
         raise UsageError(f"{file}: a page is made of a bundle, expected `stereocell export OUT`")
     way = FORMATS[ending]
     _require_takes(ending, way.takes, options)
-    _require_folder(file)
     for place in (file, *way.beside(file, options)):  # before the work
         require_free(place, expected=_EXPECTED, is_ours=is_ours(place))
+    _make_folder_of(file)
     with usd_boundary(stage_path):
         chosen = Chosen(stage_path, options, report)
         if way.lacks is not None:
@@ -222,9 +222,9 @@ def _export_page(
     require_documents(out_folder, "publish")
     out_folder.require_finished("bundle")
     _require_outside(file, out_folder, [])
-    _require_folder(file)
     ours = partial(is_own, out_folder.out)
     require_free(file, expected=_EXPECTED, is_ours=ours(file))
+    _make_folder_of(file)
     out_folder.fetch(out_folder.bundle_dir)
     with _folder_beside(file) as beside:
         line = write_scene(
@@ -292,9 +292,11 @@ def find_ending(file: Path) -> str:
     raise UsageError(f"{file}: expected a name that ends in {', '.join(ENDINGS)}")
 
 
-def _require_folder(file: Path) -> None:
-    if not file.parent.is_dir():
-        raise OutputError(f"{file.parent}: no such folder")
+def _make_folder_of(file: Path) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{file.parent}: can't be made: {error.strerror or error}") from error
 
 
 def _require_takes(ending: str, takes: frozenset[str], options: ExportOptions) -> None:

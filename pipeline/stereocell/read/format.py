@@ -18,7 +18,7 @@ from stereocell.storage.location import Location
 
 
 class Guide(NamedTuple):
-    """A row of the table of formats in docs/own-data.md, in Markdown.
+    """A row of the table of formats in docs/input-formats.md, in Markdown.
 
     input  how to name a source
     read   metadata that are read, or a link to a section

@@ -1,6 +1,6 @@
 """All limits of one client, and how the server refuses a client that exceeds them.
 
-docs/brick-stream.md lists them for readers. They are far above the needs of a browser that opens a
+docs/server.md lists them for readers. They are far above the needs of a browser that opens a
 large bundle (six connections to a host, a request for each file), and low enough that a malicious
 client leaves memory and file descriptors to the others.
 """

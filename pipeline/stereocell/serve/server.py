@@ -5,7 +5,7 @@ A static bundle works on any web host. This server answers byte ranges of its fi
 measured, from the stage beside the bundle (serve/measured_values.py). It serves localhost or, with
 `--lan`, the network: then by TLS, and only to holders of a token (serve/access.py). It logs only
 faults of the program and of the bundle: no request, so no token, and no name that a client sent.
-docs/brick-stream.md lists the requests that the other modules refuse.
+docs/server.md lists the requests that the other modules refuse.
 """
 
 import json
@@ -286,8 +286,9 @@ def _bind(host: str, port: int) -> socket.socket:
         listener.listen(128)
     except (OSError, OverflowError) as error:
         listener.close()
+        reason = error.strerror if isinstance(error, OSError) else error
         raise StereoCellError(
-            f"port {port}: {error}; choose another, or 0 for a free one"
+            f"port {port}: {reason}; choose another by --port, or --port 0 for a free one"
         ) from error
     return listener
 

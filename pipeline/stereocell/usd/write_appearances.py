@@ -13,8 +13,9 @@ The material has no volume output: USD ships no volume shader that renderers agr
 UsdPreviewSurface. So the binding of a Volume prim to its appearance hands over the channel's values
 (colour, opacity points, LUT), and does NOT make a renderer draw the volume by them: an artist
 connects `outputs:volume` to the renderer's own shader, in a layer over the stage, and feeds its
-colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/stage.md has what was
-tried (usd-core's validators refuse every shader that a renderer knows), and such a layer.
+colour from `inputs:color`. The bundle's viewer has its own ray caster. docs/stage-volumes.md lists
+all that was tried (usd-core's validators refuse every shader that a renderer knows), and has such
+a layer.
 """
 
 from collections.abc import Mapping, Sequence

@@ -6,7 +6,7 @@ serves a made-up bundle, runs all of them, prints a Markdown table of what was s
 and exits with 1 if one was not refused, or the server wrote a line, or serves no more.
 
 Limits in seconds are short here (DEADLINES), and the attacks on limits by number have small ones
-(FEW); that the usual ones are those of docs/brick-stream.md is tested in serve/test_attacks.py.
+(FEW); that the usual ones are those of docs/server.md is tested in serve/test_attacks.py.
 """
 
 import logging

@@ -102,7 +102,9 @@ FORMAT = Format(
     count_absent=_count_absent_in_views,
     guides=(
         Guide(
-            "BigDataViewer", "`NAME.xml`, or its `.h5` or `.n5`", "[BigDataViewer](#bigdataviewer)"
+            "BigDataViewer",
+            "`NAME.xml`, or its `.h5` or `.n5`",
+            "[BigDataViewer](input-bigdataviewer.md)",
         ),
     ),
 )

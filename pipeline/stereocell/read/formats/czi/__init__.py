@@ -25,7 +25,5 @@ FORMAT = Format(
     library=Library("pylibCZIrw", extra="czi", reads=".czi (Zeiss)"),
     endings=(".czi",),
     marks=(Mark("a CZI file of Zeiss", rb"ZISRAWFILE"),),
-    guides=(
-        Guide("Zeiss CZI", "`NAME.czi`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
+    guides=(Guide("Zeiss CZI", "`NAME.czi`", "[CZI, LIF, ND2 and Imaris](input-microscopes.md)"),),
 )

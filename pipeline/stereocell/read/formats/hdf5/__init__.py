@@ -42,7 +42,7 @@ FORMAT = Format(
         Guide(
             "HDF5, netCDF-4, MATLAB 7.3, EMD",
             "`NAME.h5:/KEY`, `NAME.nc`, `NAME.mat`, `NAME.emd`",
-            "[HDF5](#hdf5-netcdf-4-and-matlab)",
+            "[HDF5](input-hdf5.md)",
         ),
     ),
 )

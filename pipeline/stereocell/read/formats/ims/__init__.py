@@ -17,7 +17,5 @@ FORMAT = Format(
     open=_open,
     endings=(".ims",),
     is_unmarked=is_hdf5,
-    guides=(
-        Guide("Imaris 5.5", "`NAME.ims`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
+    guides=(Guide("Imaris 5.5", "`NAME.ims`", "[CZI, LIF, ND2 and Imaris](input-microscopes.md)"),),
 )

@@ -25,7 +25,5 @@ FORMAT = Format(
     library=Library("liffile", extra="lif", reads=".lif (Leica)"),
     endings=(".lif",),
     marks=(Mark("a LIF file of Leica", rb"\x70\0\0\0....\x2a"),),
-    guides=(
-        Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
+    guides=(Guide("Leica LIF", "`NAME.lif`", "[CZI, LIF, ND2 and Imaris](input-microscopes.md)"),),
 )

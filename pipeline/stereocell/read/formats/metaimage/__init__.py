@@ -31,6 +31,6 @@ FORMAT = Format(
     needs_ending=True,
     is_unmarked=_may_be_text,
     guides=(
-        Guide("MetaImage", "`NAME.mha`, `NAME.mhd`", "[NRRD and MetaImage](#nrrd-and-metaimage)"),
+        Guide("MetaImage", "`NAME.mha`, `NAME.mhd`", "[NRRD and MetaImage](input-volumes.md)"),
     ),
 )

@@ -33,7 +33,7 @@ FORMAT = Format(
         Guide(
             "MRC, CCP4",
             "`NAME.mrc`, `.rec`, `.map`, also `.gz`, `.bz2`",
-            "[MRC and CCP4](#mrc-and-ccp4)",
+            "[MRC and CCP4](input-volumes.md)",
         ),
     ),
 )

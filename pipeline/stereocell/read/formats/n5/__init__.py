@@ -36,7 +36,5 @@ FORMAT = Format(
     folder_endings=(".n5",),
     holds=_holds,
     count_absent=_count_absent,
-    guides=(
-        Guide("N5", "`NAME.n5`, or a folder in it", "[N5 and plain Zarr](#n5-and-plain-zarr)"),
-    ),
+    guides=(Guide("N5", "`NAME.n5`, or a folder in it", "[N5 and plain Zarr](input-zarr-n5.md)"),),
 )

@@ -31,7 +31,5 @@ FORMAT = Format(
     endings=(".nd2",),
     marks=(Mark("an ND2 file of Nikon", rb"\xda\xce\xbe\x0a"),),
     is_unmarked=_is_old,
-    guides=(
-        Guide("Nikon ND2", "`NAME.nd2`", "[CZI, LIF, ND2 and Imaris](#czi-lif-nd2-and-imaris)"),
-    ),
+    guides=(Guide("Nikon ND2", "`NAME.nd2`", "[CZI, LIF, ND2 and Imaris](input-microscopes.md)"),),
 )

@@ -23,7 +23,5 @@ FORMAT = Format(
     endings=(".nrrd", ".nhdr"),
     marks=(Mark("an NRRD file", rb"NRRD0"),),
     is_unmarked=_is_unmarked,
-    guides=(
-        Guide("NRRD", "`NAME.nrrd`, `NAME.nhdr`", "[NRRD and MetaImage](#nrrd-and-metaimage)"),
-    ),
+    guides=(Guide("NRRD", "`NAME.nrrd`, `NAME.nhdr`", "[NRRD and MetaImage](input-volumes.md)"),),
 )

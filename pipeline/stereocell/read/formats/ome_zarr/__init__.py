@@ -56,12 +56,12 @@ FORMAT = Format(
         Guide(
             "OME-Zarr 0.1 to 0.6",
             "`NAME.zarr`, a zip file of it (`NAME.ozx`), or an image in either",
-            "[OME-Zarr](#ome-zarr)",
+            "[OME-Zarr](input-ome-zarr.md)",
         ),
         Guide(
             "Zarr 2 and 3",
             "the folder of an array, or of a group of one",
-            "[N5 and plain Zarr](#n5-and-plain-zarr)",
+            "[N5 and plain Zarr](input-zarr-n5.md)",
         ),
     ),
 )

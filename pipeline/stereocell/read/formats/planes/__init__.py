@@ -55,7 +55,7 @@ FORMAT = Format(
         Guide(
             "planes of TIFF, PNG, JPEG or BMP",
             "a folder",
-            "[Folders of planes](#folders-of-planes)",
+            "[Folders of planes](input-planes.md)",
         ),
     ),
 )

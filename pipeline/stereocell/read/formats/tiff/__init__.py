@@ -44,7 +44,9 @@ FORMAT = Format(
     is_unmarked=_is_companion,
     guides=(
         Guide(
-            "TIFF: OME, ImageJ, LSM, STK, NDTiff, plain", "`NAME.tif` and others", "[TIFF](#tiff)"
+            "TIFF: OME, ImageJ, LSM, STK, NDTiff, plain",
+            "`NAME.tif` and others",
+            "[TIFF](input-tiff.md)",
         ),
     ),
 )
