@@ -11,7 +11,11 @@ import { describeInChromium } from "../support/browser/skip";
 import { DEMO_BUNDLE, DIST, prepareStand, type Stand } from "../support/browser/stand";
 
 const CODE_GZIP_BYTES = 380_000;
-const DOCS_WITH_SIZE = ["docs/viewer-drawing.md", "docs/decisions/static-bundle.md", "CHANGELOG.md"];
+const DOCS_WITH_SIZE = [
+  "docs/viewer-drawing.md",
+  "docs/decisions/static-bundle.md",
+  "CHANGELOG.md",
+];
 /** Bytes of page, code, style and bundle from a host without compression. */
 const ON_THE_WIRE_BYTES = 430_000;
 /** Bytes for ten tiles, as in the demo. */
