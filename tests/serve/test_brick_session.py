@@ -377,7 +377,7 @@ def test_a_bundle_written_anew_ends_the_connection(tmp_path):
         replace_volume(out / "bundle", 255 - VOLUME)
         t.look()
         code, reason = t.closed()
-        assert (code, reason) == (1012, "the bundle was written anew, connect again")
+        assert (code, reason) == (1012, "the bundle was replaced: connect again")
 
 
 VIEW = {"type": "view", "id": 1, "trees": [0], "pixels_per_radian": 500, "texel_px": 1, "budget": 9}
@@ -422,7 +422,7 @@ def test_a_bad_list_of_bricks_is_closed(port):
 def test_binary_frames_are_closed(port):
     with talk(port) as t:
         t.socket.send(b"\x01\x02")
-        assert t.closed() == (1003, "binary frames go to the client only")
+        assert t.closed() == (1003, "a client may send text only, not binary frames")
 
 
 def test_silence_is_closed(port, monkeypatch):

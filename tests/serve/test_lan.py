@@ -207,10 +207,10 @@ def test_the_person_is_told_what_to_accept_and_why(server, capfd):
     for words in (
         "a token that lets in one device, once",
         "this program made it just now",  # hence the phone's warning
-        "browsers give stereo (WebXR) and head tracking to encrypted pages only",
-        "Go on (Advanced, Proceed;",
+        "browsers allow stereo (WebXR) and head tracking on encrypted pages only",
+        "Continue (Advanced, Proceed;",
         f"has this SHA-256 fingerprint: {server.fingerprint}",
-        "If it has another, somebody is in between: go back.",
+        "If the fingerprint differs, somebody intercepts the connection: go back.",
     ):
         assert words in said
 

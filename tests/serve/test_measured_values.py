@@ -87,7 +87,7 @@ def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
     with serving(out) as server:
         port = server.port
         response, body = ask(port, f"/values/r0_c0/F?at={at}")
-        assert (response.status, body) == (400, b"at: expected x,y,z in um")
+        assert (response.status, body) == (400, b"at: expected three numbers x,y,z in um")
 
 
 @pytest.mark.slow
