@@ -156,7 +156,7 @@ def test_a_full_disk_refuses_new_uploads_and_keeps_what_has_come(
             status, content, _ = client.ask("POST", "/items", {"files": [["b.nii", 51]]})
             assert (status, content["line"].split(":")[0]) == (
                 507,
-                "the server's disk has room for 50 bytes more, found 51",
+                "the server's disk has 50 bytes free; this upload needs 51",
             )
             assert client.ask("POST", "/items", {"files": [["c.nii", 50]]})[0] == 201
         with patch.object(Upload, "part", lambda *_: Path("/dev/full")):
@@ -206,13 +206,13 @@ def test_a_reader_that_dies_or_hangs_is_one_line_and_the_server_goes_on(
                     packed.writestr(f"{k}.bin", bytes(100_000))
             slow = client.hand_in([("b.zip", archive.getvalue())])
             line = client.wait(slow, "failed")["line"]
-        assert line == "reading was ended: it did not end within 0 s"
+        assert line == "reading was stopped: it did not end within 0 s"
         assert client.wait(hand_in(client, "c.nii", head), "understood")
 
 
 def test_a_folder_of_other_files_and_a_damaged_queue_are_refused(tmp_path: Path) -> None:
     (tmp_path / "scan.nii").touch()
-    with pytest.raises(OutputError, match="expected an empty folder, or an inbox"):
+    with pytest.raises(OutputError, match="expected an empty folder or an inbox"):
         Inbox(tmp_path, LIMITS)
     box = tmp_path / "box"
     box.mkdir()

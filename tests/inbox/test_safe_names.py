@@ -89,5 +89,5 @@ def test_what_systems_add_is_no_file_and_several_images_are_refused(tmp_path: Pa
     head = b"\x5c\x01\0\0" + bytes(344)
     with pytest.raises(RefusedError, match="found 2 images, expected one specimen"):
         arranged(tmp_path / "two", {"a.nii": head, "b.nii": head})
-    with pytest.raises(RefusedError, match="found no file but those that systems add"):
+    with pytest.raises(RefusedError, match="found only files that operating systems add"):
         arranged(tmp_path / "none", {".DS_Store": b"1"})
