@@ -98,7 +98,7 @@ def test_the_lines_of_several_tasks_become_one_that_says_what_to_do(
     begin: Callable[[Any], BuildProcess],
 ) -> None:
     for build, expected in (
-        (fake_build.starved, "the disk is full: make room, then continue the build"),
+        (fake_build.starved, "the disk is full; free some space, then continue the build"),
         (fake_build.refused_twice, "A: f.tif: cut off (and 2 more lines)"),
     ):
         assert until(begin(build), lambda state: state.doing == "failed").line == expected
