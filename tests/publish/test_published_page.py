@@ -93,7 +93,7 @@ def test_file_that_is_spoilt_on_its_way_is_put_there_again(
     with monkeypatch.context() as patch:
         patch.setattr(FolderTarget, "write", spoils)
         code, _, said = run(out, tmp_path / "site")
-    assert (code, "the same command puts it there again" in said) == (1, True)
+    assert (code, "run the same command to upload it again" in said) == (1, True)
     assert run(out, tmp_path / "site")[1]["uploaded"] == 1
 
 
