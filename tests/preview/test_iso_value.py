@@ -56,7 +56,7 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows[0][0] == "candidate"
     assert rows[1][:2] == ["outer", "*"]
-    assert " ".join(rows[-2]) == "* a build takes it; found on all tiles"
+    assert " ".join(rows[-2]) == "* a build uses this one; found on all tiles"
     assert rows[-1] == ["wrote", str(out)]
     _, _, level, raw, inside, confidence = rows[1]
     ball = 4 / 3 * np.pi * 8**3 / (24 * 32 * 32)
@@ -191,7 +191,7 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     assert not result.unsure
     assert others
     assert all(one.setting and not one.is_chosen for one in others)
-    assert table(result)[-1] == "* a build takes it; given, and others found on all tiles"
+    assert table(result)[-1] == "* a build uses this one; given, and others found on all tiles"
 
 
 @pytest.mark.slow
@@ -246,18 +246,18 @@ def test_picture_is_named_by_channel_and_tile_unless_told(
 @pytest.mark.parametrize(
     ("flags", "code", "message"),
     [
-        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31', expected one of "),
+        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31'; expected one of "),
         (
             ("--channel", "0", "--tile", "r1_c0"),
             2,
-            "--tile is 'r1_c0', expected a tile from r0_c0 to r0_c1",
+            "--tile is 'r1_c0'; expected a tile from r0_c0 to r0_c1",
         ),
         (
             ("--channel", "1", "--tile", "r0_c0"),
             1,
-            "all voxels are nearly equal: no surface",
+            "all voxels are nearly equal, so there is no surface",
         ),
-        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg', expected a file"),
+        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg'; expected a file"),
     ],
 )
 def test_errors_are_one_clear_line(
