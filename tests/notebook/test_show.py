@@ -92,7 +92,7 @@ def test_a_build_that_nobody_keeps_goes_when_python_ends(built_page, tmp_path):
     ("source", "more", "message"),
     [
         ("", {}, "an empty name, expected a path"),  # not the build that one stands in
-        ("x.tif", {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
+        ("x.tif", {"spacing_um": 2}, "spacing_um is 2; expected z, y, x in um"),
     ],
 )
 def test_what_can_not_be_shown_is_told_in_a_line(

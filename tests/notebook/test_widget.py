@@ -72,7 +72,7 @@ def test_no_path_of_this_machine_is_in_the_state(viewer, bundle):
 
 
 def test_what_is_set_is_checked_and_what_a_page_tells_is_observed(viewer):
-    with pytest.raises(UsageError, match="there is no 'CD8', expected CD31"):
+    with pytest.raises(UsageError, match="there is no 'CD8'; expected CD31"):
         viewer.channels = {"CD8": {"visible": False}}
     assert viewer.channels == {}
     viewer.set_channel("CD31", opacity=0.5)
@@ -152,10 +152,10 @@ def test_a_bundle_by_itself_is_shown_as_the_view_asks_for(bundle):
 @pytest.mark.parametrize(
     ("source", "more", "message"),
     [
-        (5, {}, "5 is no array, expected one, or a path"),
+        (5, {}, "source is 5; expected an array or a path"),
         ("missing.tif", {}, "missing.tif"),
-        ("missing.tif", {"quality": "best"}, "quality is 'best', expected one of auto, full"),
-        ("missing.tif", {"zoom": 2}, "show takes no 'zoom'"),
+        ("missing.tif", {"quality": "best"}, "quality is 'best'; expected one of auto, full"),
+        ("missing.tif", {"zoom": 2}, "show has no argument 'zoom'"),
     ],
 )
 def test_what_can_t_be_shown_is_refused_in_a_line(source, more, message, tmp_path, monkeypatch):
