@@ -1,4 +1,4 @@
-"""Builds wait in a queue, one runs at a time, and a restart loses none of it."""
+"""Builds wait in a queue, one runs at a time, and a restart loses no build."""
 
 import io
 import json
@@ -114,7 +114,7 @@ def test_a_server_that_ends_as_a_build_does_loses_nothing(tmp_path: Path, head: 
     assert not upload.exists()
 
 
-def test_delete_deletes_everything_and_ends_what_runs(tmp_path: Path, head: bytes) -> None:
+def test_delete_removes_all_files_and_ends_running_work(tmp_path: Path, head: bytes) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         building, begun = hand_in(client, "a.nii", head), client.announce([("b.nii", head)])
@@ -145,7 +145,7 @@ def test_an_upload_that_broke_off_too_long_ago_is_removed(tmp_path: Path, head: 
     assert not item.folder.exists()
 
 
-def test_a_full_disk_refuses_new_uploads_and_keeps_what_has_come(
+def test_a_full_disk_refuses_new_uploads_and_keeps_the_bytes_that_arrived(
     tmp_path: Path, head: bytes
 ) -> None:
     with serving_inbox(tmp_path) as server:

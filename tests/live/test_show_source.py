@@ -119,7 +119,7 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
     assert "stopped" not in told  # by the user, who knows
 
 
-def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
+def test_sources_are_distinguished_from_builds_and_bundles(tmp_path: Path) -> None:
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
     build, bundle, planes = (tmp_path / name for name in ("out", "sent", "planes"))
     build.mkdir()

@@ -1,4 +1,4 @@
-"""Arrays as sources: what is taken, what is refused, and what becomes of a large one."""
+"""Arrays as sources: arrays that are accepted or refused, and the reduction of a large one."""
 
 from types import SimpleNamespace
 
@@ -22,7 +22,7 @@ SPACING = (2.0, 0.5, 0.25)
 
 
 def of_xarray(data, z=(0.0, 2.0, 4.0, 6.0), units="um", **others):
-    """What of an xarray.DataArray is looked at."""
+    """The attributes of an xarray.DataArray that the code uses."""
     places = {
         "z": np.array(z),
         "y": 0.5 * np.arange(data.shape[-2]),
@@ -101,7 +101,7 @@ def test_array_that_is_not_a_volume_is_refused_in_one_line(array, more, message)
     assert "\n" not in str(refused.value)
 
 
-def test_types_that_no_build_reads_become_those_that_it_does(tmp_path):
+def test_types_that_a_build_cannot_read_are_converted(tmp_path):
     for kind, given, expected in (
         (bool, [0, 1], np.uint8),
         (np.int64, [0, 60000], np.uint16),

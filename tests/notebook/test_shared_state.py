@@ -1,4 +1,4 @@
-"""What of the view a notebook may set."""
+"""The parts of the view that a notebook may set are checked."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from stereocell.notebook.shared_state import check_channels, check_link, check_p
 KNOWN = {"CD31": "CD31", "DNA": "DNA", "a marker": "a_x20_marker"}
 
 
-def test_what_can_be_is_taken_in_plain_numbers():
+def test_valid_values_are_returned_as_plain_numbers():
     look = {"visible": True, "color": "#FF8000", "opacity": 1, "window": np.array([1, 5])}
     assert check_channels({"CD31": look}, KNOWN) == {
         "CD31": {"visible": True, "color": "#ff8000", "opacity": 1.0, "window": [1.0, 5.0]}

@@ -1,4 +1,4 @@
-"""`stereocell iso`: a picture and a table of one tile's candidates, and nothing else."""
+"""`stereocell iso`: a picture and a table of one tile's candidates, and no other file."""
 
 import shlex
 import struct
@@ -48,7 +48,7 @@ def _iso(source: Path, *flags: str) -> int:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_picture")
-def test_the_table_names_the_levels_with_shares_and_what_takes_them(
+def test_the_table_lists_iso_values_with_shares_and_the_flags_that_choose_them(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "ball.png"
@@ -233,7 +233,7 @@ def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("small_picture")
-def test_picture_is_named_by_channel_and_tile_unless_told(
+def test_the_picture_is_named_after_channel_and_tile_by_default(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

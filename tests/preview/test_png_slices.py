@@ -1,4 +1,4 @@
-"""PNG slices of a series, with what they show."""
+"""PNG slices of a series, and the JSON file that describes them."""
 
 import json
 from itertools import product
@@ -236,7 +236,7 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     assert main(["slices", str(two), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
     assert (
         "states no position in a patient" in capsys.readouterr().err
-    )  # whatever channels are asked for
+    )  # also if several channels are requested
     assert main(["slices", str(two), "-o", str(tmp_path / "no")]) == 2
     assert "found Channel0, Channel1; choose one of them by --channels" in capsys.readouterr().err
     written(two, tmp_path / "one", "--channels", "Channel1")

@@ -1,4 +1,4 @@
-"""A bundle at a host: what is uploaded, removed and refused, and what the host then sends."""
+"""A bundle at a host: files that are uploaded, removed or refused, and the host's answers."""
 
 import hashlib
 import http.server
@@ -24,7 +24,7 @@ Run = Callable[..., tuple[int, dict[str, Any], str]]
 
 
 @pytest.mark.slow
-def test_a_folder_gets_the_bundle_and_then_what_has_changed(
+def test_a_folder_gets_the_bundle_and_later_only_the_changed_files(
     out: Path, run: Run, tmp_path: Path
 ) -> None:
     site = tmp_path / "a site"
@@ -56,10 +56,10 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
 
 
 @pytest.mark.slow
-def test_of_a_bundle_as_it_is_written_every_file_is_there(
+def test_every_file_of_a_bundle_is_published(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The manifest is in no list of files, and nothing opens without."""
+    """The manifest is not in the list of files, but no page opens without it."""
     viewer = tmp_path / "dist"
     viewer.mkdir()
     (viewer / "index.html").write_text("<!doctype html>")
@@ -80,7 +80,7 @@ def test_of_a_bundle_as_it_is_written_every_file_is_there(
     assert order[-4:] == ["files.json", "manifest.json", "index.html", LIST]
 
 
-def test_what_others_put_there_stays_and_ends_the_run_before_it_writes(
+def test_files_of_others_stay_and_end_the_run_before_it_writes(
     out: Path, run: Run, tmp_path: Path
 ) -> None:
     site = tmp_path / "site"

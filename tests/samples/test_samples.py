@@ -1,4 +1,4 @@
-"""The samples: what they promise, measured on their voxels."""
+"""The stated properties of the samples, measured on their voxels."""
 
 import json
 import math
@@ -193,7 +193,7 @@ def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
     assert np.abs(errors).max() < 0.15
 
 
-def test_truth_is_what_was_drawn(cycif: Path) -> None:
+def test_the_truth_equals_the_drawn_bodies(cycif: Path) -> None:
     truth = truth_of(cycif)
     size_um = tuple(n * h for n, h in zip(truth["shape"], truth["spacing_um"], strict=True))
     tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed=3, brightness_spread=1.0)

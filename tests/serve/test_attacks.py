@@ -1,4 +1,4 @@
-"""Whoever means ill is refused, whoever does not is served (support/server/attacks.py)."""
+"""Attacks on the server are refused; other clients are served (support/server/attacks.py)."""
 
 import asyncio
 import os

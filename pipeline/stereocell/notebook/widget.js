@@ -118,7 +118,10 @@ function render({ model, el }) {
     const changed = SHARED.filter((name) => !same(state[name], known[name]));
     if (port === null || changed.length === 0) return;
     known = state;
-    port.postMessage({ type: "state", state: Object.fromEntries(changed.map((n) => [n, state[n]])) });
+    port.postMessage({
+      type: "state",
+      state: Object.fromEntries(changed.map((n) => [n, state[n]])),
+    });
   };
   /** Sends the state beside the link, with which the page has already opened. */
   const sendAll = () => {
@@ -128,7 +131,9 @@ function render({ model, el }) {
     port?.postMessage({ type: "state", state });
   };
   const takeOver = (state) => {
-    const shared = Object.fromEntries(Object.entries(state).filter(([name]) => SHARED.includes(name)));
+    const shared = Object.fromEntries(
+      Object.entries(state).filter(([name]) => SHARED.includes(name)),
+    );
     known = { ...known, ...shared };
     for (const [name, value] of Object.entries(shared)) model.set(name, value);
     model.save_changes();
