@@ -156,7 +156,7 @@ def test_a_full_disk_refuses_new_uploads_and_keeps_the_bytes_that_arrived(
             status, content, _ = client.ask("POST", "/items", {"files": [["b.nii", 51]]})
             assert (status, content["line"].split(":")[0]) == (
                 507,
-                "the server's disk has 50 bytes free; this upload needs 51",
+                "the server's disk has 50 bytes free; this upload needs 51. Delete some items.",
             )
             assert client.ask("POST", "/items", {"files": [["c.nii", 50]]})[0] == 201
         with patch.object(Upload, "part", lambda *_: Path("/dev/full")):
@@ -169,7 +169,7 @@ def test_a_full_disk_refuses_new_uploads_and_keeps_the_bytes_that_arrived(
         client.wait(item, "understood")
         with patch.object(shutil, "disk_usage", lambda _: Usage(0, 0, 10)):
             client.command(item, "build")
-            assert "room for 10 bytes" in client.wait(item, "failed")["line"]
+            assert "has 10 bytes free" in client.wait(item, "failed")["line"]
         client.command(item, "build")
         end_build(server, item)
         client.wait(item, "built")
