@@ -1,9 +1,9 @@
-"""What hatchling asks when it builds a wheel or an sdist: the built viewer goes in, or neither is.
+"""A hook of hatchling that adds the built viewer to wheels and sdists, or stops if it is missing.
 
-A wheel has the viewer, so that viewing takes no Node, and the two scripts of `stereocell check`
-with the packages that they import, so that they take Node alone. An sdist has them where a checkout
-has, so that a wheel can be made of it anywhere. An editable install finds both in the checkout,
-built or not.
+A wheel contains the viewer, so that users need no Node to view a build. It also contains the two
+scripts of `stereocell check` and the packages that they import, so that these need only Node. An
+sdist has the same files at the places of a checkout, so that anybody can make a wheel from it. An
+editable install finds the files in the checkout, and needs no viewer that is already built.
 """
 
 import json
@@ -12,12 +12,12 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-# What viewer_gltf/tools/*.mjs import
+# Packages that viewer_gltf/tools/*.mjs import.
 TOOL_PACKAGES = ("gltf-validator", "ktx-parse", "meshoptimizer", "zstddec")
 
 
 class WheelHook(BuildHookInterface[Any]):
-    """Adds parts of viewer_gltf/: to a wheel where `stereocell.storage.assets` looks for them."""
+    """Adds parts of viewer_gltf/. In a wheel they lie where `stereocell.storage.assets` looks."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if version == "editable":
@@ -28,10 +28,10 @@ class WheelHook(BuildHookInterface[Any]):
         missing = [part for part in (viewer / "dist/index.html", *parts) if not part.exists()]
         if missing:
             self.app.abort(
-                f"{self.target_name}: {missing[0].relative_to(self.root)} is missing, expected the "
-                "built viewer: run `make wheel`, which builds it first (Node 20.19 or newer)"
+                f"{self.target_name}: {missing[0].relative_to(self.root)} is missing; expected the "
+                "built viewer. Run `make wheel`, which builds it first (Node 20.19 or newer)."
             )
-        # the viewer is made of these, and their licences ask to be passed on
+        # The viewer contains these packages, and their licences must be distributed with it.
         used = json.loads((viewer / "package.json").read_bytes())["dependencies"]
         for name in sorted(used.keys() - set(TOOL_PACKAGES)):
             parts += (packages / name).glob("LICENSE*")

@@ -1,6 +1,7 @@
-"""Run a command, with the words of the variable ARGS in place of its first word `ARGS`.
+"""Run a command after replacing its word `ARGS` by the words of the environment variable ARGS.
 
-For the Makefile: ARGS is split as a shell splits it, quotes and all, but nothing in it is run.
+The Makefile uses this. The variable is split like a shell command, with quotes, but no part of it
+is run.
 """
 
 import os
@@ -9,12 +10,12 @@ import sys
 
 
 def main(command: list[str]) -> None:
-    """Become the command, its word `ARGS` replaced by the words of the variable."""
+    """Replace this process by the command, with the variable's words in place of `ARGS`."""
     text = os.environ.get("ARGS", "")
     try:
         words = shlex.split(text)
     except ValueError as error:
-        sys.exit(f"make: ARGS is {text}: {error}, expected words as in a shell")
+        sys.exit(f"make: ARGS is {text} ({error}); expected words as in a shell")
     place = command.index("ARGS")
     os.execvp(command[0], [*command[:place], *words, *command[place + 1 :]])
 

@@ -1,8 +1,8 @@
 """StereoCell: multi-channel volumes as USD stages, web bundles and stereo views.
 
-`build` does all that the command of that name does; `open_volume` reads a source; `show` opens the
-viewer in a notebook. The steps on the way are plain functions on numpy arrays, each in a module of
-its own (docs/python.md).
+`build` does the same as the command of that name, `open_volume` opens a source for reading, and
+`show` opens the viewer in a notebook. The steps of a build are plain functions on numpy arrays,
+each in a module of its own (docs/python.md).
 """
 
 from stereocell.api import Built, build, open_volume

@@ -1,4 +1,4 @@
-"""The functions of `import stereocell`: a whole build from Python. Imports are lazy."""
+"""The functions of `import stereocell`: build a source, and open a volume. Imports are lazy."""
 
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """The results of a build: paths, or addresses where OUT is one."""
+    """The results of a build: paths, or addresses if OUT is an address.
+
+    out     the folder of the build
+    stage   the USD stage
+    bundle  the viewer's page
+    report  the report's page
+    """
 
     out: str
     stage: str
@@ -34,21 +40,24 @@ def build(
     scheduler: str = "",
     force: bool = False,
 ) -> Built:
-    """Build stage, bundle and report of a source in OUT, as the command `stereocell build` does.
+    """Build the stage, bundle and report of a source in OUT, like the command `stereocell build`.
 
     source     a path, or an address (http(s)://, s3://)
-    out        a folder, or an s3:// address; finished work there is not repeated
-    preset     cycif, em, lightsheet, mri, ct, ct-bone, pet, vessels, or a TOML file
+    out        a folder, or an s3:// address; finished work in it is not repeated
+    preset     cycif, em, lightsheet, mri, ct, ct-bone, pet, vessels, or a TOML file; None chooses
+               by the source
     config     a TOML file; its values override the preset's
-    settings   sections and keys that override both, as in the TOML
-    workers    processes; 0: this one. A script with more needs `if __name__ == "__main__":`
+    settings   sections and keys as in the TOML file; they override preset and config
+    workers    number of processes; 0 for only this one. A script that starts more needs
+               `if __name__ == "__main__":`
     scheduler  address or scheduler file of a Dask cluster, used instead of `workers`
-    force      replace all that lies in OUT; otherwise only a build of the same source is replaced
+    force      replace anything in OUT; without it, only a build of the same source is replaced
 
-    Progress goes to stderr. Raises StereoCellError, whose text is one line (a line for each
-    reason where tasks fail).
+    Progress goes to stderr. Returns the paths of the results. Raises StereoCellError; its text is
+    one line, or one line for each reason if tasks fail.
 
         built = build("scan.ome.zarr", "out/scan", preset="cycif", settings={"plan": {"level": 1}})
+        print(built.report)
     """
     from stereocell.building import phases
     from stereocell.building.out_folder import require_build_or_nothing
@@ -67,21 +76,21 @@ def build(
 
     leave_if_importing_main()
     if not isinstance(workers, int) or workers < 0:
-        raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")
+        raise UsageError(f"workers is {workers!r}; expected a whole number, 0 or more")
     path = (str, Path)
     kinds: tuple[tuple[str, Any, tuple[type, ...], str], ...] = (
         ("source", source, path, "a path or an address"),
         ("out", out, path, "a path or an address"),
-        ("preset", preset, (str, NoneType), "a name or a TOML file's"),
+        ("preset", preset, (str, NoneType), "a preset's name or a TOML file"),
         ("config", config, (*path, NoneType), "a TOML file"),
-        ("scheduler", scheduler, (str,), "an address or a file's name"),
+        ("scheduler", scheduler, (str,), "an address or the name of a file"),
     )
     for name, value, types, expected in kinds:
         if not isinstance(value, types):
-            raise UsageError(f"{name} is {value!r:.60}, expected {expected}")
+            raise UsageError(f"{name} is {value!r:.60}; expected {expected}")
     if not isinstance(settings, Mapping | None):
         raise UsageError(
-            f"settings are {settings!r:.60}, expected sections and keys, as "
+            f"settings is {settings!r:.60}; expected sections with keys, such as "
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)
@@ -114,12 +123,12 @@ def build(
 def open_volume(source: str | Path, **options: Any) -> "Dataset":
     """Open a source without reading voxels.
 
-    options  `time`, `spacing_um`, `series`, `pattern`, `axes`, `dark`: see `stereocell.read.open`,
-             with the errors
+    options  `time`, `spacing_um`, `series`, `pattern`, `axes`, `dark`; `stereocell.read.open`
+             describes them, and lists the errors
 
-    The dataset has `channels`, `levels` (shape in voxels and spacing in um, (z, y, x)) and
-    `read(channel, box, level)`. That returns a Volume: `voxels` (z, y, x) in the source's dtype,
-    `spacing_um` and `origin_um`, both (z, y, x).
+    The dataset has `channels`, `levels` (shape in voxels and spacing in um, both (z, y, x)) and a
+    method `read(channel, box, level)`. It returns a Volume with `voxels` (z, y, x) in the source's
+    dtype, `spacing_um` and `origin_um`, both (z, y, x).
 
         dataset = open_volume("head.nii.gz")
         volume = dataset.read(0, dataset.levels[-1].box, level=len(dataset.levels) - 1)

@@ -1,4 +1,4 @@
-"""Specimens are handed in over HTTP, understood, looked at and built by the product's own way."""
+"""Specimens are uploaded over HTTP, read, viewed and built by the product's own code."""
 
 import io
 import json
@@ -185,7 +185,7 @@ def test_files_of_another_patient_by_the_same_names_are_an_upload_of_their_own(
     assert announce("A" * 64) == (400, "mark: expected 64 hexadecimal digits in lower case")
 
 
-def test_choices_are_understood_anew_and_a_wrong_one_is_a_line(
+def test_changed_choices_are_read_again_and_a_wrong_one_gives_a_line(
     client: InboxClient, tmp_path: Path
 ) -> None:
     item = client.hand_in([nifti(tmp_path, "again.nii.gz")])
@@ -239,7 +239,7 @@ def test_a_patients_scan_is_built_and_only_the_upload_held_their_name(
     assert caplog.text == ""
 
 
-def test_the_limits_are_those_that_the_page_is_told(client: InboxClient) -> None:
+def test_the_limits_equal_those_that_the_page_receives(client: InboxClient) -> None:
     limits = client.state()["limits"]
     assert limits["bytes"] == LIMITS.bytes
     assert limits["files"] == LIMITS.files
@@ -263,11 +263,11 @@ def test_a_websocket_stays_open_without_news_and_a_silent_sender_is_cut_off(
         assert client.ask("HEAD", f"/items/{item}/bytes")[2]["Upload-Offset"] == "400"
         assert client.ask("DELETE", f"/items/{item}")[0] == 204
         ids: list[str] = [item]
-        while item in ids:  # it is told, so that it is open
+        while item in ids:  # a message arrives, so the websocket is still open
             ids = [one["id"] for one in json.loads(events.recv(timeout=PATIENCE_S))["items"]]
 
 
-def test_of_a_file_of_several_datasets_one_is_read_and_the_others_can_be_chosen(
+def test_one_dataset_of_a_file_is_read_and_the_others_can_be_chosen(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "several.h5"

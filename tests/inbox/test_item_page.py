@@ -1,4 +1,4 @@
-"""The page of an item watches its build, whenever that begins, ends early and begins again."""
+"""The page of an item watches its build, whenever the build begins, fails and begins again."""
 
 import http.client
 import json
@@ -128,7 +128,7 @@ def test_a_look_after_a_choice_is_a_new_view_and_the_older_one_stays_for_pages_t
         assert client.ask("GET", f"{view}/{older}manifest.json")[1] == first
 
 
-def test_a_page_of_an_item_that_is_gone_is_told_so(tmp_path: Path, head: bytes) -> None:
+def test_the_page_of_a_deleted_item_receives_that_state(tmp_path: Path, head: bytes) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         item = hand_in(client, head)

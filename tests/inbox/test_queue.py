@@ -1,4 +1,4 @@
-"""Builds wait in a queue, one runs at a time, and a restart loses none of it."""
+"""Builds wait in a queue, one runs at a time, and a restart loses no build."""
 
 import io
 import json
@@ -114,7 +114,7 @@ def test_a_server_that_ends_as_a_build_does_loses_nothing(tmp_path: Path, head: 
     assert not upload.exists()
 
 
-def test_delete_deletes_everything_and_ends_what_runs(tmp_path: Path, head: bytes) -> None:
+def test_delete_removes_all_files_and_ends_running_work(tmp_path: Path, head: bytes) -> None:
     with serving_inbox(tmp_path, FakeBuilds()) as server:
         client = InboxClient(server.port)
         building, begun = hand_in(client, "a.nii", head), client.announce([("b.nii", head)])
@@ -145,7 +145,7 @@ def test_an_upload_that_broke_off_too_long_ago_is_removed(tmp_path: Path, head: 
     assert not item.folder.exists()
 
 
-def test_a_full_disk_refuses_new_uploads_and_keeps_what_has_come(
+def test_a_full_disk_refuses_new_uploads_and_keeps_the_bytes_that_arrived(
     tmp_path: Path, head: bytes
 ) -> None:
     with serving_inbox(tmp_path) as server:
@@ -156,7 +156,7 @@ def test_a_full_disk_refuses_new_uploads_and_keeps_what_has_come(
             status, content, _ = client.ask("POST", "/items", {"files": [["b.nii", 51]]})
             assert (status, content["line"].split(":")[0]) == (
                 507,
-                "the server's disk has room for 50 bytes more, found 51",
+                "the server's disk has 50 bytes free; this upload needs 51. Delete some items.",
             )
             assert client.ask("POST", "/items", {"files": [["c.nii", 50]]})[0] == 201
         with patch.object(Upload, "part", lambda *_: Path("/dev/full")):
@@ -169,7 +169,7 @@ def test_a_full_disk_refuses_new_uploads_and_keeps_what_has_come(
         client.wait(item, "understood")
         with patch.object(shutil, "disk_usage", lambda _: Usage(0, 0, 10)):
             client.command(item, "build")
-            assert "room for 10 bytes" in client.wait(item, "failed")["line"]
+            assert "has 10 bytes free" in client.wait(item, "failed")["line"]
         client.command(item, "build")
         end_build(server, item)
         client.wait(item, "built")
@@ -206,13 +206,13 @@ def test_a_reader_that_dies_or_hangs_is_one_line_and_the_server_goes_on(
                     packed.writestr(f"{k}.bin", bytes(100_000))
             slow = client.hand_in([("b.zip", archive.getvalue())])
             line = client.wait(slow, "failed")["line"]
-        assert line == "reading was ended: it did not end within 0 s"
+        assert line == "reading was stopped: it did not end within 0 s"
         assert client.wait(hand_in(client, "c.nii", head), "understood")
 
 
 def test_a_folder_of_other_files_and_a_damaged_queue_are_refused(tmp_path: Path) -> None:
     (tmp_path / "scan.nii").touch()
-    with pytest.raises(OutputError, match="expected an empty folder, or an inbox"):
+    with pytest.raises(OutputError, match="expected an empty folder or an inbox"):
         Inbox(tmp_path, LIMITS)
     box = tmp_path / "box"
     box.mkdir()

@@ -1,4 +1,4 @@
-"""A name that a stranger hands in leads to a public host alone, however its IP address changes."""
+"""A host name from a stranger leads only to a public host, even if its IP address changes."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""Files get names of StereoCell's own, which keep what readers need and nothing else."""
+"""Files get neutral names, which keep the parts that readers need and nothing else."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def arranged(folder: Path, files: dict[str, bytes]) -> Path:
         ("a.sld", ".sld"),
     ],
 )
-def test_of_a_name_the_ending_stays(name: str, ending: str) -> None:
+def test_only_the_ending_of_a_name_stays(name: str, ending: str) -> None:
     assert ending_of(name) == ending
 
 
@@ -56,7 +56,7 @@ def test_of_a_name_the_ending_stays(name: str, ending: str) -> None:
         (["D\u00f6e_1.tif", "D\u00f6e_2.tif"], ["x_1.tif", "x_2.tif"]),
     ],
 )
-def test_of_planes_what_differs_stays(names: list[str], safe: list[str]) -> None:
+def test_parts_that_distinguish_planes_stay(names: list[str], safe: list[str]) -> None:
     found = ["/".join(parts) for parts in plane_names(check_names(names, "files"))]
     assert found == safe
 
@@ -80,7 +80,7 @@ def test_a_header_finds_its_data_under_the_new_names(tmp_path: Path) -> None:
     assert find(place.parent, ["Mustermann"]) == []
 
 
-def test_what_systems_add_is_no_file_and_several_images_are_refused(tmp_path: Path) -> None:
+def test_files_that_systems_add_are_ignored_and_several_images_are_refused(tmp_path: Path) -> None:
     for name in ("__MACOSX/._a.nii", "a/.DS_Store", "Thumbs.db", "._scan.dcm"):
         assert is_of_system(tuple(name.split("/")))
     image = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom()).read_bytes()
@@ -89,5 +89,5 @@ def test_what_systems_add_is_no_file_and_several_images_are_refused(tmp_path: Pa
     head = b"\x5c\x01\0\0" + bytes(344)
     with pytest.raises(RefusedError, match="found 2 images, expected one specimen"):
         arranged(tmp_path / "two", {"a.nii": head, "b.nii": head})
-    with pytest.raises(RefusedError, match="found no file but those that systems add"):
+    with pytest.raises(RefusedError, match="found only files that operating systems add"):
         arranged(tmp_path / "none", {".DS_Store": b"1"})

@@ -1,4 +1,4 @@
-"""The folder into which a source is built behind its page: checked before anything is shown."""
+"""The folder into which a source is built is checked before anything is shown."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A build behind a page: it is watched, paused, continued, cancelled and started again."""
+"""A build in a process of its own is watched, paused, continued, cancelled and started again."""
 
 import sys
 import time
@@ -49,7 +49,7 @@ def test_a_build_is_paused_cancelled_and_continued(
     process = begin(fake_build.steady)
     assert process.bundle is None
     until(process, lambda state: state.done >= 3)
-    process.do("continue")  # it runs already
+    process.do("continue")  # the build already runs, so this does nothing
     process.do("pause")
     assert process.state.doing in ("pausing", "paused")
     paused = until(process, lambda state: state.doing == "paused")
@@ -98,14 +98,14 @@ def test_the_lines_of_several_tasks_become_one_that_says_what_to_do(
     begin: Callable[[Any], BuildProcess],
 ) -> None:
     for build, expected in (
-        (fake_build.starved, "the disk is full: make room, then continue the build"),
+        (fake_build.starved, "the disk is full; free some space, then continue the build"),
         (fake_build.refused_twice, "A: f.tif: cut off (and 2 more lines)"),
     ):
         assert until(begin(build), lambda state: state.doing == "failed").line == expected
 
 
 @pytest.mark.slow
-def test_what_is_asked_before_the_start_holds(tmp_path: Path) -> None:
+def test_a_command_before_the_start_takes_effect(tmp_path: Path) -> None:
     nothing: Any = SimpleNamespace(tiles=())
     coarse = Coarse(nothing, {}, tmp_path / "out", tmp_path, {})
     process = BuildProcess(partial(fake_build.steady, tmp_path), tmp_path / "out")

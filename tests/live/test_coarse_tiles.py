@@ -1,4 +1,4 @@
-"""The volumes of a first view fit a bound of bytes, whatever they show, and lie where they did."""
+"""The volumes of any first view fit a limit of bytes, and keep their positions."""
 
 import json
 from dataclasses import replace
@@ -112,7 +112,7 @@ def shares(root: Path) -> NDArray[np.float64]:
     return np.array([*middles, float(voxels.mean())])
 
 
-def test_what_shows_and_what_does_not_stays_so_with_fewer_greys(tmp_path: Path) -> None:
+def test_visible_and_invisible_values_stay_so_with_fewer_greys(tmp_path: Path) -> None:
     """Each function shows the same texels; no value moves by more than half a step."""
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom(2), spacing=(1.0, 0.5, 0.5))
     settings, choice = load_for(source, None, None, flags={})

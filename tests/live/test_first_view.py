@@ -1,4 +1,4 @@
-"""The first view of a source is a bundle: coarse, at the places and in the windows of a build."""
+"""The first view of a source is a bundle: coarse, with the positions and windows of a build."""
 
 import json
 from dataclasses import replace
@@ -126,7 +126,7 @@ def test_a_large_source_is_read_at_a_coarse_level(
     assert read.voxels.size <= 2_000
 
 
-def test_of_a_large_source_without_a_pyramid_some_planes_are_read(
+def test_only_some_planes_of_a_large_source_without_a_pyramid_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(coarse_channel, "READ_VOXELS", 40_000)

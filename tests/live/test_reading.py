@@ -1,4 +1,4 @@
-"""How much of a source has been read is counted, and printed where it takes long."""
+"""The share of a source that has been read is counted, and printed if reading takes long."""
 
 from pathlib import Path
 

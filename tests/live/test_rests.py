@@ -1,4 +1,4 @@
-"""A build rests for moments while someone waits, and works at least half of the time."""
+"""A build rests for moments while somebody waits, and works at least half of the time."""
 
 import os
 import signal

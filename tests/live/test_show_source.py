@@ -54,7 +54,7 @@ def test_a_source_is_served_until_ctrl_c_and_its_folder_is_removed(tmp_path: Pat
             server.send_signal(signal.SIGINT)
             _, told = server.communicate(timeout=60)
     assert server.returncode == 0
-    assert "first view: f after" in told
+    assert "first view of f after" in told
     assert list(scratch.iterdir()) == []
     assert sorted(tmp_path.iterdir()) == [source, scratch]
 
@@ -92,7 +92,7 @@ def test_a_stopped_build_goes_on_behind_the_page_and_a_finished_one_is_shown(
         finally:
             server.send_signal(signal.SIGTERM)
             _, told = server.communicate(timeout=60)
-    assert "built earlier into out, which is shown" in told
+    assert "showing the finished build in out" in told
     assert main(["build", str(source), "-o", str(tmp_path / "plain"), *command[-2:]]) == 0
     # in this process the viewer is a small one, so that the page differs
     for part in ("stage", "bundle/channels", "bundle/volumes", "bundle/luts"):
@@ -109,7 +109,7 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
         command, cwd=tmp_path, text=True, start_new_session=True, **both
     ) as server:
         assert server.stdout is not None
-        expected = {"built behind the page into", "Ctrl+C ends it"}  # in either order
+        expected = {"building surfaces into", "Ctrl+C ends it"}  # in either order
         while expected and (line := server.stdout.readline()):
             expected = {words for words in expected if words not in line}
         os.killpg(server.pid, signal.SIGINT)  # as a terminal does
@@ -119,7 +119,7 @@ def test_ctrl_c_while_the_build_starts_prints_no_traceback(tmp_path: Path) -> No
     assert "stopped" not in told  # by the user, who knows
 
 
-def test_sources_are_told_from_builds_and_bundles(tmp_path: Path) -> None:
+def test_sources_are_distinguished_from_builds_and_bundles(tmp_path: Path) -> None:
     source = write_ome_tiff(tmp_path / "f.ome.tif", f_phantom())
     build, bundle, planes = (tmp_path / name for name in ("out", "sent", "planes"))
     build.mkdir()

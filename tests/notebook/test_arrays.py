@@ -1,4 +1,4 @@
-"""Arrays as sources: what is taken, what is refused, and what becomes of a large one."""
+"""Arrays as sources: arrays that are accepted or refused, and the reduction of a large one."""
 
 from types import SimpleNamespace
 
@@ -12,9 +12,9 @@ from stereocell.model.errors import UsageError
 from stereocell.notebook.arrays import (
     MAX_VOXELS,
     as_source,
+    describe_quality,
     find_blocks,
     is_array,
-    say_quality,
     write_source,
 )
 
@@ -22,7 +22,7 @@ SPACING = (2.0, 0.5, 0.25)
 
 
 def of_xarray(data, z=(0.0, 2.0, 4.0, 6.0), units="um", **others):
-    """What of an xarray.DataArray is looked at."""
+    """The attributes of an xarray.DataArray that the code uses."""
     places = {
         "z": np.array(z),
         "y": 0.5 * np.arange(data.shape[-2]),
@@ -71,33 +71,37 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
 @pytest.mark.parametrize(
     ("array", "more", "message"),
     [
-        (np.zeros((4, 4)), {}, r"has 2 axes \(4 x 4\), expected \(z, y, x\) or \(c, z, y, x\)"),
-        (np.zeros((3, 9, 9)), {}, "3 x 9 x 9, expected 4 voxels or more along z, y and x"),
+        (np.zeros((4, 4)), {}, r"has 2 axes \(4 x 4\); expected \(z, y, x\) or \(c, z, y, x\)"),
+        (np.zeros((3, 9, 9)), {}, "3 x 9 x 9 voxels; expected at least 4 along z, y and x"),
         (np.zeros((4, 4, 4), complex), {}, "type is complex128"),
-        (np.zeros((4, 4, 4)), {"spacing_um": None}, "no voxel spacing: name it, as spacing_um="),
+        (np.zeros((4, 4, 4)), {"spacing_um": None}, "no voxel spacing; pass it as spacing_um="),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 0, 1)}, "each above 0"),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 1)}, "expected z, y, x in um"),
-        (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
+        (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2; expected z, y, x in um"),
         (np.zeros((4, 4, 4)), {"spacing_um": "2,1,1"}, "expected z, y, x in um"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a"]}, "expected 2 different names"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a", "a"]}, "expected 2 different names"),
         (
             dask.array.zeros((3, 4000, 40000, 40000), dtype=np.uint16),
             {},
-            r"19,200,000,000,000 voxels, more than the 1,073,741,824 .*`stereocell build",
+            r"19,200,000,000,000 voxels .* at most 1,073,741,824 .*`stereocell build",
         ),
-        (of_xarray(np.zeros((4, 4, 4)), dims=("x", "y", "z")), {}, "axes are x, y, z.*transpose"),
-        (of_xarray(np.zeros((4, 4, 4)), z=(0, 1, 2, 9)), {"spacing_um": None}, "z are not even"),
-        (of_xarray(np.zeros((4, 4, 4)), units="s"), {"spacing_um": None}, "'s', no length"),
+        (of_xarray(np.zeros((4, 4, 4)), dims=("x", "y", "z")), {}, "axes are x, y, z.*Transpose"),
+        (
+            of_xarray(np.zeros((4, 4, 4)), z=(0, 1, 2, 9)),
+            {"spacing_um": None},
+            "along z are uneven",
+        ),
+        (of_xarray(np.zeros((4, 4, 4)), units="s"), {"spacing_um": None}, "'s', not a length"),
     ],
 )
-def test_what_is_no_volume_is_refused_in_a_line(array, more, message):
+def test_array_that_is_not_a_volume_is_refused_in_one_line(array, more, message):
     with pytest.raises(UsageError, match=message) as refused:
         as_source(array, **{"spacing_um": SPACING, "channels": None, **more})
     assert "\n" not in str(refused.value)
 
 
-def test_types_that_no_build_reads_become_those_that_it_does(tmp_path):
+def test_types_that_a_build_cannot_read_are_converted(tmp_path):
     for kind, given, expected in (
         (bool, [0, 1], np.uint8),
         (np.int64, [0, 60000], np.uint16),
@@ -118,11 +122,11 @@ def test_a_large_array_is_made_coarser_as_cubes_where_that_can_be():
     z, y, x = find_blocks(source)
     assert (z, y, x) == (2, 8, 8)  # cubes of 4 um
     assert 2 * 50 * 125 * 125 <= MAX_VOXELS < 2 * 100 * 143 * 143  # those of 3.5 um were too many
-    words = say_quality(source, (z, y, x))
+    words = describe_quality(source, (z, y, x))
     assert "2 x 8 x 8" in words
     assert "200,000,000" in words
     assert find_blocks(as_source(np.zeros((50, 100, 100)), SPACING, None)) == (1, 1, 1)
-    assert say_quality(source, (1, 1, 1)) == ""
+    assert describe_quality(source, (1, 1, 1)) == ""
     # four voxels stay along each axis, however many channels there are
     many = as_source(dask.array.zeros((300, 4, 400, 400)), SPACING, None)
     assert find_blocks(many, most=1000) == (1, 100, 100)

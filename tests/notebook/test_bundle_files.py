@@ -1,4 +1,4 @@
-"""What a page in a notebook may ask for: files of the bundle, whole or in part, and no others."""
+"""A page in a notebook gets files of the bundle, whole or in part, and no others."""
 
 import base64
 import hashlib
@@ -71,7 +71,7 @@ def test_the_viewer_s_lights_are_there_where_a_bundle_has_no_page(files, tmp_pat
     assert files.answer("environments/other.hdr") == (404, b"")
 
 
-def test_what_is_no_bundle_is_refused(bundle, tmp_path):
+def test_a_folder_that_is_not_a_bundle_is_refused(bundle, tmp_path):
     with pytest.raises(OutputError, match=r"manifest\.json"):
         NotebookBundle(tmp_path)
     shutil.copytree(bundle, tmp_path / "bundle")

@@ -1,4 +1,4 @@
-"""What of the view a notebook may set."""
+"""The parts of the view that a notebook may set are checked."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from stereocell.notebook.shared_state import check_channels, check_link, check_p
 KNOWN = {"CD31": "CD31", "DNA": "DNA", "a marker": "a_x20_marker"}
 
 
-def test_what_can_be_is_taken_in_plain_numbers():
+def test_valid_values_are_returned_as_plain_numbers():
     look = {"visible": True, "color": "#FF8000", "opacity": 1, "window": np.array([1, 5])}
     assert check_channels({"CD31": look}, KNOWN) == {
         "CD31": {"visible": True, "color": "#ff8000", "opacity": 1.0, "window": [1.0, 5.0]}
@@ -25,11 +25,11 @@ def test_what_can_be_is_taken_in_plain_numbers():
 @pytest.mark.parametrize(
     ("channels", "message"),
     [
-        ({"CD8": {}}, "there is no 'CD8', expected CD31, DNA, a marker"),
-        ({"CD31": 5}, "CD31 is 5, expected as"),
-        ({"CD31": {"colour": "#ff8000"}}, "no 'colour', expected visible, color"),
+        ({"CD8": {}}, "there is no 'CD8'; expected CD31, DNA, a marker"),
+        ({"CD31": 5}, "CD31 is 5; expected a dict such as"),
+        ({"CD31": {"colour": "#ff8000"}}, "no 'colour'; expected visible, color"),
         ({"CD31": {"visible": 1}}, "True or False"),
-        ({"CD31": {"color": "red"}}, "a colour as '#ff8000'"),
+        ({"CD31": {"color": "red"}}, "a colour such as '#ff8000'"),
         ({"CD31": {"opacity": 1.5}}, "0 to 1"),
         ({"CD31": {"opacity": "1"}}, "0 to 1"),
         ({"CD31": {"window": (5, 1)}}, "lower"),
@@ -44,9 +44,13 @@ def test_looks_that_can_t_be_are_refused_in_a_line(channels, message):
 @pytest.mark.parametrize(
     ("check", "value", "message"),
     [
-        (check_view, {"eye": (0, 0, 0)}, "no 'eye', expected eye_um and target_um"),
+        (check_view, {"eye": (0, 0, 0)}, "no 'eye'; expected eye_um and target_um"),
         (check_view, {"eye_um": (0, 0)}, "expected x, y, z"),
-        (check_view, {"eye_um": (1, 1, 1), "target_um": (1, 1, 1)}, "a view has a direction"),
+        (
+            check_view,
+            {"eye_um": (1, 1, 1), "target_um": (1, 1, 1)},
+            "expected two different points",
+        ),
         (check_picked, {"tile": "r0_c0"}, "point_um"),
         (check_picked, {"point_um": (1, 2, 3), "path": "/root"}, "expected"),
         (check_picked, {"point_um": (1, 2, 3), "object": 5}, "expected"),

@@ -1,4 +1,4 @@
-"""The widget, and what it says to a page: no browser is there."""
+"""The widget and its answers to a page, tested without a browser."""
 
 import io
 import json
@@ -59,7 +59,7 @@ def test_a_file_is_sent_with_its_status(viewer, bundle):
 
 
 @pytest.mark.parametrize("content", [None, "page", {}, {"ask": "rm"}, {"ask": ["page"]}])
-def test_what_is_no_question_has_no_answer(viewer, content):
+def test_a_message_that_is_not_a_request_gets_no_answer(viewer, content):
     assert hear(viewer, content) is None
 
 
@@ -71,8 +71,8 @@ def test_no_path_of_this_machine_is_in_the_state(viewer, bundle):
     assert viewer.name == "two tiles"
 
 
-def test_what_is_set_is_checked_and_what_a_page_tells_is_observed(viewer):
-    with pytest.raises(UsageError, match="there is no 'CD8', expected CD31"):
+def test_values_that_are_set_are_checked_and_values_from_the_page_are_observed(viewer):
+    with pytest.raises(UsageError, match="there is no 'CD8'; expected CD31"):
         viewer.channels = {"CD8": {"visible": False}}
     assert viewer.channels == {}
     viewer.set_channel("CD31", opacity=0.5)
@@ -86,7 +86,7 @@ def test_what_is_set_is_checked_and_what_a_page_tells_is_observed(viewer):
     assert viewer.picked == {"point_um": [1.0, 2.0, 3.0], "tile": "r0_c0"}
 
 
-def test_a_link_that_is_set_is_the_whole_view_and_one_that_is_told_goes_with_the_rest(viewer):
+def test_a_link_that_is_set_replaces_the_view_and_one_from_the_page_does_not(viewer):
     viewer.set_channel("CD31", opacity=0.5)
     viewer.picked = {"point_um": (1, 2, 3)}
     viewer.set_state({"link": "#v=1&tile=r0_c1"})
@@ -128,7 +128,7 @@ def test_a_page_s_picture_takes_its_place_and_the_widget_stays(viewer, published
     assert again["metadata"] == shown["metadata"]
 
 
-def test_what_is_no_picture_is_not_kept(viewer):
+def test_bytes_that_are_not_a_picture_are_not_kept(viewer):
     for sent in ([], [memoryview(b"<svg>")], [memoryview(png() + bytes(5 * 2**20))]):
         hear(viewer, {"ask": "picture"}, sent)
         assert viewer._picture == b""
@@ -152,13 +152,13 @@ def test_a_bundle_by_itself_is_shown_as_the_view_asks_for(bundle):
 @pytest.mark.parametrize(
     ("source", "more", "message"),
     [
-        (5, {}, "5 is no array, expected one, or a path"),
+        (5, {}, "source is 5; expected an array or a path"),
         ("missing.tif", {}, "missing.tif"),
-        ("missing.tif", {"quality": "best"}, "quality is 'best', expected one of auto, full"),
-        ("missing.tif", {"zoom": 2}, "show takes no 'zoom'"),
+        ("missing.tif", {"quality": "best"}, "quality is 'best'; expected one of auto, full"),
+        ("missing.tif", {"zoom": 2}, "show has no argument 'zoom'"),
     ],
 )
-def test_what_can_t_be_shown_is_refused_in_a_line(source, more, message, tmp_path, monkeypatch):
+def test_a_wrong_argument_is_refused_in_one_line(source, more, message, tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     before = set(tmp_path.iterdir())
@@ -168,7 +168,7 @@ def test_what_can_t_be_shown_is_refused_in_a_line(source, more, message, tmp_pat
     assert set(tmp_path.iterdir()) == before  # nothing half-made stays
 
 
-def test_without_anywidget_and_without_a_page_it_says_what_to_do(bundle, monkeypatch):
+def test_a_missing_anywidget_or_page_gives_a_line_with_the_remedy(bundle, monkeypatch):
     monkeypatch.setattr(blob_page, "viewer_dist", lambda: None)
     with pytest.raises(UsageError, match="the viewer is not built: run `make setup`"):
         stereocell.show(bundle)

@@ -1,4 +1,4 @@
-"""`stereocell iso`: a picture and a table of one tile's candidates, and nothing else."""
+"""`stereocell iso`: a picture and a table of one tile's candidates, and no other file."""
 
 import shlex
 import struct
@@ -48,7 +48,7 @@ def _iso(source: Path, *flags: str) -> int:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_picture")
-def test_the_table_names_the_levels_with_shares_and_what_takes_them(
+def test_the_table_lists_iso_values_with_shares_and_the_flags_that_choose_them(
     source: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "ball.png"
@@ -56,7 +56,7 @@ def test_the_table_names_the_levels_with_shares_and_what_takes_them(
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows[0][0] == "candidate"
     assert rows[1][:2] == ["outer", "*"]
-    assert " ".join(rows[-2]) == "* a build takes it; found on all tiles"
+    assert " ".join(rows[-2]) == "* a build uses this one; found on all tiles"
     assert rows[-1] == ["wrote", str(out)]
     _, _, level, raw, inside, confidence = rows[1]
     ball = 4 / 3 * np.pi * 8**3 / (24 * 32 * 32)
@@ -191,7 +191,7 @@ def test_a_value_that_is_given_is_the_chosen_one_in_voxels_as_they_are(
     assert not result.unsure
     assert others
     assert all(one.setting and not one.is_chosen for one in others)
-    assert table(result)[-1] == "* a build takes it; given, and others found on all tiles"
+    assert table(result)[-1] == "* a build uses this one; given, and others found on all tiles"
 
 
 @pytest.mark.slow
@@ -233,7 +233,7 @@ def test_same_input_same_bytes(source: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("small_picture")
-def test_picture_is_named_by_channel_and_tile_unless_told(
+def test_the_picture_is_named_after_channel_and_tile_by_default(
     source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -246,18 +246,18 @@ def test_picture_is_named_by_channel_and_tile_unless_told(
 @pytest.mark.parametrize(
     ("flags", "code", "message"),
     [
-        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31', expected one of "),
+        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31'; expected one of "),
         (
             ("--channel", "0", "--tile", "r1_c0"),
             2,
-            "--tile is 'r1_c0', expected a tile from r0_c0 to r0_c1",
+            "--tile is 'r1_c0'; expected a tile from r0_c0 to r0_c1",
         ),
         (
             ("--channel", "1", "--tile", "r0_c0"),
             1,
-            "all voxels are nearly equal: no surface",
+            "all voxels are nearly equal, so there is no surface",
         ),
-        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg', expected a file"),
+        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg'; expected a file"),
     ],
 )
 def test_errors_are_one_clear_line(

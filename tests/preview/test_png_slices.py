@@ -1,4 +1,4 @@
-"""PNG slices of a series, with what they show."""
+"""PNG slices of a series, and the JSON file that describes them."""
 
 import json
 from itertools import product
@@ -230,13 +230,15 @@ def test_microscopy_has_planes_by_its_axes_with_square_pixels(
     assert main(["slices", str(source), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
     told = capsys.readouterr().err
     assert "--plane axial: " in told
-    assert "states no place in a body, expected acquired, xy, xz, yz" in told
+    assert "states no position in a patient; expected acquired, xy, xz, yz" in told
     assert not (tmp_path / "no").exists()
     two = phantoms.write_ome_tiff(tmp_path / "two.ome.tif", np.stack([voxels, voxels]), "CZYX")
     assert main(["slices", str(two), "-o", str(tmp_path / "no"), "--plane", "axial"]) == 2
-    assert "states no place in a body" in capsys.readouterr().err  # whatever channels are asked for
+    assert (
+        "states no position in a patient" in capsys.readouterr().err
+    )  # also if several channels are requested
     assert main(["slices", str(two), "-o", str(tmp_path / "no")]) == 2
-    assert "found Channel0, Channel1, expected --channels with one" in capsys.readouterr().err
+    assert "found Channel0, Channel1; choose one of them by --channels" in capsys.readouterr().err
     written(two, tmp_path / "one", "--channels", "Channel1")
 
 
@@ -290,5 +292,5 @@ def test_more_than_one_channel_is_wrong_usage(
     both = np.stack([phantoms.f_phantom()] * 2)
     source = phantoms.write_ome_tiff(tmp_path / "f.ome.tif", both, axes="CZYX", names=["A", "B"])
     assert main(["slices", str(source), "-o", str(tmp_path / "out")]) == 2
-    assert "found A, B, expected --channels with one" in capsys.readouterr().err
+    assert "found A, B; choose one of them by --channels" in capsys.readouterr().err
     assert main(["slices", str(source), "-o", str(tmp_path / "out"), "--channels", "B"]) == 0

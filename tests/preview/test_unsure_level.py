@@ -1,4 +1,4 @@
-"""`iso` calls a level unsure where a build of the same settings does."""
+"""`iso` calls a level unsure if a build with the same settings does."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Pictures of a patient are the right way up, whatever way the voxels were stored."""
+"""Pictures of a patient are the right way up for every order of stored voxels."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A bundle at a host: what is uploaded, removed and refused, and what the host then sends."""
+"""A bundle at a host: files that are uploaded, removed or refused, and the host's answers."""
 
 import hashlib
 import http.server
@@ -24,7 +24,7 @@ Run = Callable[..., tuple[int, dict[str, Any], str]]
 
 
 @pytest.mark.slow
-def test_a_folder_gets_the_bundle_and_then_what_has_changed(
+def test_a_folder_gets_the_bundle_and_later_only_the_changed_files(
     out: Path, run: Run, tmp_path: Path
 ) -> None:
     site = tmp_path / "a site"
@@ -56,10 +56,10 @@ def test_a_folder_gets_the_bundle_and_then_what_has_changed(
 
 
 @pytest.mark.slow
-def test_of_a_bundle_as_it_is_written_every_file_is_there(
+def test_every_file_of_a_bundle_is_published(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The manifest is in no list of files, and nothing opens without."""
+    """The manifest is not in the list of files, but no page opens without it."""
     viewer = tmp_path / "dist"
     viewer.mkdir()
     (viewer / "index.html").write_text("<!doctype html>")
@@ -80,7 +80,7 @@ def test_of_a_bundle_as_it_is_written_every_file_is_there(
     assert order[-4:] == ["files.json", "manifest.json", "index.html", LIST]
 
 
-def test_what_others_put_there_stays_and_ends_the_run_before_it_writes(
+def test_files_of_others_stay_and_end_the_run_before_it_writes(
     out: Path, run: Run, tmp_path: Path
 ) -> None:
     site = tmp_path / "site"
@@ -88,7 +88,7 @@ def test_what_others_put_there_stays_and_ends_the_run_before_it_writes(
     (site / "index.html").write_text("mine")
     code, _, said = run(out, site)
     assert code == 1
-    assert "site/index.html: is there, and was not put there by this command" in said
+    assert "site/index.html: this file exists and was not uploaded by this command" in said
     assert below(site) == {"index.html": b"mine"}
 
 
@@ -167,10 +167,10 @@ def test_a_damaged_bundle_is_not_published(out: Path, run: Run, tmp_path: Path) 
 
 def test_a_place_in_out_or_a_plain_host_is_refused(out: Path, run: Run) -> None:
     assert "inside OUT" in run(out, out / "bundle" / "x")[2]
-    assert "nothing can be put there by http" in run(out, "https://me.example/x")[2]
+    assert "files can't be written over http" in run(out, "https://me.example/x")[2]
     assert run(out, "nowhere://x/y")[0] == 1
     code, _, said = run(out, out.parent / "site", "--url", "file:///etc")
-    assert (code, "expected an address as https://" in said) == (2, True)
+    assert (code, "expected an address such as https://" in said) == (2, True)
 
 
 @pytest.fixture
@@ -205,17 +205,17 @@ def test_every_file_is_fetched_as_browsers_do(
     (site / "volumes/r0_c0.ktx2").write_bytes(bytes(256 * 40))  # of the same size
     code, _, said = run(out, site, "--url", url)
     assert code == 1
-    assert f"{url}/volumes/r0_c0.ktx2: found other bytes" in said
+    assert f"{url}/volumes/r0_c0.ktx2: found different bytes" in said
     assert "changed since it was published" in said
     code, mended, _ = run(out, site, "--url", url, "--force")
     assert (code, mended["uploaded"]) == (0, 1)
     code, _, said = run(out, site, "--url", f"{host}/elsewhere")
     assert code == 1
-    assert "answered with 404" in said
+    assert "the host answered 404" in said
     monkeypatch.setitem(_Quiet.extensions_map, ".js", "text/plain")
     code, _, said = run(out, site, "--url", url)
     assert code == 1
-    assert "found the type text/plain, which browsers don't take for text/javascript" in said
+    assert "found the type text/plain, which browsers don't accept as text/javascript" in said
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""A page that is published again: of the same specimen alone; edited files of it stay."""
+"""A page that is published again: only for the same specimen; files that somebody edited stay."""
 
 import json
 import shutil
@@ -53,7 +53,9 @@ def test_bundle_of_another_source_does_not_replace_a_page_of_the_same_name(
 def test_file_of_a_page_that_was_edited_stays_without_force(
     out: Path, site: Path, run: Run, content: bytes, has_new_bundle: bool
 ) -> None:
-    (site / "index.html").write_bytes(content)  # of another size, and of the same
+    (site / "index.html").write_bytes(
+        content
+    )  # the first content has another size, the second the same
     if has_new_bundle:
         write(out, {"index.html": b"<!doctype html>new"})
     there = below(site)
@@ -82,7 +84,7 @@ def test_edited_file_that_the_new_bundle_lacks_is_not_removed_without_force(
     assert not (site / "sw.js").exists()
 
 
-def test_file_that_is_spoilt_on_its_way_is_put_there_again(
+def test_a_file_that_is_damaged_on_its_way_is_uploaded_again(
     out: Path, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put = FolderTarget.write
@@ -93,7 +95,7 @@ def test_file_that_is_spoilt_on_its_way_is_put_there_again(
     with monkeypatch.context() as patch:
         patch.setattr(FolderTarget, "write", spoils)
         code, _, said = run(out, tmp_path / "site")
-    assert (code, "the same command puts it there again" in said) == (1, True)
+    assert (code, "run the same command to upload it again" in said) == (1, True)
     assert run(out, tmp_path / "site")[1]["uploaded"] == 1
 
 

@@ -1,4 +1,4 @@
-"""The samples: what they promise, measured on their voxels."""
+"""The stated properties of the samples, measured on their voxels."""
 
 import json
 import math
@@ -82,7 +82,7 @@ def test_cycif_again_is_a_no_op_and_anything_else_stays(cycif: Path, tmp_path: P
     assert digests_of(cycif.parent) == before
     (tmp_path / "mine.ome.zarr").mkdir()
     (tmp_path / "mine.ome.zarr" / "thesis.tex").write_text("years of work")
-    with pytest.raises(OutputError, match="expected nothing or this very sample"):
+    with pytest.raises(OutputError, match="expected nothing or the same sample"):
         write_cycif(tmp_path / "mine.ome.zarr", **SMALL)
 
 
@@ -144,17 +144,17 @@ def test_sample_that_lost_chunks_is_made_again_and_a_damaged_one_is_named(
     capsys.readouterr()
     assert main(command) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "expected nothing or this very sample" in line
+    assert "expected nothing or the same sample" in line
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"grid": (0, 1)}, "--grid: found 0x1"),
-        ({"tile_size": (4, 96, 96)}, "--tile-size: found 4,96,96"),
-        ({"seed": -1}, "--seed: found -1"),
-        ({"brightness_spread": -0.5}, "--brightness-spread: found -0.5"),
-        ({"brightness_spread": math.nan}, "--brightness-spread: found nan"),
+        ({"grid": (0, 1)}, "--grid is 0x1"),
+        ({"tile_size": (4, 96, 96)}, "--tile-size is 4,96,96"),
+        ({"seed": -1}, "--seed is -1"),
+        ({"brightness_spread": -0.5}, "--brightness-spread is -0.5"),
+        ({"brightness_spread": math.nan}, "--brightness-spread is nan"),
     ],
 )
 def test_wrong_arguments_are_named(tmp_path: Path, change: Any, message: str) -> None:
@@ -193,7 +193,7 @@ def test_voxels_hold_the_boundary_intensity_at_the_nuclei_s_surface() -> None:
     assert np.abs(errors).max() < 0.15
 
 
-def test_truth_is_what_was_drawn(cycif: Path) -> None:
+def test_the_truth_equals_the_drawn_bodies(cycif: Path) -> None:
     truth = truth_of(cycif)
     size_um = tuple(n * h for n, h in zip(truth["shape"], truth["spacing_um"], strict=True))
     tissue = grow_tissue((size_um[0], size_um[1], size_um[2]), seed=3, brightness_spread=1.0)
@@ -335,7 +335,7 @@ def test_brain_cells_is_a_small_real_stack_with_its_licence(tmp_path: Path) -> N
 def test_brain_cells_overwrites_nothing(tmp_path: Path) -> None:
     path = tmp_path / "brain.ome.tif"
     path.write_text("mine")
-    with pytest.raises(OutputError, match="expected nothing or this very sample"):
+    with pytest.raises(OutputError, match="expected nothing or the same sample"):
         write_brain_cells(path)
     assert path.read_text("utf-8") == "mine"
     with pytest.raises(UsageError, match=r"NAME\.ome\.tif"):

@@ -1,4 +1,4 @@
-"""Whoever means ill is refused, whoever does not is served (support/server/attacks.py)."""
+"""Attacks on the server are refused; other clients are served (support/server/attacks.py)."""
 
 import asyncio
 import os
@@ -262,4 +262,4 @@ def test_a_file_that_is_cut_while_it_is_sent_is_named_in_a_line(out: Path) -> No
         _, faults = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0
     os.truncate(file, whole)
-    assert faults == f"{file}: became shorter while it was sent\n"
+    assert faults == f"{file}: the file became shorter while it was sent\n"

@@ -1,4 +1,4 @@
-"""Trees of a bundle: built once, kept, made anew when something is spoilt or changed."""
+"""Trees of a bundle are built once, stored, and built again if something is damaged or changed."""
 
 import json
 import os
@@ -49,7 +49,7 @@ def test_a_tree_is_that_of_the_bundles_volume(out):
     assert file.table.source.hex() == entry["file"]["sha256"][:32]
 
 
-def test_the_threshold_is_what_a_row_leaves_invisible():
+def test_threshold_is_the_largest_value_that_a_function_leaves_invisible():
     row = np.zeros((256, 4), np.uint8)
     row[:, :3] = 255
     assert invisible_below(row[:, 3]) == 254
@@ -62,7 +62,7 @@ def test_the_threshold_is_what_a_row_leaves_invisible():
 
 
 @pytest.mark.parametrize(("chosen", "threshold"), [("default", 99), ("sharp", 199), ("soft", -1)])
-def test_trees_are_those_of_the_function_that_the_stage_opens_with(out, chosen, threshold):
+def test_trees_use_the_function_that_the_stage_opens_with(out, chosen, threshold):
     """`soft` shows everything: no reason to send what is dark to one who looks at `sharp`."""
     opacities = np.zeros((3, 256))
     opacities[0, 100:] = opacities[1, 200:] = opacities[2] = 0.5
@@ -96,7 +96,7 @@ def test_a_second_start_builds_nothing(out):
 
 
 @pytest.mark.parametrize("spoil", ["cut", "header", "empty", "other", "brick"])
-def test_a_spoilt_tree_is_built_anew(out, spoil):
+def test_a_damaged_tree_is_built_again(out, spoil):
     before = library(out).open("r0_c0", "CD31").table_hash
     (path,) = (out / "bricks").glob("*.bvh")
     data = bytearray(path.read_bytes())
@@ -127,12 +127,12 @@ def test_nothing_but_trees_is_left_in_the_folder(out):
     assert [p.suffix for p in (out / "bricks").iterdir()] == [".bvh"]
 
 
-def test_what_the_bundle_lacks_is_named(out):
+def test_a_volume_that_the_bundle_lacks_is_named(out):
     with pytest.raises(UnknownVolumeError, match="no volume of tile r9_c9, channel CD31"):
         library(out).open("r9_c9", "CD31")
 
 
-def test_a_spoilt_volume_is_one_line_that_names_it(out):
+def test_a_damaged_volume_gives_one_line_that_names_it(out):
     path = out / "bundle/volumes/r0_c0/CD31.ktx2"
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(SourceError, match=r"CD31\.ktx2: its SHA-256 is not"):
@@ -197,7 +197,7 @@ def test_textures_come_back():
 
 
 @pytest.mark.parametrize("at", [0, 12, 20, 24, 28, 32, 36, 44, 80, 88, 96])
-def test_a_spoilt_texture_is_refused(at):
+def test_a_damaged_texture_is_refused(at):
     data = bytearray(encode_3d([VOLUME]).data)
     data[at : at + 4] = b"\xff\xff\xff\xff"
     with pytest.raises(SourceError):

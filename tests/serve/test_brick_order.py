@@ -1,4 +1,4 @@
-"""Which bricks a view gets, in which order: by geometry worked out here anew."""
+"""The bricks that a view gets, and their order, compared with geometry computed in this test."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,7 @@ def test_parents_come_before_their_children():
         assert (np.diff(worth) <= 0).all()
 
 
-def test_of_equals_the_nearer_comes_first():
+def test_the_nearer_of_two_equal_bricks_comes_first():
     """Along the line of sight: two bricks of the same level, the same parent's error."""
     _, nodes, _ = order(view((31.5, 31.5, 90.0), MIDDLE), [TREE])
     level1 = [n for n in nodes.tolist() if TREE.level[n] == 1]
@@ -95,7 +95,7 @@ def test_of_equals_the_nearer_comes_first():
     assert depth[:half].mean() > depth[-half:].mean() + 15
 
 
-def test_of_equals_the_gazed_at_comes_first():
+def test_the_brick_at_the_gaze_comes_first_among_equals():
     eye = (31.5, 31.5, 120.0)
     camera = view(eye, MIDDLE)
     for side in (-1, 1):
@@ -107,7 +107,7 @@ def test_of_equals_the_gazed_at_comes_first():
         assert side * (x[:third].mean() - x[-third:].mean()) > 5
 
 
-def test_what_errs_more_comes_first():
+def test_the_brick_with_the_larger_error_comes_first():
     volume = np.random.default_rng(3).integers(100, 110, (66, 66, 130)).astype(np.uint8)
     volume[:, :, 66:] = np.random.default_rng(3).integers(0, 255, (66, 66, 64))
     tree = placed(volume, threshold=-1)

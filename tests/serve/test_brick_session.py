@@ -1,4 +1,4 @@
-"""The websocket `/bricks`: order, windows, budgets, caches, and what is closed with which code."""
+"""The websocket `/bricks`: order, windows, budgets, caches, and the codes with which it closes."""
 
 import json
 from contextlib import contextmanager, suppress
@@ -190,7 +190,7 @@ def test_an_ack_lets_as_much_more_come(port):
         assert t.client.brick_bytes > 3 * 65536
 
 
-def test_a_cancelled_view_ends_after_what_is_on_its_way(port):
+def test_a_cancelled_view_ends_after_the_frames_that_were_sent(port):
     with talk(port, {**HELLO, "window": 65536}) as t:
         t.open(NOISE)
         t.look(1)
@@ -237,7 +237,7 @@ def test_bricks_that_a_client_finds_meanwhile_are_left_out(port):
         t.acks = True
         t.say({"type": "ack", "sequence": t.frames})
         assert t.until("done")["reason"] == "complete"
-        assert t.client.brick_bytes < 2 * 65536  # what was on its way, and one frame
+        assert t.client.brick_bytes < 2 * 65536  # the frames that were already sent, and one more
 
 
 def test_a_full_window_without_an_ack_is_closed_in_the_end(port, monkeypatch):
@@ -336,7 +336,7 @@ def test_bricks_that_were_dropped_can_be_had_again(port):
         assert frames == kept
 
 
-def test_unknown_volumes_are_told_and_the_connection_goes_on(port):
+def test_unknown_volumes_are_reported_and_the_connection_continues(port):
     with talk(port) as t:
         t.say({"type": "open", "volumes": [{"tile": "r9_c9", "channel": "CD31"}]})
         error = t.until("error")
@@ -346,7 +346,7 @@ def test_unknown_volumes_are_told_and_the_connection_goes_on(port):
         assert t.until("done")["reason"] == "complete"
 
 
-def test_a_damaged_volume_is_told_here_in_full_and_there_without_folders(tmp_path, caplog):
+def test_a_damaged_volume_is_logged_in_full_and_reported_without_folders(tmp_path, caplog):
     out = write_out(tmp_path / "out", VOLUME)
     (out / "bundle/volumes/r0_c0/CD31.ktx2").write_bytes(b"spoilt")
     with serving(out) as server, talk(server.port) as t:
@@ -370,14 +370,14 @@ def test_two_trees_in_a_view_are_both_sent(port):
         assert all(0 in t.client.trees[n].frames for n in trees)
 
 
-def test_a_bundle_written_anew_ends_the_connection(tmp_path):
+def test_a_replaced_bundle_ends_the_connection(tmp_path):
     out = write_out(tmp_path / "out", VOLUME)
     with serving(out) as server, talk(server.port) as t:
         t.open()
         replace_volume(out / "bundle", 255 - VOLUME)
         t.look()
         code, reason = t.closed()
-        assert (code, reason) == (1012, "the bundle was written anew, connect again")
+        assert (code, reason) == (1012, "the bundle was replaced: connect again")
 
 
 VIEW = {"type": "view", "id": 1, "trees": [0], "pixels_per_radian": 500, "texel_px": 1, "budget": 9}
@@ -399,7 +399,7 @@ VIEW = {"type": "view", "id": 1, "trees": [0], "pixels_per_radian": 500, "texel_
         ([HELLO] + [{"type": "cancel", "id": 1}] * 400, 1008, "more than 100 messages a second"),
     ],
 )
-def test_who_breaks_the_rules_is_closed_with_a_reason(port, messages, code, reason):
+def test_a_client_that_breaks_the_rules_is_closed_with_a_reason(port, messages, code, reason):
     with talk(port, None) as t:
         with suppress(ConnectionClosed):
             for message in messages:
@@ -422,7 +422,7 @@ def test_a_bad_list_of_bricks_is_closed(port):
 def test_binary_frames_are_closed(port):
     with talk(port) as t:
         t.socket.send(b"\x01\x02")
-        assert t.closed() == (1003, "binary frames go to the client only")
+        assert t.closed() == (1003, "a client may send text only, not binary frames")
 
 
 def test_silence_is_closed(port, monkeypatch):
@@ -437,7 +437,7 @@ def test_too_many_connections_are_sent_away(port, monkeypatch):
         assert two.closed() == (1013, "1 connections are open, try again later")
 
 
-def test_what_the_server_says_fits_the_schema(port):
+def test_messages_of_the_server_fit_the_schema(port):
     from jsonschema import Draft202012Validator
 
     from stereocell.storage.assets import schema_path

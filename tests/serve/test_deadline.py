@@ -1,4 +1,4 @@
-"""Clients that connect and send no request, or one a byte at a time, are not kept."""
+"""Clients that connect and send no request, or one byte at a time, are cut off."""
 
 import http.client
 import json

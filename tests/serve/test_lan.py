@@ -1,4 +1,4 @@
-"""Serving on the LAN: TLS, one-time tokens, sessions; and that nothing tells a token."""
+"""Serving on the LAN: TLS, one-time tokens, sessions; no output reveals a used token."""
 
 import hashlib
 import http.client
@@ -201,16 +201,16 @@ def test_nothing_that_is_written_tells_a_token_but_the_code(server, context, cap
     assert draw_qr(f"{server.address}?token={server.gate.token}") in out
 
 
-def test_the_person_is_told_what_to_accept_and_why(server, capfd):
+def test_the_terminal_explains_which_certificate_to_accept_and_why(server, capfd):
     server.invite()
     said = " ".join(capfd.readouterr().out.split())
     for words in (
         "a token that lets in one device, once",
         "this program made it just now",  # hence the phone's warning
-        "browsers give stereo (WebXR) and head tracking to encrypted pages only",
-        "Go on (Advanced, Proceed;",
+        "browsers allow stereo (WebXR) and head tracking on encrypted pages only",
+        "Continue (Advanced, Proceed;",
         f"has this SHA-256 fingerprint: {server.fingerprint}",
-        "If it has another, somebody is in between: go back.",
+        "If the fingerprint differs, somebody intercepts the connection: go back.",
     ):
         assert words in said
 
@@ -257,7 +257,9 @@ def serving_command(arguments, encoding):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("encoding", sweep(["ascii", "latin-1", "utf-8"], kept=["ascii", "utf-8"]))
-def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_path, encoding):
+def test_the_address_is_json_for_a_program_and_text_in_any_encoding_for_a_person(
+    tmp_path, encoding
+):
     bundle = tmp_path / "\u00fc\u4e2d" / "bundle"
     plain_bundle.write(bundle.parent, plain_bundle.FILES)
     with serving_command([str(bundle.parent)], encoding) as process:
@@ -272,7 +274,7 @@ def test_a_program_is_told_the_address_in_json_and_a_person_in_any_encoding(tmp_
         assert urlopen(told["address"], timeout=30).status == 200
 
 
-def test_a_program_is_told_each_invitation(tmp_path, monkeypatch, capsys):
+def test_each_invitation_is_printed_for_a_program(tmp_path, monkeypatch, capsys):
     for name in ("manifest.json", "index.html"):
         (tmp_path / name).write_text("{}")
     monkeypatch.setattr(serve_module, "find_addresses", lambda: ["127.0.0.1"])

@@ -1,4 +1,4 @@
-"""A source is served while it is built: views in folders, a websocket, and last the bundle."""
+"""A source is served while it is built: views in folders, a websocket, and finally the bundle."""
 
 import json
 from collections.abc import Iterator
@@ -88,7 +88,7 @@ def test_the_page_comes_before_the_first_view(live: Live) -> None:
         assert ask(port, "/missing")[0].status == 404
 
 
-def test_how_much_has_been_read_is_told_until_the_first_view_is_there(live: Live) -> None:
+def test_the_share_that_was_read_is_reported_until_the_first_view_exists(live: Live) -> None:
     with serving(live) as port:
         assert ask(port, "/")[0].headers["Server-Timing"] == "stereocell-reading"
         live.reading.add(0.25)
@@ -103,7 +103,7 @@ def test_a_source_that_cant_be_read_is_answered_in_a_sentence(live: Live) -> Non
         live.first.set_exception(SourceError("f.tif: cut off"))
         response, body = ask(port, "/manifest.json")
         assert response.status == 503
-        assert body == b"the source can't be shown: see the terminal"
+        assert body == b"the source can't be shown; see the terminal"
 
 
 def test_the_manifest_is_that_of_the_newest_view_and_names_its_folder(
@@ -184,7 +184,7 @@ def test_a_page_whose_frames_are_late_lets_the_build_rest(live: Live) -> None:
 def test_a_phone_that_looks_on_can_not_stop_the_build(
     live: Live, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(live_app, "is_here", lambda _: False)
+    monkeypatch.setattr(live_app, "is_on_this_machine", lambda _: False)
     build_of(live).set(doing="failed", line="patient.dcm: cut off")
     with serving(live) as port, connect(f"ws://localhost:{port}/live") as socket:
         state = json.loads(socket.recv())
@@ -196,11 +196,11 @@ def test_a_phone_that_looks_on_can_not_stop_the_build(
 
 
 @pytest.mark.parametrize(
-    ("address", "is_here"),
+    ("address", "is_on_this_machine"),
     [("127.0.0.1", True), ("::1", True), ("192.168.1.7", False), ("fe80::1", False), ("", False)],
 )
-def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_here: bool) -> None:
-    assert live_socket.is_here({"type": "websocket", "client": (address, 50_000)}) is is_here
+def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_on_this_machine: bool) -> None:
+    assert live_socket.is_on_this_machine({"type": "websocket", "client": (address, 50_000)}) is is_on_this_machine
 
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:

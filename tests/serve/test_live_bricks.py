@@ -1,4 +1,4 @@
-"""Bricks of a source that is not built: those of its build, where the window is the same."""
+"""Bricks of a source before it is built equal those of its build, if the window is the same."""
 
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -114,7 +114,7 @@ def test_a_build_rests_while_bricks_are_made_that_someone_waits_for(
 
 
 @pytest.mark.slow
-def test_bricks_of_a_view_of_a_build_are_those_of_its_bundle(source: Path, tmp_path: Path) -> None:
+def test_bricks_of_a_build_s_view_equal_those_of_its_bundle(source: Path, tmp_path: Path) -> None:
     out, scratch = tmp_path / "out", tmp_path / "scratch"
     words = ["build", str(source), "-o", str(out), "--workers", "0", "--tile-size", "32,48,72"]
     assert main(words) == 0

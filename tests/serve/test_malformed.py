@@ -1,4 +1,4 @@
-"""Frames that no client of ours sends: each is closed with a reason or ignored."""
+"""Malformed frames: the server closes each connection with a reason, or ignores the frame."""
 
 import base64
 import json
@@ -54,7 +54,7 @@ CODES = {1003, 1007, 1008, 1009}
 
 
 def texts(count):
-    """Return text messages: valid ones with a part spoilt, and noise."""
+    """Return text messages: valid ones with a damaged part, and noise."""
     rng = random.Random(7)
     found = [
         "",
@@ -168,7 +168,7 @@ def test_every_malformed_message_is_closed_with_a_reason_or_ignored(port, capfd,
     rng = random.Random(9)
     for i in range(examples(40, 8)):
         found = fate(port, rng.randbytes(rng.randrange(100)), hello=i % 4 > 0)
-        assert found == (1003, "binary frames go to the client only")
+        assert found == (1003, "a client may send text only, not binary frames")
     closed = [found for found in fates if found is not None]
     assert len(closed) / count > 100 / 170
     for code, reason in closed:
@@ -202,12 +202,12 @@ def raw_stream(port):
 
 
 @pytest.mark.slow
-def test_who_is_refused_reads_why_although_it_goes_on_sending(port):
+def test_a_refused_client_reads_the_reason_even_if_it_goes_on_sending(port):
     with raw_stream(port) as stream:
         whole = frame(1, bytes(MESSAGE_BYTES + 1))
         for start in range(0, len(whole), 16384):
             stream.sendall(whole[start : start + 16384])
-            time.sleep(0.02)  # it has judged the first part
+            time.sleep(0.02)  # by now the server has judged the first part
         said = b""
         while part := stream.recv(4096):
             said += part
@@ -237,7 +237,7 @@ def test_every_broken_frame_ends_its_connection_alone(port, capfd, caplog):
             with suppress(ConnectionError):
                 assert b"101 Switching" not in stream.recv(4096)
     assert is_well(port)
-    messages = examples(170 + 40, 60 + 8)  # of the test before
+    messages = examples(170 + 40, 60 + 8)  # the examples of the previous test
     assert len(frames) + len(heads) + messages >= examples(270, 110)
     assert capfd.readouterr().err == ""
     assert caplog.text == ""

@@ -1,4 +1,4 @@
-"""The voxels as measured, over HTTP: of the stage that the bundle is of, and of no other."""
+"""Measured values of voxels over HTTP: only those of the stage from which the bundle was made."""
 
 import json
 import shutil
@@ -66,7 +66,7 @@ def test_every_voxel_has_the_value_that_was_measured(out: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_lies_elsewhere_has_no_value(out: Path) -> None:
+def test_a_place_outside_the_volume_has_no_value(out: Path) -> None:
     with serving(out) as server:
         port = server.port
         for place, at in (
@@ -87,7 +87,7 @@ def test_a_place_that_is_none_is_refused(out: Path, at: str) -> None:
     with serving(out) as server:
         port = server.port
         response, body = ask(port, f"/values/r0_c0/F?at={at}")
-        assert (response.status, body) == (400, b"at: expected x,y,z in um")
+        assert (response.status, body) == (400, b"at: expected three numbers x,y,z in um")
 
 
 @pytest.mark.slow

@@ -81,7 +81,7 @@ def find(owner: type, name: str) -> str:
     return name if found is not None or is_set else ""
 
 
-def test_what_the_server_builds_on_is_there() -> None:
+def test_the_parts_of_uvicorn_that_the_server_overrides_exist() -> None:
     changed = [
         f"{owner.__module__}.{owner.__name__}: {wanted}, found {found or 'none'}"
         for owner, names in BUILT_ON.items()
@@ -92,7 +92,7 @@ def test_what_the_server_builds_on_is_there() -> None:
     assert not changed, f"{versions} changed what serve_*.py builds on: {changed}"
 
 
-def test_a_change_is_told() -> None:
+def test_a_changed_part_of_uvicorn_is_reported() -> None:
     class Newer(H11Protocol):
         def send_400_response(self, message: str) -> None: ...  # type: ignore[override]
 
@@ -102,8 +102,8 @@ def test_a_change_is_told() -> None:
     assert find(Newer, "no_such_thing") == ""
 
 
-def test_nothing_that_is_built_on_is_left_out() -> None:
-    """Of what they have, what our classes override, and what they ask of themselves."""
+def test_the_list_of_overridden_parts_is_complete() -> None:
+    """The list names every part of theirs that our classes override or use."""
     for ours, theirs in OURS.items():
         used = {name for name, one in vars(ours).items() if inspect.isfunction(one)}
         for node in ast.walk(ast.parse(textwrap.dedent(inspect.getsource(ours)))):
@@ -113,7 +113,7 @@ def test_nothing_that_is_built_on_is_left_out() -> None:
         assert not {name for name in used - listed if find(theirs, name)}, ours
 
 
-def test_both_are_held_below_the_next_version() -> None:
+def test_both_packages_are_pinned_below_the_next_version() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))[
         "project"
     ]

@@ -1,4 +1,4 @@
-"""The local server: byte ranges, types, nothing outside the bundle, nobody from elsewhere."""
+"""The local server: byte ranges, types, nothing outside the bundle, no clients from elsewhere."""
 
 import gzip
 import socket
@@ -82,7 +82,7 @@ def test_a_range_behind_the_end_is_refused_with_the_size(port: int) -> None:
         (f"bytes=0-{'9' * 5000}", None),
     ],
 )
-def test_ranges_mean_what_rfc_9110_says(header: str, expected: range | None) -> None:
+def test_ranges_follow_rfc_9110(header: str, expected: range | None) -> None:
     assert parse_range(header, 100) == expected
 
 
@@ -106,7 +106,7 @@ def test_ranges_are_answered_as_they_mean(
     assert (response.status, body) == (status, expected)
 
 
-def test_a_compressed_file_is_sent_to_those_that_accept_it(port: int) -> None:
+def test_a_compressed_file_is_sent_to_clients_that_accept_it(port: int) -> None:
     path = "/assets/code.js"
     plain, body = ask(port, path)
     assert (plain.headers["Content-Encoding"], body) == (None, CODE)
@@ -146,7 +146,7 @@ def test_encodings_are_accepted_as_rfc_9110_says(header: str, expected: set[str]
     assert accepted_encodings(header) - {""} == expected
 
 
-def test_what_a_browser_has_is_not_sent_again(port: int, bundle: Path) -> None:
+def test_a_file_that_a_browser_has_cached_is_not_sent_again(port: int, bundle: Path) -> None:
     (bundle / "lod1.glb").write_bytes(b"glTF")
     response, _ = ask(port, "/lod1.glb")
     tag = response.headers["ETag"]
@@ -176,7 +176,9 @@ def test_caches_ask_each_time_and_pages_learn_of_the_bricks(port: int) -> None:
         ("/assets/index.js?v=1", "text/javascript; charset=utf-8"),
     ],
 )
-def test_types_are_what_browsers_want(port: int, path: str, expected: str) -> None:
+def test_media_types_are_the_ones_that_browsers_require(
+    port: int, path: str, expected: str
+) -> None:
     response, _ = ask(port, path)
     assert (response.status, response.headers["Content-Type"]) == (200, expected)
 
@@ -246,7 +248,9 @@ def test_pages_of_other_origins_get_no_websocket(
         pass
     assert refused.value.response.status_code == 403
     ask(port, "/manifest.json")  # by now the server has done with the other one
-    assert caplog.records == []  # what is refused is no fault, and fills no terminal
+    assert (
+        caplog.records == []
+    )  # a refused request is not a fault, and prints nothing in the terminal
 
 
 def test_the_servers_own_page_and_programs_get_a_websocket(port: int) -> None:
@@ -305,7 +309,9 @@ def test_a_page_that_is_allowed_may_hold_the_viewer_in_a_frame(framed: int) -> N
 
 
 @pytest.mark.parametrize("origin", ["lab.example", "https://lab.example/page", "*", "https://a;b"])
-def test_what_is_no_origin_may_not_frame(origin: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_frame_address_that_is_not_an_origin_is_refused(
+    origin: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["serve", "out", "--allow-frame", origin]) == 2
     assert "is not an origin, expected a scheme and a host" in capsys.readouterr().err
 
@@ -368,7 +374,7 @@ def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
     for command in ("view", "serve"):
         assert main([command, str(tmp_path), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert "manifest.json: expected a built bundle, found no such file" in line
+        assert "manifest.json: not found; expected a built bundle" in line
         assert f"`stereocell bundle {tmp_path}`" in line
 
 
@@ -378,7 +384,7 @@ def test_a_place_that_does_not_exist_is_one_line(
     for command in ("view", "serve"):
         assert main([command, str(tmp_path / "vizarr.io"), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert "vizarr.io: not found, expected a build, a bundle, or a source" in line
+        assert "vizarr.io: not found; expected a build, a bundle, or a source" in line
 
 
 def test_a_bundle_is_served_by_its_own_folder_with_bricks_where_it_is_a_builds(

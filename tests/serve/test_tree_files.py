@@ -1,4 +1,4 @@
-"""Trees in a folder with a bound: the oldest leave, those that are being sent stay."""
+"""Trees in a folder with a limit: the oldest are removed, the trees in use stay."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from stereocell.serve.tree_files import FullError, TreeFiles, Volume
 
 NOISE = np.random.default_rng(3).integers(0, 255, (18, 18, 18), dtype=np.uint8)
 TREE = build(NOISE, -1)
-BYTES = len(encode_tree(TREE, bytes(HASH_BYTES)))  # of each tree in these tests
+BYTES = len(encode_tree(TREE, bytes(HASH_BYTES)))  # bytes of each tree in these tests
 
 
 def volume(number: int) -> Volume:
@@ -50,7 +50,7 @@ def test_the_trees_used_longest_ago_leave_a_bounded_folder(tmp_path: Path) -> No
         assert size_of(tmp_path / "bricks") <= 3 * BYTES + 10
 
 
-def test_trees_that_are_being_sent_stay_and_what_has_no_room_is_refused(tmp_path: Path) -> None:
+def test_trees_in_use_stay_and_a_tree_without_room_is_refused(tmp_path: Path) -> None:
     trees = TreeFiles(tmp_path / "bricks", 2 * BYTES)
     make(trees, 0)
     make(trees, 1)

@@ -219,7 +219,7 @@ def test_sample_of_another_seed_is_refused_before_it_is_made(
     capfd.readouterr()
     monkeypatch.setattr(f"stereocell.samples.{work}", lambda *_, **__: pytest.fail("it is made"))
     assert main(["sample", *words, "--seed", "7"]) == 1
-    assert "expected nothing or this very sample" in error_line(capfd)
+    assert "expected nothing or the same sample" in error_line(capfd)
     assert digests_of(tmp_path) == before
 
 

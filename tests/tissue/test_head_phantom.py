@@ -127,7 +127,7 @@ def test_a_finer_grid_shows_the_same_head(clean: HeadPhantom) -> None:
 
 def test_errors_name_the_wrong_argument() -> None:
     for found, message in (
-        ({"shape": (4, 96, 96)}, "shape: found"),
+        ({"shape": (4, 96, 96)}, "shape is"),
         ({"noise": -0.1}, "noise: found -0.1"),
         ({"bias": 2.0}, "bias: found 2"),
         ({"seed": -1}, "seed: found -1"),
@@ -231,10 +231,10 @@ def test_the_command_keeps_complete_series_and_overwrites_nothing(
     mine.write_text("mine")
     capsys.readouterr()
     assert main(["sample", "mri", str(mine)]) == 1
-    assert "expected nothing or this very sample" in capsys.readouterr().err
+    assert "expected nothing or the same sample" in capsys.readouterr().err
     assert mine.read_text("utf-8") == "mine"
     assert main(["sample", "mri", str(tmp_path / "x"), "--seed", "-1"]) == 2
-    assert "--seed: found -1" in capsys.readouterr().err
+    assert "--seed is -1" in capsys.readouterr().err
 
 
 @pytest.mark.slow

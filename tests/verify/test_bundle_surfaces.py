@@ -1,4 +1,4 @@
-"""Normals of a bundle's surface against those of the stage: as near as 8 bits let them be."""
+"""Normals of a bundle's surface agree with the stage's as closely as 8 bits allow."""
 
 import json
 import struct

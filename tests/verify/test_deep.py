@@ -1,4 +1,4 @@
-"""`check --deep` passes what was built, and names each fault that is put in by hand."""
+"""`check --deep` passes a build, and names each fault that the test adds."""
 
 import json
 import os
@@ -268,7 +268,9 @@ def lose_a_level(out: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_built_is_as_it_says(built: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_build_agrees_with_its_source_and_its_bundle(
+    built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["check", str(built), "--deep", "--workers", "0"]) == 0
     told = capsys.readouterr().out
     assert "ok   F lod0 against source: 2 surfaces within " in told
@@ -419,7 +421,7 @@ def test_a_fault_of_the_stage_is_named_when_the_bundle_has_it_too(
 
 
 @pytest.mark.slow
-def test_a_bundle_of_another_layer_is_told_from_the_stage_s_in_lines(
+def test_a_bundle_of_another_layer_is_reported_as_different_from_the_stage(
     out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     layer = tmp_path / "edit.usda"
@@ -464,7 +466,7 @@ def push_the_finest(stage: Usd.Stage) -> None:
 
 
 @pytest.mark.slow
-def test_a_bundle_of_an_edited_mesh_is_held_against_the_edited_one(
+def test_a_bundle_of_an_edited_mesh_is_compared_with_the_edited_mesh(
     out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     layer = tmp_path / "an artist's edit.usda"
@@ -493,7 +495,7 @@ def test_a_bundle_of_an_edited_mesh_is_held_against_the_edited_one(
 
 
 @pytest.mark.slow
-def test_without_its_source_the_bundle_is_held_against_the_stage_all_the_same(
+def test_a_bundle_is_compared_with_the_stage_even_without_the_source(
     built: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(_: object) -> None:

@@ -39,7 +39,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def out(made, tmp_path):
-    """A copy to be spoilt."""
+    """A copy that a test may damage."""
     return shutil.copytree(made, tmp_path / "out")
 
 
@@ -78,14 +78,14 @@ def node_finds_nothing(request, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("node")
-def test_what_the_pipeline_writes_passes_all_checks(made):
+def test_files_that_the_pipeline_writes_pass_all_checks(made):
     found = lines(made)
     assert failed(found) == set()
     assert found["glTF validator"].detail == "3 files"
 
 
 @pytest.mark.slow
-def test_what_needs_no_node_passes(made):
+def test_checks_that_need_no_node_pass(made):
     found = lines(made)
     assert failed(found) <= {"glTF validator", "KTX2 textures"}
 
@@ -109,7 +109,7 @@ def test_a_bundle_by_itself_is_checked_as_in_its_build(out):
     assert "hashes" in failed(found)
 
 
-def test_a_bundle_by_itself_has_no_source_to_be_held_against(out, capfd):
+def test_a_bundle_without_its_build_has_no_source_to_compare_with(out, capfd):
     assert main(["check", str(out / "bundle"), "--deep", "--workers", "0"]) == 1
     *_, last = capfd.readouterr().err.splitlines()
     assert "plan.json" in last
@@ -131,7 +131,7 @@ def test_changed_byte_is_found(out, name):
     assert f"{name}: not the bytes" in found["hashes"].detail
 
 
-def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
+def test_a_changed_byte_of_a_surface_contradicts_its_tileset(out):
     change_byte(out / "bundle" / GLB)
     found = lines(out)
     assert "tilesets" in failed(found)
@@ -140,7 +140,7 @@ def test_changed_byte_of_a_surface_is_not_what_its_tileset_says(out):
     assert "lod1.glb" not in detail
 
 
-def test_changed_byte_of_a_level_is_not_what_its_list_says(out):
+def test_a_changed_byte_of_a_level_contradicts_its_list(out):
     """The finest level lies last."""
     change_byte(out / "bundle" / VOLUME)
     found = lines(out)

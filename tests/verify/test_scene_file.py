@@ -89,11 +89,11 @@ DAMAGES: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "no policy": (
         lambda s: re.sub(r"<meta http-equiv=[^>]*>", "", s, count=1),
-        r"it has 0 policies",
+        r"the page has 0 policies",
     ),
     "a picture of a host": (
         lambda s: s.replace('<div id="app">', f'<img src="{HOST}"><div id="app">', 1),
-        r"it has an element <img>",
+        r"the page has an element <img>",
     ),
     "a style of a host": (
         lambda s: s.replace('href="data:,"', f'href="{HOST}"', 1),
@@ -103,7 +103,7 @@ DAMAGES: dict[str, tuple[Callable[[str], str], str]] = {
         lambda s: s.replace(
             "</title>", f'</title><meta http-equiv="refresh" content="0;url={HOST}">', 1
         ),
-        r"it has <meta http-equiv=refresh>",
+        r"the page has <meta http-equiv=refresh>",
     ),
     "a view that is an address": (lambda s: s.replace(VIEW, HOST, 1), r"its view is https"),
     "a file that is missing": (lambda s: with_block(s, LUT, "", b""), rf"{LUT}: missing"),
@@ -145,7 +145,7 @@ def test_a_deep_check_of_a_scene_names_what_it_needs(
 ) -> None:
     (tmp_path / "s.html").write_text(scene, "utf-8")
     assert main(["check", str(tmp_path / "s.html"), "--deep"]) == 1
-    assert "a scene in one file, expected OUT, with its plan.json" in capsys.readouterr().err
+    assert "found a scene in one file; expected OUT with its plan.json" in capsys.readouterr().err
 
 
 def test_each_block_has_the_hash_of_its_bytes(scene: str) -> None:

@@ -1,1 +1,1 @@
-"""The inbox: specimens that people hand in by a browser, understood, shown and built."""
+"""The inbox: people upload specimens in a browser; the server reads, shows and builds them."""

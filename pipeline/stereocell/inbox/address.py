@@ -1,7 +1,8 @@
-"""Addresses that people paste: http(s) and s3 alone, and public ones from other machines.
+"""Check addresses that people paste: only http(s) and s3, and only public hosts for others.
 
-A person at this machine may name what `build` takes. A person at another one acts through this
-machine, which may reach more than they do: hosts of its own network, and what its credentials open.
+A person at this machine may name any http(s) or s3 address that `build` takes. A person at another
+machine acts through this one, which may reach more than they do: hosts of its own network, and data
+that its credentials open.
 """
 
 import json
@@ -19,13 +20,13 @@ from stereocell.storage.public_hosts import (
 
 _BUCKET = re.compile(r"[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]")
 _IP = re.compile(r"[0-9.]+")
-_EXPECTED = "expected https://, http:// or s3:// of an image"
+_EXPECTED = "expected an image's address with https://, http:// or s3://"
 
 
 def check_address(address: str, *, is_local: bool) -> str:
     """Return an address that may be read. Raises RefusedError.
 
-    is_local  whether the person is at this machine
+    is_local  the person is at this machine
     """
     text = address.strip()
     if not text.isprintable() or not text.isascii() or " " in text or "\\" in text:
@@ -33,7 +34,7 @@ def check_address(address: str, *, is_local: bool) -> str:
     scheme, mark, rest = text.partition("://")
     scheme = scheme.lower()
     if not mark or scheme not in ("http", "https", "s3"):
-        raise RefusedError(400, f"address: found another kind, {_EXPECTED}")
+        raise RefusedError(400, f"address: found another scheme, {_EXPECTED}")
     text = f"{scheme}://{rest}"
     if scheme == "s3":
         _check_bucket(rest)
@@ -48,9 +49,9 @@ def check_address(address: str, *, is_local: bool) -> str:
 
 
 def read_as_stranger() -> None:
-    """Let this process, and those that it starts, read what a stranger can reach.
+    """Limit this process, and those that it starts, to data that a stranger can reach.
 
-    They have no credentials of this machine, and connect to public hosts alone.
+    They get no credentials of this machine, and connect to public hosts only.
     """
     import fsspec
 
@@ -74,5 +75,5 @@ def _check_bucket(rest: str) -> None:
 
 def _line_of(error: StereoCellError, *, is_local: bool) -> str:
     if is_local or "private network" not in str(error):
-        return f"address: found none that can be asked, {_EXPECTED}"
-    return "address: leads into a private network, expected a public address"
+        return f"address: found no host that can be reached, {_EXPECTED}"
+    return "address: found a host in a private network, expected a public one"

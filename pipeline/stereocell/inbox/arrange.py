@@ -1,9 +1,9 @@
-"""Make the source that a reader opens of the files of an upload: unpacked, under names of ours.
+"""Turn the files of an upload into a source that a reader can open: unpacked, with neutral names.
 
-source/specimen.nii.gz      one file
-source/dicom/000001.dcm     files of DICOM
-source/planes/x_z01.tif     planes
-source/specimen.ome.zarr/   a group
+source/specimen.nii.gz      a single file
+source/dicom/000001.dcm     DICOM files
+source/planes/x_z01.tif     images of planes
+source/specimen.ome.zarr/   a Zarr group
 """
 
 import shutil
@@ -24,20 +24,21 @@ from stereocell.storage.location import Location
 SOURCE = "source"
 _UNPACKED = "unpacked"
 _DICOM, _DICOM_ENDINGS, _INDEX = "dicom", (".dcm", ".dicom", ".ima"), "dicomdir"
-_HEADERS = (".mhd", ".nhdr", ".xml", ".xmf", ".companion.ome")  # texts that name other files
-_HEADER_BYTES = 1 << 20
-_ONE_BY_ONE = "expected one specimen: hand them in one by one"
+_HEADERS = (".mhd", ".nhdr", ".xml", ".xmf", ".companion.ome")  # text files that name other files
+_HEADER_BYTES = 1 << 20  # bytes, largest header in which names are replaced
+_ONE_BY_ONE = "expected one specimen; upload them one by one"
 
 
 def arrange(folder: str, limits: InboxLimits) -> str:
-    """Return the file or folder to open, relative to the folder of an upload that is whole.
+    """Arrange a complete upload; return the file or folder to open, relative to `folder`.
 
-    It moves the files and removes what it unpacked before. Raises RefusedError.
+    Links or copies the files into `source`, and removes an earlier arrangement. Raises
+    RefusedError.
     """
     root = Path(folder)
     upload = Upload.open(root)
     if upload is None:
-        raise RefusedError(410, "the upload is gone: hand it in again")
+        raise RefusedError(410, "the upload was deleted; upload the files again")
     for name in (SOURCE, _UNPACKED):
         shutil.rmtree(root / name, ignore_errors=True)
     names = upload.announced.parts
@@ -47,7 +48,7 @@ def arrange(folder: str, limits: InboxLimits) -> str:
         if not is_of_system(parts)
     ]
     if not files:
-        raise RefusedError(415, "found no file but those that systems add, expected an image")
+        raise RefusedError(415, "found only files that operating systems add, expected an image")
     archives = [one for one in files if is_archive(one.path, one.parts[-1])]
     if archives and len(files) > 1 and len(archives) == len(files):
         raise RefusedError(415, f"found {len(archives)} archives, {_ONE_BY_ONE}")
@@ -78,7 +79,10 @@ def _arrange(root: Path, files: Sequence[Unpacked]) -> str:
 
 
 def _files_of_dicom(files: Sequence[Unpacked]) -> list[Unpacked]:
-    """Return the files of DICOM, in the order of their names; none where no file has its mark."""
+    """Return the DICOM files, in the order of their names; none if the upload is not DICOM.
+
+    It is DICOM if a file begins with DICOM's mark, or if all files have a DICOM ending.
+    """
     marked, loose = [], []
     for one in sorted(files, key=lambda one: one.parts):
         if one.parts[-1].lower() == _INDEX:
@@ -88,7 +92,7 @@ def _files_of_dicom(files: Sequence[Unpacked]) -> list[Unpacked]:
         if found.format == _DICOM:
             marked.append(one)
         elif one.parts[-1].lower().endswith(_DICOM_ENDINGS) and not found.is_known:
-            loose.append(one)  # of before the mark was usual
+            loose.append(one)  # old DICOM files lack the mark
     return [*marked, *loose] if marked or len(loose) == len(files) else []
 
 
@@ -102,10 +106,10 @@ def _arrange_set(root: Path, files: Sequence[Unpacked]) -> str:
         ending = ending_of(one.parts[-1])
         stem = one.parts[-1][: len(one.parts[-1]) - len(ending)]
         safe = stems.setdefault(stem, NAME if not stems else f"{NAME}{len(stems) + 1}") + ending
-        if is_listed:  # the files of OME-TIFF list each other in XML that can't be rewritten
+        if is_listed:  # OME-TIFF files list each other in XML that can't be rewritten
             safe = one.parts[-1]
         if safe in renamed.values():
-            raise RefusedError(415, f"found several images of one name, {_ONE_BY_ONE}")
+            raise RefusedError(415, f"found several images of the same name, {_ONE_BY_ONE}")
         renamed[one.parts[-1]] = safe
         placed.append(((SOURCE, safe), one.path))
     _place(root, placed)
@@ -115,18 +119,18 @@ def _arrange_set(root: Path, files: Sequence[Unpacked]) -> str:
 
 
 def _rewrite(path: Path, renamed: dict[str, str]) -> None:
-    """Replace the names of files in a header by ours."""
+    """Replace the old names of files in a header by the new ones."""
     if not path.name.lower().endswith(_HEADERS) or path.stat().st_size > _HEADER_BYTES:
         return
     content = path.read_bytes()
     for name in sorted(renamed, key=len, reverse=True):
         content = content.replace(name.encode(), renamed[name].encode())
-    path.unlink()  # it may be a link to the upload's own file
+    path.unlink()  # the path may be a link to the upload's own file, which must not change
     path.write_bytes(content)
 
 
 def _main_of(names: Sequence[str], folder: Path) -> str:
-    """Return the file that stands for a set: a header, or the only file of a known format."""
+    """Return the file of a set that is opened: a header, or the only image of a known format."""
     headers = [name for name in names if name.lower().endswith(_HEADERS)]
     if len(headers) == 1:
         return headers[0]
@@ -150,9 +154,9 @@ def _main_of(names: Sequence[str], folder: Path) -> str:
 
 
 def _place(root: Path, placed: Sequence[tuple[Parts, Path]], main: str = "") -> str:
-    """Move files to their places below `source`; return the first one, or `main`, to be opened.
+    """Put files at their places below `source`; return the path to open: `main`, or the first one.
 
-    Parts of an upload are linked, so that they stay where the upload is arranged again.
+    Files are linked, not moved, so that the upload can be arranged again.
     """
     for parts, path in placed:
         target = (root / SOURCE).joinpath(*parts)

@@ -1,4 +1,4 @@
-"""Build the items of the queue, one at a time, each in a process behind its page."""
+"""Build the items of the queue, one at a time, each in a process of its own."""
 
 import shutil
 from pathlib import Path
@@ -15,9 +15,10 @@ from stereocell.read.addresses.resolved import Resolved
 
 
 class MakeBuild(Protocol):
-    """Returns the build of a source into a folder, with the choices of a person.
+    """Returns the build of a source into the folder `out`, with a person's choices.
 
-    It can be pickled. It prints nothing. `is_stranger`: it uses no credentials of this machine.
+    The build can be pickled and prints nothing. If `is_stranger`, it uses no credentials of this
+    machine.
     """
 
     def __call__(
@@ -33,16 +34,16 @@ class Builds:
         self._running: tuple[Item, BuildProcess] | None = None
 
     def step(self) -> None:
-        """Take over how far the running build is, or start the next one."""
+        """Update the item of the running build, or start the next build."""
         if self._running is not None:
-            self._follow(*self._running)
+            self._update(*self._running)
         if self._running is None:
             waiting = [one for one in self._inbox.waiting() if one.doing == "queued"]
             if waiting:
                 self._start(waiting[0])
 
     def close(self) -> None:
-        """End the running build, which goes on at the next start."""
+        """Stop the running build; the next start of the server continues it."""
         if self._running is not None:
             self._running[1].close()
 
@@ -67,22 +68,22 @@ class Builds:
             )
             with inbox.changed:
                 if item.doing not in ("building", "paused") or not inbox.is_here(item):
-                    return  # cancelled or deleted meanwhile
+                    return  # the item was cancelled or deleted meanwhile
                 if item.doing == "paused":
                     build.do("pause")
                 item.build = build
                 self._running = item, build
             build.start(coarse)
-        except Exception as error:  # whatever a reader meets in a stranger's files
+        except Exception as error:  # a stranger's files may cause any error in a reader
             with inbox.changed:
                 if item.doing in ("building", "paused"):
                     item.queued = 0
                     inbox.set(item, "failed", line_of(item, error))
 
-    def _follow(self, item: Item, build: BuildProcess) -> None:
+    def _update(self, item: Item, build: BuildProcess) -> None:
         inbox, state = self._inbox, build.state
-        is_ours = inbox.is_here(item) and item.build is build
-        if not is_ours or item.doing not in ("building", "paused"):  # cancelled, or queued again
+        is_current = inbox.is_here(item) and item.build is build
+        if not is_current or item.doing not in ("building", "paused"):  # cancelled, or queued again
             self._end(build)
         elif state.doing == "complete":
             self._end(build)
@@ -107,12 +108,12 @@ def _doing_of(doing: str) -> Doing:
 
 
 def _require_room(inbox: Inbox, item: Item) -> None:
-    """Raise RefusedError where the disk has no room for a build."""
+    """Raise RefusedError if the disk has no room for a build."""
     needed = inbox.understood(item)["bytes_estimate"]
     free = shutil.disk_usage(inbox.folder).free - inbox.limits.reserve
     if needed > free:
         raise RefusedError(
             507,
-            f"the server's disk has room for {max(0, free):,} bytes more, a build of this needs "
-            f"about {needed:,}: delete some items, then build it again",
+            f"the server's disk has {max(0, free):,} bytes free; this build needs about "
+            f"{needed:,}. Delete some items, then build it again.",
         )

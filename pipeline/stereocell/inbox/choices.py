@@ -8,20 +8,20 @@ from stereocell.inbox.refused import RefusedError
 from stereocell.model.titles import MAX_TITLE
 from stereocell.planning.settings import NO_PRESET, preset_names
 
-DARK, BRIGHT = "dark", "bright"  # the background around structures
+DARK, BRIGHT = "dark", "bright"  # brightness of the background around structures
 _MAX_CHANNELS = 1000
 _MAX_SERIES = 100_000
-_MAX_UM = 1e7  # um between voxels
+_MAX_UM = 1e7  # um, limit of the voxel spacing
 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The choices of a person. The product chooses where one is empty.
+    """A person's choices. StereoCell makes the choices that are empty.
 
     channels    indices of the source's channels, as texts
-    series      the number of an image of several, from 1, as a text
-    background  `bright` where structures are darker than their surroundings
-    spacing_um  voxel spacing (x, y, z), um, where the files state none or a wrong one
+    series      number of one image among several, from 1, as a text
+    background  `bright` if structures are darker than their surroundings
+    spacing_um  voxel spacing (x, y, z), um, for files that state none or a wrong one
     """
 
     preset: str = ""
@@ -32,7 +32,7 @@ class Choices:
     title: str = ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of the plan that are chosen, by their names."""
+        """Return the chosen settings of the plan, by name. `spacing_um` becomes (z, y, x)."""
         found: dict[str, Any] = {}
         if self.channels:
             found["channels"] = list(self.channels)
@@ -51,36 +51,36 @@ class Choices:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "Choices":
-        """Return the choices that `to_json` was given."""
+        """Return the choices from which `to_json` made the content."""
         lists = {name: tuple(content[name]) for name in ("channels", "spacing_um")}
         return cls(**{**content, **lists})
 
 
 def parse_choices(content: Any, before: Choices) -> Choices:
-    """Return the choices that a request changes. Raises RefusedError."""
+    """Return the choices `before` with the changes of a request. Raises RefusedError."""
     known = Choices.__dataclass_fields__
     if not isinstance(content, dict) or not content.keys() <= known.keys():
-        raise RefusedError(400, f"choices: expected an object of {', '.join(known)}")
-    news = dict(content)
+        raise RefusedError(400, f"choices: expected an object with only {', '.join(known)}")
+    changes = dict(content)
     for name, value in content.items():
         if name == "channels":
-            news[name] = _channels_of(value)
+            changes[name] = _channels_of(value)
         elif name == "spacing_um":
-            news[name] = _spacing_of(value)
+            changes[name] = _spacing_of(value)
         elif not isinstance(value, str):
             raise RefusedError(400, f"{name}: expected a text")
-    if news.get("preset", "") not in ("", NO_PRESET, *preset_names()):
+    if changes.get("preset", "") not in ("", NO_PRESET, *preset_names()):
         raise RefusedError(400, f"preset: expected one of {', '.join(preset_names())}, {NO_PRESET}")
-    if news.get("background", "") not in ("", DARK, BRIGHT):
+    if changes.get("background", "") not in ("", DARK, BRIGHT):
         raise RefusedError(400, f"background: expected {DARK} or {BRIGHT}")
-    if series := news.get("series", ""):
+    if series := changes.get("series", ""):
         _require_number("series", series, range(1, _MAX_SERIES))
-    title = news.get("title", "").strip()
+    title = changes.get("title", "").strip()
     if len(title) > MAX_TITLE or not title.isprintable():
         raise RefusedError(400, f"title: expected at most {MAX_TITLE} printable characters")
-    if "title" in news:
-        news["title"] = title
-    return replace(before, **news)
+    if "title" in changes:
+        changes["title"] = title
+    return replace(before, **changes)
 
 
 def _channels_of(value: Any) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ def _channels_of(value: Any) -> tuple[str, ...]:
             raise RefusedError(400, "channels: expected a list of the channels' IDs")
         _require_number("channels", one, range(_MAX_CHANNELS))
     if len(set(value)) < len(value):
-        raise RefusedError(400, "channels: found one twice, expected each once")
+        raise RefusedError(400, "channels: found a channel twice, expected each once")
     return tuple(value)
 
 

@@ -1,8 +1,8 @@
-"""The inbox: what people hand in, from the first byte to the finished build.
+"""The inbox: the items that people upload, from the first byte to the finished build.
 
-Requests come from many threads. What they change, they change under one lock, and write to the
-queue file before they answer. Reading and building run in threads of their own, and the work
-itself in other processes: see `preparing` and `builds`.
+Requests run in many threads. They change items under one lock, and write the queue file before they
+answer. Two more threads start reading and building; the work itself runs in other processes (see
+`preparing` and `builds`).
 """
 
 import json
@@ -26,61 +26,61 @@ from stereocell.live.build_state import COMMANDS
 
 _BUSY: tuple[Doing, ...] = ("unpacking", "understanding")
 _WAITING: tuple[Doing, ...] = ("queued", "building", "paused")
-_ASKS_SPACING = "--spacing-um"  # in the line of files that state no voxel size
-PREPARED: tuple[Doing, ...] = ("unpacking", "understanding")  # one item at a time is
-_FREE_STEP = 100_000_000  # bytes: free disk is told in steps, so that it is no news each time
+_ASKS_SPACING = "--spacing-um"  # the line of a failure contains this if the voxel size is missing
+PREPARED: tuple[Doing, ...] = ("unpacking", "understanding")  # the reader works on one such item
+_FREE_STEP = 100_000_000  # bytes; free disk space is rounded, so that the state changes rarely
 
 
 class Inbox:
     """The items of a folder. All methods may be called from any thread."""
 
     def __init__(self, folder: Path, limits: InboxLimits) -> None:
-        """Raises OutputError where the folder is no inbox and holds other files."""
+        """Load the items of a folder. Raises OutputError if it holds files of anything else."""
         self.folder, self.limits = folder, limits
-        self.reader = ReaderProcess()  # of what is handed in, and of first views
-        self.tile_reader = ReaderProcess()  # of tiles that are looked at, which can't wait for that
-        self.prepared: Item | None = None  # the item that is unpacked or understood now
+        self.reader = ReaderProcess()  # reads uploads and makes first views
+        self.tile_reader = ReaderProcess()  # reads tiles in view, which must not wait for uploads
+        self.prepared: Item | None = None  # the item that is being unpacked or read now
         self._is_closed = False
         self.changed = threading.Condition(threading.RLock())
         self._items = {item.id: item for item in load_items(folder)}
         for item in self._items.values():
-            self._take_up(item)
+            self._resume(item)
         with self.changed:
             self.save()
 
-    def _take_up(self, item: Item) -> None:
-        """Bring an item to where it goes on after a restart."""
+    def _resume(self, item: Item) -> None:
+        """Set the state from which an item continues after a restart of the server."""
         shutil.rmtree(item.view_folder, ignore_errors=True)
         if item.doing == "built" and not (item.out / "bundle" / "manifest.json").exists():
-            self._fail(item, "its build is gone: hand it in again")
+            self._fail(item, "the build was deleted; upload the files again")
         elif item.doing == "built" and not item.keep_upload:
-            self.remove_upload(item)  # the server ended before it was
+            self.remove_upload(item)  # the server ended before it could remove the upload
         elif item.doing in ("building", "paused"):
-            item.doing = "queued"  # with its old place, which is the first
+            item.doing = "queued"  # the item keeps its place, the first one
         if item.doing in ("uploading", *_BUSY, "understood", "queued") and item.upload is None:
-            self._fail(item, "its upload is gone: hand it in again")
+            self._fail(item, "the upload was deleted; upload the files again")
 
     # --- items, by their state
 
     def find(self, item_id: str) -> Item:
-        """Return an item. Raises RefusedError where there is none."""
+        """Return an item. Raises RefusedError if there is none."""
         with self.changed:
             item = self._items.get(item_id)
         if item is None:
-            raise RefusedError(404, "no such item: it was deleted, or its time was over")
+            raise RefusedError(404, "there is no such item: it was deleted, or it expired")
         return item
 
     def items(self) -> list[Item]:
-        """Return all items, in the order in which they were handed in."""
+        """Return all items, in the order of their uploads."""
         with self.changed:
             return list(self._items.values())
 
     def is_here(self, item: Item) -> bool:
-        """Return whether an item has not been deleted meanwhile."""
+        """Return whether an item still exists, hence was not deleted meanwhile."""
         return self._items.get(item.id) is item
 
     def set(self, item: Item, doing: Doing, line: str = "") -> None:
-        """Change the state of an item, and write it down. It does nothing to a deleted one."""
+        """Change the state of an item and save it. Does nothing if the item was deleted."""
         with self.changed:
             if self.is_here(item):
                 item.doing, item.line = doing, line
@@ -89,7 +89,7 @@ class Inbox:
 
     def save(self) -> None:
         """Write the queue file; the lock must be held. Raises OutputError."""
-        if self._is_closed:  # the end of a server is no failure of its items
+        if self._is_closed:  # work that fails because the server ends must not count as failed
             return
         save_items(self.folder, list(self._items.values()))
 
@@ -97,22 +97,25 @@ class Inbox:
         item.doing, item.line, item.queued = "failed", line, 0
 
     def waiting(self) -> list[Item]:
-        """Return the items whose builds run or wait, the first one first."""
+        """Return the items whose builds run or wait, in the order of the queue."""
         with self.changed:
             found = [item for item in self._items.values() if item.doing in _WAITING]
         return sorted(found, key=lambda item: item.queued)
 
     def place_of(self, item: Item) -> int:
-        """Return the place of an item among the builds that run or wait, from 1; 0: none."""
+        """Return the place of an item in the queue, from 1; 0 if its build neither runs nor waits.
+
+        The running build has a place, too.
+        """
         waiting = self.waiting()
         return 1 + waiting.index(item) if item in waiting else 0
 
     # --- uploads
 
     def announce(self, content: Any, *, is_local: bool) -> tuple[Item, bool]:
-        """Return the item of what a person hands in, and whether it is new. Raises RefusedError.
+        """Return the item of an announced upload, and whether the item is new. Raises RefusedError.
 
-        An upload of the same list that has broken off goes on.
+        If an upload of the same list was interrupted, it continues: the item is not new.
         """
         announced = parse_announced(content, self.limits)
         if announced.address:
@@ -125,7 +128,7 @@ class Inbox:
                     return item, False
             if len(self._items) >= self.limits.items:
                 raise RefusedError(
-                    429, f"the inbox holds {len(self._items)} items, as many as it may: delete some"
+                    429, f"the inbox is full with {len(self._items)} items; delete some"
                 )
             self._require_room(announced.total)
             item_id = new_id()
@@ -140,7 +143,7 @@ class Inbox:
         return item, True
 
     def _require_room(self, total: int) -> None:
-        """Raise RefusedError where the disk has no room for an upload and those that have begun."""
+        """Raise RefusedError if the disk has no room for an upload beside those that have begun."""
         begun = sum(
             item.upload.announced.total - item.upload.offset
             for item in self._items.values()
@@ -150,19 +153,19 @@ class Inbox:
         if total > free:
             raise RefusedError(
                 507,
-                f"the server's disk has room for {max(0, free):,} bytes more, found {total:,}: "
-                "delete some items",
+                f"the server's disk has {max(0, free):,} bytes free; this upload needs {total:,}. "
+                "Delete some items.",
             )
 
     @contextmanager
     def piece(self, item: Item, offset: int) -> Iterator[Callable[[bytes], None]]:
-        """Yield a function that takes the bytes of one piece, as they come.
+        """Yield a function that writes the bytes of one piece, as they arrive.
 
-        What has come stays, however the piece ends. A later piece takes over from one whose
-        connection is lost. Raises RefusedError.
+        Bytes that were written stay, however the piece ends. A later piece takes over from an
+        earlier one whose connection is lost. Raises RefusedError.
         """
         if item.doing != "uploading" or item.upload is None:
-            raise RefusedError(409, "nothing more is to be uploaded")
+            raise RefusedError(409, "the item expects no more bytes")
         upload, writer = item.upload, object()
         with item.writing:
             if offset != upload.offset:
@@ -174,9 +177,9 @@ class Inbox:
                 if not self.is_here(item):
                     raise RefusedError(410, "the item was deleted")
                 if item.writer is not writer:
-                    raise RefusedError(409, "the upload goes on by another connection")
+                    raise RefusedError(409, "the upload continues over another connection")
                 if len(data) > upload.announced.total - upload.offset:
-                    raise RefusedError(413, "more bytes than were announced")
+                    raise RefusedError(413, "found more bytes than were announced")
                 upload.write(data)
 
         try:
@@ -193,14 +196,14 @@ class Inbox:
                 self.set(item, "unpacking")
 
     def remove_old(self) -> None:
-        """Remove uploads that have broken off too long ago."""
+        """Delete uploads that were interrupted longer ago than the limit."""
         for item in self.items():
             upload = item.upload
             if item.doing == "uploading" and upload and upload.age_h > self.limits.hours:
                 self.delete(item)
 
     def delete(self, item: Item) -> None:
-        """Delete all of an item; what runs for it is ended. Waits for its end."""
+        """Delete an item with its files; stop its reader and its build, and wait for their end."""
         with self.changed:
             if self._items.pop(item.id, None) is None:
                 return
@@ -211,24 +214,25 @@ class Inbox:
             reader.stop(item)
         if item.build is not None:
             item.build.close()
-        with item.writing, item.reading:  # a piece ends at its next bytes, readers have been ended
-            for _ in range(20):  # a process that was ended may write one more file
+        # These locks become free soon: a piece stops at its next bytes, and the readers have ended.
+        with item.writing, item.reading:
+            for _ in range(20):  # a process that is ending may still write a file
                 shutil.rmtree(item.folder, ignore_errors=True)
                 if not item.folder.exists():
                     return
                 time.sleep(0.1)
 
     def close(self) -> None:
-        """End what is read; what is changed from here on is not written down."""
+        """Stop the readers. Later changes of items are not saved."""
         with self.changed:
             self._is_closed = True
         self.reader.close()
         self.tile_reader.close()
 
     def remove_upload(self, item: Item) -> None:
-        """Remove what was uploaded: from here on nothing holds an identity.
+        """Remove an item's upload, the only place that may hold a person's identity.
 
-        A closed inbox keeps it, since it has not written down that nobody needs it any more.
+        A closed inbox keeps the upload: its queue file may still say that a build needs it.
         """
         with self.changed:
             if self._is_closed:
@@ -236,22 +240,22 @@ class Inbox:
             item.upload = None
         shutil.rmtree(item.upload_folder, ignore_errors=True)
 
-    # --- what people ask for
+    # --- requests of people
 
     def understood(self, item: Item) -> dict[str, Any]:
-        """Return what is known of an item. Raises RefusedError."""
+        """Return the facts that the reader found in an item. Raises RefusedError."""
         try:
             found: dict[str, Any] = json.loads(item.understood_file.read_bytes())
         except (OSError, ValueError):
-            raise RefusedError(404, "it is not understood yet") from None
+            raise RefusedError(404, "the item has not been read yet") from None
         return found
 
     def choose(self, item: Item, content: Any) -> None:
-        """Change the choices of an item, which is understood again. Raises RefusedError."""
+        """Change the choices of an item, and have it read again. Raises RefusedError."""
         with self.changed:
-            self._require(item, ("understood", "failed", "cancelled", "understanding"), "chosen")
+            self._require(item, ("understood", "failed", "cancelled", "understanding"), "changed")
             if item.upload is None or (not item.source and not item.address):
-                raise RefusedError(409, "its upload is gone, or damaged: hand it in again")
+                raise RefusedError(409, "the upload is missing or damaged; upload the files again")
             item.choices = parse_choices(content, item.choices)
             item.round += 1
             self.set(item, "understanding")
@@ -264,12 +268,12 @@ class Inbox:
         with self.changed:
             self._require(item, ("understood", "failed", "cancelled"), "built")
             if item.upload is None or not item.title:
-                raise RefusedError(409, "it is not understood, so that it can't be built")
+                raise RefusedError(409, "the item can't be built, since it could not be read")
             item.keep_upload = keep
             self._enqueue(item)
 
     def command(self, item: Item, command: str) -> None:
-        """Pause, continue or cancel what runs for an item. Raises RefusedError."""
+        """Pause, continue or cancel the work on an item. Raises RefusedError."""
         with self.changed:
             build = item.build
             if command == "pause":
@@ -292,7 +296,7 @@ class Inbox:
 
     def _enqueue(self, item: Item) -> None:
         if item.upload is None:
-            raise RefusedError(409, "its upload is gone: hand it in again")
+            raise RefusedError(409, "the upload was deleted; upload the files again")
         if item.build is not None:
             item.newest = item.build.state.folder or item.newest
             item.build = None
@@ -301,7 +305,7 @@ class Inbox:
 
     def _require(self, item: Item, doings: Iterable[Doing], verb: str) -> None:
         if not self.is_here(item) or item.doing not in doings:
-            raise RefusedError(409, f"it can't be {verb} while it is {item.doing}")
+            raise RefusedError(409, f"the item can't be {verb}: its state is {item.doing}")
 
     # --- the state that pages show
 

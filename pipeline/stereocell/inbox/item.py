@@ -1,9 +1,9 @@
-"""One specimen that was handed in, and what has become of it.
+"""One specimen that was uploaded, and the state of its reading and its build.
 
-FOLDER/ID/upload/           the upload: the only place that may hold a name or a tag of it
-FOLDER/ID/understood.json   what is shown of it, with `slices/`
-FOLDER/ID/view/             its first view, and views of its build
-FOLDER/ID/out/              its build
+FOLDER/ID/upload/           the upload: the only place that may hold names and tags of the files
+FOLDER/ID/understood.json   facts that the page shows, with pictures in `slices/`
+FOLDER/ID/view/             the first view, and views of the build
+FOLDER/ID/out/              the build
 """
 
 import re
@@ -37,27 +37,27 @@ ID = re.compile(r"[0-9a-f]{16}")
 
 
 def new_id() -> str:
-    """Return an ID that nobody can guess, and that holds nothing of what is handed in."""
+    """Return an ID that nobody can guess, and that reveals nothing about the upload."""
     return secrets.token_hex(8)
 
 
 @dataclass(eq=False, slots=True)
 class Item:
-    """An item. Its fields change under the lock of the inbox alone.
+    """An uploaded specimen. Its fields change only under the lock of the inbox.
 
-    created   s since 1970
-    title     as understood; empty: not yet
-    line      why it has failed; or empty
-    source    the file or folder below `upload`; empty: not arranged yet, or an address
-    queued    place among the builds that wait, smaller ones first; 0: it does not wait
-    is_local  whether it was handed in at this machine
-    round     counts the choices, so that an answer to older ones is not taken for one to newer
-    looked    the round of the first view; -1: there is none
-    newest    folder of the newest view but for those of the build, as `g1/`; or empty
-    writer    the piece that may write: a later one takes over
-    writing   held while bytes are written
-    reading   held while its upload is read and what is found in it is written
-    is_deleted  whether its folder goes: nothing is read any more
+    created     s since 1970
+    title       title that the reader gave; empty until the upload was read
+    line        reason of a failure, or empty
+    source      file or folder to open, below `upload`; empty for an address and before arranging
+    queued      place among the builds that wait, smaller ones first; 0 if no build waits
+    is_local    whether a person at this machine uploaded it
+    round       number of changes of the choices; tells answers to old choices from new ones
+    looked      the round of the first view; -1 if there is no view
+    newest      folder of the newest view, such as `g1/`, without views of the build; or empty
+    writer      the piece that may write; a later piece takes over
+    writing     lock that is held while bytes are written
+    reading     lock that is held while the upload is read and the results are written
+    is_deleted  whether the folder is being deleted, so that no reading may begin
     """
 
     id: str
@@ -89,7 +89,7 @@ class Item:
 
     @property
     def view_folder(self) -> Path:
-        """The folder of the views before the build is whole."""
+        """The folder of the views that are shown until the build is complete."""
         return self.folder / "view"
 
     @property
@@ -104,28 +104,28 @@ class Item:
 
     @property
     def address(self) -> str:
-        """The address that was handed in; empty: files were."""
+        """The address that a person pasted; empty if they uploaded files."""
         return "" if self.upload is None else self.upload.announced.address
 
     @property
     def has_view(self) -> bool:
-        """Whether there is a view of it, of older choices perhaps."""
+        """Whether the item has a view, possibly of older choices."""
         return self.live is not None or self.doing == "built"
 
     @property
     def page(self) -> str:
-        """The address of its page, relative to the inbox; empty: it has no view of its choices."""
+        """The address of the view's page, relative to the inbox; empty without a current view."""
         is_newest = self.doing == "built" or self.looked == self.round
         return f"items/{self.id}/view/" if self.has_view and is_newest else ""
 
     def place(self) -> Source:
-        """Return the source as a reader takes it; its upload must be there."""
+        """Return the source for a reader. The upload must exist."""
         if not self.address:
             return Source(str(self.upload_folder / self.source))
         return Source(self.address)
 
     def to_record(self) -> dict[str, Any]:
-        """Return what of it survives a restart. Nothing of it comes from the upload."""
+        """Return the fields that survive a restart. No field is copied from the upload."""
         return {
             "id": self.id,
             "created": self.created,
@@ -141,7 +141,7 @@ class Item:
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any], folder: Path) -> "Item":
-        """Return the item that `to_record` was made of. Its upload is opened."""
+        """Return the item from which `to_record` made a record, with its upload opened."""
         choices = Choices.from_json(record["choices"])
         item = cls(**{**record, "choices": choices}, folder=folder / record["id"])
         item.upload = Upload.open(item.upload_folder)

@@ -1,6 +1,6 @@
-"""The build of an item, as the page of its view watches and commands it, from the first look on.
+"""The build of an item for the page of its view, which watches the build and sends it commands.
 
-The build may come later than the page, wait in the queue, end early and begin again.
+The page may be open before the build exists. The build may wait in the queue, fail and begin again.
 """
 
 from collections.abc import Mapping
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 
 
 class ItemBuild:
-    """A `WatchedBuild`, whatever becomes of its item."""
+    """A `WatchedBuild` that stays valid whatever happens to the item and its build."""
 
     def __init__(self, inbox: "Inbox", item: Item) -> None:
         self._inbox, self._item = inbox, item
 
     @property
     def out(self) -> Path:
-        """The folder that it writes."""
+        """The folder that the build writes."""
         return self._item.out
 
     @property
     def state(self) -> State:
-        """The newest state."""
+        """The current state."""
         item = self._item
         with self._inbox.changed:
             if item.is_deleted:
@@ -55,7 +55,7 @@ class ItemBuild:
                 case "built":
                     return replace(shown, doing="complete", share=1.0, has_bundle=True)
                 case "building" | "paused":
-                    # a build that has just ended counts once the queue has taken note of its end
+                    # A build that has just ended keeps its old state until the queue has noticed.
                     has_ended = item.build is None or running.doing in ("failed", "cancelled")
                     return replace(shown, doing=item.doing) if has_ended else shown
                 case _:
@@ -63,30 +63,30 @@ class ItemBuild:
 
     @property
     def bundle(self) -> Path | None:
-        """The finished bundle; None: there is none yet."""
+        """The finished bundle; None until there is one."""
         return self._item.out / "bundle" if self.state.has_bundle else None
 
     @property
     def holders(self) -> Mapping[str, Holder]:
-        """The air that the views of the build leave out, by the channel's ID."""
+        """Table, pads and cables of a CT that the build's views leave out, by the channel's ID."""
         build = self._item.build
         return {} if build is None else build.holders
 
     def rest(self) -> None:
-        """Let the build rest for a moment: frames are late on this machine."""
+        """Let the build rest for a moment, since frames are late on this machine."""
         if (build := self._item.build) is not None:
             build.rest()
 
     def while_someone_waits(self) -> AbstractContextManager[None]:
-        """Let the build rest while bricks are made that someone waits for."""
+        """Return a context in which the build rests, while bricks are made for a waiting client."""
         build = self._item.build
         return nullcontext() if build is None else build.while_someone_waits()
 
     def find_view(self, name: str) -> Path | None:
-        """Return the folder of a view by its name; None: there is no such view."""
+        """Return the folder of a view by its name; None if there is no such view."""
         return find_view(self._item.view_folder, name)
 
     def do(self, command: Command) -> None:
-        """Carry out what a user asks for; a command that does not fit the state does nothing."""
+        """Carry out a user's command; ignore a command that does not fit the state."""
         with suppress(RefusedError):
             self._inbox.command(self._item, command)

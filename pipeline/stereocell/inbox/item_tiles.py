@@ -1,4 +1,4 @@
-"""Tiles of an item that someone looks at from near, read from its upload as a build reads them."""
+"""Full-resolution tiles of an item for close views, read from the upload as a build reads them."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ItemTiles:
-    """Reads them by a reader that no other item's upload keeps busy.
+    """Reads tiles in a process that does not also read uploads, so that a viewer need not wait.
 
-    source, choices  those of the view that is looked at: an item may have newer choices
+    source, choices  the ones of the view that is shown; the item may have newer choices
     """
 
     inbox: "Inbox"
@@ -33,15 +33,15 @@ class ItemTiles:
     def read(
         self, tile_id: str, channel_id: str, window: tuple[float, float], holder: Holder | None
     ) -> NDArray[np.uint8]:
-        """Return a tile's voxels; see `FineTiles.read`. Raises SourceError, without a name."""
-        item, asked = self.item, (tile_id, channel_id, window, holder)
+        """Return a tile's voxels; see `FineTiles.read`. Raises SourceError, free of file names."""
+        item, arguments = self.item, (tile_id, channel_id, window, holder)
         try:
             with item.reading:
                 if item.upload is None:
-                    raise RefusedError(410, "its upload is gone")
+                    raise RefusedError(410, "the upload was deleted")
                 found: NDArray[np.uint8] = self.inbox.tile_reader.run(
-                    item, "fine_tile", self.source, self.choices, *asked
+                    item, "fine_tile", self.source, self.choices, *arguments
                 )
                 return found
-        except Exception as error:  # whatever a reader meets in a stranger's files
+        except Exception as error:  # a stranger's files may cause any error in a reader
             raise SourceError(line_of(item, error)) from None

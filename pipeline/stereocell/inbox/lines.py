@@ -1,4 +1,4 @@
-"""One line for each error of an item, without a name, a tag or an address of its upload."""
+"""Turn errors of items into one line each, without names, tags or addresses of the upload."""
 
 import re
 from functools import cache
@@ -14,28 +14,28 @@ from stereocell.storage.child_process import ChildError
 from stereocell.storage.location import Location
 from stereocell.storage.processes import shortage
 
-_LONGEST = 600  # characters of a line
-# names of files that are words of messages, and of nobody; see `_own_words`
+_LONGEST = 600  # characters, longest line
+# Common names of files that are also words of messages, and nobody's name; see `_own_words`.
 _WORDS = "image volume scan specimen file folder source data level series channel tile head brain"
 _LETTERS = re.compile(r"[^\W\d_]+")
-_SHORTEST_NAME = 3  # characters of a part of a name that is replaced: shorter ones are words, too
+_SHORTEST_NAME = 3  # characters; shorter parts of a name stay, since they are often words
 
 
 def line_of(item: Item, error: BaseException) -> str:
     """Return the line of an error that an item has caused."""
     if isinstance(error, ChildError):
-        return f"reading was ended: {error}"
+        return f"reading was stopped: {error}"
     if isinstance(error, StereoCellError):
         return without_identity(item, str(error))
     if isinstance(error, Exception) and (words := shortage(error)):
         return words
     if isinstance(error, OSError):
-        return f"the server: {error.strerror or type(error).__name__}"
-    return f"a fault of the program ({type(error).__name__}): please report it"
+        return f"the server had an error: {error.strerror or type(error).__name__}"
+    return f"this is a bug of StereoCell ({type(error).__name__}); please report it"
 
 
 def without_identity(item: Item, text: str) -> str:
-    """Return a text, in one line, without places and names of an upload."""
+    """Return a text, in one line, without the paths, names and address of an upload."""
     for place in (item.upload_folder / "source", item.upload_folder, item.folder):
         for shown in {str(place), str(place.absolute())}:
             text = text.replace(f"{shown}/", "").replace(shown, "the upload")
@@ -44,7 +44,8 @@ def without_identity(item: Item, text: str) -> str:
             shown = Location.of(address).shown.rstrip("/")
             places = sorted({address, shown}, key=len, reverse=True)
             one_of = "|".join(map(re.escape, places))
-            # forms of addresses that are expected may begin like it, and have an ID in it
+            # A message may show the expected form of an address, with `ID` in it. It may begin
+            # like the pasted address, and stays.
             text = re.sub(rf"(?:{one_of})(?!\S*\bID\b)", "the address", text)
         own = {part for parts in item.upload.announced.parts for part in parts}
         named = own | {one.partition(".")[0] for one in own}
@@ -61,17 +62,17 @@ def without_identity(item: Item, text: str) -> str:
 
 
 def _is_own(name: str) -> bool:
-    """Return whether a name consists of words of the program, as `mri` and `ct_head_2`."""
+    """Return whether a name consists of the program's own words, such as `mri` or `ct_head_2`."""
     words = _LETTERS.findall(name.lower())
     return bool(words) and _own_words().issuperset(words)
 
 
 @cache
 def _own_words() -> frozenset[str]:
-    """Return the words, in lower case, of which messages are made: none of them names a person.
+    """Return words of messages, in lower case, that are nobody's name.
 
-    They are the names of presets, modalities and formats, with some that messages use often. Those
-    of settings are not among them: `max` is a person's name, too.
+    They are the names of presets, modalities and formats, and some common words of messages. The
+    names of settings are excluded: `max` is also a person's name.
     """
     formats = known_formats()
     texts = [_WORDS, *preset_names(), *MODALITIES, *formats]
@@ -80,5 +81,5 @@ def _own_words() -> frozenset[str]:
 
 
 def status_of(error: StereoCellError) -> int:
-    """Return the status of HTTP for an error."""
+    """Return the HTTP status for an error."""
     return error.status if isinstance(error, RefusedError) else 422

@@ -1,4 +1,4 @@
-"""Pictures of the middle slices of a specimen, with the proposed levels as contours."""
+"""Draw the middle slices of a specimen, with the proposed iso-values as contours."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ from stereocell.preview.png_slices import to_bytes
 from stereocell.preview.views import View
 
 _LONGEST_PX = 480  # pixels, longest side of a picture
-# Share of white in a contour, and of its full light in the channel of the same colour around it:
-# without the two a contour is lost in bright voxels.
+# 0..1: share of white in a contour's colour, and brightness of the channel of that colour. A
+# contour would be invisible on bright voxels if both were plain.
 _WHITE, _LIGHT = 0.6, 0.6
 _NO_LINES = np.zeros((0, 2, 2))
 
@@ -40,9 +40,9 @@ def hex_of(color: Sequence[float]) -> str:
 def write_middle_slices(
     channels: Sequence[ShownChannel], views: Sequence[View], spacing_um: Spacing, folder: Path
 ) -> list[dict[str, str]]:
-    """Write a picture for each axis, and return their names and axes.
+    """Write a picture for each axis; return the axes, names and files of the pictures.
 
-    spacing_um  of the planned level
+    spacing_um  voxel spacing of the resolution level that is built
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -96,7 +96,7 @@ def _cut(voxels: NDArray[np.float32], box: Box, view: View) -> NDArray[np.float3
 
 
 def _fitted(picture: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """Return a picture with so many rows and columns; channels may differ by a voxel."""
+    """Resize a picture to `shape`, rows and columns; coarse channels may differ by a voxel."""
     rows, columns = (
         np.minimum(np.arange(n) * m // n, m - 1) for n, m in zip(shape, picture.shape, strict=False)
     )

@@ -1,4 +1,4 @@
-"""Check the names of files that people or archives state. No name becomes a path by itself."""
+"""Check the names of uploaded or archived files. A name is never used as a path unchecked."""
 
 import re
 import unicodedata
@@ -9,8 +9,8 @@ from stereocell.inbox.refused import RefusedError
 
 Parts = tuple[str, ...]
 _DRIVE = re.compile(r"[A-Za-z]:")
-_WHERE_NOT = "expected a plain name with folders, as scan/001.dcm"
-# files that systems add to folders
+_WHERE_NOT = "expected a plain name with folders, such as scan/001.dcm"
+# Files that operating systems add to folders.
 _OF_SYSTEMS = re.compile(
     r"(\._.*|\.DS_Store|Thumbs\.db|desktop\.ini|\.localized|\.Spotlight-V100|\.fseventsd)",
     re.IGNORECASE,
@@ -18,12 +18,12 @@ _OF_SYSTEMS = re.compile(
 
 
 def check_name(name: object, where: str) -> Parts:
-    """Return the folders and the file of a name. Raises RefusedError where it may be no name.
+    """Return the folders and the file of a name. Raises RefusedError for a forbidden name.
 
-    where  the kind of list that holds the name, for messages, which never repeat the name itself
+    where  the kind of list that contains the name; messages show it, and never the name itself
     """
     if not isinstance(name, str) or not name:
-        raise _refused(where, "an empty name, or none")
+        raise _refused(where, "an empty or missing name")
     if len(name) > NAME_CHARS:
         raise _refused(where, f"{len(name):,} characters", f"at most {NAME_CHARS:,}")
     if not name.isprintable():
@@ -34,7 +34,7 @@ def check_name(name: object, where: str) -> Parts:
         raise _refused(where, "an absolute name")
     parts = tuple(name.split("/"))
     if any(not part.strip(" .") for part in parts):
-        raise _refused(where, "a part that is empty or of dots")
+        raise _refused(where, "a part that is empty or consists of dots")
     if len(parts) > MAX_FOLDERS + 1:
         raise _refused(where, f"{len(parts) - 1} folders", f"at most {MAX_FOLDERS}")
     if any(len(part.encode()) > NAME_BYTES for part in parts):
@@ -43,10 +43,10 @@ def check_name(name: object, where: str) -> Parts:
 
 
 def check_names(names: Sequence[object], where: str) -> list[Parts]:
-    """Return the parts of names that lie in one folder together. Raises RefusedError.
+    """Return the parts of names that shall lie in one folder together. Raises RefusedError.
 
-    Names that differ by case alone, or by the way in which accents are written, would be one file
-    on some systems.
+    Two names must differ by more than case or the encoding of accents: on some systems they would
+    be the same file.
     """
     checked = [check_name(name, where) for name in names]
     files: set[Parts] = set()
@@ -54,21 +54,21 @@ def check_names(names: Sequence[object], where: str) -> list[Parts]:
     for parts in checked:
         folded = tuple(_folded(part) for part in parts)
         if folded in files:
-            raise _refused(where, "two names that are equal but for their case", "each once")
+            raise _refused(where, "two names that differ only in case", "each name once")
         files.add(folded)
         folders.update(folded[:end] for end in range(1, len(folded)))
     if files & folders:
-        raise _refused(where, "a name that is a file and a folder", "one of them")
+        raise _refused(where, "a name that is both a file and a folder", "one of them")
     return checked
 
 
 def is_of_system(parts: Parts) -> bool:
-    """Return whether a file is one that a system adds to folders, and no part of a specimen."""
+    """Return whether an operating system has added a file, so that no specimen contains it."""
     return "__MACOSX" in parts or _OF_SYSTEMS.fullmatch(parts[-1]) is not None
 
 
 def without_shared_folders(names: Iterable[Parts]) -> list[Parts]:
-    """Return names without the folders that all of them lie in."""
+    """Return names without the leading folders that all of them share."""
     found = list(names)
     while found and all(len(parts) > 1 and parts[0] == found[0][0] for parts in found):
         found = [parts[1:] for parts in found]

@@ -1,4 +1,4 @@
-"""Unpack and understand what has been handed in, and write first views: all by the reader."""
+"""Unpack and read uploads, and write first views, all in the reader's process."""
 
 import json
 import shutil
@@ -23,11 +23,11 @@ from stereocell.live.view_folders import next_view
 from stereocell.model.errors import StereoCellError
 from stereocell.storage.json_files import write_json
 
-_FOUND = "found.json"  # below the upload: the place that an address led to
+_FOUND = "found.json"  # file in the upload's folder with the place that an address led to
 
 
 def prepare(inbox: Inbox, item: Item) -> None:
-    """Unpack and understand an item; what goes wrong becomes its line."""
+    """Unpack and read an item; an error becomes the item's line."""
     with item.reading:
         if not item.is_deleted:
             inbox.prepared = item
@@ -42,7 +42,7 @@ def _prepare(inbox: Inbox, item: Item) -> None:
         if item.doing == "unpacking":
             source = inbox.reader.run(item, "arrange", inbox.limits, seconds=UNPACK_S)
             with inbox.changed:
-                if item.doing != "unpacking":  # cancelled meanwhile
+                if item.doing != "unpacking":  # the item was cancelled meanwhile
                     return
                 item.source = source
                 inbox.set(item, "understanding")
@@ -52,7 +52,7 @@ def _prepare(inbox: Inbox, item: Item) -> None:
             item, "understand", source_of(item), choices, str(item.folder / "slices")
         )
         _write_understood(item, found)
-    except Exception as error:  # whatever a reader meets in a stranger's files
+    except Exception as error:  # a stranger's files may cause any error in a reader
         with inbox.changed:
             if item.doing in ("unpacking", "understanding"):
                 inbox.set(item, "failed", line_of(item, error))
@@ -69,7 +69,7 @@ def _write_understood(item: Item, found: dict[str, Any]) -> None:
 
 
 def source_of(item: Item) -> Source:
-    """Return the source of an item, with what an earlier process found at its address."""
+    """Return the source of an item, with the place that an earlier process found at its address."""
     source = item.place()
     try:
         content = json.loads((item.upload_folder / _FOUND).read_bytes())
@@ -79,17 +79,17 @@ def source_of(item: Item) -> Source:
 
 
 def _titled(item: Item) -> Choices:
-    """Return the choices of an item with the title that it is shown by."""
+    """Return the choices of an item with its displayed title."""
     return replace(item.choices, title=item.title or item.choices.title)
 
 
 def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBuild]:
-    """Write the first view of an item, unless it has one of its choices.
+    """Write the first view of an item, unless the item has one with its current choices.
 
     page  the folder of the viewer
 
-    Returns the inputs of the views of a build behind it, and those of that build. The caller holds
-    `reading` of the item. Raises as the reader does.
+    Returns two inputs: one for the views of a build that follows, one for that build itself. The
+    caller holds the item's lock `reading`. Raises the reader's errors.
     """
     item.view_folder.mkdir(parents=True, exist_ok=True)
     round_, bundle = item.round, None if item.page else next_view(item.view_folder)
@@ -114,7 +114,7 @@ def read_first_look(inbox: Inbox, item: Item, page: Path) -> tuple[Coarse, ToBui
 
 
 def _live_of(page: Path, bundle: Path, tiles: ItemTiles, build: ItemBuild) -> Live:
-    """Return a view whose first picture is written."""
+    """Return a view whose files are already written."""
     first: Future[None] = Future()
     first.set_result(None)
     return Live(page, bundle, first, tiles, build, Reading(lambda _: None))
@@ -125,19 +125,19 @@ def look(inbox: Inbox, item: Item, page: Path) -> str:
 
     page  the folder of the viewer
 
-    Raises RefusedError.
+    Raises RefusedError if the item can't be viewed.
     """
     if item.page:
         return item.page
     if item.doing in ("uploading", "unpacking", "understanding") or not item.title:
-        raise RefusedError(409, f"it can't be looked at while it is {item.doing}")
+        raise RefusedError(409, f"the item can't be viewed: its state is {item.doing}")
     if item.upload is None:
-        raise RefusedError(409, "its upload is gone: hand it in again")
+        raise RefusedError(409, "the upload was deleted; upload the files again")
     with item.reading:
         if item.page:  # another request was first
             return item.page
         if item.is_deleted:
-            raise RefusedError(410, "it has been deleted")
+            raise RefusedError(410, "the item was deleted")
         try:
             read_first_look(inbox, item, page)
         except StereoCellError as error:

@@ -1,7 +1,7 @@
-"""Read a stranger's files in a process that may die, by the product's own readers.
+"""Read a stranger's files in a process that may die, with the product's own readers.
 
-A reader that crashes, hangs or takes too much memory ends that process, and the item's line says
-so. The process stays for a while, so that another choice or a look need not read again.
+If a reader crashes, hangs or takes too much memory, that process ends, and the item's line reports
+it. Otherwise the process stays for a while, so that other choices or a view need not read again.
 """
 
 import os
@@ -38,9 +38,9 @@ from stereocell.read.addresses.resolved import Resolved
 from stereocell.read.known_formats import format_of
 from stereocell.read.series import SeveralDatasetsError
 
-FETCHED = "fetched"  # the folder, in that of an upload, for files that an address leads to
-_MODALITIES = {"PT": "PET", "NM": "SPECT"}  # words for codes of DICOM
-_VOXEL_BYTES = 4  # bytes on the disk for each voxel of a channel, about, once all is built
+FETCHED = "fetched"  # folder, in an upload's folder, for files that are fetched from an address
+_MODALITIES = {"PT": "PET", "NM": "SPECT"}  # common names of DICOM's codes
+_VOXEL_BYTES = 4  # bytes on the disk, roughly, that a build takes for each voxel of a channel
 _PRESET = re.compile(r"preset ([\w-]+):")
 _SERIES = re.compile(r"--series (\d+)")
 _LISTED = re.compile(r"\s*(\d+)\s+(.*)")
@@ -48,11 +48,11 @@ _LISTED = re.compile(r"\s*(\d+)\s+(.*)")
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A source as the inbox has it.
+    """A source in the inbox.
 
     place        the file or folder of an upload, or an address
-    found        the place that a service led to, if an earlier process asked it; empty: none did
-    found_notes  how it was found
+    found        the place that a web service named, if an earlier process asked it; else empty
+    found_notes  notes on how that place was found
     """
 
     place: str
@@ -62,7 +62,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class ToBuild:
-    """The inputs of the build of an item; see `builds.MakeBuild`."""
+    """The inputs of an item's build; see `builds.MakeBuild`."""
 
     source: str
     found: Resolved
@@ -73,7 +73,7 @@ class ToBuild:
 class Looked:
     """The plan, voxels and choices from which the first view of an item was made.
 
-    read   the coarse voxels of its channels; see `first_view.read_channels`
+    read   coarse voxels by channel; see `first_view.read_channels`
     sizes  see `FineTiles.sizes`
     """
 
@@ -89,15 +89,15 @@ class Reader:
     def __init__(self) -> None:
         self._upload = Path()
         self._look: FirstLook | None = None
-        self._choices = Choices()  # by which it was settled
+        self._choices = Choices()  # the choices with which the plan was settled
         self._series: dict[str, list[dict[str, str]]] = {}
         self._datasets: SeveralDatasetsError | None = None
 
     def begin(self, upload: str, is_stranger: bool) -> None:
-        """Turn to an item, once.
+        """Begin to read an item. The process can't change to another item later.
 
-        upload       the folder that alone may hold an identity
-        is_stranger  use no credentials of this machine, and public hosts alone
+        upload       the item's folder of the upload, the only one that may hold a person's identity
+        is_stranger  use no credentials of this machine, and only public hosts
         """
         self._upload = Path(upload)
         fetched = self._upload / FETCHED
@@ -107,11 +107,11 @@ class Reader:
             read_as_stranger()
 
     def arrange(self, limits: InboxLimits) -> str:
-        """Return the file or folder to open; see `arrange`."""
+        """Arrange the upload; return the file or folder to open. See `arrange.arrange`."""
         return arrange(str(self._upload), limits)
 
     def understand(self, source: Source, choices: Choices, folder: str) -> dict[str, Any]:
-        """Return what is known of a source, and write its middle slices into a folder."""
+        """Return the facts found in a source, and write its middle slices into a folder."""
         choice = self._settle(source, choices)
         assert self._look is not None
         plan, dataset = self._look.plan, self._look.dataset
@@ -177,9 +177,9 @@ class Reader:
         }
 
     def first_view(self, source: Source, choices: Choices, bundle: str | None) -> Looked:
-        """Write the first view of a source, and return what it was made of.
+        """Write the first view of a source; return the inputs from which it was made.
 
-        bundle  the folder of the view; None: it is written already
+        bundle  the folder of the view; None if the view is already written
         """
         look = self._settled(source, choices)
         sizes = FineTiles(look.plan, look.dataset).sizes()
@@ -203,15 +203,15 @@ class Reader:
         return FineTiles(look.plan, look.dataset).read(tile, channel, window, holder)
 
     def _settled(self, source: Source, choices: Choices) -> FirstLook:
-        """Return the source as it was settled last; settle it where that was by other choices."""
-        # a title changes neither what is read nor how
+        """Return the source with its settled plan; settle it again if the choices differ."""
+        # A title changes nothing about the reading.
         if self._look is None or replace(choices, title=self._choices.title) != self._choices:
             self._settle(source, choices)
         assert self._look is not None
         return self._look
 
     def _settle(self, source: Source, choices: Choices) -> tuple[str, ...]:
-        """Settle the plan; return the notes on the choice of its preset."""
+        """Make the plan; return the notes on the choice of its preset."""
         self._look = None
         if source.found:
             remember(source.place, Resolved(source.found, source.found_notes))
@@ -226,9 +226,8 @@ class Reader:
     def _place_of(self, source: Source, choices: Choices) -> tuple[str, Choices]:
         """Return the place that is read, and the choices for it.
 
-        A file of several datasets becomes one of them, which the choice of a series names.
-
-        Raises RefusedError where there is no such dataset.
+        If a file contains several datasets, the choice of a series selects one of them. Raises
+        RefusedError if there is no such dataset.
         """
         place = resolve(source.place).source
         if self._datasets is None and format_of(place).has_parts:
@@ -236,7 +235,7 @@ class Reader:
                 read.open(place)
             except SeveralDatasetsError as error:
                 self._datasets = error
-            except StereoCellError:  # the next reader reports it
+            except StereoCellError:  # making the plan opens the place again and reports the error
                 pass
         if self._datasets is None:
             return source.place, choices
@@ -268,15 +267,20 @@ class Reader:
 
 
 def title_of(plan: Plan) -> str:
-    """Return a title that holds nothing of names and tags: the modality, or the format."""
+    """Return a title from the modality or the format, without any name or tag of the files."""
     if plan.modality:
         return f"{_MODALITIES.get(plan.modality, plan.modality)} volume"
     return f"{format_of(plan.source).short_title} volume"
 
 
 def words_of_size(size_um: list[float]) -> str:
-    """Return the edges of a box, as `18.2 x 20.1 x 15.0 cm`."""
-    units = (("cm", 1e4, 5e4), ("mm", 1e3, 1e3), ("um", 1.0, 0.0))  # name, um, from which edge on
+    """Return the edges of a box as text.
+
+    >>> words_of_size([182000.0, 201000.0, 150000.0])
+    '18.2 x 20.1 x 15.0 cm'
+    """
+    # name of the unit, its length in um, and the longest edge in um from which it is used
+    units = (("cm", 1e4, 5e4), ("mm", 1e3, 1e3), ("um", 1.0, 0.0))
     name, unit, _ = next(one for one in units if max(size_um) >= one[2])
     return " x ".join(f"{edge / unit:.1f}" for edge in size_um) + f" {name}"
 

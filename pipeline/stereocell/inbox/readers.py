@@ -1,4 +1,4 @@
-"""A process that reads: one item at a time, with bounds of time and memory."""
+"""A process that reads one item at a time, within limits of time and memory."""
 
 import threading
 import time
@@ -14,28 +14,28 @@ from stereocell.storage.processes import available_bytes
 
 
 class ReaderProcess:
-    """Runs methods of `Reader`. All methods may be called from any thread."""
+    """Runs methods of `Reader` in a process. Any thread may call these methods."""
 
     def __init__(self) -> None:
         self._busy = threading.Lock()
         self._child: Child | None = None
-        self._next: Child | None = None  # a process for the next item, which has done its imports
-        self._starting = threading.Lock()  # held while it starts
+        self._next: Child | None = None  # a process for the next item, with its imports done
+        self._starting = threading.Lock()  # held while the next process starts
         self._item: Item | None = None
-        self._stopped: Child | None = None  # the process that was ended while it may have been idle
+        self._stopped: Child | None = None  # a process that `stop` has ended
         self._is_closed = False
-        self._used_s = 0.0  # when it was last asked, by time.monotonic()
+        self._used_s = 0.0  # s, time.monotonic() of the last call
 
     def run(self, item: Item, method: str, *arguments: Any, seconds: float = READ_S) -> Any:
-        """Return what a method of the reader of an item returns.
+        """Call a method of an item's reader; return its result.
 
-        Raises as it does, ChildError where its process dies or exceeds its bounds, and RefusedError
-        where the item has been deleted.
+        Raises the method's errors, ChildError if the process dies or exceeds a limit, and
+        RefusedError if the item was deleted.
         """
         bounds = Bounds(seconds, int(MEMORY_SHARE * available_bytes()))
         with self._busy:
             if item.is_deleted:
-                raise RefusedError(410, "it has been deleted")
+                raise RefusedError(410, "the item was deleted")
             if self._child is self._stopped:
                 self._close()
             if self._item is not item:
@@ -54,11 +54,12 @@ class ReaderProcess:
                 self._used_s = time.monotonic()
 
     def warm(self) -> None:
-        """Start a process for the next item, while its upload comes: imports take seconds."""
+        """Start a process for the next item during its upload, since imports take seconds."""
         threading.Thread(target=self._warm, daemon=True).start()
 
     def _warm(self) -> None:
-        with self._starting, suppress(ChildError):  # the next item starts one, and has its error
+        # If this fails, the next item tries again and reports the error.
+        with self._starting, suppress(ChildError):
             if self._next is None and not self._is_closed:
                 self._next = Child(Reader)
                 self._used_s = time.monotonic()
@@ -69,14 +70,14 @@ class ReaderProcess:
         return child
 
     def stop(self, item: Item) -> None:
-        """End what runs for an item: its caller gets ChildError."""
+        """End the process if it reads this item; the caller of `run` gets ChildError."""
         child = self._child if self._item is item else None
         if child is not None:
             self._stopped = child
             child.close()
 
     def release(self, idle_s: float) -> None:
-        """End the process where nothing has been asked of it for so many seconds."""
+        """End the process if it has been idle for more than `idle_s` seconds."""
         if self._busy.acquire(blocking=False):
             try:
                 if time.monotonic() - self._used_s > idle_s:
@@ -86,7 +87,7 @@ class ReaderProcess:
                 self._busy.release()
 
     def close(self) -> None:
-        """End the process for good, whatever it does."""
+        """End the process for good, even in the middle of a call."""
         self._is_closed = True
         child = self._child
         if child is not None:

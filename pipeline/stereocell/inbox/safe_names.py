@@ -1,7 +1,7 @@
-"""Names of ours for the files of one specimen, in place of those that people gave them.
+"""Neutral names for the files of one specimen, in place of those that people gave them.
 
-Names of files may hold the name of a person. Readers need some of what names say: the ending, the
-numbers of planes and channels, the keys of a Zarr group. That much is kept.
+The name of a file may contain the name of a person. The new name keeps only the parts that readers
+need: the ending, the numbers of planes and channels, and the keys of a Zarr group.
 """
 
 import re
@@ -16,13 +16,16 @@ from stereocell.read.known_formats import known_formats
 
 NAME = "specimen"
 _IMAGE_ENDINGS = (".ome.tif", ".ome.tiff", ".tif", ".tiff", ".png", ".jpg", ".jpeg", ".bmp")
-_VOXELS = (".raw", ".zraw", ".img", ".vol", ".bin", ".dat")  # data that a header names
+_VOXELS = (".raw", ".zraw", ".img", ".vol", ".bin", ".dat")  # data files that a header names
 _TOKENS = re.compile(r"[^\W\d_]+|[0-9]+|[/._ -]+|.")
 _GROUP_ENDINGS = (".ome.zarr", ".zarr", ".n5")
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a name, as `.nii.gz`, if it is a format's; empty: it could be a name."""
+    """Return the ending of a name, such as `.nii.gz`, if a format has it; else an empty text.
+
+    An unknown ending is dropped, since it could be part of a person's name.
+    """
     lower = name.lower()
     return max((one for one in _endings() if lower.endswith(one)), key=len, default="")
 
@@ -35,9 +38,9 @@ def _endings() -> frozenset[str]:
 
 
 def group_names(names: Sequence[Parts]) -> list[Parts] | None:
-    """Return names for the files of a Zarr or N5 group; None: they are none.
+    """Return new names for the files of a Zarr or N5 group; None if the files form no group.
 
-    The keys in the group stay; the folder of the group gets a name of ours.
+    The keys inside the group stay; the group's folder gets a neutral name.
     """
     own = (*ZARR_FILES, "attributes.json")
     if not any(parts[-1] in own for parts in names):
@@ -62,7 +65,7 @@ def _below_group(names: Sequence[Parts], own: Sequence[str]) -> list[Parts]:
 
 
 def are_planes(names: Sequence[Parts]) -> bool:
-    """Return whether all files are images of planes that no file lists by their names."""
+    """Return whether all files are images of planes. OME-TIFF lists its files, and is excluded."""
     return all(
         parts[-1].lower().endswith(_IMAGE_ENDINGS) and ".ome." not in parts[-1].lower()
         for parts in names
@@ -70,14 +73,14 @@ def are_planes(names: Sequence[Parts]) -> bool:
 
 
 def plane_names(names: Sequence[Parts]) -> list[Parts]:
-    """Return names for planes: numbers and words that tell files apart stay, other words go.
+    """Return new names for planes: parts that distinguish the files stay, other words are dropped.
 
     >>> plane_names([("Doe_z01.tif",), ("Doe_z02.tif",)])
     [('x_z01.tif',), ('x_z02.tif',)]
     """
     split = [_TOKENS.findall("/".join(parts)) for parts in without_shared_folders(names)]
     forms = {tuple(_kind(token) for token in tokens) for tokens in split}
-    if len(forms) != 1:  # in no common order: their own order is all that is known
+    if len(forms) != 1:  # the names share no pattern, so only their order is kept
         return [(f"{index:06d}{ending_of(parts[-1])}",) for index, parts in enumerate(names)]
     columns = [
         _safe_column(column, i, len(split[0])) for i, column in enumerate(zip(*split, strict=True))

@@ -1,8 +1,8 @@
-"""Unpack an archive that a stranger hands in, and check it before and while it unpacks.
+"""Unpack a stranger's archive, and check it before and during unpacking.
 
-Members become files under names of ours, `000000`, `000001`, ...; their own names are checked and
-handed on. What an archive states about sizes is checked first, and what comes out is counted again.
-Archives in an archive stay packed: they are files like any other.
+Members become files with the neutral names `000000`, `000001`, ... Their own names are checked and
+returned. The sizes that an archive states are checked first; the bytes that come out are counted
+again. An archive inside the archive stays packed, like any other file.
 """
 
 import lzma
@@ -31,20 +31,20 @@ _TAR_ENDINGS = (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tar.xz", ".txz
 
 @dataclass(frozen=True, slots=True)
 class Unpacked:
-    """A file with the name that its owner gave it."""
+    """An unpacked file, with the parts of its original name."""
 
     parts: Parts
     path: Path
 
 
 def is_zip(path: Path) -> bool:
-    """Return whether a file is a zip archive, whatever its name is."""
+    """Return whether a file is a zip archive, by its first bytes alone."""
     with path.open("rb") as file:
         return file.read(4) in (b"PK\x03\x04", b"PK\x05\x06")
 
 
 def is_tar(path: Path, name: str) -> bool:
-    """Return whether a file is a tar archive, packed or not, by its name and first bytes."""
+    """Return whether a file is a tar archive, compressed or not, by its name and first bytes."""
     with path.open("rb") as file:
         head = file.read(_TAR_AT + len(_TAR_MARK))
     is_plain = head[_TAR_AT:] == _TAR_MARK
@@ -52,14 +52,14 @@ def is_tar(path: Path, name: str) -> bool:
 
 
 def is_archive(path: Path, name: str) -> bool:
-    """Return whether a file is an archive that is unpacked."""
+    """Return whether a file is an archive that the inbox unpacks."""
     return is_zip(path) or is_tar(path, name)
 
 
 def holds_zarr(path: Path, limits: InboxLimits) -> bool:
-    """Return whether a zip archive holds an OME-Zarr group, which is read without unpacking it.
+    """Return whether a zip archive holds an OME-Zarr group, which readers open without unpacking.
 
-    The members are checked as for unpacking. Raises RefusedError.
+    The members pass the same checks as for unpacking. Raises RefusedError.
     """
     with _whole(), zipfile.ZipFile(path) as archive:
         members = _checked_zip(archive, path, limits)
@@ -67,7 +67,7 @@ def holds_zarr(path: Path, limits: InboxLimits) -> bool:
 
 
 def unpack(path: Path, folder: Path, limits: InboxLimits) -> list[Unpacked]:
-    """Unpack an archive into a new folder. Raises RefusedError; the folder may then hold a part."""
+    """Unpack an archive into a new folder. Raises RefusedError; some files may then remain."""
     folder.mkdir(parents=True)
     with _whole():
         if is_zip(path):
@@ -92,7 +92,7 @@ def _unpack_zip(
 def _checked_zip(
     archive: zipfile.ZipFile, path: Path, limits: InboxLimits
 ) -> list[tuple[zipfile.ZipInfo, Parts]]:
-    """Return the files of a zip archive with their names, once all of them are allowed."""
+    """Return the files of a zip archive and their names. Raises RefusedError."""
     infos = archive.infolist()
     _require_count(len(infos), limits)
     for info in infos:
@@ -100,8 +100,8 @@ def _checked_zip(
         if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
             raise _refused("a link or a device", "files and folders")
         if info.flag_bits & _ENCRYPTED:
-            raise _refused("members with a password", "none: unpack it, and hand in the files")
-    # zipfile cuts names at a NUL and turns the separators of Windows: their raw form counts
+            raise _refused("members with a password", "none; unpack it and upload the files")
+    # zipfile cuts names at a NUL and replaces Windows' separators; the original name counts.
     if any(info.orig_filename != info.filename for info in infos):
         check_names([info.orig_filename.rstrip("/") for info in infos], "archive")
     files = [info for info in infos if not info.is_dir()]
@@ -135,7 +135,7 @@ def _unpack_tar(path: Path, folder: Path, limits: InboxLimits) -> list[Unpacked]
 
 
 class _Allowance:
-    """Counts the bytes that come out of an archive against what may come out of it."""
+    """Counts the bytes that come out of an archive, up to a limit that its own size sets."""
 
     def __init__(self, path: Path, limits: InboxLimits) -> None:
         packed = path.stat().st_size
@@ -143,11 +143,12 @@ class _Allowance:
         self._taken = 0
 
     def take(self, count: int) -> None:
-        """Count bytes. Raises RefusedError where they are too many."""
+        """Count bytes. Raises RefusedError if the sum exceeds the limit."""
         self._taken += count
         if self._taken > self._most:
             raise RefusedError(
-                413, f"archive: unpacks to more than {self._most:,} bytes: hand in the files"
+                413,
+                f"archive: found more than {self._most:,} bytes in it; upload the files instead",
             )
 
     def copy(self, member: IO[bytes], target: Path) -> None:
@@ -158,7 +159,7 @@ class _Allowance:
                     self.take(len(block))
                     file.write(block)
         except OSError as error:
-            if error.errno is None:  # of the archive's library, not of the system
+            if error.errno is None:  # this error is the archive library's, not the system's
                 raise
             raise not_written(error) from None
 
@@ -169,7 +170,7 @@ def _whole() -> Iterator[None]:
     try:
         yield
     except NotImplementedError:
-        raise _refused("a way of packing that is not known", "deflate, or no packing") from None
+        raise _refused("an unknown compression", "deflate or none") from None
     except (
         zipfile.BadZipFile,
         tarfile.TarError,
@@ -183,12 +184,12 @@ def _whole() -> Iterator[None]:
     ) as error:
         if isinstance(error, RefusedError):
             raise
-        raise _refused("damage", "an archive that is whole: pack it again") from None
+        raise _refused("damage", "an undamaged archive; pack it again") from None
 
 
 def _require_count(count: int, limits: InboxLimits) -> None:
     if count > limits.files:
-        raise RefusedError(413, f"archive: more than {limits.files:,} members: split it")
+        raise RefusedError(413, f"archive: found more than {limits.files:,} members; split it")
 
 
 def _refused(found: str, expected: str) -> RefusedError:

@@ -1,10 +1,10 @@
-"""An upload: the bytes of all files as one stream, which may break off and go on at any byte.
+"""An upload: the bytes of all files as one stream, which may stop and continue at any byte.
 
-    names.json      what was announced: the names and sizes of the files, or an address
-    parts/000000    the first file, as far as it has come, under a name of ours
+    names.json      the announcement: the names and sizes of the files, or an address
+    parts/000000    the bytes of the first file that have arrived, under a neutral name
     parts/000001    ...
 
-The stream has come as far as the sizes of the parts say, so that it goes on after a crash, too.
+The sizes of the parts tell how far the stream has come. An upload thus continues after a crash.
 """
 
 import errno
@@ -31,12 +31,12 @@ _MARK = re.compile(r"([0-9a-f]{64})?")
 
 @dataclass(frozen=True, slots=True)
 class Announced:
-    """The files or the address that a person announces before handing them in.
+    """The files or the address that a person announces before the upload.
 
-    names, sizes  of the files, in the order of the stream
-    address       empty: files
-    mark          a hash of samples of their bytes, so that files of the same names and sizes, as of
-                  two patients, are not taken for one another; empty: the client names none
+    names, sizes  the files' names and sizes in bytes, in the order of the stream
+    address       empty for files
+    mark          a hash of samples of the files' bytes; it distinguishes files of equal names and
+                  sizes, such as those of two patients. Empty if the client sent none.
     """
 
     names: tuple[str, ...] = ()
@@ -46,23 +46,23 @@ class Announced:
 
     @property
     def total(self) -> int:
-        """The bytes of all files."""
+        """Number of bytes of all files."""
         return sum(self.sizes)
 
     @property
     def digest(self) -> str:
-        """A hash by which an upload is found again."""
+        """A hash by which an interrupted upload is found again."""
         content = [self.address, self.mark, list(zip(self.names, self.sizes, strict=True))]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     @property
     def parts(self) -> list[Parts]:
-        """The folders and the file of each name."""
+        """Each name as its folders and file."""
         return [tuple(name.split("/")) for name in self.names]
 
 
 def parse_announced(content: Any, limits: InboxLimits) -> Announced:
-    """Return what the body of a request announces. Raises RefusedError."""
+    """Return the announcement in a request's body. Raises RefusedError."""
     is_object = isinstance(content, dict)
     mark = content.pop("mark", "") if is_object and "files" in content else ""
     if not isinstance(mark, str) or not _MARK.fullmatch(mark):
@@ -78,14 +78,14 @@ def parse_announced(content: Any, limits: InboxLimits) -> Announced:
         raise RefusedError(400, "files: expected a list of names and sizes that is not empty")
     if len(files) > limits.files:
         raise RefusedError(
-            413, f"files: found {len(files):,}, expected at most {limits.files:,}: zip them"
+            413, f"files: found {len(files):,}, expected at most {limits.files:,}; zip them"
         )
     sizes = []
     for one in files:
         if not isinstance(one, list) or len(one) != 2:
             raise RefusedError(400, "files: expected a name and a size in bytes for each file")
         if type(one[1]) is not int or one[1] < 0:
-            raise RefusedError(400, "files: a file's size: expected a whole number from 0")
+            raise RefusedError(400, "files: expected a whole number from 0 as a file's size")
         sizes.append(one[1])
     names = ["/".join(parts) for parts in check_names([one[0] for one in files], "files")]
     if not sum(sizes):
@@ -107,7 +107,7 @@ class Upload:
 
     @classmethod
     def create(cls, folder: Path, announced: Announced) -> "Upload":
-        """Make the folder, which its owner alone may read. Raises RefusedError."""
+        """Create the folder, which only its owner may read. Raises RefusedError."""
         try:
             folder.mkdir(parents=True, mode=0o700)
             (folder / _PARTS).mkdir()
@@ -120,7 +120,7 @@ class Upload:
 
     @classmethod
     def open(cls, folder: Path) -> "Upload | None":
-        """Return the upload of a folder; None: there is none."""
+        """Return the upload of a folder; None if there is none."""
         try:
             content = json.loads((folder / _NAMES).read_bytes())
             names, sizes = zip(*content[_LIST], strict=True) if content[_LIST] else ((), ())
@@ -131,12 +131,12 @@ class Upload:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all bytes have come."""
+        """Whether all bytes have arrived."""
         return self.offset >= self.announced.total
 
     @property
     def age_h(self) -> float:
-        """Hours since the last byte came."""
+        """Hours since the last byte arrived."""
         newest = max(
             (path.stat().st_mtime for path in (self.folder, self.folder / _PARTS, *self._last())),
             default=0.0,
@@ -144,11 +144,11 @@ class Upload:
         return (time.time() - newest) / 3600
 
     def part(self, index: int) -> Path:
-        """Return the place of a file."""
+        """Return the path of the part that holds a file."""
         return self.folder / _PARTS / f"{index:06d}"
 
     def write(self, data: bytes) -> None:
-        """Append bytes to the stream. Raises RefusedError where the disk takes no more."""
+        """Append bytes to the stream. Raises RefusedError if the disk takes no more."""
         view = memoryview(data)[: self.announced.total - self.offset]
         while view:
             index = _index_at(self._starts, self.offset)
@@ -163,7 +163,7 @@ class Upload:
             view = view[room:]
 
     def finish(self) -> None:
-        """Make the files that have no bytes. Raises RefusedError."""
+        """Create the empty files, for which no byte arrives. Raises RefusedError."""
         try:
             for index, size in enumerate(self.announced.sizes):
                 if not size:
@@ -176,7 +176,7 @@ class Upload:
         return [path for path in [self.part(index)] if path.exists()]
 
     def _find_offset(self) -> int:
-        """Return how far the stream has come; a part that is too long is cut."""
+        """Return the number of bytes in the parts; cut a part that is longer than its file."""
         offset = 0
         for index, size in enumerate(self.announced.sizes):
             path = self.part(index)
@@ -190,10 +190,10 @@ class Upload:
 
 
 def not_written(error: OSError) -> RefusedError:
-    """Return the error of a disk that takes no more."""
+    """Return the refusal for a disk that takes no more bytes."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return RefusedError(507, "the server's disk is full: make room, then the upload goes on")
-    return RefusedError(507, f"the server can't write ({error.strerror}): its owner has to look")
+        return RefusedError(507, "the server's disk is full; free space to continue the upload")
+    return RefusedError(507, f"the server can't write ({error.strerror}); inform its owner")
 
 
 def _starts_of(sizes: Sequence[int]) -> list[int]:
@@ -204,5 +204,5 @@ def _starts_of(sizes: Sequence[int]) -> list[int]:
 
 
 def _index_at(starts: Sequence[int], offset: int) -> int:
-    """Return the file that has the byte at an offset."""
+    """Return the index of the file that contains the byte at an offset of the stream."""
     return min(max(0, bisect_right(starts, offset) - 1), max(0, len(starts) - 2))

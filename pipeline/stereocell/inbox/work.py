@@ -1,4 +1,4 @@
-"""The threads of an inbox: one prepares what is handed in, one builds."""
+"""The threads of an inbox: one reads uploads, one builds."""
 
 import threading
 import time
@@ -10,16 +10,16 @@ from stereocell.inbox.inbox import PREPARED, Inbox
 from stereocell.inbox.preparing import prepare
 from stereocell.model.errors import OutputError
 
-_LOOK_S = 0.25  # s between two looks at the running build
-_OLD_S = 60.0  # s between two looks for uploads that have broken off too long ago
-_IDLE_S = 120.0  # s after which a reader without work ends
+_LOOK_S = 0.25  # s between two checks of the running build
+_OLD_S = 60.0  # s between two searches for uploads that were interrupted too long ago
+_IDLE_S = 120.0  # s after which an idle reader ends
 
 
 class Work:
-    """Runs until it is closed."""
+    """The two threads. They run from start() to close()."""
 
     def __init__(self, inbox: Inbox, page: Path, make: MakeBuild) -> None:
-        """page: the folder of the viewer; make: how sources are built."""
+        """page: the folder of the viewer; make: returns the build of a source."""
         self._inbox = inbox
         self._builds = Builds(inbox, page, make)
         self._is_over = threading.Event()
@@ -29,12 +29,12 @@ class Work:
         ]
 
     def start(self) -> None:
-        """Begin."""
+        """Start the threads."""
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """End, and wait for it. What is not finished goes on at the next start."""
+        """Stop the threads and wait for them. Unfinished work continues at the next start."""
         self._is_over.set()
         with self._inbox.changed:
             self._inbox.changed.notify_all()
@@ -53,7 +53,8 @@ class Work:
             if items and not self._is_over.is_set():
                 if len(items) > 1:
                     inbox.reader.warm()
-                with suppress(OutputError):  # the queue file: it is written at the next change
+                # If the queue file can't be written now, the next change writes it.
+                with suppress(OutputError):
                     prepare(inbox, items[0])
             for reader in (inbox.reader, inbox.tile_reader):
                 reader.release(_IDLE_S)
@@ -61,7 +62,7 @@ class Work:
     def _build(self) -> None:
         next_s = 0.0
         while not self._is_over.wait(_LOOK_S):
-            with suppress(OutputError):  # likewise
+            with suppress(OutputError):  # the next change writes the queue file
                 self._builds.step()
             if time.monotonic() > next_s:
                 with suppress(OutputError):

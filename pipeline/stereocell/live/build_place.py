@@ -1,6 +1,6 @@
-"""The folder into which a source is built behind its page.
+"""The folder into which a source is built while its page is open.
 
-What needs USD is imported only where the folder holds a build: that takes seconds.
+Modules that need USD are imported only if the folder holds a build, since that takes seconds.
 """
 
 import re
@@ -18,10 +18,10 @@ from stereocell.storage.lock import alone_in
 
 
 def free_place(plan: Plan) -> Path:
-    """Return a folder in the working folder that is named after a specimen.
+    """Return a folder for a build, in the working folder and named after the specimen.
 
-    In a folder that is itself the source it lies beside that folder, as nothing is written into the
-    data. A number follows the name where other specimens, or other files, have it already.
+    If the working folder is itself the source, the new folder lies beside it, since nothing may be
+    written into the data. The name gets a number if other specimens or files already have it.
     """
     name = re.sub(r"[^\w.+-]+", "_", plan.name).strip("._-") or "specimen"
     folder = working_folder_outside(plan.source)
@@ -35,10 +35,10 @@ def free_place(plan: Plan) -> Path:
 
 
 def require_place(source: str, out: Path, plan: Plan) -> None:
-    """Raise what a build of a plan into OUT would raise before it begins; OUT is unchanged.
+    """Raise the errors that a build of a plan into OUT would raise at once; change nothing.
 
-    Raises StereoCellError where the build would refuse it: OUT lies in the source, can't be
-    written, holds something else, or another command is writing there.
+    Raises StereoCellError if OUT lies in the source, can't be written or holds something else, or
+    if another command is writing there.
     """
     require_apart(source, out)
     require_build_or_nothing(out, source)
@@ -50,14 +50,14 @@ def require_place(source: str, out: Path, plan: Plan) -> None:
         from stereocell.building.own_parts import require_own_places
 
         require_own_places(out_folder, is_same_plan=_is_same(there, plan))
-    with alone_in(out, "view"):  # the build would not wait for another command
+    with alone_in(out, "view"):  # this raises if another command is writing into OUT
         pass
 
 
 def finished_bundle(out: Path, plan: Plan) -> Path | None:
-    """Return OUT/bundle where a build of this plan has finished and its results are whole, or None.
+    """Return OUT/bundle if a build of this plan has finished and its results are whole, else None.
 
-    Raises OutputError where OUT's plan was changed by hand.
+    Raises OutputError if OUT's plan was changed by hand.
     """
     there = replaced_plan(OutFolder(out), plan)
     if there is None or not _is_same(there, plan):
@@ -68,5 +68,5 @@ def finished_bundle(out: Path, plan: Plan) -> Path | None:
 
 
 def _is_same(there: Plan, plan: Plan) -> bool:
-    """Return whether two plans differ in their notes alone, which are no input of a build."""
+    """Return whether two plans differ at most in their notes, which do not affect a build."""
     return replace(there, notes=()) == replace(plan, notes=())

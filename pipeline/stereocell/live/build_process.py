@@ -1,8 +1,8 @@
-"""Build a source in a process of its own, of lower priority, behind the page that shows it.
+"""Build a source in a process of its own, with lower priority, while its page is open.
 
-The two processes talk over a pipe: the build reports its tasks and the views that it writes; it is
-asked to pause, to continue and to end. A pause begins when the running tasks have ended. Between
-pauses the build rests for moments, while someone waits for a picture; see `rests`.
+The two processes talk over a pipe. The build reports its tasks and the views that it writes; the
+server asks it to pause and to continue. A pause begins when the running tasks have ended.
+Independently of pauses, the build rests for moments while somebody waits for a frame; see `rests`.
 """
 
 import errno
@@ -33,10 +33,11 @@ from stereocell.planning.plan import Plan
 if TYPE_CHECKING:
     from stereocell.live.partial_view import PartialView
 
-# builds, and is watched; returns the line of an error, empty where there is none
+# Builds, and reports to the watch. Returns the line of an error, or an empty text.
 Build = Callable[[Watch], str]
 
-# Share of each part of a build in its time: of one tile of 194 x 512 x 512 voxels, three channels
+# Share of each phase in the time of a build; measured on one tile, 194 x 512 x 512 voxels, and
+# three channels.
 SHARES = {
     "windows": 0.08,
     "evidence": 0.13,
@@ -46,9 +47,9 @@ SHARES = {
     "bundle": 0.08,
     "report": 0.13,
 }
-_TELLING = 0.15  # share of a build from which its pace tells when it ends: it starts slowly
-_NICE = 10  # of 19, the lowest priority
-_END_S = 15  # s that a cancelled build has to remove what is half written
+_PREDICTABLE = 0.15  # share from which the pace predicts the end: the start of a build is slow
+_NICE = 10  # niceness, 0 to 19; a larger one means lower priority
+_END_S = 15  # s that a cancelled build has to remove unfinished files
 _KILLED = "the build was stopped from outside"
 
 
@@ -83,23 +84,23 @@ class Coarse:
 
 
 class BuildProcess:
-    """A build behind a page. All methods may be called from any thread."""
+    """A build that runs while its page is open. Any thread may call these methods."""
 
     def __init__(self, build: Build, out: Path, explain: Callable[[str], str] = str) -> None:
-        """Describe a build, which is not started.
+        """Describe a build without starting it.
 
-        build    picklable
-        out      the folder that it writes
-        explain  returns the line to be shown for an error's line
+        build    the work; must be picklable
+        out      the folder that the build writes
+        explain  returns the text to show for the text of an error
         """
         self._build, self.out, self._explain = build, out, explain
         self._coarse: Coarse | None = None
         self._is_closed = False
-        self._asked = threading.Lock()  # one start or command at a time
-        self._changed = threading.Lock()
+        self._commanding = threading.Lock()  # only one start or command runs at a time
+        self._changing = threading.Lock()
         self._state = State()
         self._views: dict[str, Path] = {}
-        self.holders: Mapping[str, Holder] = {}  # what the views leave out; see `PartialView`
+        self.holders: Mapping[str, Holder] = {}  # pieces that the views leave out; see PartialView
         self._process: Any = None
         self._rests: Rests | None = None
         self._pipe: Connection[Any, Any] | None = None
@@ -107,26 +108,27 @@ class BuildProcess:
 
     @property
     def state(self) -> State:
-        """The newest state."""
+        """The current state."""
         return self._state
 
     def find_view(self, name: str) -> Path | None:
-        """Return the folder of a later view by its name; None: there is no such view."""
+        """Return the folder of a later view by its name; None if there is no such view."""
         return self._views.get(name)
 
     @property
     def bundle(self) -> Path | None:
-        """The finished bundle; None: there is none yet."""
+        """The finished bundle; None until there is one."""
         return self.out / "bundle" if self.state.has_bundle else None
 
     def start(self, coarse: Coarse | None = None) -> None:
-        """Begin to build, or go on with a build that has ended early.
+        """Begin to build, or continue a build that ended early.
 
-        coarse  what the first view is made of; None: as at the first start
+        coarse  the inputs of the first view; None to use those of the first start
 
-        A build that a user has paused or cancelled before its start begins so.
+        A build that a user has paused before this first start begins paused. A cancelled one does
+        not begin.
         """
-        with self._asked:
+        with self._commanding:
             self._start(coarse)
 
     def _start(self, coarse: Coarse | None) -> None:
@@ -134,28 +136,28 @@ class BuildProcess:
         doing = self.state.doing if is_first else "building"
         if self._coarse is None or doing == "cancelled" or self._is_closed:
             return
-        self._pipe = None  # nobody hears the process before
+        self._pipe = None  # reports of an earlier process no longer count
         self._set(doing=doing, line="", left_s=None, all_tiles=len(self._coarse.plan.tiles))
         if self._process is not None:
-            self._process.join(_END_S)  # it has ended, or is about to
+            self._process.join(_END_S)  # the earlier process has ended or is about to end
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_run, args=(theirs,))
-        with children_ignore_interrupts():  # Ctrl+C is the server's, which ends the build
+        with children_ignore_interrupts():  # the server handles Ctrl+C and ends the build
             process.start()
-        assert process.pid is not None  # it has been started
+        assert process.pid is not None  # start() has set it
         theirs.close()
-        with suppress(OSError):  # it has ended already, and its end is heard
+        with suppress(OSError):  # the process has already ended, which `_receive` will notice
             ours.send((self._build, self._coarse))
         self._process, self._pipe, self._rests = process, ours, Rests(process.pid)
         self._began_s, self._paused_s = time.monotonic(), 0.0
         if doing == "pausing":
             self._send("pause")
-        threading.Thread(target=self._hear, args=(ours,), daemon=True).start()
+        threading.Thread(target=self._receive, args=(ours,), daemon=True).start()
 
     def do(self, command: Command) -> None:
-        """Carry out what a user asks for; a command that does not fit the state does nothing."""
-        with self._asked:
+        """Carry out a user's command; ignore a command that does not fit the state."""
+        with self._commanding:
             self._do(command)
 
     def _do(self, command: Command) -> None:
@@ -173,20 +175,20 @@ class BuildProcess:
             self._stop()
 
     def rest(self) -> None:
-        """Let the build rest for a moment: frames are late on this machine."""
+        """Let the build rest for a moment, since frames are late on this machine."""
         if self._rests is not None:
             self._rests.ask()
 
     def while_someone_waits(self) -> AbstractContextManager[None]:
-        """Let the build rest while bricks are made that someone waits for."""
+        """Return a context in which the build rests, while bricks are made for a waiting client."""
         return nullcontext() if self._rests is None else self._rests.while_someone_waits()
 
     def close(self) -> None:
-        """End the process for good, and wait for it; what is finished stays."""
-        with self._asked:
+        """End the process for good, and wait for it. Finished results stay."""
+        with self._commanding:
             self._is_closed = True
             self._stop()
-            self._coarse = None  # megabytes
+            self._coarse = None  # this frees many megabytes
 
     def _stop(self) -> None:
         process = self._process
@@ -201,59 +203,59 @@ class BuildProcess:
             process.join()
 
     def _send(self, command: str) -> None:
-        with suppress(OSError):  # it has ended
+        with suppress(OSError):  # the process has ended
             if self._pipe is not None:
                 self._pipe.send(command)
 
-    def _set(self, **news: Any) -> None:
-        with self._changed:
-            self._state = replace(self._state, **news)
+    def _set(self, **changes: Any) -> None:
+        with self._changing:
+            self._state = replace(self._state, **changes)
 
-    def _hear(self, pipe: "Connection[Any, Any]") -> None:
-        """Take what a build reports until it ends."""
+    def _receive(self, pipe: "Connection[Any, Any]") -> None:
+        """Receive the reports of a build until it ends."""
         while True:
             try:
-                told = pipe.recv()
+                report = pipe.recv()
             except (EOFError, OSError):
-                told = None
-            if pipe is not self._pipe:  # another process builds by now
+                report = None
+            if pipe is not self._pipe:  # a newer process builds by now
                 return
-            if told is None:
+            if report is None:
                 is_over = self.state.doing in ("cancelled", "failed", "complete")
                 if not is_over and not self._is_closed:
                     self._fail(_KILLED)
                 return
-            if isinstance(told, _Task):
-                self._take(told)
-            elif isinstance(told, _View):
-                self.holders = told.holders
-                self._views[told.folder.name] = told.folder
-                self._set(folder=f"{told.folder.name}/")
-            elif isinstance(told, _End) and self.state.doing != "cancelled":
-                if told.line:
-                    self._fail(told.line)
+            if isinstance(report, _Task):
+                self._show_progress(report)
+            elif isinstance(report, _View):
+                self.holders = report.holders
+                self._views[report.folder.name] = report.folder
+                self._set(folder=f"{report.folder.name}/")
+            elif isinstance(report, _End) and self.state.doing != "cancelled":
+                if report.line:
+                    self._fail(report.line)
                 else:
                     self._set(doing="complete", share=1.0, left_s=0.0, has_bundle=True)
-            elif told == "paused" and self.state.doing == "pausing":
+            elif report == "paused" and self.state.doing == "pausing":
                 self._set(doing="paused")
-            elif isinstance(told, float):
-                self._paused_s += told
+            elif isinstance(report, float):
+                self._paused_s += report
 
     def _fail(self, text: str) -> None:
-        """Take down that the build has failed.
+        """Set the state of a build that has failed.
 
-        text  a line for each cause, as the build reports them; the page has room for one
+        text  one line for each cause; the page shows the first one and the number of the others
         """
         if os.strerror(errno.ENOSPC) in text:
-            text = "the disk is full: make room, then continue the build"
+            text = "the disk is full; free some space, then continue the build"
         first, *others = self._explain(text).splitlines() or [""]
         line = f"{first} (and {counted(len(others), 'more line')})" if others else first
         self._set(doing="failed", line=line, left_s=None)
 
-    def _take(self, task: _Task) -> None:
+    def _show_progress(self, task: _Task) -> None:
         share = _share_of(task)
         spent_s = time.monotonic() - self._began_s - self._paused_s
-        left_s = spent_s * (1 - share) / share if share > _TELLING else None
+        left_s = spent_s * (1 - share) / share if share > _PREDICTABLE else None
         self._set(
             label=task.label,
             done=task.done,
@@ -261,12 +263,13 @@ class BuildProcess:
             tiles=task.tiles,
             share=share,
             left_s=left_s if self.state.doing == "building" else None,
-            has_bundle=self.state.has_bundle or task.label == "report",  # which comes after it
+            # The report is the phase after the bundle.
+            has_bundle=self.state.has_bundle or task.label == "report",
         )
 
 
 def _share_of(task: _Task) -> float:
-    """Return how much of a build is done, 0..1, when a part of it has got so far."""
+    """Return the share of a build, 0..1, that is done after a task."""
     if task.label not in SHARES:
         return 0.0
     names = list(SHARES)
@@ -275,9 +278,10 @@ def _share_of(task: _Task) -> float:
 
 
 def _run(pipe: "Connection[Any, Any]") -> None:
-    """Build, in the process of its own. What it builds comes by the pipe, however large that is."""
-    with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # nobody looks any more
-        from stereocell.live.partial_view import PartialView  # it imports USD, and the page waits
+    """Build, in the build's own process. The inputs come over the pipe, since they may be large."""
+    with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):  # the server has ended
+        # This module imports USD, which takes long. The server's process does without.
+        from stereocell.live.partial_view import PartialView
 
         lead_group()
         threading.Thread(target=end_with_parent, daemon=True).start()
@@ -288,14 +292,14 @@ def _run(pipe: "Connection[Any, Any]") -> None:
 
 
 class _Watcher:
-    """Called by the build after each task: reports it, writes views, and pauses."""
+    """The build calls this after each task. It reports the task, writes views, and pauses."""
 
     def __init__(self, view: "PartialView", pipe: "Connection[Any, Any]") -> None:
         self._view, self._pipe, self._has_failed = view, pipe, False
 
     def __call__(self, label: str, done: int, total: int, name: str) -> None:
         if label == "units":
-            self._look(name.split("/")[0] if name and done < total else None)
+            self._write_view(name.split("/")[0] if name and done < total else None)
         self._pipe.send(_Task(label, done, total, self._view.finished))
         if self._pipe.poll() and self._pipe.recv() == "pause":
             self._pipe.send("paused")
@@ -304,22 +308,22 @@ class _Watcher:
                 pass
             self._pipe.send(time.monotonic() - began_s)
 
-    def _look(self, tile_id: str | None) -> None:
-        """Write a new view where a tile is finished. Without one the build goes on all the same."""
+    def _write_view(self, tile_id: str | None) -> None:
+        """Write a new view if a tile is finished. The build continues if that fails."""
         if self._has_failed:
             return
         try:
             folder = self._view.add(tile_id)
         except (StereoCellError, OSError) as error:
             self._has_failed = True
-            console.print(f"views: {error}: the page shows surfaces at the end", markup=False)
+            console.print(f"{error}. The page shows surfaces only at the end.", markup=False)
             return
         if folder is not None:
             self._pipe.send(_View(folder, self._view.holders))
 
 
 def _lower_priority() -> None:
-    """Let whoever looks at the page go first; the workers of the build inherit it."""
+    """Lower the priority of this process and its later workers, so that the viewer stays smooth."""
     if sys.platform == "win32":
         import ctypes
 

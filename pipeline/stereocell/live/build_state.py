@@ -1,4 +1,4 @@
-"""The state of a build behind a page, and the commands that the page sends."""
+"""The state of a build whose page is open, and the commands that the page sends."""
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -12,15 +12,15 @@ Command = Literal["pause", "continue", "cancel"]
 LATE = "late"  # the frames of a page are late, and the build rests for a moment
 COMMANDS: tuple[Command, ...] = ("pause", "continue", "cancel")
 Doing = Literal[
-    "unbuilt",  # nobody has asked for a build
-    "queued",  # other builds go first
+    "unbuilt",  # no build was requested
+    "queued",  # the build waits for others
     "building",
     "pausing",
     "paused",
     "cancelled",
     "failed",
     "complete",
-    "deleted",  # with its source
+    "deleted",  # together with its source
 ]
 
 
@@ -28,15 +28,15 @@ Doing = Literal[
 class State:
     """The state of a build, which the server sends to the page.
 
-    label, done, total  its running tasks
-    tiles, all_tiles    how many tiles have their surfaces, and how many there are
-    share               how much of the build is done, 0..1
-    left_s              s until its end; None: not known yet
-    place               in the queue of builds, from 1; 0: it does not wait there
-    folder              of the newest view, as `g2/`; empty: the first view is the newest
-    has_bundle          whether OUT/bundle is whole, which then is the newest view
-    line                why it has failed; or empty
-    may_continue        whether a build that was cancelled or has failed can begin again
+    label, done, total  running phase, its finished tasks and all its tasks
+    tiles, all_tiles    number of tiles with finished surfaces, and of all tiles
+    share               share of the build that is done, 0..1
+    left_s              s until the end; None if not yet known
+    place               place in the queue of builds, from 1; 0 outside the queue
+    folder              folder of the newest view, such as `g2/`; empty for the first view
+    has_bundle          whether OUT/bundle is complete, and hence the newest view
+    line                reason of a failure, or empty
+    may_continue        whether a build that was cancelled or failed can begin again
     """
 
     doing: Doing = "building"
@@ -55,32 +55,32 @@ class State:
 
 
 class WatchedBuild(Protocol):
-    """A build as a page watches it. All methods may be called from any thread."""
+    """A build that a page watches. Any thread may call these methods."""
 
     @property
     def out(self) -> Path:
-        """The folder that it writes."""
+        """The folder that the build writes."""
 
     @property
     def state(self) -> State:
-        """The newest state."""
+        """The current state."""
 
     @property
     def bundle(self) -> Path | None:
-        """The finished bundle; None: there is none yet."""
+        """The finished bundle; None until there is one."""
 
     def rest(self) -> None:
-        """Let the build rest for a moment: frames are late on this machine."""
+        """Let the build rest for a moment, since frames are late on this machine."""
 
     def while_someone_waits(self) -> AbstractContextManager[None]:
-        """Let the build rest while bricks are made that someone waits for."""
+        """Return a context in which the build rests, while bricks are made for a waiting client."""
 
     @property
     def holders(self) -> Mapping[str, Holder]:
-        """The air that the later views leave out, by the channel's ID; see `PartialView`."""
+        """Table, pads and cables of a CT that later views leave out, by the channel's ID."""
 
     def find_view(self, name: str) -> Path | None:
-        """Return the folder of a later view by its name, as `g2`; None: there is no such view."""
+        """Return the folder of a later view by its name, such as `g2`; None if there is none."""
 
     def do(self, command: Command) -> None:
-        """Carry out what a user asks for; a command that does not fit the state does nothing."""
+        """Carry out a user's command; ignore a command that does not fit the state."""

@@ -1,4 +1,4 @@
-"""Read a channel coarsely: no more voxels than a first view needs, however large the source is."""
+"""Read a channel coarsely: only as many voxels as a first view needs, even of a large source."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -14,9 +14,9 @@ from stereocell.planning.channels import Channel
 from stereocell.planning.plan import Plan
 from stereocell.read import Dataset
 
-READ_VOXELS = 48_000_000  # most voxels of a channel that are read
+READ_VOXELS = 48_000_000  # most voxels that are read of a channel
 SLAB_VOXELS = 16_000_000  # approximate number of voxels that are read at a time
-SAMPLED_VOXELS = 6_000_000  # approximate number of values on which a window is found
+SAMPLED_VOXELS = 6_000_000  # approximate number of values from which a window is found
 OnRead = Callable[[float], None]
 _Triple = tuple[int, int, int]
 _Places = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -24,11 +24,11 @@ _Places = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True, slots=True)
 class CoarseGrid:
-    """The blocks of voxels whose means are taken.
+    """The blocks of voxels that are averaged.
 
-    level   of the source, which is read
-    box     its voxels of the planned region
-    factor  (z, y, x), voxels of a block
+    level   resolution level of the source that is read
+    box     the planned region, in voxels of that level
+    factor  (z, y, x), voxels of a block, in voxels of that level
     first   (z, y, x), centre of the first block, in voxels of the planned level
     step    (z, y, x), distance between blocks, in voxels of the planned level
     """
@@ -44,9 +44,9 @@ class CoarseGrid:
 class CoarseChannel:
     """The means of blocks of a channel's voxels, over the planned region.
 
-    voxels  float32 (z, y, x), voxel values
-    grid    where they lie
-    sample  float32 (n,), values as they were read, without means: what a histogram is made of
+    voxels  float32 (z, y, x), means in the unit of the voxels
+    grid    places of the blocks
+    sample  float32 (n,), values before averaging, for histograms
     """
 
     voxels: NDArray[np.float32]
@@ -54,7 +54,7 @@ class CoarseChannel:
     sample: NDArray[np.float32]
 
     def averaged(self, blocks: int) -> "CoarseChannel":
-        """Return the means of so many blocks along each axis, of fewer along a short one."""
+        """Return means over `blocks` blocks along each axis, or over all along a short axis."""
         if blocks == 1:
             return self
         z, y, x = (min(blocks, n) for n in self.voxels.shape)
@@ -69,10 +69,10 @@ class CoarseChannel:
         return replace(self, voxels=_means(self.voxels, (z, y, x)), grid=grid)
 
     def at(self, places: _Places) -> NDArray[np.float32]:
-        """Return the voxels at places on a grid, by linear interpolation; float32 (z, y, x).
+        """Return the values at places on a grid, by linear interpolation; float32 (z, y, x).
 
-        places  the grid's coordinates along z, y and x, in voxels of the planned level; beyond the
-                outermost voxels their values continue
+        places  the grid's coordinates along z, y and x, in voxels of the planned level; a place
+                outside gets the value at the border
         """
         values = self.voxels
         for axis, along in enumerate(places):
@@ -87,10 +87,10 @@ class CoarseChannel:
 
 
 def find_grid(dataset: Dataset, plan: Plan, voxels: int) -> CoarseGrid:
-    """Return blocks of about equal edges in um, at most `voxels` of them, in the planned region.
+    """Divide the planned region into at most `voxels` blocks with about equal edges in um.
 
-    Of a source with a pyramid its finest level of at most READ_VOXELS is read, or of as many as
-    there are blocks.
+    In a source with a pyramid, the blocks lie in the finest level whose region has at most
+    READ_VOXELS voxels, or at most `voxels` if that is more.
     """
     level = plan.level
     while level + 1 < len(dataset.levels) and prod(_region_at(dataset, plan, level).shape) > max(
@@ -101,7 +101,7 @@ def find_grid(dataset: Dataset, plan: Plan, voxels: int) -> CoarseGrid:
 
 
 def grid_at(dataset: Dataset, plan: Plan, level: int, voxels: int) -> CoarseGrid:
-    """Return such blocks of one level of a source."""
+    """Divide the planned region into blocks of one level of a source; see `find_grid`."""
     box = _region_at(dataset, plan, level)
     spacing, origin = dataset.levels[level].spacing_um, dataset.levels[level].origin_um
     factor = _factor(box.shape, spacing, voxels)
@@ -117,16 +117,16 @@ def grid_at(dataset: Dataset, plan: Plan, level: int, voxels: int) -> CoarseGrid
 
 
 def slabs_of(grid: CoarseGrid, axis: int) -> Iterator[tuple[Box, _Triple]]:
-    """Yield the boxes of voxels that are read, one after the other, and the block of each.
+    """Yield each box of voxels to read, and the voxels (z, y, x) of a block in it.
 
-    axis  of z, y, x: the source's images lie across it
+    axis  0, 1 or 2 for z, y or x: the axis across which the source's images lie
 
-    All planes of a block are read, or its middle ones where there are too many voxels.
+    All planes of a block are read. If the region has too many voxels, only the middle ones are.
     """
     box, factor = grid.box, grid.factor
     count = max(1, min(factor[axis], READ_VOXELS * factor[axis] // prod(box.shape)))
     z, y, x = (count if i == axis else factor[i] for i in range(3))
-    # Where all planes are read, many blocks are read together: a chunk holds several planes.
+    # If all planes are read, many blocks are read together, since a chunk holds several planes.
     together = max(1, SLAB_VOXELS // (prod(box.shape) // box.shape[axis] * factor[axis]))
     step = factor[axis] * (together if count == factor[axis] else 1)
     end = box.start[axis] + box.shape[axis] // factor[axis] * factor[axis]
@@ -143,14 +143,12 @@ def read_coarse(
     voxels: int,
     on_read: OnRead = lambda share: None,
 ) -> CoarseChannel:
-    """Return a channel by means of blocks of voxels; see `find_grid`.
+    """Return the means of a channel's blocks; see `find_grid`.
 
-    on_read  is given the share, 0..1, of what is read, after each part of it
+    on_read  called after each part that is read, with the part's share, 0..1
 
-    Of a source without a pyramid every k-th plane is read, across the axis along which its images
-    lie.
-
-    Raises SourceError where voxels can't be read.
+    A large source without a pyramid is read by some planes of each block only, across the axis
+    along which its images lie. Raises SourceError if voxels can't be read.
     """
     grid = find_grid(dataset, plan, voxels)
     axis = dataset.slice_axis(grid.level)
@@ -170,8 +168,8 @@ def places_in(lattice: Box, step: tuple[float, float, float]) -> _Places:
 
     lattice  the tile's lattice points
 
-    Along each axis they lie about `step` apart, from the first point to the last, and APRON more
-    lie beyond each.
+    Along each axis the places are about `step` apart, from the first lattice point to the last.
+    APRON more places lie beyond each end.
     """
     z, y, x = (
         _along(start, stop - 1, apart)
@@ -187,7 +185,7 @@ def _along(first: int, last: int, step: float) -> NDArray[np.float64]:
 
 
 def _region_at(dataset: Dataset, plan: Plan, level: int) -> Box:
-    """Return the planned region in voxels of a coarser level."""
+    """Return the planned region in voxels of another level, rounded outwards."""
     shape, coarse = dataset.levels[plan.level].shape, dataset.levels[level].shape
     start = [a * n // m for a, n, m in zip(plan.region.start, coarse, shape, strict=True)]
     stop = [-(-b * n // m) for b, n, m in zip(plan.region.stop, coarse, shape, strict=True)]
@@ -195,7 +193,7 @@ def _region_at(dataset: Dataset, plan: Plan, level: int) -> Box:
 
 
 def _factor(shape: _Triple, spacing: tuple[float, float, float], voxels: int) -> _Triple:
-    """Return the voxels (z, y, x) of a block, so that at most `voxels` blocks fill a shape."""
+    """Return the voxels (z, y, x) of a block such that at most `voxels` blocks fill a shape."""
     edge = (prod(n * s for n, s in zip(shape, spacing, strict=True)) / voxels) ** (1 / 3)
     while True:
         z, y, x = (min(max(1, round(edge / s)), n) for n, s in zip(shape, spacing, strict=True))
@@ -205,7 +203,7 @@ def _factor(shape: _Triple, spacing: tuple[float, float, float], voxels: int) ->
 
 
 def in_blocks(voxels: NDArray[Any], block: _Triple) -> NDArray[Any]:
-    """Return the whole blocks of voxels, (z, block z, y, block y, x, block x)."""
+    """Reshape voxels into complete blocks: (z, block z, y, block y, x, block x)."""
     counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
     whole = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
     z, y, x = counts
@@ -213,10 +211,10 @@ def in_blocks(voxels: NDArray[Any], block: _Triple) -> NDArray[Any]:
 
 
 def _means(voxels: NDArray[Any], block: _Triple) -> NDArray[np.float32]:
-    """Return the means of whole blocks, float32 (z, y, x)."""
+    """Return the means of complete blocks, float32 (z, y, x)."""
     counts = [n // size for n, size in zip(voxels.shape, block, strict=True)]
     total = voxels[tuple(slice(0, n * size) for n, size in zip(counts, block, strict=True))]
-    for axis, size in enumerate(block):  # one after the other: `mean` of all takes five times that
+    for axis, size in enumerate(block):  # one `mean` over all axes would take five times as long
         along = np.moveaxis(total, axis, 0)
         added = along[::size].astype(np.float32)
         for k in range(1, size):
@@ -226,6 +224,6 @@ def _means(voxels: NDArray[Any], block: _Triple) -> NDArray[np.float32]:
 
 
 def _spread(voxels: NDArray[np.generic], most: int) -> NDArray[np.float32]:
-    """Return at most so many values, spread evenly over the rows."""
+    """Return at most `most` values, spread evenly over the voxels."""
     every = -(-voxels.size // max(1, most))
     return voxels.reshape(-1)[:: every + (every % 2 == 0)].astype(np.float32)

@@ -1,4 +1,4 @@
-"""Read a label map coarsely: which blocks of voxels belong to an object, and where objects end."""
+"""Read a label map coarsely: the blocks of voxels that belong to objects, and objects' borders."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,17 +8,17 @@ from stereocell.planning.plan import Plan
 from stereocell.steps.labels import Labels
 from stereocell.steps.open_source import open_source
 
-_BORDER = 0.4  # factor for blocks at the end of an object: a line shows between two that touch
+_BORDER = 0.4  # 0..1, factor for blocks at an object's border, so that touching objects look apart
 
 
 def read_coarse_labels(plan: Plan, labels: Labels, voxels: int) -> CoarseChannel:
-    """Return the objects of a label map by blocks, at most `voxels` of them.
+    """Return the objects of a label map as at most `voxels` blocks.
 
-    The value of a block is the share, 0..1, of its voxels that belong to the object in its middle.
-    It is less at the ends of an object. The finest level is read, as a build does: coarser ones may
-    be averages of numbers.
+    The value of a block is the share, 0..1, of its voxels that belong to the object in its middle,
+    times _BORDER at an object's border. The finest level is read, as in a build, since coarser
+    levels may contain averages of object numbers.
 
-    Raises SourceError where voxels can't be read, or are no numbers of objects.
+    Raises SourceError if voxels can't be read, or are not numbers of objects.
     """
     dataset, numbers = open_source(labels.ref), labels.open()
     grid, axis = grid_at(dataset, plan, 0, voxels), dataset.slice_axis(0)
@@ -36,7 +36,7 @@ def read_coarse_labels(plan: Plan, labels: Labels, voxels: int) -> CoarseChannel
 
 
 def _is_border(numbers: NDArray[np.unsignedinteger]) -> NDArray[np.bool_]:
-    """Return where the next block along an axis belongs to another object, bool (z, y, x)."""
+    """Return the blocks whose next block along any axis is another object's, bool (z, y, x)."""
     found = np.zeros(numbers.shape, np.bool_)
     for axis in range(3):
         moved, other = np.moveaxis(found, axis, 0), np.moveaxis(numbers, axis, 0)

@@ -1,10 +1,11 @@
-"""Write the coarse volumes of a bundle's tiles, within a bound of bytes.
+"""Write the coarse volumes of a bundle's tiles, within a limit of bytes.
 
-A volume's voxels are the means of blocks (coarse_channel.py). How well they compress differs ten
-times between specimens, so the bound is on the bytes. Where they would be more, values are rounded
-to fewer greys, first those that the chosen function leaves invisible: noise, which is what
-compresses badly, is mostly in the last bits. If that is not enough, the voxels of all tiles lie
-farther apart than the blocks, which makes what is small and bright fainter.
+A volume's voxels are the means of blocks (coarse_channel.py). Their compression differs tenfold
+between specimens; hence the limit is on bytes, not on voxels. If a view would be too large, values
+are rounded to fewer greys, beginning with those that the chosen transfer function leaves invisible.
+This helps because noise, which compresses badly, is mostly in the last bits. If rounding is not
+enough, the voxels of all tiles lie farther apart than the blocks, which makes small bright
+structures fainter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,18 +34,22 @@ from stereocell.transfer.joint_histogram import to_eight_bits
 from stereocell.transfer.opacity import evaluate, invisible_below
 from stereocell.usd.composed_appearance import ComposedAppearance
 
-BYTES = 1_000_000  # most bytes of the files of a view, all channels and tiles together
+BYTES = 1_000_000  # bytes, limit for the files of a view, all channels and tiles together
 _OTHERS = 22_000  # bytes of a channel's other files: tables, histogram, lists
-# steps of grey from black to white, of what shows and of what the chosen function leaves invisible
+# Steps of grey between black and white, for visible and for invisible values, in order of trial.
 _ALL = (255, 255)
 _GREYS = (_ALL, (255, 15), (127, 15), (63, 15))
-_SAMPLED, _EACH = 6, 48  # planes that are compressed for an estimate, of so many
-# bytes of a texture with its mip levels over those of its finest one: noise has 1.14, tissue 1.2
+_SAMPLED, _EACH = (
+    6,
+    48,
+)  # for an estimate, the first number of planes is compressed out of the second
+# Bytes of a texture with all mip levels, as a multiple of the finest level's bytes. Measured: 1.14
+# for noise, 1.2 for tissue.
 _MIPS = 1.17
-_STEP = 1.02  # least factor by which voxels lie farther apart in another attempt
-_GAIN = 0.98  # share of the bytes from which an attempt brought too little for another one
+_STEP = 1.02  # smallest factor by which the distance of voxels grows in another attempt
+_GAIN = 0.98  # attempts end if the last one left more than this share of the bytes
 _Greys = tuple[int, int]
-_Sample = tuple[NDArray[np.uint8], float]  # planes, and how many there are for each of them
+_Sample = tuple[NDArray[np.uint8], float]  # planes, and the number of planes that each stands for
 Sizes = Mapping[str, tuple[int, int, int]]  # voxels (x, y, z) by the ID of the tile
 
 
@@ -62,9 +67,9 @@ class _CoarseVolume:
 
 @dataclass(frozen=True, slots=True)
 class CoarseTiles:
-    """The coarse volumes of all tiles, written.
+    """The coarse volumes of all tiles after they were written.
 
-    apart  distance between their voxels over that of the blocks that were read, from 1
+    apart  distance of their voxels as a multiple of the distance of the blocks; at least 1
     """
 
     tiles: tuple[BundleTile, ...]
@@ -79,14 +84,14 @@ def write_coarse_tiles(
     sizes: Sizes,
     holders: Mapping[str, Holder] = MappingProxyType({}),
 ) -> CoarseTiles:
-    """Write the coarse volumes of all tiles into a bundle, so that it has at most BYTES.
+    """Write the coarse volumes of all tiles into a bundle of at most BYTES.
 
-    Where that can't be, as with hundreds of tiles or channels, it has few more.
+    With hundreds of tiles or channels the bundle may become a little larger.
 
     sizes    see `first_view.write_first_view`
-    holders  what is air in the volumes of a build, by the channel's ID
+    holders  pieces that a build replaces by air, by the channel's ID
 
-    Raises OutputError where a file can't be written.
+    Raises OutputError if a file can't be written.
     """
     volumes = [
         _Source(channel, read[channel.voxels_id], appearance, holders.get(channel.id))
@@ -111,7 +116,7 @@ def write_coarse_tiles(
         while True:
             tiles = tuple(pool.map(write, plan.tiles))
             size = sum(ref.bytes for tile in tiles for one in tile.channels for ref in one.files)
-            # Many small tiles are no smaller for voxels that lie farther apart.
+            # Tiles that are already small do not shrink much when their voxels lie farther apart.
             if size <= most or size > _GAIN * before:
                 return CoarseTiles(tiles, apart)
             before = size
@@ -130,8 +135,8 @@ class _Source:
     def voxels(
         self, plan: Plan, tile: Tile, apart: float, planes: slice = slice(None)
     ) -> NDArray[np.uint8]:
-        """Return a tile's voxels with the apron, window applied, (z, y, x); or some planes."""
-        # means before other places: between them, places would miss voxels
+        """Return a tile's voxels with the apron, uint8 (z, y, x) of the window; or some planes."""
+        # Averaging comes before interpolation, which would skip voxels between distant places.
         coarse = self.coarse.averaged(int(apart))
         step = [one * apart for one in self.coarse.grid.step]
         z, y, x = places_in(tile.lattice(plan.region), (step[0], step[1], step[2]))
@@ -142,7 +147,9 @@ class _Source:
         return to_eight_bits(values, self.appearance.window)
 
     def rounded(self, voxels: NDArray[np.uint8], greys: _Greys) -> NDArray[np.uint8]:
-        """Return 8-bit values rounded to so many greys; what shows and what does not stays so."""
+        """Round 8-bit values to fewer greys. Visible values stay visible, invisible ones do not
+        become visible.
+        """
         if greys == _ALL:
             return voxels
         points = self.appearance.transfer_functions[self.appearance.chosen]
@@ -154,7 +161,7 @@ class _Source:
 
 
 def _sampled(plan: Plan, source: _Source) -> list[_Sample]:
-    """Return some planes of each part of a channel's volumes, where voxels lie as it was read."""
+    """Return some planes of each part of a channel's volumes, at the distance of the blocks."""
     found = []
     for tile in plan.tiles:
         count = len(places_in(tile.lattice(plan.region), source.coarse.grid.step)[0])
@@ -167,7 +174,7 @@ def _sampled(plan: Plan, source: _Source) -> list[_Sample]:
 
 
 def _estimate(greys: _Greys, source: _Source, sampled: Sequence[_Sample]) -> float:
-    """Return about how many bytes the volumes of a channel have in so many greys."""
+    """Return the approximate number of bytes of a channel's volumes, rounded to these greys."""
     return sum(
         _MIPS * share * len(encode_3d([source.rounded(part, greys)]).data)
         for part, share in sampled
@@ -175,7 +182,7 @@ def _estimate(greys: _Greys, source: _Source, sampled: Sequence[_Sample]) -> flo
 
 
 def _steps(values: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Return values of 0 to 255, each the nearest of so many steps; both ends are steps."""
+    """Round values of 0 to 255 to the nearest of `count` steps; 0 and 255 stay."""
     return np.rint(np.rint(values * (count / 255)) * (255 / count)).astype(np.int64)
 
 
@@ -188,12 +195,16 @@ def _write_tile(
     counted: Mapping[str, NDArray[np.uint8]],
     sizes: Sizes,
 ) -> BundleTile:
-    """Write the volumes of a tile; `counted`: the same voxels before they were rounded."""
+    """Write the volumes of a tile.
+
+    stored   voxels by channel, rounded to fewer greys
+    counted  the same voxels before rounding, for histograms
+    """
     lattice = tile.lattice(plan.region)
     first, last = plan.position_um(lattice.start), plan.position_um([n - 1 for n in lattice.stop])
     corners = world_box(first, last)
     low, high = (_point(corner) for corner in corners)
-    matrix = np.array(plan.placement).T  # USD's matrices are for row vectors
+    matrix = np.array(plan.placement).T  # USD's matrices multiply row vectors
     channels = []
     for channel, appearance in zip(plan.channels, appearances, strict=True):
         if channel.id not in stored:

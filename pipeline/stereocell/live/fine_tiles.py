@@ -1,4 +1,4 @@
-"""Read one tile of a source as finely as a build does, in 8 bits of a view's window."""
+"""Read one tile of a source as finely as a build does, in 8 bits over a view's window."""
 
 from dataclasses import dataclass, replace
 from math import prod
@@ -20,9 +20,10 @@ from stereocell.read import Dataset
 from stereocell.steps.cut_voxels import cut_voxels
 from stereocell.transfer.joint_histogram import to_eight_bits
 
-# Largest tile that is read at the planned level, voxels: about 350 MB while its tree is made
+# Voxels of the largest tile that is read at the planned level. It takes about 350 MB of memory
+# while its tree is made.
 PLANNED_VOXELS = 1 << 26
-COARSER_VOXELS = 1 << 24  # voxels of a larger tile, which is read coarser than planned
+COARSER_VOXELS = 1 << 24  # voxels to which a larger tile is reduced
 
 
 class ReadFine(Protocol):
@@ -41,9 +42,9 @@ class FineTiles:
     dataset: Dataset
 
     def sizes(self) -> dict[str, tuple[int, int, int]]:
-        """Return the voxels (x, y, z) that each tile is read with, with the apron, by its ID.
+        """Return the number of voxels (x, y, z) of each tile, with the apron, by the tile's ID.
 
-        Objects of a label map are not read so: their build is finer.
+        The result is empty for a label map without an image: its objects are not read by tiles.
         """
         if not self.plan.channels:
             return {}
@@ -52,12 +53,12 @@ class FineTiles:
     def read(
         self, tile_id: str, channel_id: str, window: tuple[float, float], holder: Holder | None
     ) -> NDArray[np.uint8]:
-        """Return a tile's voxels with the apron, uint8 (z, y, x): those of a build, if all fit.
+        """Return a tile's voxels with the apron, uint8 (z, y, x), as fine as a build's if they fit.
 
         window  voxel values that become 0 and 255
-        holder  what is air in the volume of a build; None: nothing is
+        holder  pieces that a build replaces by air, or None
 
-        Raises SourceError where the source can't be read, or has changed since it was planned.
+        Raises SourceError if the source can't be read, or has changed since it was planned.
         """
         try:
             voxels = self._read(tile_id, channel_id, holder)
@@ -82,13 +83,13 @@ class FineTiles:
         return voxels if holder is None else holder.left_out_at(voxels, places)
 
     def change(self) -> str:
-        """Return a line where the source has changed since it was planned; empty: it has not."""
+        """Return an error's line if the source has changed since it was planned, else ''."""
         states = first_states(source_of(self.plan))
         if states is None or not states.changed():
             return ""
         return (
-            f"{self.plan.source}: changed since it was opened, expected a source that does not "
-            "change while it is shown: end the command and run it again"
+            f"{self.plan.source}: changed since it was opened; expected a source that does not "
+            "change while it is shown. End the command and run it again."
         )
 
     def _require_unchanged(self) -> None:

@@ -1,6 +1,6 @@
-"""How a channel is drawn before a build has surveyed it.
+"""Choose a channel's appearance before a build has surveyed it.
 
-The rules are those of a build, and the voxels are coarse.
+The rules are the same as in a build, applied to coarse voxels.
 """
 
 from dataclasses import replace
@@ -30,21 +30,21 @@ from stereocell.transfer.joint_histogram import (
 )
 from stereocell.transfer.windows import parse_window
 
-JOINT_VOXELS = 1_000_000  # about the number of voxels that are counted by value and gradient
+JOINT_VOXELS = 1_000_000  # approximate number of voxels in the histogram of value and gradient
 
 
 def load_kernels() -> None:
-    """Load the compiled code that `first_appearance` calls, which takes a third of a second."""
+    """Load the compiled code that `first_appearance` needs. This takes a third of a second."""
     denoise(Volume(np.zeros((2, 2, 2), np.float32), (1.0, 1.0, 1.0)), 1.0)
 
 
 def first_appearance(
     plan: Plan, channel: Channel, coarse: CoarseChannel
 ) -> tuple[Appearance, bool]:
-    """Return a channel's appearance as far as its coarse voxels show it, and whether it is a body.
+    """Return a channel's appearance, found in its coarse voxels, and whether it is a body.
 
-    The window, the level and the transfer functions follow the rules of a build. A level is chosen
-    without the connected components, which only all voxels show.
+    The window, the iso-value and the transfer functions follow the rules of a build. The iso-value
+    is chosen without connected components, which only the full resolution shows.
     """
     spacing = tuple(a * b for a, b in zip(coarse.grid.step, plan.spacing_um, strict=True))
     z, y, x = spacing
@@ -61,20 +61,20 @@ def first_appearance(
     statistics = replace(statistics, suggested=suggested)
     window = Window(statistics, found.counting, None, found.max_shift)
     whole = Tile("r0_c0", Box((0, 0, 0), coarse.voxels.shape))
-    # a plan of the coarse voxels: one tile, whose evidence is that of the channel
+    # This plan is for the coarse voxels. It has one tile, with the evidence of the whole channel.
     small = replace(plan, spacing_um=(z, y, x), region=whole.box, tiles=(whole,))
     level = find_level(small, channel, window, {whole.id: found.evidence})
     iso = {whole.id: level_of_tile(small, whole, level, 0, {})}
-    # Functions are those of the planned voxels, which take the place of the coarse ones.
+    # Transfer functions follow the planned voxels, which will replace the coarse ones.
     fine = replace(plan, tiles=(Tile(whole.id, plan.region),))
     appearance = appearance_of(fine, channel, Chosen(level, 0, {}, iso))
     return appearance, is_body(appearance, statistics)
 
 
 def _find_gradient_max(volume: Volume, window: tuple[float, float]) -> float:
-    """Return the scale of gradients in functions of two dimensions, by the rule of a build.
+    """Return the largest gradient of 2D transfer functions, by the rule of a build.
 
-    Boundaries between materials are not looked for: that takes longer than all else.
+    Boundaries between materials are not searched, since that takes longer than everything else.
     """
     every = -(-volume.voxels.size // JOINT_VOXELS)
     counts = count_joint(

@@ -1,4 +1,4 @@
-"""A source as far as it can be shown before it is built: its plan, coarse voxels, a first view."""
+"""Prepare a source for display before it is built: its plan, coarse voxels and a first view."""
 
 import threading
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from stereocell.steps.open_source import open_source
 
 @dataclass(slots=True)
 class FirstLook:
-    """A source that is settled; its voxels are read once, at first need."""
+    """A source with its settled plan. The voxels are read once, when first needed."""
 
     plan: Plan
     dataset: Dataset
@@ -29,12 +29,12 @@ class FirstLook:
     def at(
         cls, source: str, settings: Settings, choice: Sequence[str], *, title: str = ""
     ) -> "FirstLook":
-        """Settle the plan of a source; the arguments are those of `settle`. Raises as it does."""
-        # The kernels load while the source is read and hashed, which leaves the interpreter idle.
+        """Settle the plan of a source. The arguments and errors are those of `settle`."""
+        # The kernels load in a thread while reading and hashing leave the interpreter idle.
         loading = threading.Thread(target=load_kernels, daemon=True)
         loading.start()
         plan = settle(source, settings, choice, title=title)
-        # USD may be imported next: it would wait for ever for a thread that loads a library
+        # An import of USD would wait for ever for a thread that loads a library.
         loading.join()
         return cls(plan, open_source(as_asked(plan.source, plan.settings.plan)))
 
@@ -45,5 +45,5 @@ class FirstLook:
         return self._read
 
     def write(self, bundle: Path, sizes: Sizes | None = None) -> None:
-        """Write the first view into a folder; see `write_first_view`."""
+        """Write the first view into a folder; see `first_view.write_first_view`."""
         write_first_view(self.plan, self.read(), bundle, sizes)

@@ -1,7 +1,7 @@
 """Write the first view of a source: a bundle of coarse volumes, without surfaces.
 
-It has the tiles, channels and files of the bundle that a build writes, by the same code and the
-same schema, so that every viewer of bundles shows it. Its voxels alone are coarse.
+The bundle has the same tiles, channels and kinds of files as the bundle of a build. The same code
+writes it, by the same schema, so that every viewer of bundles shows it. Only its voxels are coarse.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -31,7 +31,7 @@ from stereocell.transfer.opacity import SHARP, SOFT, SURFACE
 from stereocell.usd.composed_appearance import ComposedAppearance, StatedLevel
 from stereocell.usd.opening import PATIENT_SIDES, opening_plane
 
-# Largest number of voxels that are kept of a source, all channels together
+# Most coarse voxels of a source, all channels together.
 VOXELS = 4_000_000
 NOT_BUILT = "its surface is not built yet"
 OBJECTS_NOT_BUILT = "its objects are not built yet"
@@ -42,10 +42,10 @@ def read_channels(
 ) -> dict[str, CoarseChannel]:
     """Return the coarse voxels of a plan's channels, by the ID of their voxels.
 
-    on_read  is given the share, 0..1, of what is read, after each part of it; by any thread
+    on_read  called from any thread after each part that is read, with the part's share, 0..1
 
-    Of label maps without an image they are the objects'. Raises SourceError where the source can't
-    be read.
+    For label maps without an image, the voxels show the objects. Raises SourceError if the source
+    can't be read.
     """
     shown = _shown(plan)
     channels = [channel for channel in shown.channels if channel.id not in shown.shared_volumes]
@@ -73,9 +73,9 @@ def write_first_view(
     """Write a bundle of a plan's coarse volumes, without a page, into a folder.
 
     read    see `read_channels`
-    sizes   of the tiles' finer volumes, which a host has; see `FineTiles.sizes`; None: it has none
+    sizes   sizes of the finer volumes that the server can send (see `FineTiles.sizes`), or None
 
-    Raises OutputError where a file can't be written.
+    Raises OutputError if a file can't be written.
     """
     with ThreadPoolExecutor(cores()) as pool:
         found = list(
@@ -97,7 +97,7 @@ def write_first_view(
 
 
 def _shown(plan: Plan) -> Plan:
-    """Return a plan with the channels of its first view: its own, or else its label maps."""
+    """Return a plan with the channels of its first view: its channels, or else its label maps."""
     if plan.channels:
         return replace(plan, labels=())
     channels = tuple(Channel(one.channel, one.name, one.color) for one in plan.labels)
@@ -113,7 +113,7 @@ def write_view(
     is_cut: bool,
     finished: Collection[str] = (),
 ) -> None:
-    """Write what a bundle has once, where the files of its tiles lie already.
+    """Write the files of a bundle that all tiles share; the tiles' own files must exist.
 
     is_cut    whether the specimen opens cut
     finished  IDs of the tiles that have their surfaces
@@ -152,14 +152,15 @@ def write_view(
 def as_surface(
     appearance: ComposedAppearance, coarse: CoarseChannel, apart: float
 ) -> ComposedAppearance:
-    """Return how a channel is drawn until its surface is there.
+    """Return a channel's appearance until its surface is built.
 
     apart  see `CoarseTiles`
 
-    A channel that opens translucent beside its surface looks like that surface as long as there is
-    none: the picture would be much darker than that of the build. Of coarse voxels a surface would
-    be full of holes, so they are opaque bodies. If the surface lies at a height above a background,
-    no one value of the voxels is where it is, and they stay translucent.
+    A finished channel may open with a surface and a translucent volume. Without the surface, the
+    image would be much darker than the build's; the volume is therefore drawn like a surface. A
+    thin surface in coarse voxels would be full of holes, so coarse voxels are drawn as opaque
+    bodies. If the iso-value is relative to a background, no single value marks the surface, and
+    coarse voxels stay translucent.
     """
     is_coarse = apart * max(coarse.grid.step) > 1
     like = SHARP if is_coarse else SURFACE
@@ -170,7 +171,7 @@ def as_surface(
 
 
 def composed(appearance: Appearance) -> ComposedAppearance:
-    """Return a channel's appearance as the stage of a build states it, but for its surface."""
+    """Return a channel's appearance as the stage of a build states it, without a surface."""
     level, stated = appearance.level, None
     if level is not None:
         stated = StatedLevel(level.iso, level.background_range, level.smoothing_um)

@@ -1,7 +1,7 @@
 """The views of a source while it is built: surfaces of finished tiles, coarse volumes elsewhere.
 
-Each view is a bundle in a folder of its own, so that a page may go on with an older one. Files that
-two views share are hard links.
+Each view is a bundle in a folder of its own, so that a page can still use an older view. Files that
+several views share are hard links.
 """
 
 import os
@@ -29,12 +29,12 @@ from stereocell.steps.unit_files import is_whole
 from stereocell.usd.composed_appearance import ComposedAppearance
 from stereocell.usd.written_files import STAGE_NAME
 
-REST = 10.0  # so that views take at most a tenth of the time of a build
+REST = 10.0  # factor; views take at most about a tenth of the time of a build
 
 
 @dataclass(frozen=True, slots=True)
 class _Survey:
-    """The inputs that all views of a build share. The survey of the build decides them."""
+    """The inputs that all views of a build share. They come from the survey of the build."""
 
     plan: Plan
     units: Mapping[str, Path]
@@ -46,15 +46,15 @@ class _Survey:
 
 
 class PartialView:
-    """Writes a view whenever a tile has been finished.
+    """Writes views as tiles are finished.
 
-    plan     of the first view
-    read     the coarse voxels that it shows, by the ID of the voxels
+    plan     the plan of the first view
+    read     coarse voxels of the first view, by the ID of the voxels
     out      the folder of the build
     scratch  the folder of the views
     sizes    see `write_first_view`
-    rest     time between two views, as a multiple of that which the last one took: of many tiles
-             only some bring a view
+    rest     least time between two views, as a multiple of the time that the last one took; with
+             many tiles, not every tile leads to a view
     """
 
     def __init__(
@@ -69,52 +69,51 @@ class PartialView:
     ) -> None:
         self._plan, self._read, self._out, self._scratch = plan, read, out, scratch
         self._sizes = sizes or {}
-        self._rest, self._next_s, self._has_news = rest, 0.0, False
+        self._rest, self._next_s, self._has_unseen = rest, 0.0, False
         self._survey: _Survey | None = None
         self._finished: dict[str, BundleTile] = {}
-        self.holders: Mapping[str, Holder] = {}  # what a build leaves out, by the channel's ID
+        self.holders: Mapping[str, Holder] = {}  # pieces that the build leaves out, by channel ID
 
     @property
     def finished(self) -> int:
-        """How many tiles are finished."""
+        """Number of finished tiles."""
         return len(self._finished)
 
     def add(self, tile_id: str | None) -> Path | None:
-        """Return the folder of a new view if a tile has just got its surfaces; None: none has.
+        """Write a view if a tile has new surfaces, and return its folder; else return None.
 
-        tile_id  the tile to which a unit has come; None: all tiles are looked at, as at the start
-                 and the end, and no time has to pass before a view
+        tile_id  the tile whose unit was just built; None to check all tiles, and to write a view
+                 without waiting, as at the start and the end of a build
 
-        Of label maps without an image there is none: their objects show once all are built.
-
-        A build of another plan than that of the first view has no views of its own: the source or
-        what is known of it has changed meanwhile.
+        A label map without an image gets no views: its objects show once all are built. There are
+        no views either if the build has another plan than the first view, because the source or
+        its metadata changed meanwhile.
         """
         survey = self._survey or self._begin()
         if survey is None:
             return None
-        news = [
+        new = [
             tile
             for tile in survey.plan.tiles
             if tile_id in (None, tile.id)
             and tile.id not in self._finished
             and all(is_whole(folder) for folder in _units_of(survey, tile))
         ]
-        for tile in news:
+        for tile in new:
             self._finished[tile.id] = self._export(survey, tile)
-        self._has_news |= bool(news)
+        self._has_unseen |= bool(new)
         began_s = time.monotonic()
-        if not self._has_news or (tile_id is not None and began_s < self._next_s):
+        if not self._has_unseen or (tile_id is not None and began_s < self._next_s):
             return None
         root = self._write(survey)
         end_s = time.monotonic()
-        self._has_news, self._next_s = False, end_s + self._rest * (end_s - began_s)
+        self._has_unseen, self._next_s = False, end_s + self._rest * (end_s - began_s)
         return root
 
     def _begin(self) -> _Survey | None:
-        """Prepare the views: write the stage that all tiles share, and the coarse volumes anew.
+        """Prepare the views: write the stage that all tiles share, and the coarse volumes again.
 
-        The windows of the survey are those of all voxels, and hold from now on.
+        The coarse volumes now use the survey's windows, which come from all voxels.
         """
         if not self._plan.channels:
             return None
@@ -125,8 +124,9 @@ class PartialView:
         survey = read_survey(out_folder)
         found = {channel.id: survey[channel.id].holder for channel in plan.channels}
         self.holders = {name: holder for name, holder in found.items() if holder is not None}
-        for left in ("coarse", "parts", "stage"):  # by a build that was ended; its views stay
-            shutil.rmtree(self._scratch / left, ignore_errors=True)
+        # An earlier build that was stopped may have left these folders. Its views stay.
+        for leftover in ("coarse", "parts", "stage"):
+            shutil.rmtree(self._scratch / leftover, ignore_errors=True)
         steps = unit_steps(plan, survey)
         units = {name: out_folder.unit_dir(name, step.key) for name, step in steps.items()}
         folder = self._stage.parent
@@ -157,9 +157,9 @@ class PartialView:
         return self._scratch / "stage" / STAGE_NAME
 
     def _export(self, survey: _Survey, tile: Tile) -> BundleTile:
-        """Return a tile with its surfaces, written by way of the stage, and its coarse volumes."""
+        """Export a tile's surfaces through the stage; return the tile with its coarse volumes."""
         step = stage_tile_step(survey.plan, tile, survey.units, {}, self._stage.parent)
-        # without volumes, which are most of the work: the coarse ones stay
+        # The volumes are most of the work. They are not written, since the coarse ones stay.
         replace(step, shared=frozenset(unit.channel_id for unit in step.units)).run()
         part = self._scratch / "parts" / tile.id
         write_tile(self._stage, part, appearances=survey.appearances, step_m=survey.step_m)
@@ -186,7 +186,7 @@ class PartialView:
         write_view(
             survey.plan,
             root,
-            [_as_far_as_built(one, i, tiles) for i, one in enumerate(appearances)],
+            [_with_built_surface(one, i, tiles) for i, one in enumerate(appearances)],
             tiles,
             is_cut=survey.is_cut,
             finished=self._finished,
@@ -198,17 +198,17 @@ def _units_of(survey: _Survey, tile: Tile) -> list[Path]:
     return [survey.units[f"{tile.id}/{channel.id}"] for channel in survey.plan.channels]
 
 
-def _as_far_as_built(
+def _with_built_surface(
     appearance: ComposedAppearance, channel: int, tiles: Sequence[BundleTile]
 ) -> ComposedAppearance:
-    """Return a channel's appearance in a view: without a surface as long as no tile has one."""
+    """Return a channel's appearance in a view: without a surface until some tile has one."""
     if appearance.surface == "none" or any(tile.channels[channel].lods for tile in tiles):
         return appearance
     return replace(appearance, surface="none", surface_reason=NOT_BUILT)
 
 
 def _merge(built: TileChannel, coarse: TileChannel) -> TileChannel:
-    """Return a tile's channel with the surfaces of the one and the volume of the other."""
+    """Combine the surfaces of a tile's built channel with the volume of its coarse channel."""
     return replace(
         coarse,
         lods=built.lods,
@@ -219,7 +219,7 @@ def _merge(built: TileChannel, coarse: TileChannel) -> TileChannel:
 
 
 def _link(file: Path, place: Path) -> None:
-    """Put a file at a second place, as a copy where the system allows no link."""
+    """Link a file to a second place; copy it if the system allows no link."""
     place.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(file, place)

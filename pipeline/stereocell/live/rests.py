@@ -1,7 +1,7 @@
-"""Let a build rest for moments, while someone waits for a picture on the same machine.
+"""Let a build rest for moments while somebody waits for a frame on the same machine.
 
-A lower priority alone is not enough: Linux shares the cores between sessions, and a desktop between
-its programs, before a process of low priority gives way to another.
+A lower priority is not enough. Linux first divides the cores between sessions, and a desktop
+between its programs; priorities only count within each of them.
 """
 
 import os
@@ -13,31 +13,31 @@ from contextlib import contextmanager, suppress
 
 import psutil
 
-REST_S = 0.5  # s that a rest lasts after the last request for it
-MOST_S = 2.0  # s of the longest rest; the build then works for as long as it has rested
+REST_S = 0.5  # s that a rest continues after the last request for it
+MOST_S = 2.0  # s, longest rest; the build then works for at least as long as it rested
 
 
 def lead_group() -> None:
-    """Let this process and its later children be a group of processes.
+    """Make this process the leader of a process group with its later children.
 
-    Where the parent is killed during a rest, the system continues a whole group, and ends it.
+    If the parent is killed during a rest, the system wakes the whole stopped group and ends it.
     """
     if sys.platform != "win32":
         os.setpgid(0, 0)
 
 
 class Rests:
-    """The rests of one process and its children. All methods may be called from any thread."""
+    """The rests of one process and its children. Any thread may call these methods."""
 
     def __init__(self, process: int) -> None:
-        """process: its number."""
+        """process: the process's number (PID)."""
         self._process = psutil.Process(process)
         self._changed = threading.Lock()
         self._is_over = threading.Event()
         self._thread: threading.Thread | None = None
         self._waiting = 0
         self._until_s = self._not_before_s = 0.0
-        self.rested_s = 0.0  # of all rests that have ended
+        self.rested_s = 0.0  # s, sum of all rests that have ended
 
     def ask(self) -> None:
         """Let the process rest for REST_S from now, unless it has just rested for MOST_S."""
@@ -48,7 +48,7 @@ class Rests:
 
     @contextmanager
     def while_someone_waits(self) -> Iterator[None]:
-        """Let the process rest as long as the body runs, though it works half of a longer time."""
+        """Let the process rest in the `with` block; in a long block it works half the time."""
         with self._changed:
             self._waiting += 1
             self._begin(time.monotonic())
@@ -59,7 +59,7 @@ class Rests:
                 self._waiting -= 1
 
     def end(self) -> None:
-        """Let the process work, and never rest again."""
+        """Let the process work without any more rests."""
         self._is_over.set()
         with self._changed:
             thread = self._thread
@@ -92,14 +92,15 @@ class Rests:
 
 
 def _tree_of(process: psutil.Process) -> Iterator[psutil.Process]:
-    """Yield a process, and then the children that it has had until then."""
+    """Yield a process, and then the children that it has when the caller asks for them."""
     yield process
-    with suppress(psutil.Error):  # it has ended
+    with suppress(psutil.Error):  # the process has ended
         yield from process.children(recursive=True)
 
 
 def _stop(process: psutil.Process) -> None:
-    for one in _tree_of(process):  # a stopped process gets no more children
+    # The parent is stopped before its children are listed, so that it can't start more of them.
+    for one in _tree_of(process):
         with suppress(psutil.Error):
             one.suspend()
 

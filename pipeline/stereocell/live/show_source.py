@@ -32,8 +32,8 @@ from stereocell.storage.location import Location
 def is_source(place: Path | str) -> bool:
     """Return whether a place is a source, and neither a build nor a bundle.
 
-    A path that does not exist counts as a source if its name ends as those of a format do: then the
-    reader reports that it is missing.
+    A path that does not exist counts as a source if its name has the ending of a known format. The
+    reader then reports that it is missing.
     """
     if isinstance(place, Path) and place.exists():
         return contents_of(place).kind in (Kind.FILE, Kind.FOLDER)
@@ -44,11 +44,11 @@ def is_source(place: Path | str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Behind:
-    """The build behind the first view of a source.
+    """The build that runs while the first view of a source is shown.
 
     build         builds into a folder; see `build_process.Build`
-    out           the folder; None: one in the working folder that is named after the source
-    serve_bundle  serves the bundle of a build that has finished earlier, until it is stopped
+    out           the folder; None for one in the working folder, named after the specimen
+    serve_bundle  serves the bundle of a build that finished earlier, until the user stops it
     """
 
     build: Callable[[Path, Watch], str]
@@ -61,11 +61,11 @@ class Live:
     """A source that is shown.
 
     page     the folder of the viewer
-    bundle   the folder of the first view, once `first` has a result
-    first    done once the first view is written; its error is why that can't be
-    fine     the tiles that are looked at, read from the source; None: the views stay coarse
-    build    the build behind the view; None: it is only looked at
-    reading  how much has been read for the first view
+    bundle   the folder of the first view; complete once `first` has a result
+    first    done once the first view is written; holds the error if it can't be written
+    fine     reads tiles in view at full resolution; None if the views stay coarse
+    build    the build that runs meanwhile; None if the source is only shown
+    reading  the share that has been read for the first view
     """
 
     page: Path
@@ -85,23 +85,23 @@ def show_source(
     *,
     title: str = "",
 ) -> None:
-    """Serve a source: its first view, which is written meanwhile, and then what is built of it.
+    """Serve a source: its first view, which is written meanwhile, and then the views of its build.
 
-    A source whose build has finished earlier is shown by its bundle.
+    If a build of the source finished earlier, its bundle is served instead.
 
     choice  notes on how the settings were chosen; see `load_for`
-    serve   serves until it is stopped, or until there can be no first view
-    behind  how the source is built meanwhile; None: it is only looked at
-    title   the name of the specimen; empty: the one that the source gives it
+    serve   serves until the user stops it, or until the first view turns out to be impossible
+    behind  the build that runs meanwhile; None to show the source only
+    title   the name of the specimen; empty for the name in the source
 
-    Raises StereoCellError where the source can't be read. The views are removed at the end.
+    Raises StereoCellError if the source can't be read. The views are removed at the end.
     """
     began_s = time.monotonic()
     page = viewer_dist()
     if page is None:
         raise OutputError("the viewer is not built: run `make setup`")
     if not Location.of(source).is_local:
-        _print(f"reading {printable(source)}")  # an answer may take a while
+        _print(f"reading {printable(source)}")  # a remote source may take a while to answer
     look = FirstLook.at(source, settings, choice, title=title)
     plan = look.plan
     fine = FineTiles(plan, look.dataset)
@@ -111,14 +111,14 @@ def show_source(
         require_place(source, out, plan)
         if (bundle := finished_bundle(out, plan)) is not None:
             _print(
-                f"built earlier into {printable(str(out))}, which is shown; "
-                f"`stereocell build {shlex.quote(source)} -o {shlex.quote(str(out))}` checks it"
+                f"showing the finished build in {printable(str(out))}; to check it, run "
+                f"`stereocell build {shlex.quote(source)} -o {shlex.quote(str(out))}`"
             )
             behind.serve_bundle(bundle)
             return
-        build = BuildProcess(partial(behind.build, out), out, partial(_why_stopped, fine))
+        build = BuildProcess(partial(behind.build, out), out, partial(_explain_stop, fine))
     else:
-        print_notes(plan)  # a build prints them itself
+        print_notes(plan)  # a build would print the notes itself
     with tempfile.TemporaryDirectory(prefix="stereocell-", ignore_cleanup_errors=True) as folder:
         scratch, first = Path(folder), Future[None]()
         live = Live(page, scratch / "bundle", first, fine, build, Reading(_print))
@@ -128,17 +128,18 @@ def show_source(
                 read = look.read(live.reading.add)
                 sizes = fine.sizes()
                 look.write(live.bundle, sizes)
-            except BaseException as error:  # the command raises it
+            except BaseException as error:  # the command raises it again from `first`
                 first.set_exception(error)
                 return
             first.set_result(None)
             seconds = time.monotonic() - began_s
-            _print(f"first view: {printable(plan.name)} after {seconds:.1f} s, by coarse volumes")
+            _print(f"first view of {printable(plan.name)} after {seconds:.1f} s: coarse volumes")
             if build is None:
-                _print(f"for surfaces: stereocell build {shlex.quote(source)} -o OUT")
+                _print(f"for surfaces, run `stereocell build {shlex.quote(source)} -o OUT`")
             else:
                 _print(
-                    f"built behind the page into {printable(str(build.out))}; --no-build only shows"
+                    f"building surfaces into {printable(str(build.out))}; use --no-build to only "
+                    "show the source"
                 )
                 build.start(Coarse(plan, read, build.out, scratch, sizes))
 
@@ -152,11 +153,11 @@ def show_source(
             first.result()
 
 
-def _why_stopped(fine: FineTiles, line: str) -> str:
-    """Return, and print, why a build has stopped, which has ended with a line."""
-    why = fine.change() or line
-    _print(f"the build has stopped: {why}")
-    return why
+def _explain_stop(fine: FineTiles, line: str) -> str:
+    """Print and return the reason why a build stopped: a changed source, or the error's line."""
+    reason = fine.change() or line
+    _print(f"the build has stopped: {reason}")
+    return reason
 
 
 def _print(line: str) -> None:

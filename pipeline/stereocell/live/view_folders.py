@@ -1,4 +1,4 @@
-"""Folders of the views of a source: `g1`, `g2`, ..., so that a page may go on with an older one."""
+"""Number the folders of a source's views, `g1`, `g2`, ..., so that older views stay usable."""
 
 import re
 from pathlib import Path
@@ -7,13 +7,13 @@ _NAME = re.compile(r"g([1-9][0-9]{0,8})")
 
 
 def next_view(folder: Path) -> Path:
-    """Return the place of a further view in a folder, numbered after all that are there."""
+    """Return the path for the next view in a folder, numbered after all existing ones."""
     numbers = [int(found[1]) for found in map(_number_in, folder.glob("g*")) if found]
     return folder / f"g{1 + max(numbers, default=0)}"
 
 
 def find_view(folder: Path, name: str) -> Path | None:
-    """Return the folder of a view by its name; None: there is no such view."""
+    """Return the folder of a view by its name; None if there is no such view."""
     found = folder / name
     return found if _NAME.fullmatch(name) and found.is_dir() else None
 

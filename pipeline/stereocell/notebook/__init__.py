@@ -1,1 +1,1 @@
-"""The viewer in a notebook: the page in a frame, fed by the kernel, without a server."""
+"""Show the viewer in a notebook: its page in a frame, with files from the kernel, not a server."""

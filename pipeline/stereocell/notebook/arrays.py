@@ -1,8 +1,8 @@
-"""An array becomes a source that a build reads: one file, as fine as a notebook has patience for.
+"""Turn an array into a source that a build reads: one file, small enough for a quick build.
 
-numpy, dask, zarr and xarray are told by what they have, so that none of them has to be installed.
-A larger array is made coarser by means over blocks of voxels, whose edges are as equal in um as can
-be; it is read a block of planes at a time, so that no more of it is in memory.
+Arrays of numpy, dask, zarr and xarray are recognised by their attributes, so that none of these
+packages must be installed. A large array is reduced by averaging blocks of voxels, whose edges are
+as equal in um as possible. It is read by a few planes at a time to save memory.
 """
 
 import hashlib
@@ -22,20 +22,20 @@ from stereocell.read.spacing import um_per
 
 Triple = tuple[float, float, float]
 
-MAX_VOXELS = 4_000_000  # voxels of all channels: their build takes half a minute on two cores
-_MAX_READ = 2**30  # voxels: more take minutes to read
-_MIN_EDGE = 4  # voxels: a thinner array has no surface
+MAX_VOXELS = 4_000_000  # voxels of all channels; their build takes half a minute on two cores
+_MAX_READ = 2**30  # voxels, largest array; a larger one takes minutes to read
+_MIN_EDGE = 4  # voxels, shortest edge; a thinner array has no surface
 _AXES = {3: "zyx", 4: "czyx"}
-_READ_AT_ONCE = 2**24  # voxels
+_READ_AT_ONCE = 2**24  # voxels that are read at a time
 
 
 @dataclass(frozen=True, slots=True)
 class ArraySource:
-    """An array as a notebook was given it.
+    """An array that a notebook shows.
 
-    data        whatever slices into numpy arrays, (z, y, x) or (c, z, y, x)
-    spacing_um  (z, y, x)
-    channels    names
+    data        an array (z, y, x) or (c, z, y, x) whose slices convert to numpy arrays
+    spacing_um  voxel spacing (z, y, x), um
+    channels    names of the channels
     """
 
     data: Any
@@ -44,12 +44,12 @@ class ArraySource:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """(c, z, y, x)."""
+        """The shape as (c, z, y, x)."""
         shape = tuple(int(n) for n in self.data.shape)
         return (1, *shape) if len(shape) == 3 else shape  # type: ignore[return-value]
 
     def planes(self, channel: int, start: int, stop: int) -> NDArray[Any]:
-        """Return planes of a channel."""
+        """Return the planes `start` to `stop` of a channel, (z, y, x)."""
         whole = self.data if len(self.data.shape) == 3 else self.data[channel]
         return np.asarray(whole[start:stop])
 
@@ -62,63 +62,68 @@ def is_array(source: Any) -> bool:
 def as_source(
     array: Any, spacing_um: Sequence[float] | None, channels: Sequence[str] | None
 ) -> ArraySource:
-    """Return an array with its spacing and channels; those that are given go before its own.
+    """Return an array with its spacing and channels. The arguments override the array's own.
 
-    Raises UsageError where it can't be a volume.
+    Raises UsageError if the array can't be a volume.
     """
     shape = tuple(array.shape)
     size = " x ".join(str(n) for n in shape)
     if len(shape) not in _AXES:
         raise UsageError(
-            f"the array has {len(shape)} axes ({size}), expected (z, y, x) or (c, z, y, x)"
+            f"the array has {len(shape)} axes ({size}); expected (z, y, x) or (c, z, y, x)"
         )
     axes = _AXES[len(shape)]
     dims = tuple(str(dim).lower() for dim in getattr(array, "dims", ()))
     if dims and dims != tuple(axes):
         raise UsageError(
-            f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}: transpose it"
+            f"the array's axes are {', '.join(dims)}; expected {', '.join(axes)}. Transpose it."
         )
     if min(shape[-3:]) < _MIN_EDGE:
         raise UsageError(
-            f"the array is {size}, expected {_MIN_EDGE} voxels or more along z, y and x"
+            f"the array has {size} voxels; expected at least {_MIN_EDGE} along z, y and x"
         )
     if array.dtype.kind not in "buif":
-        raise UsageError(f"the array's type is {array.dtype}, expected whole numbers or fractions")
+        raise UsageError(
+            f"the array's type is {array.dtype}; expected integers, floating-point numbers or "
+            "booleans"
+        )
     if prod(shape) > _MAX_READ:
         raise UsageError(
-            f"the array is {size}, {prod(shape):,} voxels, more than the {_MAX_READ:,} that a "
-            "notebook reads: save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out`, and "
-            "show out; or show a part of it"
+            f"the array has {prod(shape):,} voxels ({size}); expected at most {_MAX_READ:,} in a "
+            "notebook. Save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out` and show "
+            "out, or show a part of the array."
         )
     found = spacing_um if spacing_um is not None else _spacing_of(array)
     if found is None:
         raise UsageError(
-            "an array states no voxel spacing: name it, as spacing_um=(0.5, 0.25, 0.25) (z, y, x)"
+            "the array states no voxel spacing; pass it as spacing_um=(0.5, 0.25, 0.25), for "
+            "(z, y, x)"
         )
     spacing = check_spacing(found)
     count = shape[0] if len(shape) == 4 else 1
     names = list(channels) if channels is not None else _names_of(array, count)
     if len(names) != count or len(set(names)) != count or not all(names):
-        raise UsageError(f"channels are {names!r:.80}, expected {count} different names")
-    data = getattr(array, "variable", array)  # of xarray, whose own slices carry coordinates
+        raise UsageError(f"channels are {names!r:.80}; expected {count} different names")
+    # The variable of an xarray.DataArray is used, since slicing the array would copy coordinates.
+    data = getattr(array, "variable", array)
     return ArraySource(getattr(data, "data", data) if dims else data, spacing, tuple(names))
 
 
 def check_spacing(given: Any) -> Triple:
-    """Return a voxel spacing (z, y, x), um. Raises UsageError for anything else."""
+    """Return a voxel spacing (z, y, x), um. Raises UsageError for any other value."""
     try:
         z, y, x = (float(v) for v in given)
-    except (TypeError, ValueError):  # one number, words
+    except (TypeError, ValueError):  # such as a single number, or a text
         z = y = x = 0.0
     if not all(isfinite(v) and v > 0 for v in (z, y, x)):
-        raise UsageError(f"spacing_um is {given!r:.60}, expected z, y, x in um, each above 0")
+        raise UsageError(f"spacing_um is {given!r:.60}; expected z, y, x in um, each above 0")
     return z, y, x
 
 
 def _spacing_of(array: Any) -> tuple[float, ...] | None:
-    """Return the spacing that an xarray's coordinates have; None: it has none, or not for all axes.
+    """Return the spacing of an xarray's coordinates; None unless z, y and x have coordinates.
 
-    Raises UsageError for places that are not even, or a unit that is no length.
+    Raises UsageError for uneven coordinates, or a unit that is not a length.
     """
     spacing = []
     for axis in "zyx":
@@ -128,12 +133,12 @@ def _spacing_of(array: Any) -> tuple[float, ...] | None:
         places = np.asarray(coordinate.data, float)
         step = float((places[-1] - places[0]) / (len(places) - 1))
         if not np.allclose(np.diff(places), step, rtol=1e-3):
-            raise UsageError(f"the array's places along {axis} are not even: name spacing_um")
+            raise UsageError(f"the array's coordinates along {axis} are uneven; pass spacing_um")
         unit = coordinate.attrs.get("units", "um")
         um = um_per(unit)
         if um is None:
             raise UsageError(
-                f"the array's unit along {axis} is {unit!r:.40}, no length: name spacing_um"
+                f"the array's unit along {axis} is {unit!r:.40}, not a length; pass spacing_um"
             )
         spacing.append(abs(step) * um)
     return tuple(spacing)
@@ -150,10 +155,10 @@ def _names_of(array: Any, count: int) -> list[str]:
 
 
 def find_blocks(source: ArraySource, *, most: int = MAX_VOXELS) -> tuple[int, int, int]:
-    """Return the voxels (z, y, x) that become one, so that at most so many are left.
+    """Return the block of voxels (z, y, x) that becomes one voxel, so that at most `most` are left.
 
-    The edges of the new voxels grow step by step until few enough are left: where those of the
-    array are long, they stay. No axis is left with less than a surface needs.
+    The edges of the new voxels grow step by step until few enough are left. An axis whose spacing
+    is already larger is not reduced. No axis gets shorter than a surface needs.
     """
     count, *shape = source.shape
     finest = min(source.spacing_um)
@@ -170,21 +175,21 @@ def find_blocks(source: ArraySource, *, most: int = MAX_VOXELS) -> tuple[int, in
     return z, y, x
 
 
-def say_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
-    """Return in words what of the array is shown, and why; empty: all of it."""
+def describe_quality(source: ArraySource, blocks: tuple[int, int, int]) -> str:
+    """Return a sentence on how the array was reduced, and why; empty if it was not."""
     if blocks == (1, 1, 1):
         return ""
     voxels = prod(source.shape)
     return (
-        f"means of {' x '.join(str(b) for b in blocks)} voxels (z, y, x): the array has "
-        f"{voxels:,}, and of at most {MAX_VOXELS:,} a build is quick; quality='full' takes all"
+        f"Shows means of {' x '.join(str(b) for b in blocks)} voxels (z, y, x): the array has "
+        f"{voxels:,} voxels, and a build is quick up to {MAX_VOXELS:,}. Use quality='full' for all."
     )
 
 
 def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) -> None:
     """Write an array as OME-TIFF; the same array gives the same bytes.
 
-    Raises UsageError for values that no file holds.
+    Raises UsageError for an array without finite values.
     """
     count, depth, *_ = source.shape
     coarse = [
@@ -196,7 +201,7 @@ def write_source(source: ArraySource, path: Path, blocks: tuple[int, int, int]) 
     content = hashlib.sha256(np.ascontiguousarray(voxels).data)
     content.update(repr((spacing, source.channels)).encode())
     metadata = {
-        # tifffile would draw one at random
+        # tifffile would choose a random UUID
         "UUID": str(uuid5(NAMESPACE_OID, content.hexdigest())),
         "axes": "CZYX",
         "Channel": {"Name": list(source.channels)},
@@ -213,7 +218,7 @@ def _parts(source: ArraySource, channel: int, depth: int, block: int) -> list[ND
 
 
 def _mean(part: NDArray[Any], blocks: tuple[int, int, int]) -> NDArray[Any]:
-    """Return means over blocks; those at the far sides may have fewer voxels."""
+    """Return means over blocks; the last block along an axis may have fewer voxels."""
     if blocks == (1, 1, 1):
         return part
     sums, counts = part.astype(np.float64), np.ones((1, 1, 1))
@@ -227,7 +232,7 @@ def _mean(part: NDArray[Any], blocks: tuple[int, int, int]) -> NDArray[Any]:
 
 
 def _as_stored(voxels: NDArray[Any]) -> NDArray[Any]:
-    """Return voxels in a type that OME-TIFF has and a build reads. Raises UsageError."""
+    """Convert voxels to a type that OME-TIFF can store and a build can read. Raises UsageError."""
     if voxels.dtype.kind == "b":
         return voxels.astype(np.uint8)
     if voxels.dtype.kind == "f":

@@ -1,7 +1,7 @@
-"""The files of a bundle, as the page in a notebook asks for them: these, and no others.
+"""Give the page in a notebook the files of a bundle, and no others.
 
-The bundle's own list says which there are. A path that it does not have, as one that leads out by
-`..`, is not found; nor is a file of the list that is a link out.
+The bundle's own list names its files. A path that is not in the list is not found, and so can't
+lead out of the folder by `..`. A listed file that is a link to a place outside is not found either.
 """
 
 from pathlib import Path
@@ -11,20 +11,20 @@ from stereocell.bundle.manifest import FILES, MANIFEST, REMEDY, read_manifest
 from stereocell.serve.static_files import parse_range
 from stereocell.storage.file_list import read_list
 
-_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # the viewer's environments
+_LIGHTS = ("environments/sky.hdr", "environments/studio.hdr")  # environment maps of the viewer
 _WHOLE, _PART, _MISSING, _UNSATISFIABLE = 200, 206, 404, 416
 
 
 class NotebookBundle:
     """A bundle that a notebook shows.
 
-    name      of the specimen
-    channels  their IDs
-    ids       of each channel, by its ID and by its name
+    name      name of the specimen
+    channels  IDs of the channels
+    ids       ID of each channel, by its ID and by its name
     """
 
     def __init__(self, folder: Path) -> None:
-        """Raises OutputError where there is no bundle, or its list is damaged."""
+        """Raises OutputError if there is no bundle, or its list is damaged."""
         self._root = folder.resolve()
         manifest = read_manifest(self._root)
         listed = read_list(self._root / FILES, REMEDY)
@@ -35,14 +35,14 @@ class NotebookBundle:
         self.ids = {**{name: id_ for id_, name in about}, **{id_: id_ for id_, _ in about}}
 
     def answer(self, path: object, *, header: object = None) -> tuple[int, bytes]:
-        """Return the status of HTTP and the bytes of a file, or of the part that a Range asks for.
+        """Return an HTTP status and the bytes of a file, or of the part in a Range header.
 
-        What a page sends is anybody's: whatever it is, there is an answer.
+        The page may send any values. This method answers all of them without raising.
         """
         place = self._find(path) if isinstance(path, str) else None
         try:
             content = b"" if place is None else place.read_bytes()
-        except OSError:  # it has gone since
+        except OSError:  # the file was removed meanwhile
             place = None
         if place is None:
             return _MISSING, b""

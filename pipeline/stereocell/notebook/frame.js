@@ -1,5 +1,5 @@
-// In the frame that holds the viewer's page in a notebook. The page's files come from the parent with a port,
-// and the bundle's are asked of the kernel through it. The rest is in bundle/blob_page.js.
+// This script runs in the frame that holds the viewer's page in a notebook. The parent window sends the page's
+// files and a port. Through the port, the page requests the bundle's files. bundle/blob_page.js does the rest.
 addEventListener("message", function begin({ data, ports, source }) {
   if (source !== parent || data?.stereocell !== "begin") return;
   removeEventListener("message", begin);
@@ -22,14 +22,14 @@ function readerOf(port) {
   return (path, range, signal) =>
     new Promise((resolve, reject) => {
       const id = ++last;
-      const leave = () => {
+      const abort = () => {
         waiting.delete(id);
-        reject(new DOMException("the request was left", "AbortError"));
+        reject(new DOMException("the request was aborted", "AbortError"));
       };
-      if (signal?.aborted) return leave();
-      signal?.addEventListener("abort", leave, { once: true });
+      if (signal?.aborted) return abort();
+      signal?.addEventListener("abort", abort, { once: true });
       waiting.set(id, (answer) => {
-        signal?.removeEventListener("abort", leave);
+        signal?.removeEventListener("abort", abort);
         resolve(answer);
       });
       port.postMessage({ type: "file", id, path, range });

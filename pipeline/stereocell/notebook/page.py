@@ -1,6 +1,7 @@
-"""The viewer's page as a notebook's frame has it: one document, and the files that it takes.
+"""The viewer's page for a frame in a notebook: one document, and the files that it needs.
 
-The frame has no origin and no address: `frame.js` asks the kernel for the bundle's files.
+The frame has no origin and no address. Its script `frame.js` therefore requests the bundle's files
+from the kernel.
 """
 
 import hashlib
@@ -19,7 +20,7 @@ def document() -> str:
 
 @cache
 def key() -> str:
-    """Return what tells this page from others: a view that comes again need not ask for it."""
+    """Return a key of this version of the page, by which a notebook caches the page's files."""
     digest = hashlib.sha256(document().encode())
     digest.update("\n".join(blob_page.files()).encode())
     return digest.hexdigest()[:16]

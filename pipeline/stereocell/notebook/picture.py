@@ -1,7 +1,8 @@
-"""A picture of a build, for a notebook that no browser has opened: drawn as the report draws.
+"""Draw a picture of a build for a notebook that no browser has opened, as the report does.
 
-Channels that are seen through are drawn one more time each, and mixed with what is behind: exact
-where one of them lies over another, which is most of a picture.
+For each opacity below 1, the picture is drawn again with the channels of that opacity, and blended
+with the picture so far. This is exact where one translucent channel lies over others, which holds
+for most pixels.
 """
 
 import io
@@ -20,22 +21,22 @@ from stereocell.model.errors import StageError
 from stereocell.report.draw_scenes import draw_image
 from stereocell.textures.draw_meshes import Shape
 
-Looks = Mapping[str, Mapping[str, Any]]  # by the channel's ID, as `Viewer.channels`
+Appearances = Mapping[str, Mapping[str, Any]]  # by the channel's ID, as in `Viewer.channels`
 
-_WIDTH = 640  # pixels: a notebook has them as text
-_TRIANGLES = 100_000  # more take seconds, and show no finer
+_WIDTH = 640  # pixels; small, since a notebook stores pictures as text
+_TRIANGLES = 100_000  # triangles; more take seconds and show no finer details
 
 
-def no_picture(_: Looks) -> bytes:
-    """Return that there is none."""
+def no_picture(_: Appearances) -> bytes:
+    """Return no bytes, for a viewer without a picture."""
     return b""
 
 
-def draw(out: Path, looks: Looks) -> bytes:
-    """Return a PNG of OUT's surfaces; empty where none is shown: the viewer draws volumes."""
+def draw(out: Path, appearances: Appearances) -> bytes:
+    """Return a PNG of OUT's surfaces; empty if none is shown, since volumes are not drawn here."""
     try:
         chosen = Chosen(OutFolder(out).stage_file, ExportOptions(), lambda _: None)
-        layers = _layers(chosen, looks)
+        layers = _layers(chosen, appearances)
     except StageError:
         return b""
     if not layers:
@@ -56,17 +57,17 @@ def draw(out: Path, looks: Looks) -> bytes:
     return file.getvalue()
 
 
-def _layers(chosen: Chosen, looks: Looks) -> dict[float, list[Shape]]:
-    """Return the shapes that show, by their opacity. Raises StageError where there is none."""
+def _layers(chosen: Chosen, appearances: Appearances) -> dict[float, list[Shape]]:
+    """Return the visible shapes by their opacity. Raises StageError if the stage has no surface."""
     layers: dict[float, list[Shape]] = {}
     for piece in chosen.pieces(chosen.levels(light=_TRIANGLES)[0]):
-        look = looks.get(piece.channel.id, {})
-        opacity = float(look.get("opacity", 1))
-        if not (look.get("visible", True) and opacity):
+        own = appearances.get(piece.channel.id, {})
+        opacity = float(own.get("opacity", 1))
+        if not (own.get("visible", True) and opacity):
             continue
         color = np.array(piece.material.color)
-        if "color" in look:
-            red, green, blue = bytes.fromhex(look["color"].removeprefix("#"))
+        if "color" in own:
+            red, green, blue = bytes.fromhex(own["color"].removeprefix("#"))
             color = np.array(linear_color((red, green, blue)))
         mesh = piece.mesh
         shape = Shape(mesh.positions, mesh.triangles, mesh.normals, color)

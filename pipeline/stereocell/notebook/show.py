@@ -1,6 +1,6 @@
-"""`stereocell.show`: a build, a source or an array becomes a viewer in the notebook.
+"""`stereocell.show`: show a build, a source or an array in a notebook.
 
-Imports are lazy: `import stereocell` takes none of them.
+Imports are lazy, so that `import stereocell` stays quick.
 """
 
 import atexit
@@ -46,19 +46,20 @@ def show(
 
     source      OUT of a build, its bundle, a path that `build` reads, or an array (z, y, x) or
                 (c, z, y, x) of numpy, dask, zarr or xarray
-    spacing_um  of an array, z, y, x; xarray's coordinates will do
-    channels    names of an array's channels
-    name        of an array
-    quality     auto: means of voxels where an array, or a level where a source, is large; full
-    out         where the build of a source or an array stays; else it goes when Python ends
-    preset, settings  of the build, as `stereocell.build` takes them
-    force       replace whatever lies in `out`; without, only a build of the same source or array is
-    height      CSS pixels
-    state       `link`, `channels`, `view`, `picked`: what the viewer opens with
+    spacing_um  voxel spacing (z, y, x), um; not needed if an xarray has coordinates
+    channels    names of an array's channels; the channels to build of any other source
+    name        name of an array's specimen
+    quality     `auto` reduces a large array by averaging blocks of voxels; `full` uses all voxels
+    out         folder that keeps the build of a source or an array; None for a temporary folder
+                that is removed when Python ends
+    preset, settings  preset and settings of the build, as for `stereocell.build`
+    force       replace anything in `out`; without it, only a build of the same source or array
+    height      height of the viewer, CSS pixels
+    state       initial `link`, `channels`, `view` and `picked` of the viewer
 
-    Returns a widget: the last line of a cell shows it. Its `channels`, `view`, `picked` and `link`
-    follow what is done in the viewer, and may be set; see `stereocell.notebook.widget.Viewer`.
-    Raises StereoCellError, whose text is one line.
+    Returns a widget, which the last line of a cell displays. Its traits `channels`, `view`,
+    `picked` and `link` follow the user's actions in the viewer, and may be set; see
+    `stereocell.notebook.widget.Viewer`. Raises StereoCellError, whose text is one line.
 
         viewer = stereocell.show(stack, spacing_um=(0.5, 0.25, 0.25))
     """
@@ -69,21 +70,21 @@ def show(
     from stereocell.storage.overwriting import IN_PYTHON, forcing
 
     if quality not in _QUALITIES:
-        raise UsageError(f"quality is {quality!r:.40}, expected one of {', '.join(_QUALITIES)}")
+        raise UsageError(f"quality is {quality!r:.40}; expected one of {', '.join(_QUALITIES)}")
     if unknown := sorted(state.keys() - {"link", "channels", "view", "picked"}):
-        raise UsageError(f"show takes no {unknown[0]!r:.40}")
-    find_page()  # before a build that nobody could look at
+        raise UsageError(f"show has no argument {unknown[0]!r:.40}")
+    find_page()  # raise before the build if the viewer is missing
     if not is_array(source):
         if not isinstance(source, str | Path):
-            raise UsageError(f"{source!r:.60} is no array, expected one, or a path")
-        Location.of(source)  # an empty name is refused, before it is taken for this folder
+            raise UsageError(f"source is {source!r:.60}; expected an array or a path")
+        Location.of(source)  # this refuses an empty path, which would mean the current folder
         if spacing_um is None and channels is None and (found := _find_bundle(Path(source))):
             return _viewer(*found, height=height, state=state)
     kept = None if out is None else Path(out)
     folder = kept or Path(tempfile.mkdtemp(prefix="stereocell-"))
     try:
         with forcing(force, IN_PYTHON):
-            chosen, told = _build(
+            chosen, printed = _build(
                 source,
                 folder,
                 spacing_um=spacing_um,
@@ -94,7 +95,7 @@ def show(
                 settings=settings or {},
             )
         bundle = folder / "bundle"
-        viewer = _viewer(bundle, folder, quality=chosen, told=told, height=height, state=state)
+        viewer = _viewer(bundle, folder, quality=chosen, told=printed, height=height, state=state)
     except BaseException:
         if kept is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -115,8 +116,8 @@ def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
         return path, None
     if (path / "plan.json").is_file():
         raise UsageError(
-            f"{path}: a build without a bundle, expected {path / 'bundle' / _MANIFEST}: "
-            f"run `stereocell bundle {shlex.quote(str(path))}` first"
+            f"{path}: found a build without a bundle; expected {path / 'bundle' / _MANIFEST}. "
+            f"Run `stereocell bundle {shlex.quote(str(path))}` first."
         )
     return None
 
@@ -160,7 +161,7 @@ def _build(
     preset: str | None,
     settings: Mapping[str, Any],
 ) -> tuple[str, str]:
-    """Build a source or an array in a folder; return words about its quality, and what was said."""
+    """Build a source or an array in a folder; return a sentence on its quality, and the output."""
     from stereocell.notebook import arrays
     from stereocell.storage.overwriting import is_forced
 
@@ -172,29 +173,29 @@ def _build(
     if arrays.is_array(source):
         given = arrays.as_source(source, spacing_um, channels)
         blocks = (1, 1, 1) if is_full else arrays.find_blocks(given)
-        chosen = arrays.say_quality(given, blocks)
+        chosen = arrays.describe_quality(given, blocks)
         source = folder / f"{_file_name(name)}.ome.tif"
-        _keep_source(given, source, blocks)
+        _write_source(given, source, blocks)
     else:
         plan = wanted.setdefault("plan", {})
         if spacing_um is not None:
             plan["spacing_um"] = arrays.check_spacing(spacing_um)
         if channels is not None:
             plan["channels"] = tuple(channels)
-    with _heard() as said:
+    with _captured_output() as output:
         build(source, folder, preset=preset, settings=wanted, force=is_forced())
-    return chosen, said.getvalue()
+    return chosen, output.getvalue()
 
 
 def _file_name(name: str) -> str:
-    """Return a file's name without an ending; the build is named after its file."""
+    """Return the name of an array's file, without an ending. The build is named after its file."""
     return re.sub(r"[^\w .-]", "_", name)[:60].strip(" .") or "array"
 
 
-def _keep_source(given: "ArraySource", source: Path, blocks: tuple[int, int, int]) -> None:
+def _write_source(given: "ArraySource", source: Path, blocks: tuple[int, int, int]) -> None:
     """Write an array into the folder of its build.
 
-    Raises OutputError where the folder holds anything but a build of this very array.
+    Raises OutputError if the folder holds anything but a build of exactly this array.
     """
     from stereocell.building.out_folder import require_build_or_nothing
     from stereocell.notebook.arrays import write_source
@@ -214,14 +215,14 @@ def _keep_source(given: "ArraySource", source: Path, blocks: tuple[int, int, int
 
 
 @contextmanager
-def _heard() -> Iterator[io.StringIO]:
-    """Take what a build says, which a notebook would keep among its outputs."""
+def _captured_output() -> Iterator[io.StringIO]:
+    """Capture the text that a build prints, which a notebook would store among its outputs."""
     from stereocell.engine.run import console
 
-    said = io.StringIO()
+    output = io.StringIO()
     before, console.is_jupyter = console.is_jupyter, False
     try:
-        with redirect_stderr(said):
-            yield said
+        with redirect_stderr(output):
+            yield output
     finally:
         console.is_jupyter = before

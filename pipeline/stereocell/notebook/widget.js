@@ -1,26 +1,28 @@
-// The widget's view: the viewer's page in a frame of its own, and the messages between it and the kernel.
-// The frame is of no origin (a sandbox), so that a bundle can reach neither the notebook nor its server.
+// The widget's view: shows the viewer's page in a frame, and passes messages between the frame and the kernel.
+// The frame is a sandbox without an origin, so that a bundle can reach neither the notebook nor its server.
 
-/** The page's files, for all widgets; and files of bundles, for a view that comes again. */
+/** The page's files by version, shared by all widgets. */
 const pages = new Map();
-const kept = new Map();
-const MAX_KEPT = 64 * 2 ** 20;
-let keptBytes = 0;
-/** Of the state, what goes both ways. */
+/** Recent files of bundles, for a view that is opened again. */
+const cached = new Map();
+/** Bytes of all cached files of bundles, at most. */
+const MAX_CACHED = 64 * 2 ** 20;
+let cachedBytes = 0;
+/** Traits that both the kernel and the page may change. */
 const SHARED = ["link", "channels", "view", "picked"];
 
-/** Asks of the kernel; each answer is of one question. */
+/** Sends requests to the kernel, and resolves each with its own answer. */
 function kernelOf(model) {
   const waiting = new Map();
   const mine = crypto.randomUUID();
   let last = 0;
-  const hear = (content, buffers) => {
+  const receive = (content, buffers) => {
     const answer = waiting.get(content.id);
-    if (answer === undefined) return; // of another view of the same widget
+    if (answer === undefined) return; // the answer is for another view of the same widget
     waiting.delete(content.id);
     answer({ ...content, buffers: buffers.map(bytesOf) });
   };
-  model.on("msg:custom", hear);
+  model.on("msg:custom", receive);
   return {
     ask: (question) =>
       new Promise((resolve) => {
@@ -28,11 +30,11 @@ function kernelOf(model) {
         waiting.set(id, resolve);
         model.send({ ...question, id });
       }),
-    leave: () => model.off("msg:custom", hear),
+    leave: () => model.off("msg:custom", receive),
   };
 }
 
-/** Buffers come as views of whatever the notebook's program has: a copy of one's own may be handed on. */
+/** Returns a copy of a buffer. The notebook's own memory, of which buffers are views, can't be transferred. */
 function bytesOf(buffer) {
   const isView = ArrayBuffer.isView(buffer);
   return isView
@@ -49,26 +51,26 @@ async function pageOf(kernel, model) {
 
 async function fileOf(kernel, model, { path, range }) {
   const key = `${model.get("_bundle")} ${range} ${path}`;
-  const found = kept.get(key);
+  const found = cached.get(key);
   if (found !== undefined) return found;
   const { status, buffers } = await kernel.ask({ ask: "file", path, range });
   const answer = { status, bytes: buffers[0] ?? new Uint8Array() };
-  keep(key, answer);
+  cache(key, answer);
   return answer;
 }
 
-/** The newest files stay. */
-function keep(key, answer) {
-  keptBytes += answer.bytes.length;
-  kept.set(key, answer);
-  for (const [oldest, { bytes }] of kept) {
-    if (keptBytes <= MAX_KEPT) return;
-    keptBytes -= bytes.length;
-    kept.delete(oldest);
+/** Caches a file, and drops the oldest ones if there are too many bytes. */
+function cache(key, answer) {
+  cachedBytes += answer.bytes.length;
+  cached.set(key, answer);
+  for (const [oldest, { bytes }] of cached) {
+    if (cachedBytes <= MAX_CACHED) return;
+    cachedBytes -= bytes.length;
+    cached.delete(oldest);
   }
 }
 
-/** The output with the picture, which comes after the widget's; null: this program has it elsewhere. */
+/** Returns the output with the picture, which follows the widget's output; null in a notebook without it there. */
 function pictureBelow(el) {
   for (let node = el; node !== null; node = node.parentElement ?? node.getRootNode().host ?? null) {
     const next = node.nextElementSibling;
@@ -97,9 +99,9 @@ function render({ model, el }) {
   const frame = document.createElement("iframe");
   const kernel = kernelOf(model);
   let port = null;
-  /** What both sides know of: what comes back is no news. */
+  /** The state that kernel and page agree on. It is not sent again. */
   let known = {};
-  /** The output below, while this lives. */
+  /** The output with the picture, which is hidden while this viewer is live. */
   let hidden = null;
 
   const showHeight = () => root.style.setProperty("height", `${model.get("height")}px`);
@@ -111,33 +113,38 @@ function render({ model, el }) {
     for (const byte of bytesOf(bytes)) text += String.fromCharCode(byte);
     picture.src = `data:image/png;base64,${btoa(text)}`;
   };
-  const tell = () => {
+  const sendChanges = () => {
     const state = Object.fromEntries(SHARED.map((name) => [name, model.get(name)]));
-    const news = SHARED.filter((name) => !same(state[name], known[name]));
-    if (port === null || news.length === 0) return;
+    const changed = SHARED.filter((name) => !same(state[name], known[name]));
+    if (port === null || changed.length === 0) return;
     known = state;
-    port.postMessage({ type: "state", state: Object.fromEntries(news.map((n) => [n, state[n]])) });
+    port.postMessage({
+      type: "state",
+      state: Object.fromEntries(changed.map((n) => [n, state[n]])),
+    });
   };
-  /** What the link, which the page has opened with, does not say. */
-  const tellAll = () => {
+  /** Sends the state beside the link, with which the page has already opened. */
+  const sendAll = () => {
     const { channels, view, picked } = Object.fromEntries(SHARED.map((n) => [n, model.get(n)]));
-    const isNamed = picked !== null && picked.tile === undefined; // else the link has it, or nobody
+    const isNamed = picked !== null && picked.tile === undefined; // a point that the notebook has set
     const state = { channels, view, ...(isNamed ? { picked } : {}) };
     port?.postMessage({ type: "state", state });
   };
-  const take = (state) => {
-    const told = Object.fromEntries(Object.entries(state).filter(([name]) => SHARED.includes(name)));
-    known = { ...known, ...told };
-    for (const [name, value] of Object.entries(told)) model.set(name, value);
+  const takeOver = (state) => {
+    const shared = Object.fromEntries(
+      Object.entries(state).filter(([name]) => SHARED.includes(name)),
+    );
+    known = { ...known, ...shared };
+    for (const [name, value] of Object.entries(shared)) model.set(name, value);
     model.save_changes();
   };
 
-  const hear = async ({ data }) => {
+  const receive = async ({ data }) => {
     if (data.type === "file") {
       const { status, bytes } = await fileOf(kernel, model, data);
       port?.postMessage({ type: "file", id: data.id, status, bytes });
-    } else if (data.type === "state") take(data.state);
-    else if (data.type === "open") tellAll();
+    } else if (data.type === "state") takeOver(data.state);
+    else if (data.type === "open") sendAll();
     else if (data.type === "shown") {
       root.dataset.state = "live";
       hidden = pictureBelow(el);
@@ -152,26 +159,26 @@ function render({ model, el }) {
     const { port1, port2 } = new MessageChannel();
     port?.close();
     port = port1;
-    port.onmessage = (event) => void hear(event);
+    port.onmessage = (event) => void receive(event);
     known = Object.fromEntries(SHARED.map((name) => [name, model.get(name)]));
     const message = { stereocell: "begin", files, view: model.get("link") };
     frame.contentWindow?.postMessage(message, "*", [port2]);
   };
   const open = async () => {
-    words.textContent = "A picture, until the kernel answers: it does between two cells.";
+    words.textContent = "This is a still picture. The viewer starts when no cell is running.";
     const { html } = await pageOf(kernel, model);
     words.textContent = "";
     frame.title = picture.alt;
     frame.setAttribute("sandbox", "allow-scripts allow-downloads");
     frame.allow = "fullscreen; xr-spatial-tracking; clipboard-write";
     frame.srcdoc = html;
-    frame.addEventListener("load", () => void begin()); // anew where the notebook moves it about
+    frame.addEventListener("load", () => void begin()); // a notebook that moves the frame loads it again
     root.append(frame);
   };
   const watched = [
     ["change:height", showHeight],
     ["change:_picture", showPicture],
-    ...SHARED.map((name) => [`change:${name}`, tell]),
+    ...SHARED.map((name) => [`change:${name}`, sendChanges]),
   ];
   for (const [event, then] of watched) model.on(event, then);
   showHeight();

@@ -1,7 +1,7 @@
-"""The widget: the viewer's page in a frame, its state in both directions, its picture for good.
+"""The widget: the viewer's page in a frame, a state shared with the kernel, and a lasting picture.
 
-The kernel answers what the page asks for by messages of the widget, so that it works wherever
-widgets do: no port, no server, no address. The page asks between two cells, when the kernel rests.
+The page requests files by messages of the widget, which the kernel answers. It thus works wherever
+widgets do, without a server, a port or an address. The kernel answers when no cell is running.
 """
 
 import base64
@@ -17,7 +17,7 @@ from IPython.display import display, update_display
 from stereocell.bundle import blob_page
 from stereocell.notebook import page
 from stereocell.notebook.bundle_files import NotebookBundle
-from stereocell.notebook.picture import Looks, no_picture
+from stereocell.notebook.picture import Appearances, no_picture
 from stereocell.notebook.shared_state import (
     check_channels,
     check_link,
@@ -27,22 +27,22 @@ from stereocell.notebook.shared_state import (
 
 _HERE = Path(__file__).parent
 _PNG = b"\x89PNG\r\n\x1a\n"
-_MAX_PICTURE = 4 * 2**20  # bytes: a notebook with larger ones is slow to open
+_MAX_PICTURE = 4 * 2**20  # bytes, largest picture; larger ones make a notebook slow to open
 _VIEW = "application/vnd.jupyter.widget-view+json"
 
 
 class Viewer(anywidget.AnyWidget):
-    """The viewer in a notebook. Its state may be set, and observed as any trait.
+    """The viewer in a notebook. Its state can be set, and observed like any trait.
 
-    link      the whole view, as behind `#` in links to it
-    channels  by ID, or by name where they are set: `visible`, `color` (#rrggbb), `opacity` (0..1),
-              `window` (the source's values); what is left out stays as it is
-    view      `eye_um` and `target_um`: from where the specimen is seen, x, y, z of the world in um
-    picked    what was tapped last: `point_um`, `tile`, `channel`, `object` (its number in a label
-              map); None: nothing was. One that is set is marked
-    height    CSS pixels
-    quality   in words: of what the picture is, and why
-    told      what the build said
+    link      the whole view, as the part of a link from `#` on
+    channels  `visible`, `color` (#rrggbb), `opacity` (0..1) and `window` (the source's values) of
+              channels, by ID; may be set by name, too. Values that are left out do not change
+    view      `eye_um` and `target_um` of the camera: x, y, z of the world in um
+    picked    the point that was tapped last: `point_um`, `tile`, `channel`, `object` (number in a
+              label map); or None. A point that is set gets a mark
+    height    height of the viewer, CSS pixels
+    quality   a sentence on how an array was reduced, or empty
+    told      the text that the build printed
     """
 
     _esm = (_HERE / "widget.js").read_text("utf-8")
@@ -65,35 +65,36 @@ class Viewer(anywidget.AnyWidget):
         *,
         quality: str = "",
         told: str = "",
-        draw: Callable[[Looks], bytes] = no_picture,
+        draw: Callable[[Appearances], bytes] = no_picture,
         height: int = 520,
     ) -> None:
-        """
-        draw  returns a PNG of the specimen by the channels' looks, for a notebook that no browser
-              has opened; empty: none can be drawn
+        """Make a viewer of a bundle.
+
+        draw  returns a PNG of the specimen with the channels' appearances, for a notebook that no
+              browser has opened; empty if no picture can be drawn
         """
         self._files = bundle
         self._draw = draw
         self._display_id = ""
-        self._is_told = False
+        self._is_from_page = False
         self.told = told
         super().__init__(height=height, _page=page.key(), _bundle=secrets.token_hex(8))
         self.set_trait("name", bundle.name)
         self.set_trait("quality", quality)
-        self.on_msg(self._hear)
+        self.on_msg(self._answer)
 
     def set_channel(self, channel: str, **look: Any) -> None:
-        """Set some of a channel's `visible`, `color`, `opacity`, `window`; others stay."""
+        """Set some of a channel's `visible`, `color`, `opacity` and `window`; the others stay."""
         id_ = self._files.ids.get(channel, channel)
         self.channels = {**self.channels, id_: {**self.channels.get(id_, {}), **look}}
 
     # --- the notebook's side
 
     def _ipython_display_(self, **_: Any) -> None:
-        """Show the viewer, and below it its picture, by itself: the viewer hides it while it lives.
+        """Display the viewer, and its picture below it, which a live viewer hides.
 
-        JupyterLab shows no picture of an output that was a widget's, and begins an output anew that
-        is given another picture.
+        The picture is an output of its own for two reasons. JupyterLab shows no picture in an
+        output that held a widget, and it restarts an output whose picture changes.
         """
         if not self._picture:
             self._picture = self._draw(self.channels)
@@ -104,7 +105,7 @@ class Viewer(anywidget.AnyWidget):
         display(shown["obj"], metadata=shown["metadata"], raw=True, display_id=self._display_id)
 
     def _shown(self) -> dict[str, Any]:
-        """Return the picture as an output."""
+        """Return the picture as the arguments of an output."""
         data = {"text/plain": ""}
         if self._picture:
             data["image/png"] = base64.b64encode(self._picture).decode()
@@ -114,15 +115,15 @@ class Viewer(anywidget.AnyWidget):
     # --- the page's side
 
     def set_state(self, sync_data: dict[str, Any]) -> None:
-        """Take what the page tells."""
-        self._is_told = True
+        """Take over the state that the page sends."""
+        self._is_from_page = True
         try:
             super().set_state(sync_data)
         finally:
-            self._is_told = False
+            self._is_from_page = False
 
-    def _hear(self, _: Any, content: Any, buffers: Any) -> None:
-        """Answer what a page asks for."""
+    def _answer(self, _: Any, content: Any, buffers: Any) -> None:
+        """Answer a request of the page, or take over its picture."""
         if not isinstance(content, Mapping):
             return
         about = {"id": content.get("id")}
@@ -141,7 +142,7 @@ class Viewer(anywidget.AnyWidget):
                     if self._display_id:
                         update_display(**self._shown(), raw=True, display_id=self._display_id)
 
-    # --- what may be set
+    # --- checks of the state that is set
 
     @traitlets.validate("link")
     def _check_link(self, proposal: Any) -> Any:
@@ -160,8 +161,8 @@ class Viewer(anywidget.AnyWidget):
         return check_picked(proposal["value"])
 
     @traitlets.observe("link")
-    def _begin_anew(self, _: Any) -> None:
-        """A link is a whole view: what was set before it is over, unless the page tells of it."""
-        if not self._is_told:
+    def _reset(self, _: Any) -> None:
+        """Clear the other state when a notebook sets a link, since a link is a whole view."""
+        if not self._is_from_page:
             self.channels, self.view = {}, {}
             self.set_trait("picked", None)

@@ -1,1 +1,1 @@
-"""Pictures of a source before a build."""
+"""Draw pictures of a source before it is built."""

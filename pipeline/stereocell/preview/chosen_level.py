@@ -1,4 +1,4 @@
-"""Which level a build would take of a tile, and whether it would call that level unsure."""
+"""Choose the iso-value that a build would use in a tile, and report whether it would be unsure."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -23,11 +23,11 @@ from stereocell.planning.plan import Plan
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The level that a build would take.
+    """The iso-value that a build would use.
 
-    value       voxel values; None: there is no surface
-    confidence  of the channel, 0..1; None: not rated, as a level that the settings state
-    unsure      why the level cannot be called clear; empty: it can
+    value       iso-value, in voxel values; None if there is no surface
+    confidence  confidence of the channel, 0..1; None if not rated, as when the settings state it
+    unsure      reason why the iso-value is not clear; empty if it is clear
     """
 
     value: float | None
@@ -43,14 +43,14 @@ def choose_level(
     tile: Tile,
     field: NDArray[np.float32],
 ) -> Chosen:
-    """Return the level that a build would take if all tiles were like this one.
+    """Return the iso-value that a build would use if all tiles were like this one.
 
-    tiles  those that `found` rests on
-    field  float32 (z, y, x), denoised voxels of `tile`; above the background if `found` subtracts
+    tiles  the tiles in which `found` was found
+    field  float32 (z, y, x), denoised voxels of `tile`; minus the background if `found` subtracts
     """
     if not found.candidates:
         return Chosen(None)
-    place = _place_of_rung(plan, found, field)
+    place = _index_of_level(plan, found, field)
     rung = found.candidates[place]
     if found.levels is None or not isinstance(rung, Level):
         return Chosen(rung.value if isinstance(rung, Level) else rung)
@@ -67,8 +67,8 @@ def choose_level(
     return Chosen(value, rung.confidence, unsure)
 
 
-def _place_of_rung(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
-    """Return the index of the rung that the pieces in one tile speak for."""
+def _index_of_level(plan: Plan, found: Found, field: NDArray[np.float32]) -> int:
+    """Return the index in `found.candidates` of the level that one tile's components favour."""
     least = float(plan.settings.surface.min_diagonal_um)
     rungs = [rung.value for rung in found.candidates if isinstance(rung, Level)]
     compares = plan.settings.isovalue.rung == CONNECTED

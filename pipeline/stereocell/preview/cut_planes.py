@@ -1,8 +1,8 @@
-"""Cut a dataset into pictures across one axis: which way is up, and pixels that are square.
+"""Cut a dataset into pictures across one axis, the right way up and with square pixels.
 
-The planes of the grid are read a slab at a time, as the source's chunks lie, so that no chunk is
-decoded twice. Where slices were uneven or tilted, the grid is interpolated; then the source's own
-images are shown, as they are, as long as the whole volume is asked for.
+The grid's planes are read in slabs that match the source's chunks, so that no chunk is decoded
+twice. If the source's slices were uneven or tilted, the grid is interpolated. In this case the
+source's own images are shown unchanged, provided that the whole volume is wanted.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,21 +23,21 @@ from stereocell.read import Dataset
 
 ACQUIRED = "acquired"
 PLANES = (ACQUIRED, "axial", "coronal", "sagittal", "xy", "xz", "yz")
-LONGEST_PX = 8192  # a side of a picture that is enlarged to square pixels
-_UNSEEN = 0.5  # pixels by which a picture may be too long without being resampled
+LONGEST_PX = 8192  # pixels, longest side to which a picture is enlarged for square pixels
+_UNSEEN = 0.5  # pixels by which a picture may be too long before it is resampled
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
     """Pictures across one axis.
 
-    view       the way to look
-    shape      of a picture: pixels (rows, columns)
-    pixel_um   between (rows, columns), um
-    first_um   float64 (n, 3): the world's (x, y, z) of each picture's first pixel
-    steps_um   float64 (2, 3): in the world, from a pixel to the one below, to the one on its right
+    view       direction and orientation of the pictures
+    shape      pixels (rows, columns) of a picture
+    pixel_um   distance of neighbouring (rows, columns), um
+    first_um   float64 (n, 3): world position (x, y, z) of each picture's first pixel
+    steps_um   float64 (2, 3): world vectors from a pixel to the one below and to the one right
     planes     the pictures in order: (rows, columns), grey values
-    are_own    they are the source's own images, and not the grid's planes
+    are_own    the pictures are the source's own images, not planes of the grid
     """
 
     view: View
@@ -50,24 +50,27 @@ class Cut:
 
 
 def choose_view(views: Sequence[View], axis: int, plane: str, shown: str) -> View:
-    """Return the view of a plane's name; `acquired` is the one across `axis` (of z, y, x).
+    """Return the view with a plane's name; `acquired` means the view across `axis` (of z, y, x).
 
-    Raises UsageError for an axial plane of microscopy, or an xy plane of a patient.
+    Raises UsageError for an axial plane of microscopy data, or an xy plane of a patient.
     """
     if plane == ACQUIRED:
         return next(view for view in views if view.order[0] == axis)
     found = [view for view in views if view.name == plane]
     if not found:
         named = ", ".join(sorted(view.name for view in views))
-        what = "no place in a body" if plane in PLANES[1:4] else "a place in a body"
-        raise UsageError(f"--plane {plane}: {shown} states {what}, expected {ACQUIRED}, {named}")
+        what = "no" if plane in PLANES[1:4] else "a"
+        raise UsageError(
+            f"--plane is {plane}, but {shown} states {what} position in a patient; expected "
+            f"{ACQUIRED}, {named}"
+        )
     return found[0]
 
 
 def cut_planes(dataset: Dataset, plan: Plan, channel: int, plane: str) -> Cut:
-    """Return the pictures of the plan's region of a channel. Raises UsageError for a wrong plane.
+    """Return the pictures of a channel in the plan's region. Raises UsageError for a wrong plane.
 
-    channel  index in the dataset
+    channel  index of the channel in the dataset
     plane    one of PLANES
     """
     acquired = dataset.acquired
@@ -92,7 +95,7 @@ def cut_planes(dataset: Dataset, plan: Plan, channel: int, plane: str) -> Cut:
     um = np.array(plan.origin_um) + first * spacing
     steps = np.zeros((2, 3))
     for row, (of, sign) in enumerate(zip((down, right), signs, strict=True)):
-        # of a flipped axis the last voxel is first; a pixel's edge is where the voxel's was
+        # A flipped axis begins at its last voxel. Resized pixels keep the outer edge of the voxels.
         um[:, of] += (shape[of] - 1) * spacing[of] if sign < 0 else 0.0
         um[:, of] += sign * (pixel[row] - spacing[of]) / 2
         steps[row, of] = sign * pixel[row]
@@ -111,10 +114,10 @@ def cut_planes(dataset: Dataset, plan: Plan, channel: int, plane: str) -> Cut:
 def square_pixels(
     shape: tuple[int, int], spacing_um: tuple[float, float]
 ) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Return the pixels (rows, columns) of a picture of this plane, and their size in um.
+    """Return the pixels (rows, columns) of a plane's picture, and their size in um.
 
-    The wider spacing becomes the finer one, but for what is longer than LONGEST_PX; the size of
-    a pixel then differs between the two by less than half of one over the whole picture.
+    Pixels get the finer of the two spacings, or a coarser one if the picture would be longer than
+    LONGEST_PX. Rows and columns may differ in size by less than half a pixel over the picture.
 
     >>> square_pixels((10, 100), (2.0, 0.5))
     ((40, 100), (0.5, 0.5))
@@ -129,7 +132,7 @@ def square_pixels(
 
 
 def extent_words(cut: Cut, *, is_patient: bool) -> dict[str, str]:
-    """Return where pictures, their rows and their columns run: `slices`, `rows`, `columns`."""
+    """Return the directions in which `slices`, `rows` and `columns` run: axes or sides."""
     if not is_patient:
         slices, rows, columns = ("zyx"[axis] for axis in cut.view.order)
         return {"slices": slices, "rows": rows, "columns": columns}
@@ -139,7 +142,7 @@ def extent_words(cut: Cut, *, is_patient: bool) -> dict[str, str]:
 
 
 def is_patient(plan: Plan) -> bool:
-    """Return whether the voxels have a place in a body."""
+    """Return whether the source states a position in a patient."""
     return plan.placement != IDENTITY
 
 
@@ -154,7 +157,7 @@ _SIDES = {
 
 
 def _slabs(dataset: Dataset, channel: int, plan: Plan, axis: int) -> Iterator[NDArray[Any]]:
-    """Yield the region's voxels (z, y, x) by layers of chunks across an axis."""
+    """Yield the region's voxels (z, y, x) in slabs of one chunk's thickness across an axis."""
     chunk = max(1, dataset.arrays[plan.level].chunk[axis])
     region = plan.region
     begin, end = region.start[axis], region.stop[axis]
@@ -168,7 +171,7 @@ def _slabs(dataset: Dataset, channel: int, plan: Plan, axis: int) -> Iterator[ND
 
 
 def _resized(plane: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
-    """Return a plane with so many pixels (rows, columns), linearly interpolated."""
+    """Resize a plane to `shape` (rows, columns) by linear interpolation."""
     if plane.shape == shape:
         return plane
     picture = Image.fromarray(np.ascontiguousarray(plane, np.float32))

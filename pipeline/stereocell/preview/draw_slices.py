@@ -1,8 +1,8 @@
-"""Mid-slices of a unit across its three axes, with the extracted surface drawn on them.
+"""Draw the middle slices of a unit across its three axes, with the extracted surface.
 
-The amber line is the cross-section of the LOD0 mesh with the plane: the actual surface, not the
-intended one. The dashed line is where the smoothed 8-bit field meets the iso-value. Where the two
-differ, repair or simplification changed the surface.
+The amber line is the cross-section of the LOD0 mesh: the actual surface. The dashed line is the
+contour of the smoothed 8-bit field at the iso-value: the intended surface. Where the two differ,
+repair or simplification has changed the surface.
 """
 
 import io
@@ -31,21 +31,21 @@ FIELD = (70, 190, 255)
 _GROUND = (38, 43, 51)
 _LONGEST_PX = 300  # pixels, longest side of a slice
 _GAP_PX = 6  # pixels between slices
-_FINE = 3  # factor by which lines are drawn larger, then averaged down
+_FINE = 3  # factor; lines are drawn this much larger and then averaged down
 _DASH_PX = 4  # pixels, length of a dash
-_SHOWN_PX = 330  # pixels, width of display for which lines and text have weight 1
+_SHOWN_PX = 330  # pixels, displayed width at which lines and text have weight 1
 
 
 @dataclass(frozen=True, slots=True)
 class Slice:
-    """One plane through a unit, as the picture has it: rows downwards, columns to the right.
+    """One plane through a unit in the orientation of the picture: rows down, columns right.
 
-    grey        uint8 (rows, columns), windowed; or with colours, (rows, columns, 3)
+    grey        uint8 (rows, columns) over the intensity window; (rows, columns, 3) for colours
     spacing_um  (row, column), um
     outline     float64 (n, 2, 2): n line segments between two points (row, column), in voxels
     above       float32 (rows, columns): field minus iso-value, or None without an iso-value
-    contours    colours (sRGB, 0..255), each with a field like `above`, whose zero line is drawn
-                solid
+    contours    colours (sRGB, 0..255), each with a field like `above`; the zero line of the field
+                is drawn as a solid line
     """
 
     view: View
@@ -67,15 +67,16 @@ def cut_unit(
     iso_at: Callable[[Box], NDArray[np.float32]] | None,
     views: Sequence[View] = MICROSCOPE,
 ) -> list[Slice]:
-    """Return the three mid-slices of a unit.
+    """Return the three middle slices of a unit.
 
-    volume     uint8 (z, y, x), the lattice's voxels, without an apron
-    lattice    its box in voxels of the dataset
-    first_um   (z, y, x), um, the centre of the first voxel; `spacing_um` is (z, y, x), um
-    mesh       the finest, in world um; None: no surface
-    sigma_um   of the Gaussian before surface extraction
-    iso_at     returns the iso-value on the scale of 8 bits at the voxels of a box of the dataset
-    views      ways to look at it
+    volume      uint8 (z, y, x), the lattice's voxels, without an apron
+    lattice     the lattice's box in voxels of the dataset
+    first_um    (z, y, x), um, centre of the first voxel
+    spacing_um  (z, y, x), um
+    mesh        finest mesh, in world um; None if there is no surface
+    sigma_um    sigma of the Gaussian before surface extraction
+    iso_at      returns the iso-value, on the scale of 8 bits, at the voxels of a box of the dataset
+    views       the three views to draw
     """
     points = None if mesh is None else voxels_of(mesh, first_um, spacing_um)
     slices = []
@@ -101,8 +102,9 @@ def cut_unit(
 
 
 def voxels_of(mesh: Mesh, first_um: Point, spacing_um: Spacing) -> NDArray[np.float64]:
-    """Return the vertices in voxels from the one at first_um: float64 (n, 3), (z, y, x)."""
-    axes = zyx_to_xyz(np.eye(3))  # world directions of z, y, x: orthonormal, so this inverts it
+    """Return a mesh's vertices in voxels, from the voxel at first_um: float64 (n, 3), zyx."""
+    # The world directions of z, y, x are orthonormal, so the transposed matrix inverts the mapping.
+    axes = zyx_to_xyz(np.eye(3))
     positions = mesh.positions.astype(np.float64) @ axes.T
     return (positions - np.asarray(first_um)) / np.asarray(spacing_um)
 
@@ -110,18 +112,19 @@ def voxels_of(mesh: Mesh, first_um: Point, spacing_um: Spacing) -> NDArray[np.fl
 def cross_section(
     points: NDArray[np.float64], triangles: NDArray[np.uint32], axis: int, at: float
 ) -> NDArray[np.float64]:
-    """Return the cut of triangles with the plane points[:, axis] = at: segments, float64 (n, 2, 3).
+    """Cut triangles with the plane points[:, axis] = at; return segments, float64 (n, 2, 3).
 
-    points     (m, 3), float64; `triangles` is (k, 3), indices of points
+    points     (m, 3), float64
+    triangles  (k, 3), indices of points
 
-    A vertex on the plane counts as above it, so that each triangle gives one segment or none and
+    A vertex on the plane counts as above it. Each triangle then gives one segment or none, and
     closed meshes give closed lines.
     """
     above = points[:, axis] >= at
     sides = above[triangles]
     mixed = sides.any(axis=1) & ~sides.all(axis=1)
     met, sides = triangles[mixed].astype(np.int64), sides[mixed]
-    # one of the three corners is alone on its side; both ends lie on its edges
+    # One of the three corners is alone on its side. Both ends of the segment lie on its edges.
     lone = np.where(sides[:, 0] == sides[:, 1], 2, np.where(sides[:, 0] == sides[:, 2], 1, 0))
     rows = np.arange(len(met))
     tip = points[met[rows, lone]]
@@ -134,7 +137,7 @@ def cross_section(
 
 
 def draw_slices(slices: list[Slice]) -> tuple[bytes, int, int]:
-    """Return a WebP picture of the slices, its width and height."""
+    """Return a WebP picture of the slices, and its width and height in pixels."""
     picture = paint_slices(slices, _LONGEST_PX)
     return encode(picture), *picture.size
 
@@ -144,10 +147,10 @@ def paint_slices(
 ) -> Image.Image:
     """Return a picture of three slices: the second below the first, the third on its right.
 
-    longest_px  longest side of a slice
-    shown_px    width of display; lines and text scale with it
+    longest_px  pixels, longest side of a slice
+    shown_px    pixels, displayed width; lines and text scale with it
 
-    All three slices have one scale, in the specimen's own proportions.
+    All three slices have the same scale and the specimen's proportions.
     """
     longest = max(um for s in slices for um in _extent(s))
     scale = longest_px / longest
@@ -170,7 +173,7 @@ def paint_slices(
 
 
 def paint_slice(part: Slice, longest_px: int) -> Image.Image:
-    """Return a picture of one slice, whose longest side has `longest_px`, with a scale bar."""
+    """Return a picture of one slice with a scale bar; its longest side has `longest_px` pixels."""
     scale = longest_px / max(_extent(part))
     rows, columns = (max(2, round(um * scale)) for um in _extent(part))
     weight = max(1.0, longest_px / _SHOWN_PX)
@@ -230,7 +233,7 @@ def _zero_line(
 
 
 def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
-    """Return the mask of the outline: points close enough along each segment to touch."""
+    """Return the mask of the outline. Each segment is drawn as points close enough to touch."""
     shape = (size[1] * _FINE, size[0] * _FINE)
     fine = np.array(shape)
     pixels = (part.outline + 0.5) * (fine / np.array(part.grey.shape))
@@ -247,14 +250,14 @@ def _lines(part: Slice, size: tuple[int, int], weight: float) -> Image.Image:
 
 
 def _averaged(mask: NDArray[np.bool_], weight: float) -> Image.Image:
-    """Return the mask at the picture's size, with lines about `weight` pixels wide."""
+    """Reduce a mask to the picture's size, with lines about `weight` pixels wide."""
     reach = max(1, round((_FINE * weight - 1) / 2))
     wide = _widened(_widened(mask, reach).T, reach).T
     return Image.fromarray(wide.astype(np.uint8) * np.uint8(255)).reduce(_FINE)
 
 
 def _widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Return the mask with `reach` more rows on both sides: ten times as fast as SciPy's filter."""
+    """Widen a mask by `reach` rows on both sides. This is ten times as fast as SciPy's filter."""
     wide = mask.copy()
     for step in range(1, reach + 1):
         wide[step:] |= mask[:-step]
@@ -280,7 +283,7 @@ def _write_ends(
     size: tuple[int, int],
     weight: float,
 ) -> None:
-    """Write what stands at the middle of each edge of a panel: size is (columns, rows)."""
+    """Write the letters in the middle of each edge of a panel; `size` is (columns, rows)."""
     (x, y), (width, height), gap = corner, size, round(3 * weight)
     places = (
         ((x + gap, y + height / 2), "lm"),
@@ -294,17 +297,18 @@ def _write_ends(
 
 @cache
 def find_font(size: int) -> ImageFont.FreeTypeFont:
-    """Return a font that ships with matplotlib and that has a micro sign; `size` in pixels."""
-    place = find_spec("matplotlib")  # is not imported for a file's name: that takes .2 s
+    """Return a font from matplotlib's package that has a micro sign; `size` in pixels."""
+    place = find_spec("matplotlib")  # finding the package avoids its import, which takes 0.2 s
     if place is None or place.origin is None:
-        raise ModuleNotFoundError("matplotlib is not installed, expected the font that it ships")
+        raise ModuleNotFoundError("matplotlib is not installed; expected the font in its package")
     fonts = Path(place.origin).parent / "mpl-data" / "fonts" / "ttf"
     return ImageFont.truetype(fonts / "DejaVuSans.ttf", size)
 
 
 def _scale_bar(draw: ImageDraw.ImageDraw, xy: tuple[int, int], scale: float, weight: float) -> None:
-    """Draw a bar of 1, 2 or 5 times a power of ten um at the lower left of xy (width, height).
+    """Draw a scale bar at the lower left: 1, 2 or 5 times a power of ten, in um.
 
+    xy     width and height of the picture, or of its first slice, in pixels
     scale  pixels per um
     """
     longest = 0.35 * xy[0] / scale

@@ -1,7 +1,7 @@
-"""Preview a channel's level before a build, in one tile: slices with contours, histogram, table.
+"""Preview a channel's iso-value before a build: slices of a tile, a histogram and a table.
 
-The level is that of the whole channel, as a build of the same settings finds it. Of a large dataset
-it is found on tiles spread evenly, and the table says so.
+The iso-value is the whole channel's, found as in a build with the same settings. In a large dataset
+it is found in some tiles that are spread evenly; the table then says so.
 """
 
 import warnings
@@ -51,9 +51,9 @@ COLORS: tuple[Color, ...] = (
     (190, 140, 255),
     (255, 255, 255),
 )
-LOOKED_AT = 100_000_000  # voxels that the level is found on; a build takes all
+LOOKED_AT = 100_000_000  # voxels in which the iso-value is found; a build uses all voxels
 _EXPECTED = "nothing or a picture of the same source"
-_SOURCE = "Source"  # key of a PNG's text: the fingerprint of the source
+_SOURCE = "Source"  # key of the PNG's text that holds the fingerprint of the source
 _LONGEST_PX = 900  # pixels, longest side of a slice
 _CHART_PX = 200  # pixels, height of the histogram
 _GROUND, _AXIS, _CURVE = (18, 20, 24), (90, 96, 104), (225, 228, 232)
@@ -62,14 +62,15 @@ _MARGIN_PX, _TEXT_PX = 14, 14
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A level at which the surface could be taken.
+    """An iso-value at which the surface could be extracted.
 
-    level       in voxel values; `above`: above the background
-    raw         with the mean of the tile's background added
-    inside      share of the tile's voxels above it
-    confidence  of the channel, 0..1; None: not rated
-    is_chosen   a build takes it
-    setting     the flag that takes it; empty: none is needed
+    level       iso-value, in voxel values
+    above       whether `level` counts from the background
+    raw         `level` plus the mean of the tile's background, if `above`
+    inside      share of the tile's voxels above the iso-value, 0..1
+    confidence  confidence of the channel, 0..1; None if not rated
+    is_chosen   whether a build uses this iso-value
+    setting     the flag that chooses it; empty if none is needed
     """
 
     name: str
@@ -84,11 +85,11 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """The levels at which a channel's surface could lie, and which of them a build takes.
+    """The iso-values at which a channel's surface could lie, and the one that a build uses.
 
-    doubt   why a build makes no surface; empty: it makes one
-    basis   what the levels rest on
-    unsure  why a build calls its level unsure; empty: the level is clear, or given
+    doubt   reason why a build makes no surface; empty if it makes one
+    basis   the tiles in which the iso-values were found, in words
+    unsure  reason why a build calls its iso-value unsure; empty if it is clear or given
     """
 
     candidates: list[Candidate]
@@ -100,16 +101,16 @@ class Preview:
 def preview(
     source: str, channel_name: str, *, tile_id: str, out: Path | None, settings: Settings
 ) -> tuple[Preview, Path]:
-    """Write the picture; return what was found and the picture's path. Nothing else is written.
+    """Write the picture, and no other file; return the candidates and the picture's path.
 
     channel_name  name, ID or index
-    out           a .png; None: iso_<channel>_<tile>.png in the current folder
+    out           a .png; None for iso_<channel>_<tile>.png in the current folder
 
-    Raises UsageError for a channel or tile that the plan lacks, NoSurfaceError where all voxels are
-    alike, SourceError where the source can't be read.
+    Raises UsageError for a channel or tile that the plan lacks, NoSurfaceError if all voxels are
+    nearly equal, SourceError if the source can't be read.
     """
     if out is not None and out.suffix.lower() != ".png":
-        raise UsageError(f"-o is {str(out)!r}, expected a file named .png")
+        raise UsageError(f"-o is {str(out)!r}; expected a file name that ends in .png")
     plan = settle(source, settings)
     print_notes(plan)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
@@ -125,7 +126,7 @@ def preview(
     volume = open_source(source_of(plan, channel=channel)).read(channel.index, tile.box, plan.level)
     smoothing_um = float(plan.settings.surface.smoothing_um)
     field = denoise(volume, smoothing_um, window.max_shift)
-    if window.holder is not None:  # contours go round what a build's surface goes round
+    if window.holder is not None:  # a build's surface leaves these pieces out, and so do contours
         field = window.holder.left_out_of(field, tile.box)
     under = np.zeros((1, 1, 1), np.float32)
     if window.statistics.background is not None:
@@ -135,13 +136,13 @@ def preview(
     candidates = _candidates(plan, channel, found, chosen, field, under)
     if not candidates:
         raise NoSurfaceError(
-            f"{tile.id}/{channel.name}: all voxels are nearly equal: no surface to look at"
+            f"{tile.id}/{channel.name}: all voxels are nearly equal, so there is no surface"
         )
     where = f"{len(tiles)} of {len(plan.tiles)}" if len(tiles) < len(plan.tiles) else "all"
     is_given = given_level(plan, channel) is not None
     basis = f"{'given, and others found' if is_given else 'found'} on {where} tiles"
     if where != "all":
-        basis += "; a build takes all"
+        basis += "; a build uses all tiles"
     if window.holder is not None:
         basis += f"; a build leaves out {', '.join(window.holder.pieces)}, {window.holder.WORDS}"
     result = Preview(candidates, found.reason, basis, chosen.unsure)
@@ -161,7 +162,7 @@ def preview(
 
 
 def _mark(plan: Plan) -> PngInfo:
-    """Return the texts of a picture that identify its program and its source."""
+    """Return the texts in a PNG that identify its program and its source."""
     mark = PngInfo()
     mark.add_text("Software", GENERATOR)
     mark.add_text(_SOURCE, plan.fingerprint)
@@ -169,9 +170,9 @@ def _mark(plan: Plan) -> PngInfo:
 
 
 def require_picture_or_nothing(path: Path) -> None:
-    """Raise OutputError where a path holds no picture of this command, of whichever source."""
+    """Raise OutputError if a path holds anything but a picture of this command, of any source."""
     if path.is_dir():
-        raise OutputError(f"{path}: is a folder, expected a file named .png")
+        raise OutputError(f"{path}: found a folder; expected a file name that ends in .png")
     require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) is not None)
 
 
@@ -179,16 +180,18 @@ def _source_of_picture(path: Path) -> str | None:
     """Return the fingerprint of the source of an earlier picture; None for any other file."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the header of a foreign file may state a huge size
+            warnings.simplefilter(
+                "ignore"
+            )  # Pillow warns if another file's header states a huge size
             with Image.open(path) as picture:
                 found = picture.info.get(_SOURCE)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # it is no picture
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # not a picture
         return None
     return found if isinstance(found, str) else None
 
 
 def _spread(plan: Plan, tile: Tile) -> list[Tile]:
-    """Return all tiles, or so many of them, evenly chosen and the one that is shown."""
+    """Return all tiles if they are few; else some, spread evenly, and the tile that is shown."""
     voxels = int(np.prod(plan.region.shape, dtype=np.int64))
     count = max(1, len(plan.tiles) * LOOKED_AT // voxels)
     if count >= len(plan.tiles):
@@ -199,9 +202,9 @@ def _spread(plan: Plan, tile: Tile) -> list[Tile]:
 
 
 def table(result: Preview) -> list[str]:
-    """Return the candidates as lines of text; a star marks the one that a build takes."""
+    """Return the candidates as lines of text; a star marks the one that a build uses."""
     head = f"{'candidate':<18}{'level':>12}{'raw':>12}{'inside':>10}{'confidence':>12}"
-    lines = [f"{head}  take it by"]
+    lines = [f"{head}  choose it by"]
     for c in result.candidates:
         confidence = "-" if c.confidence is None else f"{c.confidence:.2f}"
         level = f"{c.level:.5g}{'+b' if c.above else ''}"
@@ -213,12 +216,12 @@ def table(result: Preview) -> list[str]:
 
 
 def _note(result: Preview) -> str:
-    """Return what a build does, and what that rests on."""
+    """Return the line that says what a build does, and in which tiles this was found."""
     if not any(c.is_chosen for c in result.candidates):
         return f"a build makes no surface: {result.doubt}; {result.basis}"
     marks = " (b: the background)" if any(c.above for c in result.candidates) else ""
     unsure = f" and calls it unsure: {result.unsure}" if result.unsure else ""
-    return f"* a build takes it{unsure}{marks}; {result.basis}"
+    return f"* a build uses this one{unsure}{marks}; {result.basis}"
 
 
 def _find_channel(plan: Plan, name: str) -> Channel:
@@ -226,7 +229,7 @@ def _find_channel(plan: Plan, name: str) -> Channel:
         if name in (channel.name, channel.id, str(channel.index)):
             return channel
     names = ", ".join(channel.name for channel in plan.channels)
-    raise UsageError(f"--channel is {name!r}, expected one of {names}")
+    raise UsageError(f"--channel is {name!r}; expected one of {names}")
 
 
 def _find_tile(plan: Plan, tile_id: str) -> Tile:
@@ -235,7 +238,7 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
             return tile
     first, last = plan.tiles[0].id, plan.tiles[-1].id
     known = first if first == last else f"a tile from {first} to {last}"
-    raise UsageError(f"--tile is {tile_id!r}, expected {known}")
+    raise UsageError(f"--tile is {tile_id!r}; expected {known}")
 
 
 def _candidates(
@@ -293,7 +296,7 @@ def _slices(
     window: Window,
     plan: Plan,
 ) -> list[Slice]:
-    """Return the tile's mid-slices, windowed, with the candidates' contours."""
+    """Return the tile's middle slices in 8 bits of the window, with the candidates' contours."""
     low, high = window.statistics.window
     under = np.broadcast_to(under, field.shape)
     slices = []
@@ -312,7 +315,7 @@ def _slices(
                 (plan.spacing_um[order[1]], plan.spacing_um[order[2]]),
                 np.zeros((0, 2, 2)),
                 None,
-                # the chosen one last: on top
+                # The contour of the chosen candidate comes last, and so is drawn on top.
                 tuple(
                     (color, view.plane((plane - below if c.above else plane) - np.float32(c.level)))
                     for c, color in reversed(list(zip(candidates, COLORS, strict=False)))
@@ -362,7 +365,7 @@ def _draw_histogram(
     candidates: Sequence[Candidate],
     levels: ChannelLevels,
 ) -> None:
-    """Draw the channel's histogram into the box (left, top, right), a line for each candidate."""
+    """Draw the channel's histogram at (left, top, right), with a line for each candidate."""
     left, top, right = chart
     bottom = top + _CHART_PX - _TEXT_PX - 8
     values, heights = levels.curve()
@@ -380,5 +383,5 @@ def _draw_histogram(
     draw.text((left, bottom + 4), f"{values[0]:.4g}", _AXIS, font)
     draw.text((right, bottom + 4), f"{values[-1]:.4g}", _AXIS, font, anchor="ra")
     middle = (left + right) / 2
-    words = "voxels of the whole channel over levels, closer together where they are high"
+    words = "number of voxels in the whole channel, over voxel values on a compressed scale"
     draw.text((middle, bottom + 4), words, _AXIS, font, anchor="ma")

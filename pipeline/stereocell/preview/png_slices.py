@@ -1,9 +1,9 @@
-"""Write one channel as 8-bit PNG slices, with a JSON that describes them.
+"""Write one channel as 8-bit PNG slices, with a JSON file that describes them.
 
     000.png 001.png ...     slices across one axis, the right way up (preview/cut_planes.py)
-    slices.json             plane, sizes, places, window, modality: schemas/slices.schema.json
+    slices.json             plane, sizes, positions, window, modality (schemas/slices.schema.json)
 
-The window is found as in a build, so that 0 and 255 mean the same here as there.
+The window is found as in a build, so that 0 and 255 mean the same as there.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -45,7 +45,7 @@ FORMAT, VERSION = "stereocell-slices", 2
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written: the number of slices, the plane's name, and a line that says it."""
+    """The number of slices that were written, the plane's name, and a line that describes them."""
 
     count: int
     plane: str
@@ -53,26 +53,28 @@ class Written:
 
 
 def without_surface(settings: Settings) -> Settings:
-    """Return settings with all surface lengths 0, so that they suit all voxels."""
+    """Return settings with all lengths of surfaces 0, so that they suit voxels of any size."""
     lengths = {f.name: 0.0 for f in fields(SurfaceOptions) if f.name.endswith("_um")}
     return replace(settings, surface=SurfaceOptions(**lengths))  # type: ignore[arg-type]
 
 
 def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
-    """Write the plan's region of its one channel.
+    """Write the plan's only channel, in the plan's region.
 
-    folder  replaced as a whole if it holds slices
+    folder  folder for the slices; replaced as a whole if it holds slices
     plane   one of cut_planes.PLANES
 
-    Raises UsageError for more than one channel and for a plane that the source hasn't, OutputError
-    for a folder with other content, SourceError where the source can't be read.
+    Raises UsageError for more than one channel or a plane that the source lacks, OutputError for a
+    folder with other content, SourceError if the source can't be read.
     """
     dataset, channel = open_source(source_of(plan)), plan.channels[0]
     views = views_of(plan.placement, is_neurological=plan.settings.plan.neurological)
-    choose_view(views, dataset.acquired.axis, plane, dataset.shown)  # before what else is wrong
+    choose_view(views, dataset.acquired.axis, plane, dataset.shown)  # report a wrong plane first
     if len(plan.channels) != 1:
         found = ", ".join(channel.name for channel in plan.channels)
-        raise UsageError(f"slices are of one channel: found {found}, expected --channels with one")
+        raise UsageError(
+            f"slices show one channel, found {found}; choose one of them by --channels"
+        )
     _require_own(folder, plan)
     cut = cut_planes(dataset, plan, channel.index, plane)
     window = window_step(plan, channel).run().statistics.window
@@ -87,7 +89,7 @@ def write_slices(plan: Plan, folder: Path, *, plane: str = ACQUIRED) -> Written:
 
 
 def to_bytes(plane: NDArray[Any], window: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return grey values as uint8 of the same shape: the window becomes 0..255, the rest is cut."""
+    """Return grey values as uint8 of the same shape; the window becomes 0..255."""
     low, high = window
     share = (plane.astype(np.float32) - np.float32(low)) / np.float32(high - low)
     return np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
@@ -116,7 +118,7 @@ def _describe(
 
 
 def _line(plan: Plan, cut: Cut) -> str:
-    """Return a line: `28 axial slices of ...`."""
+    """Return a line that describes the slices: `28 axial slices, 512 x 512 pixels of ...`."""
     (rows, columns), size, count = cut.shape, max(cut.pixel_um), len(cut.first_um)
     words = extent_words(cut, is_patient=is_patient(plan))
     if is_patient(plan):
@@ -134,7 +136,7 @@ def _line(plan: Plan, cut: Cut) -> str:
 
 
 def require_slices_or_nothing(folder: Path) -> None:
-    """Raise OutputError where a folder holds no slices, of whichever source."""
+    """Raise OutputError if a folder holds anything but slices, of any source."""
     require_free(folder, expected=_EXPECTED, is_ours=contents_of(folder).kind is Kind.SLICES)
 
 

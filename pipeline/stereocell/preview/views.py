@@ -1,9 +1,9 @@
-"""The three ways to look at a volume: which axis is cut, which way is up, what stands at the edges.
+"""The three views of a volume: the axis that is cut, the orientation, and letters at the edges.
 
-A patient is shown as radiologists do: from the front and from the feet, so that the patient's right
-is on the picture's left; the nose points up in axial planes and to the left in sagittal ones. Or,
-as neurologists prefer, with right on the right. Voxels (z, y, x) of a patient run to the front, the
-feet and the left (read/anatomical_axes.py).
+A patient is shown by radiologists' convention, from the front and from the feet. The patient's
+right is on the picture's left. The nose points up in axial planes, and to the left in sagittal
+ones. By neurologists' convention, right is on the right. Voxels (z, y, x) of a patient run to the
+front, to the feet and to the left (read/anatomical_axes.py).
 """
 
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ from stereocell.model.rigid_transform import IDENTITY, Matrix
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One way to look.
+    """One view of a volume.
 
-    order  axes (of z, y, x): the cut one, the picture's rows, its columns
-    flips  whether rows, columns run against their axis
-    ends   what stands at the picture's left, right, top, bottom
+    order  indices of axes (of z, y, x): the one that is cut, the rows' and the columns'
+    flips  whether rows and columns run against their axes
+    ends   letters at the picture's left, right, top and bottom
     """
 
     name: str
@@ -30,12 +30,12 @@ class View:
     ends: tuple[str, str, str, str]
 
     def plane(self, plane: NDArray[Any]) -> NDArray[Any]:
-        """Return a plane (rows, columns), along the axes, as the picture has it: a view."""
+        """Turn a plane (rows, columns) to the picture's orientation, as a numpy view."""
         down, right = (slice(None, None, -1 if flip else 1) for flip in self.flips)
         return plane[down, right]
 
     def points(self, points: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float64]:
-        """Return places (..., 2) in voxels along rows and columns, as the picture has them."""
+        """Turn points (..., 2), in voxels along rows and columns, to the picture's orientation."""
         last = np.asarray(shape) - 1.0
         return np.where(self.flips, last - points, points)
 
@@ -53,7 +53,7 @@ PATIENT = (
 
 
 def views_of(placement: Matrix, *, is_neurological: bool = False) -> tuple[View, View, View]:
-    """Return the views of a dataset, by its place: of a patient where it has one."""
+    """Return the views for a dataset: a patient's if its placement states a patient's position."""
     if placement == IDENTITY:
         return MICROSCOPE
     coronal, axial, sagittal = PATIENT

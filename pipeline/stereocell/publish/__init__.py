@@ -1,1 +1,1 @@
-"""Puts a bundle on a web host: a folder, object storage, whatever fsspec opens."""
+"""Publish a bundle on a web host: in a folder, on object storage, or anywhere fsspec can write."""

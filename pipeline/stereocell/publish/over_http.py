@@ -1,4 +1,4 @@
-"""What a host answers for the files of a bundle, held against their hashes."""
+"""Fetch a published bundle's files from its host, and compare them with their hashes."""
 
 import hashlib
 import urllib.error
@@ -16,35 +16,37 @@ INDEX = "index.html"
 _AT_ONCE = 8
 _WAIT_S = 30.0
 _BLOCK = 1 << 20
-# browsers refuse these, or take them for text, where the host says another type
+# Browsers refuse these files, or show them as text, if the host sends another type.
 _STRICT = (".html", ".js", ".wasm", ".webmanifest", ".json")
 
 
 def fetch_faults(
     address: str, entries: Mapping[str, Mapping[str, Any]], report: Callable[[str], None]
 ) -> dict[str, str]:
-    """Return what is wrong with each file that a host sends, by path: none where it is empty.
+    """Return the fault of each file that a host sends wrongly, by path; empty if all are right.
 
-    address  with a slash at its end
+    address  address of the folder, with a slash at its end
     entries  path -> bytes and sha256
     """
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         found = pool.map(lambda path: _fault(address, path, entries[path]), entries)
         faults = {path: fault for path, fault in zip(entries, found, strict=True) if fault}
-    report(f"{len(entries) - len(faults)} of {len(entries)} files are right at {address}")
+    report(f"{len(entries) - len(faults)} of {len(entries)} files are correct at {address}")
     return faults
 
 
 def find_page(address: str, entries: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the address of the page: of the folder, or of its index.html where the host, as S3,
-    answers with no page for a folder.
+    """Return the address of the page.
+
+    This is the folder's address, or its index.html for a host that sends no page for a folder, such
+    as S3.
     """
     index = entries.get(INDEX)
     return address if index is None or _fault(address, "", index) is None else address + INDEX
 
 
 def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:
-    # of what some host sends packed all the same, the hash would be another's
+    # The hash is that of the uncompressed file, so the host must not compress its answer.
     request = urllib.request.Request(
         address + quote(path), headers={"Accept-Encoding": "identity", "Cache-Control": "no-cache"}
     )
@@ -56,14 +58,14 @@ def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:
                 count += len(block)
             found_type = answer.headers.get_content_type()
     except urllib.error.HTTPError as error:
-        return f"answered with {error.code} {error.reason}"
+        return f"the host answered {error.code} {error.reason}"
     except (OSError, HTTPException, ValueError) as error:
         reason = getattr(error, "reason", error)
-        return f"no answer ({reason})"
+        return f"the host did not answer ({reason})"
     if count != entry["bytes"]:
         return f"found {count} bytes"
     if digest.hexdigest() != entry["sha256"]:
-        return "found other bytes"
+        return "found different bytes"
     expected = media_type(PurePosixPath(path)).partition(";")[0]
     is_packed = path.endswith((".gz", ".br"))
     if (
@@ -71,5 +73,5 @@ def _fault(address: str, path: str, entry: Mapping[str, Any]) -> str | None:
         and not is_packed
         and found_type not in (expected, "application/javascript")
     ):
-        return f"found the type {found_type}, which browsers don't take for {expected}"
+        return f"found the type {found_type}, which browsers don't accept as {expected}"
     return None

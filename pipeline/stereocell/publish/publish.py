@@ -1,9 +1,9 @@
-"""Puts a bundle at a target, and no more than has changed since the last time.
+"""Publish a bundle at a target; upload only the files that have changed since the last time.
 
-What was put there is listed beside it. So a second run knows what it may overwrite and remove: what
-somebody else put there is left alone, and refused by name where a file of the bundle would take its
-place. Files that lead to others come last, so that whoever opens the page meanwhile sees the
-earlier one or the new one.
+A list of the published files is left at the target. It tells the next run which files it may
+replace and remove. Files of somebody else are left alone. If a file of the bundle would take the
+place of one, the run is refused. Files that refer to others are uploaded last, so that a person who
+opens the page meanwhile sees either the old page or the new one.
 """
 
 import gzip
@@ -38,12 +38,18 @@ from stereocell.storage.overwriting import is_forced
 
 _LAST = ("sw.js", FILES, MANIFEST, INDEX)
 _REMEDY = "run `stereocell bundle OUT` first"
-_SMALL_BYTES = 1000  # JSON below is as short as it is
+_SMALL_BYTES = 1000  # bytes; smaller JSON files are not compressed
 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """What a run has done. address: of the page, for browsers, or None."""
+    """The result of a run.
+
+    address                   the page's address for browsers; None if it is not known
+    files, bytes              all files of the bundle, and their size
+    uploaded, uploaded_bytes  files that were uploaded, and their size
+    removed                   number of old files that were removed
+    """
 
     address: str | None
     files: int
@@ -55,9 +61,12 @@ class Published:
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file of the bundle, or one that is made of it."""
+    """A file of the bundle, or a compressed copy of one.
 
-    entry: Mapping[str, Any]  # bytes, sha256
+    entry  bytes and sha256
+    """
+
+    entry: Mapping[str, Any]
     read: Callable[[], bytes]
 
 
@@ -65,10 +74,10 @@ class _File:
 class _Work:
     """The changes that a run makes at a target.
 
-    there    bytes of each file at the target
-    before   the entries of the files that an earlier run has put there
-    changed  paths that are to be uploaded
-    gone     paths that the bundle has no more
+    there    path -> bytes of each file at the target
+    before   the entries of the files that an earlier run has uploaded
+    changed  paths to upload
+    gone     published paths that the bundle no longer has
     """
 
     there: Mapping[str, int]
@@ -80,19 +89,20 @@ class _Work:
 def publish(
     out: Path, text: str, url: str | None, *, is_public: bool, report: Callable[[str], None]
 ) -> Published:
-    """Put OUT's bundle at a target, and hold every file there against its hash.
+    """Publish OUT's bundle at a target, and compare every file there with its hash.
 
-    text       a folder, or an address that fsspec opens
-    url        where browsers find it; None: of S3 its own address, else files are read again
+    text       the target: a folder, or an address that fsspec opens
+    url        address at which browsers find the target; None for S3's own address, or to read the
+               files back from the target instead
     is_public  ask S3 to let everybody read each object (ACL public-read)
-    report     takes lines of progress
+    report     called with lines of progress
 
-    Raises UsageError for a url that is none; OutputError where the bundle is damaged or not made of
-    the plan, units and stage beside it, or where the target can't be written, holds files of others
-    in the bundle's place, or answers with something else.
+    Raises UsageError for an invalid `url`. Raises OutputError if the bundle is damaged or not made
+    from the plan, units and stage beside it, or if the target can't be written, holds somebody
+    else's files in the bundle's place, or sends other bytes.
     """
     if url is not None and not url.startswith(("https://", "http://")):
-        raise UsageError(f"--url is {url}, expected an address as https://me.example/mine")
+        raise UsageError(f"--url is {url}; expected an address such as https://me.example/mine")
     held = contents_of(out)
     bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
     build = held.build if bundle == out else out
@@ -107,17 +117,21 @@ def publish(
         _require_apart(folder, out)
     entries = {path: file.entry for path, file in files.items()}
     work = _compare(target, entries, specimen)
-    _require_whole(bundle, listed)  # after the guards: it hashes all of the bundle
+    _require_whole(bundle, listed)  # this comes late, since it hashes the whole bundle
     _put(target, files, work, specimen, report)
     address = (url and url.rstrip("/") + "/") or target.address
     faults = (
         fetch_faults(address, entries, report)
         if address
-        else {p: "is another" for p in files if digest(target.read(p)) != entries[p]["sha256"]}
+        else {
+            path: "found different bytes"
+            for path in files
+            if digest(target.read(path)) != entries[path]["sha256"]
+        }
     )
     if faults:
         other = {p for p in faults if digest(target.read(p)) != entries[p]["sha256"]}
-        _mark_spoilt(target, other & {*work.changed}, entries, specimen)
+        _mark_damaged(target, other & {*work.changed}, entries, specimen)
         raise _error_of(address or f"{target.shown}/", faults, entries, other, work)
     size = sum(entry["bytes"] for entry in entries.values())
     sent = sum(entries[path]["bytes"] for path in work.changed)
@@ -126,9 +140,9 @@ def publish(
 
 
 def _compare(target: Target, entries: Entries, specimen: Mapping[str, str]) -> _Work:
-    """Return the work that there is to do at a target.
+    """Return the changes that are needed at a target.
 
-    Raises OutputError where the target holds what is not ours, or what somebody edited.
+    Raises OutputError if the target holds somebody else's files, or files that somebody edited.
     """
     there = target.sizes()
     before = read_published(target, there)
@@ -151,11 +165,12 @@ def _put(
     specimen: Mapping[str, str],
     report: Callable[[str], None],
 ) -> None:
-    """Upload what has changed, and remove what the bundle has no more."""
+    """Upload the changed files, and remove published files that the bundle no longer has."""
     entries = {path: file.entry for path, file in files.items()}
     if not (work.changed or work.gone or work.before != entries):
         return
-    # The list names the coming files first. A run that is killed then finds them as its own.
+    # The list names the files before they are uploaded. If this run is killed, the next one
+    # recognises them as published.
     unsure = dict.fromkeys((*work.gone, *work.changed))
     target.write(PUBLISHED, list_of({**work.before, **entries, **unsure}, specimen))
     _upload(target, files, work.changed, report)
@@ -165,27 +180,27 @@ def _put(
     target.write(PUBLISHED, list_of(entries, specimen))
 
 
-def _mark_spoilt(
-    target: Target, spoilt: Iterable[str], entries: Entries, specimen: Mapping[str, str]
+def _mark_damaged(
+    target: Target, damaged: Iterable[str], entries: Entries, specimen: Mapping[str, str]
 ) -> None:
-    """Note at the target which files the next run is to put there again."""
-    if unsure := dict.fromkeys(spoilt):
+    """Note in the target's list the files that the next run must upload again."""
+    if unsure := dict.fromkeys(damaged):
         target.write(PUBLISHED, list_of({**entries, **unsure}, specimen))
 
 
 def _error_of(
     where: str, faults: Mapping[str, str], entries: Entries, other: Collection[str], work: _Work
 ) -> OutputError:
-    """Return the error of files that are not sent as they were put there.
+    """Return the error for files that the host does not send correctly.
 
-    other  the files that the target itself has otherwise: those that this run has put there were
-           spoilt on their way, and the next run puts them there again; somebody edited the others
+    other  files that differ at the target itself. If this run uploaded such a file, it was damaged
+           on the way, and the next run uploads it again. Otherwise somebody edited it.
     """
     path, fault = next(iter(sorted(faults.items())))
     remedy = f": {CHANGED}: {keep_copy()}" if path in other else ""
     if path in other and path in work.changed:
-        remedy = ": the same command puts it there again"
-    more = f" ({len(faults)} such)" if len(faults) > 1 else ""
+        remedy = ": run the same command to upload it again"
+    more = f" ({len(faults)} such files)" if len(faults) > 1 else ""
     size = entries[path]["bytes"]
     return OutputError(
         f"{where}{path}: {fault}, expected the bundle's file of {size} bytes{more}{remedy}"
@@ -193,7 +208,7 @@ def _error_of(
 
 
 def _require_whole(bundle: Path, listed: FileList) -> None:
-    """Raise OutputError unless each file of the bundle's list has the bytes that it says."""
+    """Raise OutputError unless each file of the bundle has the size and hash in the list."""
     _raise_on(bundle, find_faults(bundle, listed))
 
 
@@ -205,14 +220,14 @@ def _raise_on(bundle: Path, faults: Mapping[str, str]) -> None:
 
 
 def _files_of(bundle: Path, listed: FileList) -> dict[str, _File]:
-    """Return the bundle's files by path, and JSON packed for hosts that send such files.
+    """Return the bundle's files by path, and gzip copies of JSON for hosts that send such copies.
 
-    Raises OutputError where a JSON file is damaged.
+    Raises OutputError if a JSON file is damaged.
     """
     documents = {path: one for path, one in listed.items() if path.endswith(".json")}
     _raise_on(bundle, find_faults(bundle, documents))
     files = {path: _File(entry, partial(_content, bundle / path)) for path, entry in listed.items()}
-    # the list names all files but itself and the manifest, which names the list
+    # The list names all files except itself and the manifest. The manifest names the list.
     index = _made(_content(bundle / FILES))
     manifest = read_manifest(bundle, _REMEDY)
     if manifest["files"] != {"path": FILES, **index.entry}:
@@ -235,11 +250,11 @@ def _made(content: bytes) -> _File:
 
 def _require_apart(folder: Path, out: Path) -> None:
     if folder.resolve().is_relative_to(out.resolve()):
-        raise OutputError(f"TARGET is {folder}, inside OUT, expected a folder elsewhere")
+        raise OutputError(f"TARGET is {folder}, inside OUT; expected a folder elsewhere")
 
 
 def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:
-    """Return the name of a bundle's specimen, and the fingerprint of its source if it is known."""
+    """Return the name of a bundle's specimen, and its source's fingerprint or an empty text."""
     found = contents_of(bundle)
     fingerprint = found.fingerprint
     if not fingerprint and held.build is not None:

@@ -1,8 +1,8 @@
-"""Compare a target with what an earlier run published there, and protect what somebody changed.
+"""Compare a target with the files that an earlier run published there, and protect other files.
 
-The list that publishing leaves there holds the specimen and a hash of each file. So a page of
-another specimen, a file that somebody changed since, and files of somebody else are refused by
-name, and only --force replaces them.
+Publishing leaves a list at the target, with the specimen and a hash of each file. It reveals a page
+of another specimen, files that somebody has changed since, and files of somebody else. The run then
+names such a file and stops. Only --force replaces it.
 """
 
 import json
@@ -17,14 +17,14 @@ from stereocell.storage.contents import PUBLISHED, words_for
 from stereocell.storage.file_list import to_json
 from stereocell.storage.overwriting import is_forced, or_force, refused
 
-# path -> bytes and sha256; None: a run that was stopped may or may not have put it there
+# path -> bytes and sha256; None if a run was stopped that may or may not have uploaded the file
 Entries = Mapping[str, Any]
 _OF_HOSTS = ("CNAME", "README.md", "LICENSE", "robots.txt", "404.html")
 CHANGED = "changed since it was published"
 
 
 def list_of(entries: Entries, specimen: Mapping[str, str]) -> bytes:
-    """Return the list that is left at the target."""
+    """Return the content of the list that is left at the target."""
     content = {
         "format": "stereocell-published",
         "version": 1,
@@ -35,7 +35,10 @@ def list_of(entries: Entries, specimen: Mapping[str, str]) -> bytes:
 
 
 def read_published(target: Target, there: Mapping[str, int]) -> dict[str, Any]:
-    """Return the entries of the files that an earlier run has put there."""
+    """Return the entries of the files that an earlier run has uploaded.
+
+    Raises OutputError if the list is damaged.
+    """
     if PUBLISHED not in there:
         return {}
     where = f"{target.shown}/{PUBLISHED}"
@@ -45,7 +48,7 @@ def read_published(target: Target, there: Mapping[str, int]) -> dict[str, Any]:
         is_known = found["format"] == "stereocell-published" and found["version"] == 1
     except (ValueError, TypeError, KeyError, RecursionError):
         is_known, files = False, {}
-    # the list says what may be removed: a path in it may lead nowhere else
+    # Listed files may be removed, so no path in the list may lead out of the target.
     if not is_known or not all(_is_inside(path) for path in files):
         raise OutputError(f"{where}: damaged, expected a list of published files; remove it")
     return files
@@ -68,22 +71,22 @@ def require_own(
     before: Entries,
     specimen: Mapping[str, str],
 ) -> None:
-    """Raise OutputError where the target holds another page, or files that no run has put there.
+    """Raise OutputError if the target holds another page, or files that no run has uploaded.
 
-    Files of a host, as CNAME, may lie in a target that nothing was published to before.
+    Files for the host, such as CNAME, may lie in a new target.
 
     entries   the files of the bundle
-    there     bytes of each file at the target
-    before    the entries of the files that an earlier run has put there
-    specimen  its name and fingerprint
+    there     path -> bytes of each file at the target
+    before    the entries of the files that an earlier run has uploaded
+    specimen  name and fingerprint of the bundle's specimen
     """
     if is_forced():
         return
     for path, entry in entries.items():
         if path in there and path not in before and not _is_same(target, path, entry, there):
             raise OutputError(
-                f"{target.shown}/{path}: is there, and was not put there by this command, "
-                f"expected a place of the bundle's own: {or_force('choose another place')}"
+                f"{target.shown}/{path}: this file exists and was not uploaded by this command; "
+                f"expected a place without other files: {or_force('choose another place')}"
             )
     others = [path for path in there if path not in entries and not _is_of_host(path)]
     if not before and others:
@@ -98,7 +101,7 @@ def require_own(
 def find_changed(
     target: Target, paths: Iterable[str], there: Mapping[str, int], before: Entries
 ) -> list[str]:
-    """Return those of some paths whose files are not as an earlier run has put them there."""
+    """Return the paths whose files at the target differ from those that an earlier run uploaded."""
     return [
         path
         for path in paths
@@ -111,9 +114,10 @@ def find_changed(
 def require_unchanged(
     target: Target, paths: Iterable[str], there: Mapping[str, int], before: Entries
 ) -> None:
-    """Raise OutputError where files that a run would replace or remove were changed at the target.
+    """Raise OutputError if a file that a run would replace or remove was changed at the target.
 
-    Only these are read: to read all of a page on object storage takes as long as to upload it.
+    Only these files are read, since reading a whole page from object storage takes as long as
+    uploading it.
     """
     changed = [] if is_forced() else find_changed(target, paths, there, before)
     if changed:
@@ -122,7 +126,7 @@ def require_unchanged(
 
 
 def keep_copy() -> str:
-    """Return the remedy where a file of the page was edited at the target."""
+    """Return the remedy for a file of the page that was edited at the target."""
     return or_force("keep a copy of the edited file elsewhere and remove it there")
 
 
@@ -132,12 +136,12 @@ def _is_same(target: Target, path: str, entry: Mapping[str, Any], there: Mapping
 
 
 def _is_of_host(path: str) -> bool:
-    """Return whether a file in a target is one by which hosts are told how to serve it."""
+    """Return whether a file in a target configures the host or describes the repository."""
     return path in _OF_HOSTS or path.startswith(".")
 
 
 def _is_one(earlier: Mapping[str, str], specimen: Mapping[str, str]) -> bool:
-    """Return whether two specimens are known to be one: by name, and by the source of both."""
+    """Return whether two specimens are surely the same: equal names and source fingerprints."""
     known = earlier.get("fingerprint", "")
     return bool(
         known and known == specimen["fingerprint"] and earlier.get("name") == specimen["name"]
@@ -150,7 +154,7 @@ def _words(specimen: Mapping[str, str]) -> str:
 
 
 def _published_specimen(target: Target, there: Mapping[str, int]) -> dict[str, str]:
-    """Return the specimen of the page at a target: by its list, of an earlier version by name."""
+    """Return the specimen of the page at a target, from its list or else from its manifest."""
     for path in (PUBLISHED, MANIFEST):
         if path not in there:
             continue

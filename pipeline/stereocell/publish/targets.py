@@ -1,4 +1,4 @@
-"""Where a bundle is put: files by their paths below one folder or address."""
+"""The target of publishing: reads and writes files by their paths below a folder or an address."""
 
 import hashlib
 import os
@@ -15,50 +15,50 @@ from stereocell.storage.atomic_write import write_bytes
 from stereocell.storage.library_errors import one_line
 from stereocell.storage.location import ANSWER_S, Location, does_answer, is_own
 
-# names that hold a hash of their content may be kept for ever; all others are asked for again,
-# which costs a round trip and no bytes where nothing has changed
+# Browsers may cache a file for ever if its name contains a hash of its content. They ask again for
+# all other files. That costs a round trip, but no bytes if nothing has changed.
 FOREVER, AGAIN = "public, max-age=31536000, immutable", "no-cache"
 _S3 = ("s3", "s3a")
 
 
 class Target(Protocol):
-    """Files at a host. Paths have forward slashes; all methods raise OutputError."""
+    """Files at a host. Paths have forward slashes. All methods may raise OutputError."""
 
     shown: str
     at_once: int  # files that may be written at a time
 
     @property
     def address(self) -> str | None:
-        """The address at which browsers find it, with a slash at its end; None: unknown."""
+        """The address at which browsers find the files, ending in a slash; None if unknown."""
 
     def sizes(self) -> dict[str, int]:
-        """Return all files that are there, whoever put them, with their bytes."""
+        """Return path -> bytes of all files at the target, including files of others."""
 
     def read(self, path: str) -> bytes:
         """Return a file's content."""
 
     def write(self, path: str, content: bytes) -> None:
-        """Put a file there, whole or not at all."""
+        """Write a file in one step, so that no reader sees a part of it."""
 
     def remove(self, path: str) -> None:
         """Remove a file."""
 
 
 def target_of(text: str, *, is_public: bool) -> Target:
-    """Return the target of a folder's path or of an address, as `s3://bucket/specimen`."""
+    """Return the target for a folder's path or for an address such as `s3://bucket/specimen`."""
     location = Location.of(text)
     if location.is_local:
         return FolderTarget(Path(location.source))
     if urlsplit(text).scheme in ("http", "https"):
         raise OutputError(
-            f"{location.shown}: nothing can be put there by http, "
-            "expected a folder or an address as s3://bucket/name"
+            f"{location.shown}: files can't be written over http; "
+            "expected a folder or an address such as s3://bucket/name"
         )
     return StoreTarget(location, is_public)
 
 
 def cache_control(path: str) -> str:
-    """Return how long a browser may keep a file: the viewer's assets have a hash in their names."""
+    """Return the Cache-Control header of a file. The viewer's assets have hashes in their names."""
     return FOREVER if PurePosixPath(path).parts[0] == "assets" else AGAIN
 
 
@@ -66,16 +66,16 @@ class FolderTarget:
     """A folder of this machine: of a web server, or of a checked out `gh-pages` branch."""
 
     address = None
-    at_once = 1  # files at a time: in a folder each writer clears what killed writers have left
+    at_once = 1  # each write to a folder removes temporary files, also those of a parallel write
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.shown = str(folder)
 
     def sizes(self) -> dict[str, int]:
-        """Return all files below the folder, but for those of git."""
+        """Return path -> bytes of all files below the folder, except git's."""
         if self.folder.exists() and not self.folder.is_dir():
-            raise OutputError(f"{self.folder}: is a file, expected a folder")
+            raise OutputError(f"{self.folder}: found a file, expected a folder")
         return {
             file.relative_to(self.folder).as_posix(): file.stat().st_size
             for file in sorted(self.folder.rglob("*"))
@@ -88,20 +88,20 @@ class FolderTarget:
             return self._own(path).read_bytes()
 
     def write(self, path: str, content: bytes) -> None:
-        """Put a file there, whole or not at all."""
+        """Write a file in one step, so that no reader sees a part of it."""
         write_bytes(self._own(path), content)
 
     def remove(self, path: str) -> None:
-        """Remove a file, and the folders that have nothing else in them."""
+        """Remove a file, and the folders that become empty."""
         file = self._own(path)
         with one_line(str(file), "a file that may be removed", raised=OutputError):
             file.unlink(missing_ok=True)
         for folder in file.relative_to(self.folder).parents[:-1]:
-            with suppress(OSError):  # something else is in it
+            with suppress(OSError):  # the folder is not empty
                 (self.folder / folder).rmdir()
 
     def _own(self, path: str) -> Path:
-        """Return a file's place. A link in TARGET may not lead out of it."""
+        """Return a file's path. Raises OutputError if a link leads out of the target."""
         file = self.folder / path
         if not is_own(file.parent, [Path(os.path.realpath(self.folder))]):
             raise OutputError(
@@ -111,9 +111,9 @@ class FolderTarget:
 
 
 class StoreTarget:
-    """What fsspec opens: object storage, mostly."""
+    """A target that fsspec opens, mostly object storage."""
 
-    at_once = 8  # most of a request is waiting
+    at_once = 8  # parallel requests, since most of a request is waiting
 
     def __init__(self, location: Location, is_public: bool) -> None:
         self.location = location
@@ -123,10 +123,10 @@ class StoreTarget:
 
     @cached_property
     def _storage(self) -> tuple[Any, str]:
-        """The file system of fsspec, and the target's path in it."""
+        """fsspec's file system, and the target's path in it."""
         import fsspec
 
-        with self._telling(""):
+        with self._in_one_line(""):
             fs, path = fsspec.core.url_to_fs(
                 self.location.source, use_listings_cache=False, **self.location.storage_options
             )
@@ -137,7 +137,8 @@ class StoreTarget:
         return fs, str(path).rstrip("/")
 
     @contextmanager
-    def _telling(self, path: str) -> Iterator[None]:
+    def _in_one_line(self, path: str) -> Iterator[None]:
+        """Turn errors of the store into an OutputError of one line."""
         where = f"{self.shown}/{path}".rstrip("/")
         with one_line(where, "a place that this machine may write to", raised=OutputError):
             try:
@@ -147,7 +148,7 @@ class StoreTarget:
 
     @property
     def address(self) -> str | None:
-        """The address of S3 itself, or of the store that stands for it here."""
+        """The address at S3, or at the S3-compatible store that this machine is configured for."""
         if self.scheme not in _S3:
             return None
         fs, path = self._storage
@@ -164,9 +165,9 @@ class StoreTarget:
         )
 
     def sizes(self) -> dict[str, int]:
-        """Return all objects below the address."""
+        """Return path -> bytes of all objects below the address."""
         fs, base = self._storage
-        with self._telling(""):
+        with self._in_one_line(""):
             try:
                 found = fs.find(base, detail=True)
             except FileNotFoundError:
@@ -178,12 +179,12 @@ class StoreTarget:
     def read(self, path: str) -> bytes:
         """Return an object's content."""
         fs, base = self._storage
-        with self._telling(path):
+        with self._in_one_line(path):
             content: bytes = fs.cat_file(f"{base}/{path}")
         return content
 
     def write(self, path: str, content: bytes) -> None:
-        """Put an object there: on S3 with its type, and how long it may be kept."""
+        """Write an object. On S3 its media type and Cache-Control are set, too."""
         fs, base = self._storage
         headers = {}
         if self.scheme in _S3:
@@ -193,7 +194,7 @@ class StoreTarget:
             }
             if self.is_public:
                 headers["ACL"] = "public-read"
-        with self._telling(path):
+        with self._in_one_line(path):
             if not headers and "/" in path:
                 fs.makedirs(f"{base}/{path}".rpartition("/")[0], exist_ok=True)
             fs.pipe_file(f"{base}/{path}", content, **headers)
@@ -201,7 +202,7 @@ class StoreTarget:
     def remove(self, path: str) -> None:
         """Remove an object."""
         fs, base = self._storage
-        with self._telling(path), suppress(FileNotFoundError):
+        with self._in_one_line(path), suppress(FileNotFoundError):
             fs.rm_file(f"{base}/{path}")
 
 

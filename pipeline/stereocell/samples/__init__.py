@@ -1,4 +1,4 @@
-"""Samples that come with the package: no network, the same bytes every time."""
+"""Samples that come with the package. They need no network and have the same bytes every time."""
 
 from stereocell.samples.brain_cells import write_brain_cells
 from stereocell.samples.cells import write_cells

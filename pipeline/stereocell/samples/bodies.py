@@ -1,8 +1,8 @@
 """Solids with known surfaces: ellipsoids, balls and tubes. Lengths in um, axes (z, y, x).
 
 Points are three arrays z, y, x (um) that broadcast together, so that a grid needs no full
-coordinates. Sums are written out: with more threads a BLAS may add in another order, and the
-samples must be equal to the last bit.
+coordinates. Sums are written out in code: a BLAS with more threads may add in another order, but
+the samples must be equal to the last bit.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ class Nucleus:
 
     center_um     (z, y, x)
     semi_axes_um  along the columns of `rotation`, a (3, 3) rotation of (z, y, x)
-    brightness    of the dye inside, times the channel's amplitude
-    cell_um       radius of the cell body, a ball around the same centre; 0: no tumour cell
+    brightness    brightness of the dye inside, as a factor of the channel's amplitude
+    cell_um       radius of the cell body, a ball around the same centre; 0 outside the tumour
     """
 
     center_um: Triple
@@ -39,8 +39,8 @@ class Nucleus:
     def distance(self, points: Points) -> Values:
         """Return signed distances in um, negative inside, in the broadcast shape of `points`.
 
-        First order: k0 (k0 - 1) / k1 with k0 = |p / a|, k1 = |p / a^2|. Exact on the surface, with
-        a small relative error near it.
+        The first-order approximation is k0 (k0 - 1) / k1 with k0 = |p / a| and k1 = |p / a^2|. It
+        is exact on the surface, and has a small relative error near it.
 
         References: Quilez, "Ellipsoid SDF", https://iquilezles.org/articles/ellipsoids/
         """
@@ -70,13 +70,13 @@ class Tube:
 
     @property
     def low_um(self) -> Triple:
-        """The lower corner (z, y, x) of its bounding box."""
+        """The lower corner (z, y, x) of the bounding box."""
         z, y, x = (min(a, b) for a, b in zip(self.start_um, self.end_um, strict=True))
         return z - self.radius_um, y - self.radius_um, x - self.radius_um
 
     @property
     def high_um(self) -> Triple:
-        """The upper corner (z, y, x) of its bounding box."""
+        """The upper corner (z, y, x) of the bounding box."""
         z, y, x = (max(a, b) for a, b in zip(self.start_um, self.end_um, strict=True))
         return z + self.radius_um, y + self.radius_um, x + self.radius_um
 
@@ -89,9 +89,9 @@ class Tube:
 
 
 def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the (3, 3) rotation of a quaternion (w, x, y, z), float64 (4,), of any length but 0.
+    """Return the (3, 3) rotation of a quaternion (w, x, y, z), float64 (4,), of any length above 0.
 
-    Four normally distributed numbers give a uniform distribution over all rotations.
+    A quaternion of four normally distributed numbers gives each rotation with equal probability.
     """
     w, x, y, z = quaternion
     s = 2.0 / (w * w + x * x + y * y + z * z)

@@ -15,11 +15,11 @@ _FOLDER = files("stereocell.samples") / "brain-cells"
 def write_brain_cells(path: Path) -> None:
     """Copy the sample to `path` (NAME.ome.tif), and its licence to NAME.LICENSE beside it.
 
-    An existing equal sample stays. Raises UsageError for a name of another kind, OutputError where
-    other content lies at the path or it can't be written.
+    An existing equal sample stays. Raises UsageError for a name with another ending, OutputError if
+    the path holds other content or can't be written.
     """
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
-        raise UsageError(f"{path}: the sample is an OME-TIFF, expected a name like NAME{SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-TIFF; expected a name like NAME{SUFFIX}")
     licence = path.with_name(path.name.removesuffix(SUFFIX) + ".LICENSE")
     contents = {
         licence: (_FOLDER / "LICENSE").read_bytes(),

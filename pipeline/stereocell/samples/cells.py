@@ -1,10 +1,10 @@
 """A synthetic tissue of touching cells: an image of markers, a label map, and a table of the cells.
 
-A cell is what lies nearest to its centre, within a ball round it; centres are spread and then moved
-to the middle of what is nearest to them (Lloyd). Types lie in patches, as tissues have them. A dye
-of nuclei fills an ellipsoid in each cell; each marker fills a cell by its type's level, brighter at
-the membrane. The table has each cell's type and the level of each marker as the image was drawn
-with: the truth, without blur and noise.
+A cell consists of the voxels that are nearest to its centre and inside a ball around it. Centres
+are placed at random and then moved repeatedly to the mean of their nearest voxels (Lloyd's
+algorithm). Types lie in patches, as in real tissue. A dye of nuclei fills the inner part of each
+cell. Each marker fills a cell at the level of the cell's type, and is brighter at the membrane. The
+table has each cell's type and marker levels before blur and noise: the ground truth.
 """
 
 import csv
@@ -31,12 +31,12 @@ SUFFIX = ".ome.zarr"
 SHAPE = (44, 176, 264)  # voxels (z, y, x)
 SPACING_UM = (1.0, 0.5, 0.5)  # (z, y, x)
 CELLS = 300
-RADIUS_UM = 7.5  # um: radius of the ball that a cell stays in
+RADIUS_UM = 7.5  # um, radius of the ball that contains a cell
 LABELS = "cells"
 TYPES = ("tumour", "T cell", "B cell", "macrophage")
-_SHARES = (0.45, 0.25, 0.18, 0.12)  # share of the cells of each type
+_SHARES = (0.45, 0.25, 0.18, 0.12)  # share of each type among the cells
 NUCLEI = "DNA"
-# levels of the markers by type, in the order of TYPES; 1 is a channel's full brightness
+# Level of each marker in each type, in the order of TYPES; 1 is a channel's full brightness.
 MARKERS = {
     "panCK": (1.0, 0.05, 0.05, 0.1),
     "Ki67": (0.6, 0.2, 0.15, 0.05),
@@ -51,23 +51,23 @@ MARKERS = {
     "HLADR": (0.15, 0.2, 0.8, 0.9),
     "SOX10": (0.7, 0.02, 0.02, 0.02),
 }
-_COLUMNS = ("CellID", "cell_type", *MARKERS)  # of the table
+_COLUMNS = ("CellID", "cell_type", *MARKERS)  # columns of the table
 _HEAD = ",".join(_COLUMNS) + "\n"  # first line of the table
-_FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts
-_MEMBRANE_UM = 0.8
-_INSIDE = 0.35  # brightness of a marker inside a cell, as a share of that at the membrane
-_BLUR_UM = 0.45  # sigma
-_LLOYD = 4  # rounds
+_FULL, _OFFSET, _NOISE = 3000.0, 120.0, 18.0  # counts: full brightness, dark voxel, sigma of noise
+_MEMBRANE_UM = 0.8  # um, thickness of the membrane
+_INSIDE = 0.35  # brightness of a marker inside a cell, as a share of the brightness at the membrane
+_BLUR_UM = 0.45  # um, sigma of the blur
+_LLOYD = 4  # rounds of Lloyd's algorithm
 
 
 @dataclass(frozen=True, slots=True)
 class CellTissue:
-    """The truth: n cells.
+    """The ground truth of n cells.
 
-    labels   uint32 (z, y, x), 1 to n; 0: between cells
+    labels   uint32 (z, y, x), 1 to n; 0 between cells
     centres  float64 (n, 3), um, (z, y, x)
-    types    int64 (n,), in TYPES
-    levels   float64 (n, markers), 0..1 and more
+    types    int64 (n,), indices in TYPES
+    levels   float64 (n, markers), from 0; 1 is a channel's full brightness
     """
 
     labels: NDArray[np.uint32]
@@ -79,13 +79,13 @@ class CellTissue:
 def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAPE) -> None:
     """Write the sample to `path` (NAME.ome.zarr), and its table to NAME.csv beside it.
 
-    shape  voxels (z, y, x); the number of cells goes by the volume
+    shape  voxels (z, y, x); the number of cells is proportional to the volume
 
-    An existing equal sample stays. Raises UsageError for another ending, OutputError where other
-    content lies at the path or at the table's, or it can't be written.
+    An existing equal sample stays. Raises UsageError for another ending, OutputError if another
+    file lies at the sample's or the table's path, or they can't be written.
     """
     if not path.name.endswith(SUFFIX):
-        raise UsageError(f"{path}: expected a name that ends in {SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-Zarr; expected a name like NAME{SUFFIX}")
     _require_free(path, seed, shape)
     tissue = make_tissue(shape, seed)
     files, table = _zarr_files(tissue, seed), _table(tissue).encode()
@@ -100,9 +100,10 @@ def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAP
 
 
 def _require_free(path: Path, seed: int, shape: tuple[int, int, int]) -> None:
-    """Raise OutputError where another volume or table lies, before the sample is made.
+    """Raise OutputError if another volume or table exists, before the sample is computed.
 
-    The volume's attributes tell its arguments. A table is told by its first line.
+    A volume is recognised by its attributes, which state the sample's arguments. A table is
+    recognised by its first line.
     """
     group = find_group(path)
     is_ours = group is not None and group.attrs.get(SAMPLE) == _about(seed, shape)
@@ -112,7 +113,7 @@ def _require_free(path: Path, seed: int, shape: tuple[int, int, int]) -> None:
 
 
 def _is_table(file: Path) -> bool:
-    """Return whether a file begins as the table of such a sample does."""
+    """Return whether a file begins like the table of this sample."""
     if not file.is_file():
         return False
     with file.open("rb") as opened:
@@ -120,17 +121,17 @@ def _is_table(file: Path) -> bool:
 
 
 def _about(seed: int, shape: tuple[int, int, int]) -> dict[str, Any]:
-    """Return the sample's arguments, as the volume's attributes have them."""
+    """Return the sample's arguments for the volume's attributes."""
     return {"name": "cells", "seed": seed, "shape": list(shape)}
 
 
 def table_beside(path: Path) -> Path:
-    """Return the path of the table of a sample."""
+    """Return the path of a sample's table."""
     return path.with_name(path.name.removesuffix(SUFFIX) + ".csv")
 
 
 def make_tissue(shape: tuple[int, int, int], seed: int) -> CellTissue:
-    """Return the cells of a box of voxels (z, y, x); the same seed gives the same ones."""
+    """Return the cells in a box of voxels (z, y, x). The same seed gives the same cells."""
     rng = np.random.default_rng([seed, 77])
     spacing = np.array(SPACING_UM)
     box = (np.array(shape) - 1) * spacing
@@ -154,14 +155,14 @@ def make_tissue(shape: tuple[int, int, int], seed: int) -> CellTissue:
 
 
 def _types(centres: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return types in patches: by a smooth field, with some cells among others."""
+    """Return the cells' types. They form patches along a smooth field, with some cells mixed in."""
     wave = np.sin(centres @ np.array([0.03, 0.055, 0.04])) + np.cos(centres[:, 2] * 0.05)
     rank = np.argsort(np.argsort(wave + rng.normal(0, 0.35, len(centres)))) / len(centres)
     return np.searchsorted(np.cumsum(_SHARES)[:-1], rank, side="right")
 
 
 def _zarr_files(tissue: CellTissue, seed: int) -> dict[str, bytes]:
-    """Return the files of the OME-Zarr by their relative paths."""
+    """Return the contents of the OME-Zarr's files by their relative paths."""
     buffers: dict[str, Buffer] = {}
     _write_zarr(MemoryStore(buffers), tissue, seed)
     return {name: buffer.to_bytes() for name, buffer in sorted(buffers.items())}
@@ -226,7 +227,7 @@ def _axes() -> list[dict[str, str]]:
 
 
 def _depth(labels: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Return how deep in its cell each voxel lies, um, float32; 0 outside."""
+    """Return each voxel's depth in its cell, um, float32 (z, y, x); 0 outside cells."""
     at_wall = np.zeros(labels.shape, bool)
     for axis in range(3):
         ahead = np.diff(labels.astype(np.int64), axis=axis) != 0

@@ -23,8 +23,8 @@ from stereocell.storage.json_files import read_json
 from stereocell.storage.overwriting import require_free
 
 SUFFIX = ".ome.zarr"
-_CHUNK = (1, 32, 128, 128)  # (c, z, y, x): 1 MB
-_COARSEST = 64  # voxels: largest longer side, in the plane, of the coarsest level
+_CHUNK = (1, 32, 128, 128)  # voxels (c, z, y, x), 1 MB
+_COARSEST = 64  # voxels, longer side in y and x at which no coarser level is added
 
 
 def write_cycif(
@@ -39,11 +39,11 @@ def write_cycif(
 
     grid               columns x rows of tiles
     tile_size          voxels (z, y, x)
-    brightness_spread  brightness of the cells is log-uniform over 1 .. 1 + this
+    brightness_spread  brightness of the cells is log-uniform from 1 to 1 + this
 
     The voxels are uint16 (c, z, y, x). The same arguments give the same bytes; an existing equal
-    sample stays. Raises UsageError for arguments that make no volume, OutputError where other
-    content lies at `path` or it can't be written.
+    sample stays. Raises UsageError for arguments out of range, OutputError if `path` holds other
+    content or can't be written.
     """
     _check(path, grid, tile_size, seed, brightness_spread)
     depth, height, width = tile_size
@@ -76,14 +76,14 @@ def write_cycif(
 
 
 def _about(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the sample's name and arguments, as its volume and its truth have them."""
+    """Return the sample's name and arguments for its volume and its truth."""
     return {"name": "cycif", **settings}
 
 
 def _require_free(truth_path: Path, settings: dict[str, Any]) -> None:
-    """Raise OutputError where another file lies at the truth's place, before it is made.
+    """Raise OutputError if another file lies at the truth's path, before the truth is computed.
 
-    The sample's arguments stand in a truth, so it is read as far as that.
+    A truth is recognised by the sample's arguments in it.
     """
     try:
         found = read_json(truth_path, None, "")
@@ -101,16 +101,16 @@ def _check(
     brightness_spread: float,
 ) -> None:
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
-        raise UsageError(f"{path}: the sample is an OME-Zarr, expected a name like NAME{SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-Zarr; expected a name like NAME{SUFFIX}")
     if min(grid) < 1:
-        raise UsageError(f"--grid: found {grid[0]}x{grid[1]}, expected columns x rows from 1x1")
+        raise UsageError(f"--grid is {grid[0]}x{grid[1]}; expected columns x rows, at least 1x1")
     if min(tile_size) < 8:
         found = ",".join(map(str, tile_size))
-        raise UsageError(f"--tile-size: found {found}, expected z,y,x of at least 8 voxels each")
+        raise UsageError(f"--tile-size is {found}; expected z,y,x of at least 8 voxels each")
     if seed < 0:
-        raise UsageError(f"--seed: found {seed}, expected 0 or more")
+        raise UsageError(f"--seed is {seed}; expected 0 or more")
     if not (math.isfinite(brightness_spread) and 0.0 <= brightness_spread <= 20.0):
-        raise UsageError(f"--brightness-spread: found {brightness_spread:g}, expected 0 to 20")
+        raise UsageError(f"--brightness-spread is {brightness_spread:g}; expected 0 to 20")
 
 
 def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
@@ -119,7 +119,7 @@ def _is_there(path: Path, attributes: dict[str, Any]) -> bool:
     group = find_group(path)
     if group is None or group.attrs.asdict() != attributes:
         require_free(path, expected=EXPECTED)
-        return False  # it is forced
+        return False  # --force allows its replacement
     levels = [array for _, array in group.arrays()]
     return bool(levels) and all(level.nchunks == level.nchunks_initialized for level in levels)
 
@@ -133,7 +133,7 @@ def _level_shapes(shape: tuple[int, int, int]) -> list[tuple[int, int, int]]:
 
 
 def _attributes(shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the attributes of the group, OME-Zarr 0.5."""
+    """Return the attributes of the OME-Zarr 0.5 group."""
     axes: list[dict[str, str]] = [{"name": "c", "type": "channel"}]
     axes += [{"name": axis, "type": "space", "unit": "micrometer"} for axis in "zyx"]
     depth_um, height_um, width_um = SPACING_UM
@@ -176,9 +176,9 @@ def _write_zarr(
     attributes: dict[str, Any],
     seed: int,
 ) -> None:
-    """Write the voxels, by way of compressed memory.
+    """Compress the voxels in memory, then write the files.
 
-    zarr writes from threads of its own, which would continue after an exception of ours.
+    zarr would write files from threads of its own, which continue after an exception in this one.
     """
     files: dict[str, Buffer] = {}
     group = zarr.open_group(MemoryStore(files), mode="w", zarr_format=3, attributes=attributes)
@@ -189,7 +189,8 @@ def _write_zarr(
             shape=(len(STAINS), *size),
             chunks=tuple(min(a, b) for a, b in zip(_CHUNK, (1, *size), strict=True)),
             dtype="uint16",
-            compressors=ZstdCodec(level=3),  # one thread, no dictionary: the same bytes every time
+            # With one thread and no dictionary, the bytes are the same every time.
+            compressors=ZstdCodec(level=3),
             dimension_names=("c", "z", "y", "x"),
         )
         for level, size in enumerate(shapes)
@@ -197,7 +198,7 @@ def _write_zarr(
     _, height, width = tile_size
     for y in range(0, shape[1], height):
         for stain in range(len(STAINS)):
-            # A whole row of tiles at a time, so that few chunks are written twice.
+            # A whole row of tiles is written at a time, so that few chunks are written twice.
             row = np.concatenate(
                 [
                     microscope.record(tissue, stain, box=box, seed=seed)
@@ -215,7 +216,7 @@ def _write_zarr(
 
 
 def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:
-    """Fill a level with the means of 2 x 2 voxels of the finer one, rounded half up."""
+    """Fill a level with the means of 2 x 2 voxels of the finer level, rounded half up."""
     channels, depth, height, width = coarser.shape
     for c, y, x in product(range(channels), range(0, height, 128), range(0, width, 512)):
         rows, columns = min(128, height - y), min(512, width - x)
@@ -225,7 +226,7 @@ def _halve(finer: zarr.Array[Any], coarser: zarr.Array[Any]) -> None:
 
 
 def _truth(tissue: Tissue, shape: tuple[int, int, int], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the ground truth of the voxels. Lengths in um, positions (z, y, x)."""
+    """Return the ground truth of the voxels; lengths in um, positions (z, y, x)."""
     waves = [
         microscope.waves_of(index, tissue.size_um, settings["seed"]) for index in range(len(STAINS))
     ]

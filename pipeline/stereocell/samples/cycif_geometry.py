@@ -1,7 +1,7 @@
-"""The synthetic block's nuclei, tumour cells and vessels: geometry alone, no voxels.
+"""The geometry of the synthetic block: nuclei, tumour cells and vessels, without voxels.
 
-Vessels grow first, as trees that fork. Nuclei are then placed at random, and accepted where they
-touch nothing (random sequential packing). Positions are (z, y, x) in um.
+Vessels grow first, as trees that fork. Nuclei are then placed at random, and accepted if they touch
+nothing (random sequential packing). Positions are (z, y, x) in um.
 
 References: Murray, "The physiological principle of minimum work", Proceedings of the National
 Academy of Sciences 12(3), 1926, https://doi.org/10.1073/pnas.12.3.207
@@ -17,21 +17,21 @@ from scipy.spatial import KDTree
 
 from stereocell.samples.bodies import Nucleus, Triple, Tube, rotation_of
 
-MARGIN_UM = 4.0  # width of a margin with bodies, so that the block cuts some of them
-NUCLEUS_GAP_UM = 1.0  # smallest distance between the surfaces of two nuclei
-STROMA_GAP_UM = 5.0  # smallest distance between nuclei outside the tumour
-VESSEL_GAP_UM = 1.0  # smallest distance between a nucleus and a vessel
-CELL_RIM_UM = 1.4  # cytoplasm around a tumour nucleus
-TUMOR_SHARE = 0.58  # share of the block's width
-_THROW_UM3 = 5.0  # um3 per random placement: more placements hardly pack denser
-_STEP_UM = 1.5  # length of a vessel's segment
-_FORK_UM = (14.0, 26.0)  # length of a branch before it forks, smallest and largest
+MARGIN_UM = 4.0  # um, margin around the block that also holds bodies, so that the block cuts some
+NUCLEUS_GAP_UM = 1.0  # um, smallest distance between the surfaces of two nuclei
+STROMA_GAP_UM = 5.0  # um, smallest distance between nuclei outside the tumour
+VESSEL_GAP_UM = 1.0  # um, smallest distance between a nucleus and a vessel
+CELL_RIM_UM = 1.4  # um, thickness of the cytoplasm around a tumour nucleus
+TUMOR_SHARE = 0.58  # share of the block's width that is tumour
+_THROW_UM3 = 5.0  # um3 per random placement; with more placements the packing hardly gets denser
+_STEP_UM = 1.5  # um, length of a vessel's segment
+_FORK_UM = (14.0, 26.0)  # um, smallest and largest length of a branch before it forks
 _SHRINK = 0.794  # factor of the radius at a fork: Murray's law for two equal branches, 2^(-1/3)
 
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """The bodies of the block. `size_um` is (z, y, x)."""
+    """The nuclei and vessels of the block. `size_um` is (z, y, x)."""
 
     size_um: Triple
     nuclei: tuple[Nucleus, ...]
@@ -41,7 +41,7 @@ class Tissue:
 def grow_tissue(size_um: Triple, seed: int, brightness_spread: float) -> Tissue:
     """Return the tissue that fills a block of `size_um` (z, y, x).
 
-    Brightness is log-uniform over 1 .. 1 + `brightness_spread`; 0 makes all cells equally bright.
+    Brightness is log-uniform from 1 to 1 + `brightness_spread`; 0 makes all cells equally bright.
     """
     rng = np.random.default_rng([seed, 0])
     vessels = _grow_vessels(size_um, rng)
@@ -54,7 +54,7 @@ def _grow_vessels(size_um: Triple, rng: np.random.Generator) -> tuple[Tube, ...]
     trees = max(1, round(height * width / 2500.0))
     tubes: list[Tube] = []
     for tree in range(trees):
-        # They enter at the lower or upper edge, spread along x.
+        # The trees enter at the lower or upper edge, spread along x.
         x = width * (tree + rng.uniform(0.3, 0.7)) / trees
         from_top = bool(rng.random() < 0.5)
         y = -MARGIN_UM if from_top else height + MARGIN_UM
@@ -78,7 +78,8 @@ def _grow_tree(
         at, heading, radius = tips.pop()
         length = rng.uniform(*_FORK_UM)
         while length > 0.0 and np.all(at > low) and np.all(at < high):
-            pull = np.array([0.08 * (0.5 - at[0] / size_um[0]), 0.0, 0.0])  # stay in the section
+            # This pull towards the middle of z keeps the vessel inside the section.
+            pull = np.array([0.08 * (0.5 - at[0] / size_um[0]), 0.0, 0.0])
             heading = heading / np.linalg.norm(heading) + rng.normal(0.0, 0.11, 3) + pull
             heading = heading / np.linalg.norm(heading) * (0.6, 1.0, 1.0)
             end = at + _STEP_UM * heading / np.linalg.norm(heading)
@@ -136,12 +137,14 @@ def _kept_apart(
     in_tumor: NDArray[np.bool_],
     candidates: NDArray[np.bool_],
 ) -> list[int]:
-    """Return the placements that keep their distance from those accepted before.
+    """Return the placements that keep their distance from those accepted before them.
 
-    centers     (n, 3), float64, (z, y, x), um, of the candidates; `reach`, `in_tumor` are (n,)
-    candidates  (m,), a mask over all placements, which the returned indices count
+    centers     float64 (n, 3), centres (z, y, x) of the candidates, um
+    reach       (n,), radii of the candidates, um
+    in_tumor    (n,), whether a candidate lies in the tumour
+    candidates  (m,), mask of the candidates among all placements; the result has indices into it
     """
-    cell = 14.0  # um: centres further apart than this are never too close
+    cell = 14.0  # um; centres that are further apart are never too close
     bins: defaultdict[tuple[int, int, int], list[tuple[float, ...]]] = defaultdict(list)
     kept = []
     throws = np.flatnonzero(candidates).tolist()
@@ -167,7 +170,7 @@ def _kept_apart(
 def _in_tumor(
     points: NDArray[np.float64], size_um: Triple, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the points in the tumour: left of a wavy front."""
+    """Return a mask (n,) of the points in the tumour, which lies left of a wavy front."""
     _, height, width = size_um
     phases = rng.uniform(0.0, 2.0 * np.pi, 2)
     front = TUMOR_SHARE * width + 0.06 * width * np.sin(points[:, 1] / 0.28 / height + phases[0])

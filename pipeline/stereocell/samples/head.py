@@ -1,14 +1,15 @@
 """A head in T1-weighted MRI, made of ellipsoids, and its ground truth.
 
-It follows the phantom of Shepp & Logan, in three dimensions by Kak & Slaney (table 3.2), for MRI by
-Gach, Tanase & Boada. The outer ellipsoid and the two tilted, unequal ventricles have the
-proportions of that table at 104 mm a unit. The tissues are those of a head, and the surfaces of
-grey and white matter are folded. Nothing is its own mirror image: nose and eyes in front, the neck
-below, and a capsule of oil on the left temple, which radiographers tape there to mark the side.
+It follows the phantom of Shepp & Logan, in its 3D form by Kak & Slaney (table 3.2) and its MRI form
+by Gach, Tanase & Boada. The outer ellipsoid and the two tilted, unequal ventricles have the
+proportions of that table, with 104 mm as the unit. The tissues are a head's, and the surfaces of
+grey and white matter are folded. The head has no mirror symmetry: nose and eyes are in front, the
+neck below, and a capsule of oil on the left temple. Radiographers tape such a capsule there to mark
+the side.
 
-Bodies are painted one over the other, each with the share of a voxel that it covers (a ramp one
-voxel wide over its surface), so that the truth is known as shares, too. A receive coil's bias
-field multiplies the signal; noise is Rician, as in magnitude images.
+Bodies are painted one over the other. Each covers a share of a voxel, by a ramp one voxel wide over
+its surface; hence the truth is also known as shares. The bias field of a receive coil multiplies
+the signal. Noise is Rician, as in magnitude images.
 
 References: Shepp & Logan, "The Fourier reconstruction of a head section", IEEE Transactions on
 Nuclear Science 21(3), 1974, https://doi.org/10.1109/TNS.1974.6499235
@@ -30,7 +31,7 @@ Triple = tuple[float, float, float]
 Field = NDArray[np.float32]
 
 SHAPE = (112, 96, 96)  # voxels (z, y, x)
-FIELD_MM: Triple = (224.0, 192.0, 201.6)  # (z, y, x), field of view for every shape
+FIELD_MM: Triple = (224.0, 192.0, 201.6)  # mm (z, y, x), field of view for every shape
 BACKGROUND, CSF, GREY, WHITE, OTHER = range(5)
 CLASSES = ("background", "CSF", "grey", "white", "other")
 WHITE_LEVEL = 1000.0  # voxel value of white matter, without bias
@@ -38,12 +39,15 @@ WHITE_LEVEL = 1000.0  # voxel value of white matter, without bias
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An ellipsoid. Lengths in mm from the middle of the field of view, along (z, y, x): to the
-    front, down, to the patient's left.
+    """An ellipsoid.
 
-    signal   as a share of white matter's
-    turn     degrees about the y axis; positive: its front end turns to the left
-    fold_mm  amplitude of its surface's folds
+    label      class of the tissue, BACKGROUND to OTHER
+    signal     as a share of white matter's signal
+    center     mm from the middle of the field of view (z, y, x): to the front, down, to the
+               patient's left
+    semi_axes  mm (z, y, x)
+    turn       degrees about the y axis; a positive angle turns the front end to the left
+    fold_mm    mm, amplitude of the surface's folds
     """
 
     name: str
@@ -55,7 +59,7 @@ class Body:
     fold_mm: float = 0.0
 
 
-# in the order of painting: later bodies cover earlier ones
+# Bodies in the order of painting; later bodies cover earlier ones.
 BODIES = (
     Body("neck", OTHER, 0.55, (-22, 75, 0), (44, 62, 42)),
     Body("nose", OTHER, 0.70, (92, 22, 0), (18, 20, 12)),
@@ -86,9 +90,9 @@ class HeadPhantom:
 
     voxels      uint16 (z, y, x), with bias field and noise
     spacing_um  (z, y, x), um
-    labels      uint8 (z, y, x): the class (BACKGROUND .. OTHER) that covers most of the voxel
-    fractions   float32 (class, z, y, x): the share of each voxel that each class covers, 0..1
-    bias        float32 (z, y, x): the factor of the signal; its mean is about 1
+    labels      uint8 (z, y, x), class (BACKGROUND to OTHER) that covers most of the voxel
+    fractions   float32 (class, z, y, x), share of each voxel that each class covers, 0..1
+    bias        float32 (z, y, x), factor of the signal, with a mean of about 1
     """
 
     voxels: NDArray[np.uint16]
@@ -101,12 +105,12 @@ class HeadPhantom:
 def make_head(
     *, shape: tuple[int, int, int] = SHAPE, noise: float = 0.05, bias: float = 0.2, seed: int = 1
 ) -> HeadPhantom:
-    """Return the head in `shape` (z, y, x) voxels over the same field of view.
+    """Return the head in `shape` (z, y, x) voxels. The field of view is the same for each shape.
 
     noise  sigma of each of the two receive channels, as a share of white matter's signal
-    bias   range of the bias field: 0.2 means 0.9 to 1.1, as in BrainWeb
+    bias   range of the bias field; 0.2 means 0.9 to 1.1, as in BrainWeb
 
-    The same arguments give the same voxels. Raises UsageError for arguments that make no head.
+    The same arguments give the same voxels. Raises UsageError for arguments out of range.
     """
     _check(shape, noise, bias, seed)
     spacing = tuple(length / n for length, n in zip(FIELD_MM, shape, strict=True))
@@ -141,16 +145,19 @@ def make_head(
 
 def _check(shape: tuple[int, int, int], noise: float, bias: float, seed: int) -> None:
     if len(shape) != 3 or not all(16 <= n <= 1024 for n in shape):
-        raise UsageError(f"shape: found {shape}, expected z, y, x of 16 to 1024 voxels each")
+        raise UsageError(f"shape is {shape}; expected z, y, x of 16 to 1024 voxels each")
     for name, value in (("noise", noise), ("bias", bias)):
         if not 0 <= value <= 1:
-            raise UsageError(f"{name}: found {value:g}, expected a share from 0 to 1")
+            raise UsageError(f"{name} is {value:g}; expected a share from 0 to 1")
     if seed < 0:
-        raise UsageError(f"seed: found {seed}, expected 0 or more")
+        raise UsageError(f"seed is {seed}; expected 0 or more")
 
 
 def _reach(axis: Field, body: Body, k: int, width: float) -> slice:
-    """Return the range along axis k that a body may cover; `axis`: coordinates (n,), mm."""
+    """Return the range of indices along axis k that a body may cover.
+
+    axis  coordinates (n,) along axis k, mm
+    """
     radius = max(body.semi_axes) if body.turn and k != 1 else body.semi_axes[k]
     reach = radius + body.fold_mm + width
     ends = (body.center[k] - reach, body.center[k] + reach)
@@ -159,11 +166,12 @@ def _reach(axis: Field, body: Body, k: int, width: float) -> slice:
 
 
 def _distance(body: Body, axes: list[Field]) -> Field:
-    """Return the approximate distance of the points outside a body, mm, float32 (z, y, x).
+    """Return the approximate signed distance to a body's surface, mm, float32 (z, y, x).
 
     axes  coordinates (n,) along z, y, x, mm
 
-    First order: the value of the ellipsoid's implicit function over its gradient.
+    The distance is negative inside. It is a first-order approximation: the value of the ellipsoid's
+    implicit function divided by its gradient.
     """
     z, y, x = np.meshgrid(
         *(axis - np.float32(c) for axis, c in zip(axes, body.center, strict=True)),
@@ -190,8 +198,10 @@ def _distance(body: Body, axes: list[Field]) -> Field:
 
 
 def _bias(axes: list[Field], share: float) -> Field:
-    """Return a smooth field from 1 - share/2 to 1 + share/2, float32 (z, y, x), brightest off the
-    middle."""
+    """Return a smooth field from 1 - share/2 to 1 + share/2, float32 (z, y, x).
+
+    The field is brightest outside the middle.
+    """
     z, y, x = np.meshgrid(
         *(axis / np.float32(length / 2) for axis, length in zip(axes, FIELD_MM, strict=True)),
         indexing="ij", sparse=True,

@@ -1,10 +1,10 @@
 """The sample `mri`: the head phantom as a DICOM series of sagittal slices, of a made-up patient.
 
-The series has the usual properties of a scanner's: the grid is turned a few degrees against the
-patient, as ImageOrientationPatient states (the voxels are the phantom's own, so that its truth lies
-on the same grid), file names and instance numbers are not in the order of positions, and
-SliceThickness isn't the spacing. The bytes are the same each time: no current date, and UIDs
-derived from hashes of the content.
+The series has the usual properties of a scanner's series. The grid is turned by a few degrees
+against the patient, as ImageOrientationPatient states. The voxels are the phantom's own, so that
+its truth lies on the same grid. File names and instance numbers are not in the order of positions,
+and SliceThickness differs from the spacing. The bytes are the same each time: they contain no
+current date, and UIDs are hashes of the seed and of a name.
 
 References: DICOM PS3.3 A.4 (MR Image IOD); PS3.5 B.2 (UUID derived UIDs).
 """
@@ -29,9 +29,9 @@ from stereocell.storage.atomic_write import replacing_folder
 from stereocell.storage.folder_names import names_in_folder
 from stereocell.storage.overwriting import require_free
 
-_UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace of this sample's UIDs
+_UIDS = UUID("9c5b0d0e-3f5e-5a0c-8e0f-6d1c1d6f2a74")  # namespace for the UIDs of this sample
 PATIENT = "Ovoidsen^Emmeline"
-IDENTITY = {  # a made-up patient
+IDENTITY = {  # tags of the made-up patient
     "PatientName": PATIENT,
     "PatientID": "PHANTOM-1974-0613",
     "PatientBirthDate": "19740613",
@@ -45,21 +45,21 @@ IDENTITY = {  # a made-up patient
     "StudyDescription": "Quadrics of the head",
     "SeriesDescription": "T1w sagittal phantom",
 }
-# Tilt of the head: nod, turn and lean, degrees about (left, posterior, superior).
+# Degrees by which the head is turned about the axes (left, posterior, superior).
 TURN_DEG = (4.0, -3.0, 6.0)
-ISOCENTRE_MM = (3.0, -12.0, 21.0)  # LPS of the middle of the grid
+ISOCENTRE_MM = (3.0, -12.0, 21.0)  # mm, LPS position of the middle of the grid
 _FILE = re.compile(r"IM\d{4}\.dcm")  # names of the sample's files
-SLICE_THICKNESS_MM = 5.0  # differs from the spacing of this series
+SLICE_THICKNESS_MM = 5.0  # mm; intentionally differs from the spacing of this series
 
 
 def write_head(path: Path, *, seed: int = 0) -> None:
     """Write the phantom of `seed` to the folder `path`. An existing equal sample stays.
 
-    Raises UsageError for a seed below 0, OutputError where other content lies there or it can't be
+    Raises UsageError for a seed below 0, OutputError if the folder holds other content or can't be
     written.
     """
     if seed < 0:
-        raise UsageError(f"--seed: found {seed}, expected 0 or more")
+        raise UsageError(f"--seed is {seed}; expected 0 or more")
     _require_free(path, seed)
     write_dicom(path, make_head(seed=seed), seed=seed)
 
@@ -67,7 +67,7 @@ def write_head(path: Path, *, seed: int = 0) -> None:
 def write_dicom(path: Path, head: HeadPhantom, *, seed: int = 0) -> None:
     """Write one file per sagittal slice into the folder `path`, in an order shuffled by `seed`.
 
-    Raises OutputError where other content lies there or it can't be written.
+    Raises OutputError if the folder holds other content or can't be written.
     """
     files = _files(head, seed)
     if is_there(path, files):
@@ -78,9 +78,9 @@ def write_dicom(path: Path, head: HeadPhantom, *, seed: int = 0) -> None:
 
 
 def _require_free(path: Path, seed: int) -> None:
-    """Raise OutputError where a folder holds more than files of this sample, before it is made.
+    """Raise OutputError if a folder holds other files, before the sample is computed.
 
-    Each file tells its series, and the series its seed.
+    The UID of the series in the first file depends on the seed, and so identifies the sample.
     """
     names = names_in_folder(path)
     is_ours = not path.is_file() and all(_FILE.fullmatch(name) for name in names)
@@ -94,7 +94,7 @@ def _require_free(path: Path, seed: int) -> None:
 
 
 def affine_of(head: HeadPhantom) -> NDArray[np.float64]:
-    """Return the (4, 4) matrix for columns from (slice, row, column, 1) to LPS, mm.
+    """Return the (4, 4) matrix that maps columns (slice, row, column, 1) to LPS, mm.
 
     Slices run to the patient's left, rows down, columns to the back.
     """
@@ -109,7 +109,7 @@ def affine_of(head: HeadPhantom) -> NDArray[np.float64]:
 
 
 def _turn(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return the rotation (3, 3) by angles (degrees) about x, then y, then z."""
+    """Return the rotation (3, 3) by angles in degrees about x, then y, then z."""
     turn = np.eye(3)
     for axis, angle in enumerate(np.radians(degrees)):
         a, b = [k for k in range(3) if k != axis]
@@ -122,9 +122,9 @@ def _turn(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def _files(head: HeadPhantom, seed: int) -> dict[str, bytes]:
-    """Return the files' contents by name."""
+    """Return the contents of the files by name."""
     affine = affine_of(head)
-    # stored as (slice, row, column): to the left, down, to the back
+    # Slices are stored as (slice, row, column), which run to the left, down and to the back.
     stored = head.voxels[::-1].transpose(2, 1, 0)
     numbers = np.random.default_rng(seed).permutation(len(stored)) + 1
     files = {}
@@ -174,5 +174,5 @@ def _uid(seed: int, name: str) -> UID:
 
 
 def _decimal(value: float) -> str:
-    """Return a number in at most the 16 characters of a DS (DICOM PS3.5 6.2)."""
+    """Return a number as a DS, which has at most 16 characters (DICOM PS3.5 6.2)."""
     return f"{value + 0.0:.10f}"[:16]

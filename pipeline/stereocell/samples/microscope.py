@@ -1,10 +1,10 @@
-"""A model of a confocal microscope's recording of the tissue: dye, blur, background, noise.
+"""A model of a confocal microscope that records the tissue: dye, blur, background and noise.
 
-Each dye is drawn with partial volumes from its signed distance (a ramp one sample wide over the
-surface), on samples as fine along z as in the plane. They are averaged into voxels, blurred by a
-Gaussian, and lifted by an uneven background. Poisson noise of the photons and Gaussian noise of the
-camera are added. A box is drawn from the bodies that reach into it, so any part of the block can be
-made by itself.
+Each dye is drawn from signed distances, with a ramp one sample wide over the surface for partial
+volumes. The samples are as fine along z as along y and x. They are averaged into voxels and blurred
+by a Gaussian; an uneven background is added. Poisson noise of photons and Gaussian noise of the
+camera follow. A box is drawn from the bodies that reach into it, so that any part of the block can
+be computed on its own.
 """
 
 from collections.abc import Callable
@@ -21,18 +21,18 @@ from stereocell.samples.cycif_geometry import Tissue
 
 Field = NDArray[np.float32]
 
-SPACING_UM: Triple = (0.28, 0.14, 0.14)  # (z, y, x)
-BLUR_UM: Triple = (0.30, 0.12, 0.12)  # sigma (z, y, x); wider along z, as an objective blurs
+SPACING_UM: Triple = (0.28, 0.14, 0.14)  # um (z, y, x)
+BLUR_UM: Triple = (0.30, 0.12, 0.12)  # um, sigma (z, y, x); wider along z, as in an objective
 OFFSET = 100.0  # counts of a dark voxel
 GAIN = 1.5  # counts per photo-electron
-READ_NOISE = 4.0  # counts, sigma
-MEMBRANE_UM = 0.5  # thickness of a cell's membrane
-CYTOPLASM = 0.3  # brightness, as a share of the membrane's
-WALL_UM = 0.7  # thickness of a vessel's wall
+READ_NOISE = 4.0  # counts, sigma of the camera's noise
+MEMBRANE_UM = 0.5  # um, thickness of a cell's membrane
+CYTOPLASM = 0.3  # brightness of the cytoplasm, as a share of the membrane's
+WALL_UM = 0.7  # um, thickness of a vessel's wall
 CHROMATIN = 0.2  # amplitude of clumps inside a nucleus, as a share of its dye
-CHROMATIN_FROM_UM = 0.4  # depth below the surface at which clumps begin; full at twice that depth
-_TRUNCATE = 4.0  # sigmas of the Gaussian that are summed
-_SAMPLES = 2  # along z in a voxel: makes the samples cubes
+CHROMATIN_FROM_UM = 0.4  # um below the surface at which clumps begin; they are full at twice this
+_TRUNCATE = 4.0  # sigmas at which the Gaussian is cut off
+_SAMPLES = 2  # samples along z in a voxel, which makes the samples cubes
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Wave:
 
 @dataclass(frozen=True, slots=True)
 class Stain:
-    """One channel. Levels are counts over the offset, at brightness 1."""
+    """One channel. `amplitude` and `background` are counts above OFFSET, at brightness 1."""
 
     name: str
     color: str  # sRGB, hexadecimal
@@ -62,7 +62,7 @@ STAINS = (
 
 
 def waves_of(stain: int, size_um: Triple, seed: int) -> tuple[Wave, ...]:
-    """Return the unevenness of a stain's background; the weights add up to at most 0.45."""
+    """Return the waves of a stain's uneven background. Their weights add up to 0.45."""
     rng = np.random.default_rng([seed, 1, stain])
     longest = max(size_um)
     waves = []
@@ -82,7 +82,7 @@ def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
     for wave in waves:
         kz, ky, kx = wave.k
         in_plane = ky * y + kx * x + wave.phase
-        # cos(a + b), so that a grid takes cosines of a line and of a plane only
+        # cos(a + b) is expanded, so that a grid needs cosines of one line and one plane only.
         level += wave.weight * (
             np.cos(kz * z) * np.cos(in_plane) - np.sin(kz * z) * np.sin(in_plane)
         )
@@ -92,7 +92,7 @@ def background(stain: Stain, waves: tuple[Wave, ...], points: Points) -> Values:
 def record(tissue: Tissue, stain: int, *, box: Box, seed: int) -> NDArray[np.uint16]:
     """Return the voxels (z, y, x), uint16 counts, of a box in one channel.
 
-    The noise belongs to the box: another box that overlaps it repeats the dye, not the noise.
+    Another box that overlaps this one repeats the dye, but has other noise.
     """
     halo = [int(np.ceil(_TRUNCATE * b / h)) for b, h in zip(BLUR_UM, SPACING_UM, strict=True)]
     canvas = _Canvas(box, (halo[0], halo[1], halo[2]))
@@ -128,7 +128,10 @@ class _Canvas:
     def around(
         self, low_um: Triple, high_um: Triple
     ) -> tuple[tuple[slice, slice, slice], Points] | None:
-        """Return the samples between two corners (z, y, x) and their points, um; None: outside."""
+        """Return the samples between two corners (z, y, x), and their points in um.
+
+        Returns None if no sample lies there.
+        """
         pad = 2.0 * self.width_um
         z, y, x = (
             slice(*(int(i) for i in np.searchsorted(axis, (a - pad, b + pad))))
@@ -139,7 +142,7 @@ class _Canvas:
         return (z, y, x), _open_grid(self.axes[0][z], self.axes[1][y], self.axes[2][x])
 
     def share_inside(self, distance: NDArray[np.floating[Any]]) -> Field:
-        """Return the share of each sample that lies inside, 0..1; `distance`: um."""
+        """Return the share of each sample that lies inside, 0..1, from signed distances in um."""
         share: Field = np.clip(0.5 - distance / self.width_um, 0.0, 1.0).astype(np.float32)
         return share
 
@@ -157,7 +160,7 @@ def _draw_nuclei(tissue: Tissue, canvas: _Canvas) -> Field:
         if found is not None:
             where, points = found
             distance = nucleus.distance(points)
-            # Chromatin shows well inside only: at the surface the dye is even, as in the truth.
+            # Chromatin begins below the surface. At the surface the dye is even, as in the truth.
             depth = np.clip((-distance - CHROMATIN_FROM_UM) / CHROMATIN_FROM_UM, 0.0, 1.0)
             even = nucleus.brightness * (1.0 + CHROMATIN * depth * _chromatin(points))
             dye[where] = np.maximum(dye[where], even * canvas.share_inside(distance))
@@ -165,7 +168,7 @@ def _draw_nuclei(tissue: Tissue, canvas: _Canvas) -> Field:
 
 
 def _chromatin(points: Points) -> Values:
-    """Return clumps about 1.5 um apart, -1 .. 1: slanted waves that bend one another."""
+    """Return clumps about 1.5 um apart, -1..1, made of slanted waves that bend each other."""
     z, y, x = points
     a = 3.1 * z + 2.9 * y + 1.0 * x
     b = 0.9 * z - 2.4 * y + 3.7 * x
@@ -175,7 +178,7 @@ def _chromatin(points: Points) -> Values:
 
 
 def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
-    """Draw tumour cells: balls that share a flat wall where two overlap, as soap bubbles do."""
+    """Draw tumour cells: balls with a flat wall where two overlap, like soap bubbles."""
     nearest = np.full(canvas.shape, 1e3, np.float32)
     second = np.full(canvas.shape, 1e3, np.float32)
     brightness = np.zeros(canvas.shape, np.float32)
@@ -189,7 +192,7 @@ def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
         np.minimum(second[where], np.where(wins, nearest[where], distance), out=second[where])
         brightness[where][wins] = cell.brightness
         np.minimum(nearest[where], distance, out=nearest[where])
-    depth = np.minimum(-nearest, (second - nearest) / 2.0)  # from the cell's own boundary inwards
+    depth = np.minimum(-nearest, (second - nearest) / 2.0)  # um inside the cell's own boundary
     body = canvas.share_inside(nearest)
     inner = canvas.share_inside(MEMBRANE_UM - depth)
     plasma = inner.copy()
@@ -203,7 +206,7 @@ def _draw_membranes(tissue: Tissue, canvas: _Canvas) -> Field:
 
 
 def _draw_vessels(tissue: Tissue, canvas: _Canvas) -> Field:
-    """Draw tubes with a wall and an open lumen, which continues through the forks."""
+    """Draw tubes with a wall and an open lumen that continues through the forks."""
     outer = np.full(canvas.shape, 1e3, np.float32)
     for tube in tissue.vessels:
         found = canvas.around(tube.low_um, tube.high_um)

@@ -1,4 +1,4 @@
-"""The place of a sample: anything else that lies there stays, unless it is forced."""
+"""Check the path of a sample. Other content there is never replaced, except with --force."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,12 +7,12 @@ import zarr
 
 from stereocell.storage.overwriting import require_free
 
-EXPECTED = "nothing or this very sample"
+EXPECTED = "nothing or the same sample"
 SAMPLE = "stereocell_sample"  # attribute of a Zarr group that holds the sample's arguments
 
 
 def find_group(place: Path) -> zarr.Group | None:
-    """Return the Zarr group at a path; None where there is none, or it is damaged."""
+    """Return the Zarr group at a path; None if there is none, or it is damaged."""
     try:
         return zarr.open_group(place, mode="r")
     except (OSError, ValueError, LookupError, TypeError):
@@ -22,9 +22,9 @@ def find_group(place: Path) -> zarr.Group | None:
 def is_there(place: Path, content: bytes | Mapping[str, bytes]) -> bool:
     """Return whether a file or folder already holds the sample.
 
-    content  bytes of the file, or of a folder's files by their relative paths
+    content  bytes of the file, or of a folder's files by relative path
 
-    An incomplete folder of the sample returns False. Raises OutputError for other content.
+    Returns False for an incomplete folder of the sample. Raises OutputError for other content.
     """
     if isinstance(content, bytes):
         is_same = place.is_file() and place.read_bytes() == content

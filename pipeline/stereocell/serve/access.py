@@ -41,20 +41,20 @@ _PAGE = (
     'background:#0b0d12;color:#dfe3ea"><h1 style="font-size:1.3em">A new code is needed</h1><p>{}'
 )
 
-MAY_UPLOAD = "may_upload"  # in the state of a request: whether its client may hand things in
+MAY_UPLOAD = "may_upload"  # key in a request's state: whether its client may upload to an inbox
 
 
 class Gate:
     """Tokens and sessions of a server on the LAN. They end with the process."""
 
     def __init__(self, on_used: Callable[[], None]) -> None:
-        """on_used: called after a token was used; `token` is then new, for another device."""
+        """on_used: called after a token was used, when `token` is already the next device's."""
         self._on_used = on_used
         self._sessions: list[str] = []
         self.token = secrets.token_urlsafe(32)
 
     def exchange(self, token: str) -> str | None:
-        """Return a new session for the token, which becomes void; None: the token is wrong."""
+        """Return a new session for the token, which becomes void; None if the token is wrong."""
         if not secrets.compare_digest(token.encode(), self.token.encode()):
             return None
         self.token = secrets.token_urlsafe(32)
@@ -63,7 +63,7 @@ class Gate:
         return self._sessions[-1]
 
     def knows(self, session: str) -> bool:
-        """Return whether this is a session. Takes the same time for all values."""
+        """Return whether this is a session. The time does not depend on how much of it matches."""
         found = False
         for known in self._sessions:
             found |= secrets.compare_digest(session.encode(), known.encode())
@@ -87,9 +87,9 @@ class Access:
         """Wrap an application.
 
         names      hosts that this server answers to, in lower case
-        gate       None on localhost
+        gate       tokens and sessions of the LAN; None on localhost, where no session is needed
         frames     origins whose pages may hold the viewer in a frame
-        uploaders  the gate whose sessions may upload, too; None: on localhost all clients may
+        uploaders  gate whose sessions may upload as well as look; None where there is no such gate
         """
         self._uploaders = uploaders
         self._app = app
@@ -113,11 +113,11 @@ class Access:
         elif scope["type"] == "http":
             await answer(scope, receive, send_protected)
         else:
-            # 403 without a text: after a response of our own uvicorn logs a false fault
+            # This closes with a bare 403. uvicorn would log a false error after our own response.
             await WebSocket(scope, receive, send).close()
 
     def _judge(self, scope: Scope) -> Response | None:
-        """Return the refusal of a request, or None where it may pass."""
+        """Return the refusal of a request, or None if the request may pass."""
         headers = Headers(scope=scope)
         host = headers.get("host", "").lower()
         if _name(host) not in self._names:
@@ -125,7 +125,7 @@ class Access:
         is_read = scope["type"] == "websocket" or scope["method"] in ("GET", "HEAD")
         is_own = _is_own_fetch(headers, bool(self._frames), is_read=is_read)
         if not (_is_own_origin(headers, host) and is_own):
-            return PlainTextResponse("pages of other origins may not ask this server", 403)
+            return PlainTextResponse("pages of other origins may not use this server", 403)
         rights = scope.setdefault("state", {})
         rights[MAY_UPLOAD] = self._gate is None
         if self._gate is None:
@@ -141,7 +141,8 @@ class Access:
         is_known = gate.knows(_cookie(headers)) or is_uploader
         if not tokens:
             return None if is_known else _no_session(headers)
-        if scope["type"] != "http" or scope["method"] != "GET":  # a HEAD is a preview, not a visit
+        # Only a visit uses up a token: neither a websocket nor a HEAD, which previews a link.
+        if scope["type"] != "http" or scope["method"] != "GET":
             return _no_session(headers)
         if is_uploader or (is_known and self._uploaders is None):
             return redirect(scope["path"])
@@ -165,17 +166,18 @@ def _is_own_origin(headers: Headers, host: str) -> bool:
 
 
 def _is_own_fetch(headers: Headers, may_be_framed: bool, *, is_read: bool) -> bool:
-    """Return whether the request comes from this server's page, a person or no browser.
+    """Return whether the request comes from this server's page, a followed link or no browser.
 
-    may_be_framed  a frame of another page may ask, too: the browser then asks the page's policy
-    is_read        it changes nothing: a form of another page may not send what does
+    may_be_framed  another page may hold this server's page in a frame; the browser then checks the
+                   page's own policy
+    is_read        the request changes nothing; another page may not send one that changes something
     """
     if headers.get("sec-fetch-site", "none") in ("none", "same-origin"):
         return True
     if not is_read:
         return False
     goes = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
-    a_link = ("navigate", "document")  # on a page or in a chat
+    a_link = ("navigate", "document")  # a person followed a link on a page or in a chat
     return goes == a_link or (may_be_framed and goes == ("navigate", "iframe"))
 
 
@@ -194,7 +196,7 @@ def _cookie(headers: Headers) -> str:
 
 
 def _no_session(headers: Headers) -> Response:
-    """Return the refusal of a client without a session: a page for whoever has opened one."""
+    """Return the refusal of a client without a session: a page for a browser, else plain text."""
     never = {"Cache-Control": "no-store"}
     if "text/html" not in headers.get("accept", ""):
         return PlainTextResponse(_SCAN, 403, never)

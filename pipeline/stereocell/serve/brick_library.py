@@ -1,13 +1,14 @@
-"""The trees of a bundle's volumes: built on first request, and stored in a folder.
+"""The brick trees of a bundle's volumes: built on first request, and stored in a folder.
 
-They are made of the bundle's own files, and so are stored in OUT/bricks: a second start builds
-nothing, and a new bundle is detected. A view of a source has finer trees than files, which are made
-of the source (live/fine_tiles.py) and stored in a scratch folder (serve/live_bricks.py).
+The trees of a built bundle are made from its own files and stored in OUT/bricks. A second start
+builds nothing, and a new bundle gets new trees. The view of a source that is still being built has
+trees finer than its files. They are read from the source (live/fine_tiles.py) and stored in a
+scratch folder (serve/live_bricks.py).
 
-The threshold is the largest intensity that the channel's transfer function leaves invisible. The
-function is the one selected in the stage, with which a viewer opens. The lowest threshold of all
-functions would mostly come from an unused one. A viewer that switches to a function that
-shows more fetches the volume's KTX2 file instead.
+A tree omits intensities up to a threshold: the largest one that the channel's transfer function
+leaves invisible. The function is the one selected in the stage, with which a viewer opens. The
+lowest threshold of all functions would mostly come from an unused one. A viewer that switches to
+a function that shows more fetches the volume's KTX2 file instead.
 """
 
 import hashlib
@@ -49,10 +50,10 @@ class BrickLibrary:
         """Describe a library; nothing is read yet.
 
         bundle      the folder of manifest.json
-        trees       the folder of the trees, or those that several bundles share
-        read        where the texels of volumes with finer trees than files come from; None: the
+        trees       the folder of the trees, or the `TreeFiles` that several bundles share
+        read        returns the texels of a volume whose tree is finer than its file; None if the
                     bundle has no such volumes
-        while_made  what holds while a tree is made
+        while_made  returns a context that is entered while a tree is made
         """
         self._bundle, self._read, self._while_made = bundle, read, while_made
         self._trees = trees if isinstance(trees, TreeFiles) else TreeFiles(trees)
@@ -62,13 +63,13 @@ class BrickLibrary:
 
     @property
     def built(self) -> int:
-        """How many trees were built."""
+        """Number of trees that were built since the start."""
         return self._trees.built
 
     def volumes(self) -> dict[tuple[str, str], Volume]:
-        """Return the volumes by (tile, channel), read again where the bundle was written anew.
+        """Return the volumes by (tile, channel); read them again if the bundle was replaced.
 
-        Raises OutputError where the bundle is missing, SourceError where it is damaged.
+        Raises OutputError if the bundle is missing, SourceError if it is damaged.
         """
         with self._listing:
             path = self._bundle / MANIFEST
@@ -83,17 +84,17 @@ class BrickLibrary:
             return self._volumes
 
     def has_finer(self) -> bool:
-        """Return whether any tree has finer texels than the volume's file."""
+        """Return whether any tree has finer texels than its volume's file."""
         try:
             return any("finer_size" in volume.entry for volume in self.volumes().values())
-        except StereoCellError:  # whoever asks for a tree is told
+        except StereoCellError:  # open() raises it again for the client that requests a tree
             return False
 
     def open(self, tile: str, channel: str) -> BrickFile:
-        """Return a volume's tree; build it where necessary.
+        """Return a volume's tree; build it if necessary.
 
-        Raises UnknownVolumeError; OutputError and SourceError where the bundle or the source is
-        damaged; FullError where there is no room.
+        Raises UnknownVolumeError; OutputError and SourceError if the bundle or the source is
+        damaged; FullError if the folder has no room.
         """
         volume = self._volume(tile, channel)
         file = self._trees.find(volume)
@@ -113,12 +114,12 @@ class BrickLibrary:
         return self._trees.find(self._volume(tile, channel))
 
     def hold(self, owner: object, names: Iterable[tuple[str, str]]) -> None:
-        """Let the trees of (tile, channel) stay as long as `owner` sends them."""
+        """Keep the trees of these (tile, channel) in the folder until `owner` releases them."""
         volumes = self.volumes()
         self._trees.hold(owner, [volumes[name] for name in names if name in volumes])
 
     def release(self, owner: object) -> None:
-        """Let the trees leave that `owner` held."""
+        """Allow the removal of the trees that `owner` held."""
         self._trees.release(owner)
 
     def _volume(self, tile: str, channel: str) -> Volume:
@@ -177,7 +178,7 @@ def _read_volumes(bundle: Path) -> dict[tuple[str, str], Volume]:
 
 
 def _read(bundle: Path, ref: dict[str, Any]) -> bytes:
-    """Return a file of the bundle. Raises SourceError where it doesn't match its FileRef."""
+    """Return a file of the bundle. Raises SourceError if it doesn't match its FileRef."""
     try:
         data = (bundle / ref["path"]).read_bytes()
     except OSError as error:

@@ -1,8 +1,9 @@
 """The bricks that a view needs, in the order of their screen-space error.
 
-A brick's worth is the cost of its absence: the error of its parent (shown instead), times the size
-of its box on the screen, times a weight that falls off from the gaze's direction. A brick never
-comes before its parent: its worth is at most the parent's, and of equals the coarser comes first.
+A brick's worth is the cost of its absence, in which case its parent is shown. It is the product of
+the parent's error, the size of the brick's box on the screen, and a weight that falls off from the
+gaze's direction. A brick never
+comes before its parent: its worth is at most the parent's, and a tie puts the coarser brick first.
 
 References: Guthe & Strasser, "Advanced techniques for high-quality multi-resolution volume
 rendering", Computers & Graphics 28(1), 2004, https://doi.org/10.1016/j.cag.2003.10.018
@@ -49,10 +50,11 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class PlacedTree:
-    """A tree at its tile's place; boxes (n, 3), (x, y, z), um before the tile's matrix.
+    """A tree at its tile's place; n nodes in breadth-first order.
 
-    center, half  of the nodes' boxes
-    to_world      (4, 4) for column vectors; to_tile: its inverse
+    center, half  (n, 3), centre and half the edges of each node's box: (x, y, z) in um, in the
+                  tile's space, before its matrix
+    to_world      (4, 4) for column vectors, from the tile's space; to_tile is its inverse
     texel_um      longest edge of a finest texel
     parents       (n,), index of each node's parent; the root's is 0
     error_max, error_rms  (n,), grey values 0..255
@@ -74,11 +76,11 @@ class PlacedTree:
 def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
     """Return a tree in the box of its volume.
 
-    entry  of volumes.json
+    entry  the volume's entry in volumes.json
 
-    The boxes are those of the drawn part: they end at the centres of the last texels inside the
-    apron, and boxes of nodes with apron only have negative edges. Raises SourceError for a matrix
-    that can't be inverted.
+    The boxes enclose the part that is drawn: they end at the centres of the last texels inside the
+    apron. A node that holds nothing but apron gets a box with negative edges. Raises SourceError
+    for a matrix that can't be inverted.
     """
     nodes = table.nodes
     size = np.array(table.size[::-1], dtype=np.float64)
@@ -93,7 +95,7 @@ def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
     low = np.maximum(at * edge, first) - first
     high = np.minimum((at + 1) * edge, size - first) - first
     low_box, high_box = low_um + low * spacing, low_um + high * spacing
-    # texture y runs down the image, world y up
+    # y runs down the image in the texture, and up in the world
     low_box[:, 1], high_box[:, 1] = (
         high_um[1] - high[:, 1] * spacing[1],
         high_um[1] - low[:, 1] * spacing[1],
@@ -104,7 +106,7 @@ def place(table: Table, entry: dict[str, Any]) -> PlacedTree:
     try:
         to_tile = np.linalg.inv(to_world).astype(np.float64)
     except np.linalg.LinAlgError:
-        raise SourceError(f"tile {entry['tile']}: its matrix can't be undone") from None
+        raise SourceError(f"tile {entry['tile']}: its matrix can't be inverted") from None
     return PlacedTree(
         ((low_box + high_box) / 2).astype(np.float32),
         ((high_box - low_box) / 2).astype(np.float32),
@@ -126,9 +128,9 @@ def order(
     """Return tree (index into `trees`), node and worth of the bricks that a view needs, in order.
 
     All three are (k,). A root is needed if its box is in the frustum. A child is needed if its
-    parent is, its own box is in the frustum, and the parent is too coarse: its texels are longer
-    than `texel_px` on the screen at the nearest point of its box, and its error_max exceeds
-    `error_grey`. Empty nodes are never sent.
+    parent is needed, its own box is in the frustum, and the parent is too coarse. Too coarse means
+    that its texels are longer than `texel_px` on the screen at the nearest point of its box, and
+    that its error_max exceeds `error_grey`. Empty nodes are never sent.
     """
     trees_, nodes, worths, levels = [], [], [], []
     for i, tree in enumerate(trees):
@@ -146,8 +148,8 @@ def order(
 def _weigh(view: View, tree: PlacedTree) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Return a mask (n,) of the nodes that the view needs, and the worth of each, (n,).
 
-    It is computed in the tile's own space, where boxes are axis-aligned. A matrix with the same
-    scale along all axes, as a moved tile's, changes no ratio of size to distance.
+    Both are computed in the tile's own space, where boxes are axis-aligned. This is exact if the
+    tile's matrix scales all axes alike: ratios of size to distance are then the world's.
     """
     eye = (tree.to_tile @ np.append(view.eye, 1.0))[:3]
     gaze = tree.to_tile[:3, :3] @ view.gaze

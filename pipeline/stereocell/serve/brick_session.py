@@ -7,9 +7,9 @@ and a reason:
 
     1003  a binary frame                    1007  invalid UTF-8, JSON or schema
     1008  against the order or the limits   1009  a message that is too long
-    1012  the bundle was written anew       1013  too many connections
+    1012  the bundle was replaced           1013  too many connections
 
-(1001, the server ends, and the limits of single frames: serve/websocket_protocol.py.)
+serve/websocket_protocol.py closes with 1001 when the server ends, and limits single frames.
 """
 
 import asyncio
@@ -63,7 +63,7 @@ T = TypeVar("T")
 
 
 class BrickEndpoint:
-    """The websocket part of a server: its connections share threads."""
+    """The websocket `/bricks` of a server. Its connections share threads."""
 
     def __init__(self) -> None:
         self._builder = ThreadPoolExecutor(1, "bricks-build")
@@ -84,20 +84,20 @@ class BrickEndpoint:
             await BrickSession(socket, library, self._builder, self._quick).run()
         finally:
             counts[address] -= 1
-            counts += Counter()  # removes entries of 0
+            counts += Counter()  # this addition removes entries of 0
 
     def close(self) -> None:
-        """End the threads after their current work."""
+        """End the threads after the work that they are doing now; drop the rest."""
         self._builder.shutdown(wait=False, cancel_futures=True)
         self._quick.shutdown(wait=False, cancel_futures=True)
 
 
 @dataclass(slots=True)
 class _Tree:
-    """An open tree. Its file may leave the server meanwhile, and is then made again.
+    """A tree that the client has opened. Its file may be removed meanwhile, and is then rebuilt.
 
-    lengths  bytes of each node's brick
-    sent     a byte per node: 1 where the client has its brick
+    lengths  (n,), bytes of each node's brick
+    sent     one byte per node: 1 if the client has its brick
     """
 
     tile: str
@@ -114,7 +114,12 @@ class _Tree:
 
 @dataclass(slots=True)
 class _Running:
-    """A view in progress. order: int64 (3, n): number of the tree, node, bytes; None: not ready."""
+    """A view in progress.
+
+    order  int64 (3, n): number of the tree, node, bytes of the brick; None until it is computed
+    files  the open file of each tree that the order names, by the tree's number
+    at     position in the order, up to which bricks were sent or skipped
+    """
 
     id: int
     message: dict[str, Any]
@@ -127,7 +132,7 @@ class _Running:
 
 
 class BrickSession:
-    """One connection."""
+    """One connection of a client to a library."""
 
     def __init__(
         self,
@@ -143,14 +148,14 @@ class BrickSession:
         self._window = FrameWindow()
         self._messages = MessageReader(socket)
         self._trees: list[_Tree] = []
-        self._asked = 0  # trees requested
+        self._asked = 0  # trees requested on this connection
         self._to_open: asyncio.Queue[dict[str, str]] = asyncio.Queue()
         self._outbox: deque[str | Part] = deque()
         self._view: _Running | None = None
         self._wake = asyncio.Event()
 
     async def run(self) -> None:
-        """Serve the client. Closes the socket, unless the client left."""
+        """Serve the client until it leaves or breaks a rule; then close the socket."""
         tasks = [asyncio.create_task(work) for work in (self._read(), self._open(), self._send())]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -192,7 +197,7 @@ class BrickSession:
             "messages_per_s": MESSAGES_PER_S,
             "ack_s": ACK_S,
         }
-        self._say(
+        self._queue(
             {"type": "welcome", "version": VERSION, "window": self._window.size, "limits": limits}
         )
         handlers: dict[str, Callable[[dict[str, Any]], None]] = {
@@ -263,12 +268,12 @@ class BrickSession:
                 self._report(wanted, "unknown", str(error))
                 continue
             except FullError as error:
-                self._report(wanted, "full", "the server has no room for it now")
+                self._report(wanted, "full", "the server has no room for this volume now")
                 _LOG.error("%s", error)
                 continue
             except (StereoCellError, OSError) as error:
-                _LOG.error("%s", error)  # for this machine's user: it may name folders
-                self._report(wanted, "damaged", "can't be read; the server's terminal says why")
+                _LOG.error("%s", error)  # only for this machine's user: the text may name folders
+                self._report(wanted, "damaged", "can't be read: see the server's terminal")
                 continue
             table = file.table
             number = len(self._trees)
@@ -276,7 +281,7 @@ class BrickSession:
             sent = bytearray(len(lengths))
             self._trees.append(_Tree(tile, channel, file.table_hash, file.placed, lengths, sent))
             follows = wanted.get("table") != file.table_hash
-            self._say(_describe(number, wanted, file, table_follows=follows))
+            self._queue(_describe(number, wanted, file, table_follows=follows))
             if follows:
                 for at in range(0, table.bytes, FRAME_BYTES):
                     part = file.table_bytes[at : at + FRAME_BYTES]
@@ -311,16 +316,18 @@ class BrickSession:
             files = {number: await self._file(trees[number]) for number in needed}
         except (StereoCellError, OSError) as error:
             _LOG.error("%s", error)
-            raise Refusal(1012, "the bundle was written anew, connect again") from None
+            raise Refusal(1012, "the bundle was replaced: connect again") from None
         view.files, view.order = files, found
 
     async def _file(self, tree: _Tree) -> BrickFile:
-        """Return a tree's file; it is made again where it has left the server meanwhile."""
+        """Return a tree's file; rebuild it if it was removed meanwhile."""
         file = await self._in(self._quick, partial(self._library.open_built, *tree.name))
         if file is None:
             file = await self._in(self._builder, partial(self._library.open, *tree.name))
         if file.table_hash != tree.table_hash:
-            raise StereoCellError(f"tile {tree.tile}, channel {tree.channel}: another volume now")
+            raise StereoCellError(
+                f"tile {tree.tile}, channel {tree.channel}: the volume was replaced"
+            )
         return file
 
     async def _send_batch(self, view: _Running) -> None:
@@ -352,7 +359,7 @@ class BrickSession:
 
         data = await self._in(self._quick, work)
         await self._window.wait_for_room(len(data))
-        if self._view is not view:  # ended meanwhile, and its `done` is queued
+        if self._view is not view:  # the view ended meanwhile, and its `done` is queued
             return
         view.at = at
         view.bricks += len(picked)
@@ -362,7 +369,7 @@ class BrickSession:
         await self._push(data)
 
     async def _push(self, data: bytes) -> None:
-        """Send a binary frame, which carries the next sequence number."""
+        """Send a binary frame, which carries the next sequence number, as soon as it fits."""
         await self._window.wait_for_room(len(data))
         self._window.add(len(data))
         await self._socket.send_bytes(data)
@@ -373,13 +380,13 @@ class BrickSession:
         self._view = None
         self._library.release(self)
         counts = {"bricks": view.bricks, "bytes": view.bytes}
-        self._say({"type": "done", "view": view.id, "reason": reason, **counts})
+        self._queue({"type": "done", "view": view.id, "reason": reason, **counts})
 
     def _report(self, volume: dict[str, str], code: str, message: str) -> None:
         place = {"tile": volume["tile"], "channel": volume["channel"]}
-        self._say({"type": "error", "code": code, "message": message, **place})
+        self._queue({"type": "error", "code": code, "message": message, **place})
 
-    def _say(self, message: dict[str, Any]) -> None:
+    def _queue(self, message: dict[str, Any]) -> None:
         self._outbox.append(json.dumps(message))
         self._wake.set()
 
@@ -390,7 +397,7 @@ class BrickSession:
 def _describe(
     number: int, volume: dict[str, str], file: BrickFile, *, table_follows: bool
 ) -> dict[str, Any]:
-    """Return the message on an open tree."""
+    """Return the message that tells the client that a tree is open."""
     table = file.table
     return {
         "type": "tree",

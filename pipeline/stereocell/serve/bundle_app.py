@@ -30,19 +30,20 @@ def make_app(
 ) -> ASGIApp:
     """Return the application: the bundle's files, `/bricks` and `/values`.
 
-    library  of the bundle; None: there is no `/bricks`
-    stage    the folder of the stage beside the bundle in OUT; None: there is no `/values`
-    names    the hosts that it answers to, in lower case
-    gate     tokens and sessions on the LAN; None: all clients of this machine have access
+    library  the bundle's brick trees; None for an application without `/bricks`
+    stage    the folder of the stage beside the bundle in OUT; None for one without `/values`
+    names    the host names that the application answers to, in lower case
+    gate     tokens and sessions on the LAN; None if all clients of this machine have access
     frames   origins whose pages may hold the viewer in a frame
-    live     a source whose first view is the bundle; see `serve.server.serve`
+    live     a source whose first view is the bundle (see `serve.server.serve`); None if the bundle
+             is finished
     """
     app = bundle_app(bundle, library, stage) if live is None else LiveApp(live, built_app)
     return Access(app, names, gate, frames)
 
 
 def built_app(bundle: Path) -> ASGIApp:
-    """Return the application of the bundle of a build, beside which its stage lies."""
+    """Return the application of a bundle that lies in OUT, beside its stage."""
     out = bundle.parent
     return bundle_app(bundle, BrickLibrary(bundle, out / "bricks"), out / "stage")
 
@@ -68,5 +69,6 @@ def bundle_app(bundle: Path, library: BrickLibrary | None, stage: Path | None) -
     if values is not None:
         routes.insert(0, Route("/values/{tile}/{channel}", values.answer, methods=["GET"]))
     app = Starlette(routes=routes, lifespan=lifespan)
-    app.router.redirect_slashes = False  # paths with a line break match no route
+    # A path with a line break matches no route. It shall give 404, not a redirect.
+    app.router.redirect_slashes = False
     return app

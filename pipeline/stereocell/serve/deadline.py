@@ -1,10 +1,10 @@
 """Close connections that send no request: uvicorn itself keeps them open for ever.
 
 uvicorn's `timeout_keep_alive` begins at the end of an answer and ends with the next byte of any
-kind. It doesn't count before the first request, and `limit_concurrency` counts whole requests. So a
-silent client, or one that sends a head (or an ignored body) byte by byte, holds a socket for good.
-Here a head has HEAD_S seconds, from the start of the connection or the end of the last answer. (The
-TLS handshake before it has the same limit: serve/lifetime.py.)
+kind. It doesn't count before the first request, and `limit_concurrency` counts whole requests. A
+silent client, or one that sends a head (or an ignored body) byte by byte, would hold a socket for
+good. Here a request's head must arrive within HEAD_S, counted from the start of the connection or
+the end of the last answer. serve/lifetime.py limits the TLS handshake before it likewise.
 """
 
 import asyncio
@@ -35,16 +35,16 @@ class HeadDeadline(H11Protocol):
 
     def on_response_complete(self) -> None:
         self._await_head()
-        super().on_response_complete()  # a request that is already here begins now
+        super().on_response_complete()  # this starts a request that has already arrived
         self._stop_if_answering()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        self._stop()  # a websocket has its own limits: serve/limits.py
+        self._stop()  # websockets have limits of their own, in serve/limits.py
         super().handle_websocket_upgrade(event)
 
     def _await_head(self) -> None:
         self._stop()
-        self._deadline = self.loop.call_later(self.head_s, self._give_up)
+        self._deadline = self.loop.call_later(self.head_s, self._close_or_abort)
 
     def _stop_if_answering(self) -> None:
         if self.cycle is not None and not self.cycle.response_complete:
@@ -55,8 +55,8 @@ class HeadDeadline(H11Protocol):
             self._deadline.cancel()
             self._deadline = None
 
-    def _give_up(self) -> None:
+    def _close_or_abort(self) -> None:
         if self.transport.get_write_buffer_size():
             self.transport.close()  # the end of an answer is still being sent
         else:
-            self.transport.abort()  # closing TLS would wait for the client once more
+            self.transport.abort()  # closing TLS properly would wait for the client again

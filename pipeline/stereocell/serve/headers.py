@@ -1,10 +1,11 @@
 """Headers of every answer that restrict the use of this server's content in a browser.
 
-The viewer's page has its own Content-Security-Policy in its <meta>, with the hash of its script;
-the header adds the directives that only a header can set. Scripts get the same, since workers take
-their policy from it. All other files of a bundle are data: opened directly (an SVG, say), they run
-and load nothing. There is no Cross-Origin-Embedder-Policy: the viewer shares no memory, and may
-read a bundle of another host.
+The viewer's page has its own Content-Security-Policy in its <meta>, with the hash of its script.
+The header adds the directives that only a header can set. Scripts get the same header, since
+workers take their policy from it. All other files of a bundle are data: if a person opens one
+directly (an SVG, say), it can neither run scripts nor load anything. The server sends no
+Cross-Origin-Embedder-Policy: the viewer shares no memory between threads, and may read a bundle of
+another host.
 
 References: W3C Content Security Policy Level 3.
 """
@@ -26,7 +27,7 @@ RawHeaders = list[tuple[bytes, bytes]]
 
 
 def protect(headers: Iterable[tuple[bytes, bytes]], frames: Iterable[str] = ()) -> RawHeaders:
-    """Return an answer's headers (names in lower case) with the common ones added.
+    """Return an answer's headers, names in lower case, with the protective ones added.
 
     frames  origins whose pages may hold the viewer's page in a frame
     """
@@ -40,13 +41,16 @@ def protect(headers: Iterable[tuple[bytes, bytes]], frames: Iterable[str] = ()) 
 
 
 def policy(content_type: str) -> dict[str, str]:
-    """Return the policy of a file; its 304 must repeat it, since caches take a 304's headers."""
+    """Return the policy header of a file.
+
+    A 304 answer must repeat it, since caches replace stored headers by those of a 304.
+    """
     runs = content_type.partition(";")[0] in _RUN
     return {"Content-Security-Policy": _PAGE if runs else _DATA}
 
 
 def _framed(value: bytes, allowed: str) -> bytes:
-    """Return the page's policy with the origins that may frame it; every other value as it is."""
+    """Add the origins that may frame the page to its policy; return any other value unchanged."""
     if not allowed or value != _PAGE.encode():
         return value
     return value.replace(_NO_FRAME.encode(), f"frame-ancestors {allowed}".encode())

@@ -1,11 +1,10 @@
 """The subset of HTTP that a bundle needs; all other requests are refused before processing.
 
 uvicorn passes every request to the application, and closes those that it can't parse with 400. Here
-a request has no body (413; without one no second request can be smuggled in; an inbox alone takes
-bodies: inbox_protocol.py), one plain path, and a
-head of limited size; a client has a limited number of connections and requests. A refused client
-may continue to send for LINGER_S: if the socket closed at once, the client's system would discard
-the answer.
+a request must have one plain path, a head of limited size, and no body (413). A request without a
+body can't smuggle in a second one. Only an inbox takes bodies (inbox_protocol.py). A client has a
+limited number of connections and requests. A refused client may continue to send for LINGER_S: if
+the socket closed at once, the client's system would discard the answer.
 
 References: RFC 9112 (HTTP/1.1).
 """
@@ -31,9 +30,9 @@ from stereocell.serve.limits import (
     Clients,
 )
 
-_LINE_BYTES = 8 << 10  # bytes of a header; the websockets library accepts no longer one
+_LINE_BYTES = 8 << 10  # bytes, largest header; the websockets library refuses longer ones
 _VERSIONS = ("1.0", "1.1")
-_LENGTH_DIGITS = 18  # of a Content-Length
+_LENGTH_DIGITS = 18  # most digits of a Content-Length
 
 
 class State(ServerState):
@@ -45,7 +44,7 @@ class State(ServerState):
 
 
 class _RefusedError(Exception):
-    """The request is answered with this status, and its connection closed."""
+    """Raised to answer the request with this status and to close its connection."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -78,7 +77,7 @@ class GuardedHttp(HeadDeadline):
         self._is_counted = self._clients.enter(self._address)
         if not self._is_counted:
             self._refuse(_RefusedError(503, "too many connections are open, try again later"))
-            self.transport.close()  # lingering would hold the resource that is exhausted
+            self.transport.close()  # a lingering socket would use up what has run out
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._is_counted:
@@ -88,7 +87,7 @@ class GuardedHttp(HeadDeadline):
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        self._is_counted = False  # the websocket owns the connection now, and leaves later
+        self._is_counted = False  # from here on the websocket's protocol counts the connection
         super().handle_websocket_upgrade(event)
 
     @property
@@ -114,7 +113,7 @@ class GuardedHttp(HeadDeadline):
             self._refuse(error)
 
     def _should_upgrade(self) -> bool:
-        """Check the request between its head and its answer, then continue."""
+        """Check the request; uvicorn calls this between the head and the answer."""
         self._judge()
         return super()._should_upgrade()
 
@@ -147,18 +146,18 @@ class GuardedHttp(HeadDeadline):
             raise _RefusedError(405, "websockets begin with GET")
 
     def _most_bytes(self) -> int:
-        """Return the largest body that the request may have; 0: none."""
+        """Return the size in bytes of the largest body that the request may have."""
         return 0
 
     def _judge_body(self, length: bytes, most: int, *, is_chunked: bool) -> None:
         if is_chunked:
             raise _RefusedError(411, "expected a Content-Length")
-        # h11 accepts digits alone
+        # h11 has already refused a length that does not consist of digits.
         if len(length) > _LENGTH_DIGITS or int(length) > most:
             raise _RefusedError(413, f"a body of more than {most} bytes")
 
     def send_400_response(self, msg: str) -> None:
-        """Answer a request that can't be parsed; called where h11's error is handled.
+        """Answer a request that can't be parsed; uvicorn calls this while it handles h11's error.
 
         The answer has no text: the request may have been a HEAD, whose answer has no body.
         """
@@ -190,7 +189,7 @@ class GuardedHttp(HeadDeadline):
             headers=protect(self.server_state.default_headers + headers),
             reason=HTTPStatus(error.status).phrase.encode(),
         )
-        # the answer to a HEAD has only the length: h11 accepts no body for it
+        # The answer to a HEAD states the length of the text and omits the text.
         is_head = self.scope is not None and self.scope["method"] == "HEAD"
         for event in (answer, h11.Data(data=b"" if is_head else text), h11.EndOfMessage()):
             self.transport.write(self.conn.send(event) or b"")
@@ -198,7 +197,7 @@ class GuardedHttp(HeadDeadline):
             self.transport.write_eof()
             self.transport.resume_reading()
         else:
-            self.transport.close()  # TLS: waits for the client's part of the end
+            self.transport.close()  # a TLS transport waits for the client's close_notify
         self.loop.call_later(LINGER_S, self.transport.abort)
 
     # --- answers that the client doesn't read

@@ -1,4 +1,4 @@
-"""The requests of the page of an inbox: uploads in pieces, what is understood, builds, views.
+"""The requests of an inbox's page: uploads in pieces, facts and choices, builds and views.
 
     /                       the page; its files lie beside it
     /items, /items/ID/...   see docs/inbox.md
@@ -6,7 +6,8 @@
     /items/ID/view/live     a websocket with the state of its build; see serve/live_app.py
     /events                 a websocket with the state of all items, whenever it changes
 
-Each refusal is one line of JSON, {"line": "..."}. The session of a viewer may only look.
+Each refusal is one line of JSON, {"line": "..."}. A session without the right to upload may only
+look.
 """
 
 import asyncio
@@ -44,10 +45,10 @@ from stereocell.serve.static_files import BundleFiles
 _PAGE = "inbox.html"
 _OFFSET = "Upload-Offset"
 _SLICE = re.compile(r"slices/[xyz]\.png")
-_EACH_S = 0.25  # s between two states
-_MAX_VIEWS = 16  # views whose applications are kept
+_STATE_EVERY_S = 0.25  # s between two checks for a new state
+_MAX_VIEWS = 16  # most views whose applications are cached
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
-# files of the viewer that the page of the inbox does not need: at / they would be another page
+# Files of the viewer that are not served at /: there they would replace the inbox's own page.
 _OF_VIEWER = ("/index.html", "/sw.js")
 
 Handler = Callable[[Request, Item], Awaitable[Response]]
@@ -57,7 +58,7 @@ class InboxApp:
     """The application of an inbox."""
 
     def __init__(self, inbox: Inbox, work: Work, page: Path) -> None:
-        """page: the folder of the viewer, which holds the page of the inbox, too."""
+        """page: the folder of the viewer, which also holds the page of the inbox."""
         self._inbox, self._work, self._page = inbox, work, page
         self._files = BundleFiles(page, {})
         self._views: dict[str, tuple[Live | None, ASGIApp]] = {}
@@ -65,8 +66,8 @@ class InboxApp:
         self._live = LiveSocket(_may_upload)
         self._handlers: dict[tuple[str, str], Handler] = {
             ("PATCH", "bytes"): self._take_piece,
-            ("HEAD", "bytes"): self._tell_offset,
-            ("GET", "understood"): self._tell_understood,
+            ("HEAD", "bytes"): self._send_offset,
+            ("GET", "understood"): self._send_understood,
             ("PUT", "choices"): self._choose,
             ("POST", "look"): self._look,
             ("POST", "build"): self._build,
@@ -79,7 +80,7 @@ class InboxApp:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or talk over a websocket."""
         if scope["type"] == "lifespan":
-            await self._live_through(receive, send)
+            await self._start_and_stop(receive, send)
             return
         item_id, slash, rest = _split(scope["path"])
         if scope["type"] == "websocket" and rest == "view/live":
@@ -98,14 +99,14 @@ class InboxApp:
             return await self._answer_or_raise(request, item_id, rest)
         except StereoCellError as error:
             return JSONResponse({"line": str(error)}, status_of(error), _HEADERS)
-        except ClientDisconnect:  # nobody is there to be answered
+        except ClientDisconnect:  # the client has left and reads no answer
             return Response(status_code=400)
 
     async def _answer_or_raise(self, request: Request, item_id: str, rest: str) -> Response:
         method, path = request.method, request.scope["path"]
         is_read = method in ("GET", "HEAD")
         if not is_read and not _may_upload(request.scope):
-            raise RefusedError(403, "this session may only look: ask for the code for uploading")
+            raise RefusedError(403, "this session may only look; scan the code for uploading")
         if path == "/items" and method == "POST":
             return await self._announce(request)
         if not path.startswith("/items"):
@@ -123,7 +124,7 @@ class InboxApp:
         """Return the item of a path, if the client may see it. Raises RefusedError."""
         item = self._inbox.find(item_id)
         if not _may_upload(scope) and not item.has_view:
-            raise RefusedError(404, "no such item, or it can't be looked at yet")
+            raise RefusedError(404, "there is no such item, or it can't be viewed yet")
         return item
 
     async def _answer_file(self, request: Request) -> Response:
@@ -137,12 +138,12 @@ class InboxApp:
 
     async def _announce(self, request: Request) -> Response:
         content = await _content_of(request)
-        is_local = _is_here(request)
+        is_local = _is_on_this_machine(request)
         item, is_new = await anyio.to_thread.run_sync(
             lambda: self._inbox.announce(content, is_local=is_local)
         )
         offset = item.upload.offset if item.upload else 0
-        return _told({"id": item.id, "offset": offset}, 201 if is_new else 200)
+        return _json({"id": item.id, "offset": offset}, 201 if is_new else 200)
 
     async def _take_piece(self, request: Request, item: Item) -> Response:
         offset = request.headers.get(_OFFSET, "")
@@ -155,7 +156,7 @@ class InboxApp:
         except RefusedError as error:
             return self._with_offset(item, error)
         try:
-            with suppress(ClientDisconnect):  # what has come stays
+            with suppress(ClientDisconnect):  # the bytes that have arrived stay
                 async for data in request.stream():
                     await run(write, data)
         except RefusedError as error:
@@ -171,9 +172,9 @@ class InboxApp:
             return Response(status_code=204, headers=headers)
         return JSONResponse({"line": str(error)}, error.status, headers)
 
-    async def _tell_offset(self, _: Request, item: Item) -> Response:
+    async def _send_offset(self, _: Request, item: Item) -> Response:
         if item.upload is None:
-            raise RefusedError(410, "the upload is gone")
+            raise RefusedError(410, "the upload was deleted; upload the files again")
         return Response(headers={**_HEADERS, _OFFSET: str(item.upload.offset)})
 
     async def _delete(self, _: Request, item: Item) -> Response:
@@ -181,28 +182,28 @@ class InboxApp:
         self._views.pop(item.id, None)
         return Response(status_code=204, headers=_HEADERS)
 
-    # --- what is understood, and what becomes of it
+    # --- facts, choices and builds of an item
 
-    async def _tell_understood(self, _: Request, item: Item) -> Response:
-        return _told(await anyio.to_thread.run_sync(self._inbox.understood, item))
+    async def _send_understood(self, _: Request, item: Item) -> Response:
+        return _json(await anyio.to_thread.run_sync(self._inbox.understood, item))
 
     async def _choose(self, request: Request, item: Item) -> Response:
         content = await _content_of(request)
         await anyio.to_thread.run_sync(self._inbox.choose, item, content)
-        return _told({}, 202)
+        return _json({}, 202)
 
     async def _look(self, _: Request, item: Item) -> Response:
-        return _told({"page": await anyio.to_thread.run_sync(look, self._inbox, item, self._page)})
+        return _json({"page": await anyio.to_thread.run_sync(look, self._inbox, item, self._page)})
 
     async def _build(self, request: Request, item: Item) -> Response:
         content = await _content_of(request, default={})
         await anyio.to_thread.run_sync(self._inbox.build, item, content)
-        return _told({}, 202)
+        return _json({}, 202)
 
     async def _command(self, request: Request, item: Item) -> Response:
         command = request.scope["path"].rpartition("/")[2]
         await anyio.to_thread.run_sync(self._inbox.command, item, command)
-        return _told({}, 202)
+        return _json({}, 202)
 
     # --- views
 
@@ -218,7 +219,7 @@ class InboxApp:
     async def _show(
         self, item_id: str, rest: str, scope: Scope, receive: Receive, send: Send
     ) -> None:
-        """Hand a request to the application of an item's view."""
+        """Pass a request on to the application of an item's view."""
         try:
             app = self._view_of(self._find(item_id, scope))
         except RefusedError as error:
@@ -234,9 +235,9 @@ class InboxApp:
         await app({**scope, "path": path, "raw_path": path.encode()}, receive, send)
 
     def _view_of(self, item: Item) -> ASGIApp:
-        """Return the application of an item's view. Raises RefusedError where there is none."""
+        """Return the application of an item's view. Raises RefusedError if there is no view."""
         if not item.has_view:
-            raise RefusedError(404, "it can't be looked at yet: press Look in the inbox")
+            raise RefusedError(404, "this item has no view yet; press Look in the inbox")
         known = self._views.get(item.id)
         if known is None or known[0] is not item.live:
             live = item.live
@@ -246,35 +247,35 @@ class InboxApp:
             self._views[item.id] = known = live, app
         return known[1]
 
-    # --- the state
+    # --- the state of all items
 
     async def _talk(self, socket: WebSocket) -> None:
-        """Send one client the state until it leaves."""
+        """Send one client the state of all items whenever it changes, until the client leaves."""
         await socket.accept()
         if self._sockets >= min(MAX_CONNECTIONS, 4 * CLIENT_SOCKETS):
             await socket.close(1013, "too many connections are open, try again later")
             return
         self._sockets += 1
         may_upload = _may_upload(socket.scope)
-        heard = asyncio.ensure_future(socket.receive())
+        received = asyncio.ensure_future(socket.receive())
         sent = ""
         try:
-            while not heard.done():
+            while not received.done():
                 state = await asyncio.to_thread(self._inbox.state, may_upload=may_upload)
                 text = json.dumps(state)
                 if text != sent:
                     await socket.send_text(text)
                     sent = text
-                await asyncio.wait([heard], timeout=_EACH_S)
-            if heard.result()["type"] != "websocket.disconnect":
-                await socket.close(1008, "nothing is to be sent here")
-        except (WebSocketDisconnect, RuntimeError):  # it has left
+                await asyncio.wait([received], timeout=_STATE_EVERY_S)
+            if received.result()["type"] != "websocket.disconnect":
+                await socket.close(1008, "this websocket takes no messages")
+        except (WebSocketDisconnect, RuntimeError):  # the client has left
             pass
         finally:
             self._sockets -= 1
-            heard.cancel()
+            received.cancel()
 
-    async def _live_through(self, receive: Receive, send: Send) -> None:
+    async def _start_and_stop(self, receive: Receive, send: Send) -> None:
         while True:
             message = await receive()
             if message["type"] == "lifespan.startup":
@@ -299,7 +300,7 @@ def _may_upload(scope: Scope) -> bool:
     return bool(scope.get("state", {}).get(MAY_UPLOAD))
 
 
-def _is_here(request: Request) -> bool:
+def _is_on_this_machine(request: Request) -> bool:
     """Return whether a client is on this machine."""
     with suppress(ValueError):
         return request.client is not None and ip_address(request.client.host).is_loopback
@@ -310,12 +311,12 @@ def _at(request: Request, path: str) -> Request:
     return Request({**request.scope, "path": path}, request.receive)
 
 
-def _told(content: dict[str, Any], status: int = 200) -> Response:
+def _json(content: dict[str, Any], status: int = 200) -> Response:
     return JSONResponse(content, status, _HEADERS)
 
 
 async def _content_of(request: Request, default: Any = None) -> Any:
-    """Return the JSON of a request's body. Raises RefusedError."""
+    """Return the JSON of a request's body; `default` for an empty one. Raises RefusedError."""
     body = await request.body()
     if not body and default is not None:
         return default

@@ -1,7 +1,7 @@
 """Serve an inbox: `stereocell serve --inbox`.
 
-On this machine everybody may upload. With `--lan` there are two codes: the sessions of one may
-upload and look, those of the other may look alone.
+Without `--lan`, every client of this machine may upload. With `--lan`, the server prints two codes:
+one admits devices that upload and look, the other admits devices that only look.
 """
 
 from pathlib import Path
@@ -37,7 +37,7 @@ class InboxServer(Server):
         lan: bool,
         for_program: bool = False,
     ) -> None:
-        """Raises OutputError where the folder is no inbox, and as `Server` does."""
+        """Raises OutputError if the folder holds other files than an inbox's; see also `Server`."""
         page = viewer_dist()
         if page is None:
             raise OutputError("the viewer is not built: run `make setup`")
@@ -76,9 +76,9 @@ def serve_inbox(
     open_browser: bool,
     for_program: bool,
 ) -> None:
-    """Serve an inbox until Ctrl+C or SIGTERM; the folder is made where it is missing.
+    """Serve an inbox until Ctrl+C or SIGTERM; create its folder if it is missing.
 
-    Raises StereoCellError where the folder holds other files, or another server serves it.
+    Raises StereoCellError if the folder holds other files, or another server serves it.
     """
     with alone_in(folder, "serve"):
         server = InboxServer(

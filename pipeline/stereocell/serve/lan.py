@@ -1,9 +1,9 @@
 """Serving on the LAN: this machine's addresses, a certificate, a QR code to scan.
 
-WebXR and device orientation need a secure context, hence TLS. trustme makes the certificate at
-start, for the machine's addresses, and signs it by an authority whose key is discarded at once;
-neither is stored. A phone doesn't know the authority and warns: the person compares the
-fingerprint.
+WebXR and device orientation need a secure context, hence TLS. At start, trustme makes a certificate
+for the machine's addresses and signs it by an authority whose key is discarded at once. Neither is
+stored. A phone doesn't know the authority and shows a warning. The person then compares the
+certificate's fingerprint with the one in the terminal.
 """
 
 import hashlib
@@ -20,12 +20,12 @@ from stereocell.model.errors import StereoCellError
 def find_addresses() -> list[str]:
     """Return this machine's IPv4 addresses on the LAN, the one of the default route first.
 
-    Raises StereoCellError where there is none.
+    Raises StereoCellError if there is none.
     """
     found: list[str] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(("192.0.2.1", 9))  # chooses a route; UDP sends nothing here
+            probe.connect(("192.0.2.1", 9))  # this only chooses a route: UDP sends nothing yet
             found.append(probe.getsockname()[0])
         except OSError:
             pass
@@ -36,7 +36,9 @@ def find_addresses() -> list[str]:
         pass
     addresses = [a for a in dict.fromkeys(found) if not a.startswith("127.") and a != "0.0.0.0"]
     if not addresses:
-        raise StereoCellError("--lan: this machine has no address on a network, expected one")
+        raise StereoCellError(
+            "--lan: this machine has no address on a network; connect it to one, or omit --lan"
+        )
     return addresses
 
 
@@ -47,7 +49,7 @@ def find_names(addresses: Sequence[str]) -> list[str]:
 
 
 def _can_be_certified(name: str) -> bool:
-    """Return whether a certificate can hold the name: not with an underscore, as Docker's hosts."""
+    """Return whether a certificate can hold the name. Names of Docker's hosts with `_` can't be."""
     try:
         return bool(idna.encode(name))
     except idna.IDNAError:
@@ -60,7 +62,7 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
     trustme passes the key to OpenSSL in a file of the temporary folder, which it removes at once.
     """
     names = [name for name in names if _can_be_certified(name)]
-    import trustme  # only here: most servers serve this machine alone, and the import is slow
+    import trustme  # imported here, since it is slow and most servers serve this machine only
 
     leaf = trustme.CA(organization_name="StereoCell", organization_unit_name="this run").issue_cert(
         *names, organization_name="StereoCell", organization_unit_name="this run"
@@ -74,8 +76,11 @@ def make_certificate(names: Sequence[str]) -> tuple[ssl.SSLContext, str]:
 
 
 def draw_qr(address: str, *, encoding: str = "utf-8") -> str:
-    """Return a QR code for a terminal, of half blocks; where its encoding lacks them, of spaces
-    with escape codes for the background."""
+    """Return a QR code for a terminal, drawn with half blocks.
+
+    If the terminal's encoding lacks half blocks, the code consists of spaces on backgrounds that
+    escape codes set.
+    """
     import segno
 
     code = segno.make(address, error="l", micro=False)
@@ -90,15 +95,15 @@ def draw_qr(address: str, *, encoding: str = "utf-8") -> str:
 
 
 def explain(address: str, fingerprint: str, code: str) -> str:
-    """Return the text for the person at the terminal. Only the code contains the token."""
+    """Return the text for the person at the terminal. The token is in the code, not in the text."""
     return (
         f"{code}\n"
         f"Scan this code with a phone in the same network: it opens {address} with a token\n"
         "that lets in one device, once.\n"
         "The phone warns that it does not know the certificate: this program made it just now,\n"
-        "for this run, so nobody else has vouched for it. It encrypts all the same, and browsers\n"
-        "give stereo (WebXR) and head tracking to encrypted pages only. Go on (Advanced, Proceed;\n"
-        "on an iPhone: Show Details, visit this website) if the certificate that the phone shows\n"
-        f"has this SHA-256 fingerprint:\n{fingerprint}\n"
-        "If it has another, somebody is in between: go back."
+        "for this run, and no authority has signed it. The connection is encrypted all the same,\n"
+        "and browsers allow stereo (WebXR) and head tracking on encrypted pages only.\n"
+        "Continue (Advanced, Proceed; on an iPhone: Show Details, visit this website) if the\n"
+        f"certificate that the phone shows has this SHA-256 fingerprint:\n{fingerprint}\n"
+        "If the fingerprint differs, somebody intercepts the connection: go back."
     )

@@ -1,9 +1,9 @@
-"""Start and end: transfers that run at the stop may finish within STOP_S, and no new one begins.
+"""Start and stop the server. At the stop, running transfers may finish within STOP_S; none begins.
 
-uvicorn alone gives TLS a minute before the first byte, logs a fault and a traceback for transfers
-that didn't finish in time, and from Python 3.12 on waits for clients even after the second Ctrl+C.
-asyncio counts a TLS connection only after its handshake: many silent clients would use up all file
-descriptors of this process.
+This class replaces three behaviours of uvicorn. It gives TLS a minute before the first byte.
+It logs an error and a traceback for transfers that didn't finish in time. From Python 3.12 on, it
+waits for clients even after the second Ctrl+C. In asyncio, a TLS connection counts only after its
+handshake, so that many silent clients would use up all file descriptors of this process.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ import uvicorn
 from stereocell.serve.http_protocol import GuardedHttp, State
 from stereocell.serve.limits import HEAD_S, STOP_S
 
-_TICK_S = 0.05  # s between looks at the running transfers
+_TICK_S = 0.05  # s between two checks of the running transfers
 
 
 class Lifetime(uvicorn.Server):
@@ -37,7 +37,11 @@ class Lifetime(uvicorn.Server):
         context: ssl.SSLContext | None,
         on_wait: Callable[[int], None],
     ) -> None:
-        """context: for TLS; on_wait: called with the number of transfers that the stop awaits."""
+        """Configure a server.
+
+        context  for TLS; None for plain HTTP
+        on_wait  called at the stop with the number of transfers that may still finish
+        """
         super().__init__(config)
         self.server_state = state = State()
         self._clients = state.clients
@@ -49,10 +53,10 @@ class Lifetime(uvicorn.Server):
         """Listen on bound sockets."""
         await self.lifespan.startup()
         loop = asyncio.get_running_loop()
-        loop.set_exception_handler(_tell_fault)
+        loop.set_exception_handler(_report_fault)
         make: Callable[[], asyncio.Protocol] = self._make_http
         if self._context is not None:
-            make = partial(_Door, self._shake)
+            make = partial(_BeforeTls, self._start_tls)
         self.servers = [await loop.create_server(make, sock=one) for one in sockets or []]
         self.started = True
 
@@ -70,15 +74,15 @@ class Lifetime(uvicorn.Server):
         assert issubclass(kind, GuardedHttp)
         return kind(self.config, self.server_state, self.lifespan.state)
 
-    def _shake(self, transport: asyncio.Transport) -> None:
-        """Begin TLS on a new connection, which counts from now on."""
+    def _start_tls(self, transport: asyncio.Transport) -> None:
+        """Begin TLS on a new connection, and count it among its client's."""
         address = str((transport.get_extra_info("peername") or ("",))[0])
         if not self._clients.enter(address):
             transport.abort()
             return
 
-        async def shake() -> None:
-            early = _Early()
+        async def shake_hands() -> None:
+            early = _EarlyBytes()
             try:
                 secure = await asyncio.get_running_loop().start_tls(
                     transport,
@@ -87,7 +91,7 @@ class Lifetime(uvicorn.Server):
                     server_side=True,
                     ssl_handshake_timeout=self.handshake_s,
                 )
-            except OSError:  # no TLS, or too slow
+            except OSError:  # the client doesn't speak TLS, or is too slow
                 return transport.abort()
             finally:
                 self._clients.leave(address)
@@ -95,10 +99,10 @@ class Lifetime(uvicorn.Server):
                 http = self._make_http()
                 secure.set_protocol(http)
                 http.connection_made(secure)
-                if early.data:  # an empty call would signal the client's end
+                if early.data:  # uvicorn takes a call without data for the end of the connection
                     http.data_received(early.data)
 
-        task = asyncio.ensure_future(shake())
+        task = asyncio.ensure_future(shake_hands())
         self._handshakes.add(task)
         task.add_done_callback(self._handshakes.discard)
 
@@ -120,24 +124,24 @@ class Lifetime(uvicorn.Server):
             await asyncio.sleep(_TICK_S)
         for connection in list(state.connections):
             connection.transport.abort()
-        if state.tasks:  # they receive that their clients left
+        if state.tasks:  # the requests' tasks receive the news that their clients left
             await asyncio.wait(state.tasks, timeout=1)
         await self.lifespan.shutdown()
 
 
-class _Door(asyncio.Protocol):
+class _BeforeTls(asyncio.Protocol):
     """A connection before TLS."""
 
-    def __init__(self, shake: Callable[[asyncio.Transport], None]) -> None:
-        self._shake = shake
+    def __init__(self, start_tls: Callable[[asyncio.Transport], None]) -> None:
+        self._start_tls = start_tls
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
-        self._shake(transport)
+        self._start_tls(transport)
 
 
-class _Early(asyncio.Protocol):
-    """Buffers bytes that follow a handshake until the server handles its end."""
+class _EarlyBytes(asyncio.Protocol):
+    """Buffers the bytes that arrive between the end of a handshake and the server's HTTP."""
 
     def __init__(self) -> None:
         self.data = b""
@@ -150,8 +154,8 @@ class _Early(asyncio.Protocol):
         self.is_over = True
 
 
-def _tell_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Report faults, except for a lack of file descriptors: asyncio reports that at each try."""
+def _report_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Log a fault, unless file descriptors ran out: asyncio would log that at each new attempt."""
     fault = context.get("exception")
     if not isinstance(fault, OSError) or fault.errno not in (errno.EMFILE, errno.ENFILE):
         loop.default_exception_handler(context)

@@ -1,55 +1,55 @@
 """All limits of one client, and how the server refuses a client that exceeds them.
 
-docs/server.md lists them for readers. They are far above the needs of a browser that opens a
-large bundle (six connections to a host, a request for each file), and low enough that a malicious
-client leaves memory and file descriptors to the others.
+docs/server.md lists the limits for users. They are far above the needs of a browser that opens a
+large bundle (six connections to a host, a request for each file). They are low enough that a
+malicious client can't take all memory or file descriptors from the others.
 """
 
 import asyncio
 from dataclasses import dataclass
 
 # A websocket, /bricks
-MESSAGE_BYTES = 1 << 16  # bytes of a message
+MESSAGE_BYTES = 1 << 16  # bytes, longest message of a client
 WINDOW_BYTES = 1 << 20  # largest window, bytes
-FRAME_BYTES = 48 << 10  # bytes of a frame; below the smallest window
-MAX_TREES = 1024  # trees of a connection
-MAX_CONNECTIONS = 128  # websockets of all clients
-CLIENT_SOCKETS = 64  # websockets of one address
-MESSAGES_PER_S = 100  # messages other than acks
-ACKS_PER_S = 5000  # acks of a connection
-CONTROLS_PER_S = 20  # pings and pongs
-MAX_FRAGMENTS = 64  # frames of one message
+FRAME_BYTES = 48 << 10  # bytes, largest frame; smaller than the smallest window
+MAX_TREES = 1024  # most trees that a connection may open
+MAX_CONNECTIONS = 128  # most websockets of all clients together
+CLIENT_SOCKETS = 64  # most websockets of one address
+MESSAGES_PER_S = 100  # most messages a second, without acks
+ACKS_PER_S = 5000  # most acks a second on a connection
+CONTROLS_PER_S = 20  # most pings, and most pongs, a second
+MAX_FRAGMENTS = 64  # most frames of one message
 FRAGMENTS_S = 10.0  # s from a message's first frame to its last
 HELLO_S = 10.0  # s from the connection to its `hello`
 ACK_S = 60.0  # s from a full window to the next ack
 _REASON_BYTES = 120  # RFC 6455: a close frame has room for 123
 
 # A request
-TARGET_BYTES = 8 << 10  # bytes of its path
-HEAD_BYTES = 16 << 10  # bytes of its head
-MAX_HEADERS = 100  # headers of a request
-HEAD_S = 10.0  # s for the head of an HTTP request, and before it for the TLS handshake
-STALL_S = 60.0  # longest time in which no byte of an answer is sent
-LINGER_S = 1.0  # time in which a refused client may still send, so that it reads the answer
+TARGET_BYTES = 8 << 10  # bytes, longest path with its query
+HEAD_BYTES = 16 << 10  # bytes, largest head
+MAX_HEADERS = 100  # most headers of a request
+HEAD_S = 10.0  # s for the head of a request, and another HEAD_S for the TLS handshake before it
+STALL_S = 60.0  # s, longest time in which a client reads no byte of its answer
+LINGER_S = 1.0  # s in which a refused client may go on sending, so that it can read the refusal
 
 # Bodies of requests to an inbox
-LIST_BYTES = 16 << 20  # bytes of the list of files that is announced
-SMALL_BYTES = 64 << 10  # bytes of any other body of JSON
-BODY_STALL_S = 30.0  # s without a byte of a body
-BODY_S = 300.0  # s for a whole body
+LIST_BYTES = 16 << 20  # bytes, longest list of files that announces an upload
+SMALL_BYTES = 64 << 10  # bytes, largest body of any other request with JSON
+BODY_STALL_S = 30.0  # s, longest time without a byte of a body
+BODY_S = 300.0  # s, longest time for a whole body
 
-# A client, identified by its address: one for this machine, one for all behind the same router
-CONNECTIONS = 400  # sockets of all clients: each may open a file; 1024 descriptors are usual
-CLIENT_CONNECTIONS = 200  # connections of one client
-REQUESTS_PER_S = 500  # requests of a client, in the long run
-REQUESTS_AT_ONCE = 20_000  # requests of a client in a burst: a bundle has thousands of files
-_KNOWN = 1024  # addresses without a connection whose requests are remembered
+# A client is identified by its address. All clients behind one router count as one.
+CONNECTIONS = 400  # most sockets of all clients; each may open a file, of 1024 descriptors in all
+CLIENT_CONNECTIONS = 200  # most connections of one client
+REQUESTS_PER_S = 500  # most requests a second of one client, in the long run
+REQUESTS_AT_ONCE = 20_000  # most requests of one client in a burst; bundles have thousands of files
+_KNOWN = 1024  # most addresses without a connection whose requests are remembered
 
-STOP_S = 8.0  # for transfers that run when the server is stopped
+STOP_S = 8.0  # s in which transfers may finish that run when the server is stopped
 
 
 class Refusal(Exception):
-    """The connection must be closed with this code and reason."""
+    """Raised to close a websocket with this code and reason."""
 
     def __init__(self, code: int, reason: str) -> None:
         super().__init__(reason)
@@ -58,7 +58,10 @@ class Refusal(Exception):
 
 
 class Bucket:
-    """A token bucket: `per_s` a second in the long run, `at_once` (default 2 * per_s) at once."""
+    """A token bucket: allows `per_s` a second in the long run, `at_once` in a burst.
+
+    The default of `at_once` is 2 * per_s.
+    """
 
     def __init__(self, per_s: int, at_once: int | None = None) -> None:
         self.per_s = per_s
@@ -100,7 +103,7 @@ class Clients:
         return True
 
     def leave(self, address: str) -> None:
-        """Remove a connection that entered from the count."""
+        """Take a connection that `enter` has counted from the count."""
         self._known[address].connections -= 1
         self.connections -= 1
 
@@ -112,7 +115,7 @@ class Clients:
         client = self._known.get(address)
         if client is None:
             idle = [name for name, one in self._known.items() if not one.connections]
-            for name in idle[: max(0, len(idle) - _KNOWN + 1)]:  # those known longest
+            for name in idle[: max(0, len(idle) - _KNOWN + 1)]:  # the oldest come first
                 del self._known[name]
             client = _Client(Bucket(REQUESTS_PER_S, REQUESTS_AT_ONCE))
             self._known[address] = client

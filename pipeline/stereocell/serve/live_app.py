@@ -1,13 +1,13 @@
 """Serve a source while it is built: `/live`, the views in folders of their own, and the bundle.
 
-    /               the page and the first view, whose files wait until they are written; once the
-                    build has a bundle, that with its bricks and values
-    /manifest.json  of the newest view, whose folder the header Stereocell-Live names
-    /g1/, /g2/      the views that came later: surfaces where a tile is finished
-    /bricks         a websocket with the bricks of the first view, made of the source; those of a
-                    later one are at /g1/bricks
-    /reading        how much has been read for the first view, as {"share": 0.4}
-    /live           a websocket with the state of the build, which takes commands
+    /               the page and the first view; a request for one of its files waits until the
+                    file is written; once the build has a bundle, the bundle with bricks and values
+    /manifest.json  the newest view's manifest; the header Stereocell-Live names the view's folder
+    /g1/, /g2/      later views, which show surfaces wherever a tile is finished
+    /bricks         a websocket with the bricks of the first view, which are made from the source;
+                    a later view's bricks are at /g1/bricks
+    /reading        the share of the source that has been read for the first view: {"share": 0.4}
+    /live           a websocket that sends the state of the build and takes commands
 
 The server sends the state whenever it changes, at most four times a second: see
 `live/build_state.py`.
@@ -16,9 +16,10 @@ The server sends the state whenever it changes, at most four times a second: see
      "left_s": 38.5, "folder": "g1/", "has_bundle": false, "line": "", "all_tiles": 10, "place": 0,
      "may_continue": true, "may_control": true}
 
-A client may send `pause`, `continue` or `cancel` as text, and `late`: its frames are late, and the
-build rests for a moment. Only clients of this machine may: on the LAN a phone that looks on can't
-stop the build, and gets no line of an error. Of an inbox those may that may upload.
+A client may send `pause`, `continue` or `cancel` as text. It may also send `late` if its frames are
+late; the build then rests for a moment. Only clients of this machine may send commands: a phone on
+the LAN that watches can't stop the build, and its state has no line of an error. For an inbox's
+build, the clients that may upload may also send commands.
 """
 
 import asyncio
@@ -37,16 +38,16 @@ from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.brick_session import BrickEndpoint
 from stereocell.serve.headers import policy
 from stereocell.serve.live_bricks import LiveBricks
-from stereocell.serve.live_socket import LiveSocket, is_here
+from stereocell.serve.live_socket import LiveSocket, is_on_this_machine
 from stereocell.serve.static_files import BundleFiles, bricks_header
 
 LIVE_HEADER = "Stereocell-Live"
-READING = "stereocell-reading"  # on the page: `/reading` tells how far the first view is
+READING = "stereocell-reading"  # Server-Timing of the page while `/reading` reports a share below 1
 _NOW = {"Cache-Control": "no-store", **policy("application/json")}
 
 
 class LiveApp:
-    """The application over a build that runs."""
+    """The application that serves a source while it is built."""
 
     def __init__(self, live: Live, built: Callable[[Path], ASGIApp]) -> None:
         """built: returns the application that serves a whole bundle."""
@@ -56,12 +57,12 @@ class LiveApp:
             None if live.fine is None else LiveBricks(live.fine, live.bundle.parent, live.build)
         )
         self._endpoint = BrickEndpoint()
-        self._socket = LiveSocket(is_here)
+        self._socket = LiveSocket(is_on_this_machine)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or talk over a websocket."""
         if scope["type"] == "lifespan":
-            await self._live_through(receive, send)
+            await self._start_and_stop(receive, send)
         elif scope["type"] == "websocket" and scope["path"] == "/live":
             await self._talk(WebSocket(scope, receive, send))
         elif (app := self._find_built()) is not None and self._folder_of(scope) is None:
@@ -78,13 +79,13 @@ class LiveApp:
         return self._built
 
     def _folder_of(self, scope: Scope) -> Path | None:
-        """Return the folder of the later view that a path names; None: it names none."""
+        """Return the folder of the later view that a path names; None if it names no later view."""
         if self._build is None:
             return None
         return self._build.find_view(_first_of(scope["path"]))
 
     async def _send_bricks(self, socket: WebSocket) -> None:
-        """Talk to one client that asks for the bricks of a view."""
+        """Talk to one client that requests the bricks of a view."""
         folder = self._folder_of(socket.scope)
         path = "/bricks" if folder is None else f"/{_first_of(socket.scope['path'])}/bricks"
         library = self._library(folder)
@@ -94,7 +95,10 @@ class LiveApp:
         await self._endpoint.talk(socket, library)
 
     def _library(self, folder: Path | None) -> BrickLibrary | None:
-        """Return the bricks of a later view, or of the first one; None: views stay coarse."""
+        """Return the bricks of a later view, or of the first one if `folder` is None.
+
+        Returns None if the source can't be read tile by tile: its views then stay coarse.
+        """
         if self._bricks is None:
             return None
         if folder is None or self._build is None:
@@ -102,7 +106,7 @@ class LiveApp:
         return self._bricks.library(folder, self._build.holders)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer from the folder of a view."""
+        """Answer with a file of a view, or with the share that has been read."""
         if scope["method"] not in ("GET", "HEAD"):
             await PlainTextResponse("expected GET", 405)(scope, receive, send)
             return
@@ -128,18 +132,18 @@ class LiveApp:
         scope: Scope,
         receive: Receive,
     ) -> Response:
-        """Return a file of a view; of the first one, where `folder` is None, or of the page."""
+        """Return a file of a later view; if `folder` is None, of the page or the first view."""
         request = Request({**scope, "path": f"/{path}"}, receive)
         if folder is None:
-            of_page = await BundleFiles(self._live.page, {}).answer(request)
-            if of_page.status_code != 404:
+            page_file = await BundleFiles(self._live.page, {}).answer(request)
+            if page_file.status_code != 404:
                 if not self._live.first.done():
-                    of_page.headers["Server-Timing"] = READING
-                return of_page
+                    page_file.headers["Server-Timing"] = READING
+                return page_file
             try:
                 await asyncio.shield(asyncio.wrap_future(self._live.first))
-            except StereoCellError:  # the command reports it, and ends
-                return PlainTextResponse("the source can't be shown: see the terminal", 503)
+            except StereoCellError:  # the command prints the error and ends
+                return PlainTextResponse("the source can't be shown; see the terminal", 503)
         library = self._library(folder) if path == MANIFEST else None
         if library is not None and library.has_finer():
             headers = headers | bricks_header("" if folder is None else f"{folder.name}/")
@@ -151,7 +155,7 @@ class LiveApp:
         else:
             await self._socket.talk(socket, self._build)
 
-    async def _live_through(self, receive: Receive, send: Send) -> None:
+    async def _start_and_stop(self, receive: Receive, send: Send) -> None:
         while True:
             message = await receive()
             if message["type"] == "lifespan.startup":

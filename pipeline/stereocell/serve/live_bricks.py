@@ -1,6 +1,6 @@
-"""Bricks of the views of a source: their trees are made of the source, tile by tile, on request.
+"""Bricks of the views of a source: their trees are made from the source, tile by tile, on request.
 
-All views share one folder of trees beside them, which is bounded.
+All views share one folder of trees, which lies beside them and has a limited size.
 """
 
 from collections.abc import Mapping
@@ -16,18 +16,18 @@ from stereocell.live.fine_tiles import ReadFine
 from stereocell.serve.brick_library import BrickLibrary
 from stereocell.serve.tree_files import TreeFiles, Volume
 
-MOST_BYTES = 2 << 30  # of all trees of a source
+MOST_BYTES = 2 << 30  # bytes of all trees of a source together
 _FOLDER = "bricks"
 
 
 class LiveBricks:
-    """The libraries of a source's views."""
+    """The brick libraries of a source's views."""
 
     def __init__(self, fine: ReadFine, scratch: Path, build: WatchedBuild | None) -> None:
         """Describe the libraries; nothing is read yet.
 
-        scratch  the folder of the views, in which the trees get a folder of their own
-        build    rests while a tree is made; None: there is none
+        scratch  the folder of the views; the trees get a folder of their own in it
+        build    the build that rests while a tree is made; None if no build runs
         """
         self._fine, self._build = fine, build
         self._trees = TreeFiles(scratch / _FOLDER, MOST_BYTES)
@@ -36,7 +36,7 @@ class LiveBricks:
     def library(self, view: Path, holders: Mapping[str, Holder]) -> BrickLibrary:
         """Return the library of a view.
 
-        holders  what its volumes leave out, by the channel's ID
+        holders  table, pads and cables of a CT that its volumes leave out, by the channel's ID
         """
 
         def read(volume: Volume) -> NDArray[np.uint8]:

@@ -1,4 +1,4 @@
-"""The websocket by which a page watches a build; see serve/live_app.py."""
+"""The websocket over which a page watches a build; see serve/live_app.py."""
 
 import asyncio
 import json
@@ -14,32 +14,32 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from stereocell.live.build_state import COMMANDS, LATE, State, WatchedBuild
 from stereocell.serve.limits import CLIENT_SOCKETS, MAX_CONNECTIONS
 
-_EACH_S = 0.25  # s between two states
+_STATE_EVERY_S = 0.25  # s between two checks for a new state
 MayControl = Callable[[Scope], bool]  # whether a client may pause, continue and cancel
 
 
 class LiveSocket:
-    """Talks to the pages that watch builds; counts them."""
+    """Talks to the pages that watch builds, and limits their number."""
 
     def __init__(self, may_control: MayControl) -> None:
         self._may_control = may_control
         self._sockets = 0
 
     async def refuse(self, socket: WebSocket) -> None:
-        """Report to one client that there is nothing to watch any more."""
+        """Report to one client that the item was deleted, and close."""
         await socket.accept()
         await socket.send_text(_message(State(doing="deleted"), may_control=False))
         await socket.close()
 
     async def talk(self, socket: WebSocket, build: WatchedBuild) -> None:
-        """Send one client the state until it leaves, and take its commands."""
+        """Send one client each new state until it leaves; carry out its commands."""
         await socket.accept()
         if self._sockets >= min(MAX_CONNECTIONS, 4 * CLIENT_SOCKETS):
             await socket.close(1013, "too many connections are open, try again later")
             return
         self._sockets += 1
         may_control = self._may_control(socket.scope)
-        heard = asyncio.ensure_future(socket.receive_text())
+        received = asyncio.ensure_future(socket.receive_text())
         sent = ""
         try:
             while True:
@@ -51,25 +51,25 @@ class LiveSocket:
                 if state.doing == "deleted":
                     await socket.close()
                     return
-                await asyncio.wait([heard], timeout=_EACH_S)
-                if not heard.done():
+                await asyncio.wait([received], timeout=_STATE_EVERY_S)
+                if not received.done():
                     continue
-                command = heard.result()
+                command = received.result()
                 known = next((one for one in COMMANDS if one == command), None)
                 if (known is None and command != LATE) or not may_control:
-                    words = "expected pause, continue, cancel or late, of a client that may control"
-                    await socket.close(1008, words)
+                    reason = "expected pause, continue, cancel or late, from a client with control"
+                    await socket.close(1008, reason)
                     return
                 await asyncio.to_thread(build.rest if known is None else partial(build.do, known))
-                heard = asyncio.ensure_future(socket.receive_text())
-        except (WebSocketDisconnect, KeyError, RuntimeError):  # it has left, or has sent bytes
+                received = asyncio.ensure_future(socket.receive_text())
+        except (WebSocketDisconnect, KeyError, RuntimeError):  # the client left, or sent bytes
             pass
         finally:
             self._sockets -= 1
-            heard.cancel()
+            received.cancel()
 
 
-def is_here(scope: Scope) -> bool:
+def is_on_this_machine(scope: Scope) -> bool:
     """Return whether a client is on this machine."""
     with suppress(ValueError):
         client = scope.get("client")
@@ -78,6 +78,6 @@ def is_here(scope: Scope) -> bool:
 
 
 def _message(state: State, *, may_control: bool) -> str:
-    """Return a state as a client gets it: lines of errors are for those who can act on them."""
+    """Return a state as JSON. Only a client that may control the build gets an error's line."""
     shown = state if may_control else replace(state, line="")
     return json.dumps({**asdict(shown), "may_control": may_control})

@@ -1,9 +1,11 @@
-"""Answer with voxels as they were measured: `GET /values/<tile>/<channel>?at=x,y,z`.
+"""Answer with the measured value of a voxel: `GET /values/<tile>/<channel>?at=x,y,z`.
 
-A bundle has 8 bits of the window; the stage beside it in OUT has the source's values. volumes.json
-names the file of the stage that a volume was made with, by its hash: where the stage's list has
-another, as after a new build, there is no answer. `at` is in um, in the volume's own space (before
-its matrix); the answer is {"value": ...} of the voxel in which it lies, null where none is kept.
+A bundle stores intensities in 8 bits; the stage beside it in OUT has the source's values.
+The list volumes.json names, by its hash, the file of the stage that belongs to a volume. If the
+stage's list
+has another file there, as after a new build, the server gives no value. `at` is in um, in the
+volume's own space (before its matrix). The answer is {"value": ...} for the voxel that contains the
+place, and null if the stage stores no value there.
 """
 
 import math
@@ -26,13 +28,13 @@ from stereocell.storage.file_list import find_faults, read_list
 
 VALUES_HEADER = {"Stereocell-Values": "version=1"}  # announces /values to a page
 _LIST = "files.json"  # the stage's list of files
-_KEPT_FILES = 32
-_LONGEST = 200  # characters of `at`
+_OPEN_FILES = 32  # most files that stay open
+_LONGEST = 200  # most characters of `at` that are read
 _HEADERS = {"Cache-Control": "no-store", **policy("application/json")}
 
 
 class MeasuredValues:
-    """The measured voxels of the volumes of one bundle. Its methods are thread-safe."""
+    """The measured values of one bundle's volumes. Its methods are thread-safe."""
 
     def __init__(self, library: BrickLibrary, stage: Path) -> None:
         self._library, self._stage = library, stage
@@ -43,13 +45,13 @@ class MeasuredValues:
         """Answer a GET."""
         at = parse_place(request.query_params.get("at", ""))
         if at is None:
-            return PlainTextResponse("at: expected x,y,z in um", 400, _HEADERS)
+            return PlainTextResponse("at: expected three numbers x,y,z in um", 400, _HEADERS)
         tile, channel = (str(request.path_params[name]) for name in ("tile", "channel"))
         value = await anyio.to_thread.run_sync(self.find, tile, channel, at)
         return JSONResponse({"value": value}, headers=_HEADERS)
 
     def find(self, tile: str, channel: str, at: tuple[float, float, float]) -> float | None:
-        """Return the value of the voxel at a place; None: there is none, or none is kept."""
+        """Return the value of the voxel at a place (x, y, z) in um; None if none is stored."""
         try:
             volume = self._library.volumes().get((tile, channel))
             if volume is None or not _holds(volume, at):
@@ -59,11 +61,11 @@ class MeasuredValues:
                 found = None if values is None else values.box(at, (1, 1, 1))[0, 0, 0]
         except StereoCellError:
             return None
-        # the shortest number that is this float32
+        # Converting through text gives the shortest number that rounds to this float32.
         return None if found is None or not np.isfinite(found) else float(str(found))
 
     def _open(self, volume: Volume) -> VdbValues | None:
-        """Return the voxels that a volume was made with; None where the stage has them no more."""
+        """Return the voxels from which a volume was made; None if the stage has them no longer."""
         named = volume.entry.get("measured")
         if named is None:
             return None
@@ -77,13 +79,13 @@ class MeasuredValues:
             return None
         values = VdbValues(self._stage / path, MEASURED_NAME)
         self._files[key] = named["sha256"], values
-        if len(self._files) > _KEPT_FILES:
+        if len(self._files) > _OPEN_FILES:
             self._files.popitem(last=False)
         return values
 
 
 def parse_place(text: str) -> tuple[float, float, float] | None:
-    """Return `x,y,z` as numbers; None where these are not three finite ones."""
+    """Return the numbers of a text `x,y,z`; None unless they are three finite numbers."""
     try:
         x, y, z = (float(part) for part in text[:_LONGEST].split(","))
     except ValueError:

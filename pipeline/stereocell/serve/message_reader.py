@@ -1,4 +1,4 @@
-"""The messages of one client, each checked against the limits of its kind and its schema."""
+"""Read the messages of one client; check each against the schema and its kind's limits."""
 
 from typing import Any
 
@@ -17,13 +17,13 @@ class MessageReader:
         self._acks = Bucket(ACKS_PER_S)
 
     async def read(self) -> dict[str, Any]:
-        """Return the next message. Raises Refusal, WebSocketDisconnect where the client left."""
+        """Return the next message. Raises Refusal, and WebSocketDisconnect if the client left."""
         event = await self._socket.receive()
         if event["type"] != "websocket.receive":
             raise WebSocketDisconnect(event.get("code", 1006), event.get("reason"))
         text = event.get("text")
         if text is None:
-            raise Refusal(1003, "binary frames go to the client only")
+            raise Refusal(1003, "a client may send text only, not binary frames")
         if len(text) > MESSAGE_BYTES:
             raise Refusal(1009, f"a message of more than {MESSAGE_BYTES} bytes")
         try:

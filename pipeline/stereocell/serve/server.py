@@ -1,11 +1,14 @@
 """Serve a built bundle and its bricks: `stereocell view` and `stereocell serve`.
 
-A static bundle works on any web host. This server answers byte ranges of its files, its websocket
-`/bricks` sends volumes by view (serve/brick_session.py), and `/values` tells voxels as they were
-measured, from the stage beside the bundle (serve/measured_values.py). It serves localhost or, with
-`--lan`, the network: then by TLS, and only to holders of a token (serve/access.py). It logs only
-faults of the program and of the bundle: no request, so no token, and no name that a client sent.
-docs/server.md lists the requests that the other modules refuse.
+A static bundle works on any web host. This server adds three things to it. It answers byte ranges
+of files. Its websocket `/bricks` sends the parts of volumes that a view needs
+(serve/brick_session.py). `/values` returns measured values from the stage beside the bundle
+(serve/measured_values.py).
+
+The server listens on localhost. With `--lan` it serves the network, over TLS, and only devices that
+were admitted by a token (serve/access.py). It logs only faults of the program and of the bundle. It
+logs no requests, hence neither tokens nor names that a client sent. docs/server.md lists the
+requests that the other modules refuse.
 """
 
 import json
@@ -38,7 +41,7 @@ from stereocell.serve.static_files import ShrunkError
 from stereocell.serve.websocket_protocol import GuardedSocket
 
 LOCALHOST = "127.0.0.1"
-_OWN_NAMES = (LOCALHOST, "localhost")  # with any port: it may be forwarded
+_OWN_NAMES = (LOCALHOST, "localhost")  # with any port, since a tunnel may forward another one
 
 
 def serve(
@@ -51,21 +54,21 @@ def serve(
     frames: tuple[str, ...] = (),
     live: Live | None = None,
 ) -> None:
-    """Serve OUT/bundle until Ctrl+C or SIGTERM; port 0 takes a free one. OUT may be a bundle.
+    """Serve OUT/bundle until Ctrl+C or SIGTERM. OUT may be a bundle. Port 0 takes any free port.
 
-    for_program  print lines of JSON in place of texts for a person: first the address, then, with
-                 `lan`, an address that admits one device, a new one after each admission
+    for_program  print lines of JSON instead of texts for a person: first the address, then, with
+                 `lan`, an address that admits one device, and a new one after each admission
     frames       origins whose pages may hold the viewer in a frame
-    live         a source whose first view is the bundle, and is written meanwhile; None: the bundle
-                 is there
+    live         a source whose first view is the bundle, and is still being written; None if the
+                 bundle is finished
 
     Returns when the running transfers have finished, or STOP_S later. Raises KeyboardInterrupt at
-    once at a second Ctrl+C; StereoCellError where there is no bundle, its manifest was changed, the
-    port is taken, or there is no network.
+    once at a second Ctrl+C. Raises StereoCellError if there is no bundle, its manifest was changed,
+    the port is taken, or there is no network.
     """
     bundle, _ = _places(out)
     if (bundle / MANIFEST).is_file():
-        read_manifest(bundle)  # raises where it was changed
+        read_manifest(bundle)  # this raises if the manifest was changed
     server = BundleServer(out, port, lan, for_program, frames, live)
     if live is not None:
         live.first.add_done_callback(lambda first: _stop_after(first, server))
@@ -73,11 +76,12 @@ def serve(
 
 
 def run_until_stopped(server: "Server", *, open_browser: bool) -> None:
-    """Introduce a server and run it until Ctrl+C or SIGTERM.
+    """Print a server's address and run it until Ctrl+C or SIGTERM.
 
     Raises KeyboardInterrupt at a second Ctrl+C.
     """
-    # a running uvicorn handles SIGTERM itself: it ends, then raises the signal again
+    # While uvicorn runs, it handles SIGTERM itself: it ends, then raises the signal again. This
+    # handler receives that signal, and an earlier SIGTERM.
     before = signal.signal(signal.SIGTERM, lambda *_: server.stop())
     try:
         server.introduce()
@@ -93,9 +97,9 @@ def run_until_stopped(server: "Server", *, open_browser: bool) -> None:
 
 
 def _places(out: Path) -> tuple[Path, Path | None]:
-    """Return the folders of a bundle and of its brick trees: below OUT, or where OUT is a bundle.
+    """Return the folders of a bundle and of its brick trees; OUT may be a bundle itself.
 
-    None for the trees: a bundle by itself, beside which nothing may be written.
+    The second is None for a bundle outside a build: nothing may be written beside it.
     """
     if (out / "bundle").exists() or not (out / MANIFEST).is_file():
         return out / "bundle", out / "bricks"
@@ -110,7 +114,7 @@ MakeApp = Callable[[tuple[str, ...], Gate | None], ASGIApp]
 
 
 class Server:
-    """A bound server: `address` is where it listens; run() until stop()."""
+    """A server that is bound to `address`; run() answers requests until stop()."""
 
     def __init__(
         self,
@@ -121,9 +125,11 @@ class Server:
         for_program: bool = False,
         http: type[GuardedHttp] = GuardedHttp,
     ) -> None:
-        """make: returns the application for the server's names and its gate on the LAN.
+        """Bind a server.
 
-        Raises StereoCellError where the port is taken, or there is no network.
+        make  returns the application for the server's names and, on the LAN, its gate
+
+        Raises StereoCellError if the port is taken, or there is no network.
         """
         self.for_program = for_program
         names: tuple[str, ...] = _OWN_NAMES
@@ -152,36 +158,36 @@ class Server:
             ws_per_message_deflate=False,  # bricks are compressed already
         )
         logging.getLogger("uvicorn.error").addFilter(_is_ours)
-        self._server = Lifetime(config, context, self._tell_wait)
+        self._server = Lifetime(config, context, self._print_wait)
 
     @property
     def has_started(self) -> bool:
-        """Whether it answers requests."""
+        """Whether the server answers requests."""
         return self._server.started
 
     @property
     def was_forced(self) -> bool:
-        """Whether a second Ctrl+C cut its end short."""
+        """Whether a second Ctrl+C ended the server before its transfers had finished."""
         return self._server.force_exit
 
     def introduce(self) -> None:
-        """Print the address, and what lies there."""
-        self.introduce_as("what is served", {})
+        """Print the address and the content that it shows."""
+        self.introduce_as("the content of this server", {})
 
     def introduce_as(self, shown: str, about: Mapping[str, object]) -> None:
-        """Print the address with these words, or for a program with these values."""
+        """Print the address with the words `shown`, or for a program with the values `about`."""
         if self.for_program:
             print_json({"address": self.address, **about, "fingerprint": self.fingerprint})
         else:
             print(f"{self.address} shows {shown}; Ctrl+C ends it", flush=True)
 
     def invite(self) -> None:
-        """Print the QR code for the next device on the LAN, and an explanation of its warning."""
+        """Print the QR code for the next device on the LAN, and explain the device's warning."""
         if self.gate is not None:
             self.invite_by(self.gate, "", {})
 
     def invite_by(self, gate: Gate, title: str, about: Mapping[str, object]) -> None:
-        """Print the QR code of a gate under a title, or for a program with these values."""
+        """Print the QR code of a gate under a title, or for a program with the values `about`."""
         invitation = f"{self.address}?token={gate.token}"
         if self.for_program:
             print_json({"invitation": invitation, **about})
@@ -189,7 +195,7 @@ class Server:
         code = draw_qr(invitation, encoding=sys.stdout.encoding or "utf-8")
         print(title + explain(self.address, self.fingerprint, code), flush=True)
 
-    def _tell_wait(self, transfers: int) -> None:
+    def _print_wait(self, transfers: int) -> None:
         print(
             f"finishing {transfers} transfer{'s' * (transfers > 1)}, at most {STOP_S:g} s; "
             "Ctrl+C again stops at once",
@@ -205,7 +211,7 @@ class Server:
             self._socket.close()
 
     def stop(self) -> None:
-        """Make run() end soon; thread-safe."""
+        """Make run() end soon. Any thread may call this."""
         self._server.should_exit = True
 
 
@@ -221,7 +227,7 @@ class BundleServer(Server):
         frames: tuple[str, ...] = (),
         live: Live | None = None,
     ) -> None:
-        """Raises StereoCellError where there is no bundle, the port is taken, or no network."""
+        """Raises StereoCellError if there is no bundle or network, or the port is taken."""
         bundle, bricks = _places(out) if live is None else (live.bundle, None)
         library = stage = None
         if bricks is not None:
@@ -230,14 +236,14 @@ class BundleServer(Server):
         self._live = live
         if live is None and not out.exists():
             raise StereoCellError(
-                f"{out}: not found, expected a build, a bundle, or a source: a file, a folder, or "
-                "an address that begins with https:// or s3://"
+                f"{out}: not found; expected a build, a bundle, or a source (a file, a folder, or "
+                "an address that begins with https:// or s3://)"
             )
         for name in (MANIFEST, "index.html"):
             if live is None and not (bundle / name).is_file():
                 raise StereoCellError(
-                    f"{bundle / name}: expected a built bundle, found no such file; "
-                    "`stereocell bundle OUT` writes it"
+                    f"{bundle / name}: not found; expected a built bundle. "
+                    "Run `stereocell bundle OUT` to write it."
                 )
 
         def make(names: tuple[str, ...], gate: Gate | None) -> ASGIApp:
@@ -248,26 +254,26 @@ class BundleServer(Server):
         super().__init__(port, lan, make, for_program=for_program)
 
     def introduce(self) -> None:
-        """Print the address, and the path of the bundle, or of OUT where a source is built."""
+        """Print the address, and the path of the bundle or, while a source is built, of OUT."""
         if self._live is not None:
             self._introduce_source(self._live)
             return
         shown = str(self.bundle)
         if not self.has_bricks:
-            shown += " (a bundle by itself: its volumes come whole)"
+            shown += " (a bundle without its build: volumes are sent whole)"
         self.introduce_as(shown, {"bundle": str(self.bundle), "bricks": self.has_bricks})
 
     def _introduce_source(self, live: Live) -> None:
         about: dict[str, object] = {"bricks": live.fine is not None}
         if live.build is None:
-            self.introduce_as("the source, which is not built", about)
+            self.introduce_as("the source without building it", about)
         else:
             about |= {"out": str(live.build.out)}
-            self.introduce_as("the source, and what is built of it", about)
+            self.introduce_as("the source and, as it is built, its surfaces", about)
 
 
 def _stop_after(first: "Future[None]", server: BundleServer) -> None:
-    """Stop a server where there can be no first view."""
+    """Stop a server whose first view could not be made."""
     if first.exception() is not None:
         server.stop()
 
@@ -280,7 +286,7 @@ def print_json(content: Mapping[str, object]) -> None:
 def _bind(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        if sys.platform != "win32":  # Windows would take a port that is in use
+        if sys.platform != "win32":  # with this option, Windows would share a port that is in use
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
         listener.listen(128)
@@ -294,9 +300,10 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 def _is_ours(record: logging.LogRecord) -> bool:
-    """Drop tracebacks of a client's invalid frames: the client was closed with a code.
+    """Return whether to log a record: not the traceback of a client's invalid frame.
 
-    A file that shrank while it was sent is logged in one line.
+    That client was closed with a code. The traceback of a file that shrank while it was sent
+    becomes one line.
     """
     fault = record.exc_info[1] if record.exc_info else None
     if isinstance(fault, ShrunkError):

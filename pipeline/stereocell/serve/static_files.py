@@ -1,11 +1,11 @@
 """Serve the files of a bundle: types, byte ranges, 304 for cached files, nothing outside the root.
 
-A file with a compressed one beside it, `index.html.br` or `.gz`, is sent as that to clients that
-accept it; a byte range is always one of the file itself.
+If a compressed file such as `index.html.br` or `.gz` lies beside a file, clients that accept the
+encoding get that one. A byte range always means bytes of the uncompressed file.
 
 The viewer fetches single mip levels by ranges. A Range header that is malformed, in another unit,
 or asks for several ranges is ignored, as the RFC allows: the answer is the whole file. All answers
-are `no-cache`, since the bundle may be built anew meanwhile.
+are `no-cache`, since a new build may replace the bundle at any time.
 
 References: RFC 9110, sections 14 (range requests) and 12.5.3 (Accept-Encoding).
 """
@@ -26,13 +26,13 @@ from stereocell.formats.media_types import media_type
 from stereocell.serve.headers import policy
 
 _HEADERS = {"Cache-Control": "no-cache"}
-_ENCODINGS = {"br": ".br", "gzip": ".gz"}  # the shorter first
+_ENCODINGS = {"br": ".br", "gzip": ".gz"}  # br comes first, since its files are smaller
 _RANGE = re.compile(r"bytes=(\d*)-(\d*)", re.ASCII)
 _DIGITS = 18  # digits of a number in a Range header: no file has more bytes
 
 
 def bricks_header(folder: str = "") -> dict[str, str]:
-    """Return the header that announces `/bricks` to a page, or that of a folder, as `g1/`."""
+    """Return the header that announces `/bricks`, or the bricks of a folder such as `g1/`."""
     return {"Stereocell-Bricks": "version=1" + (f"; folder={folder}" if folder else "")}
 
 
@@ -44,12 +44,12 @@ class _SentFile(FileResponse):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
-        except h11.LocalProtocolError as error:  # fewer bytes than its head promised
-            raise ShrunkError(f"{self.path}: became shorter while it was sent") from error
+        except h11.LocalProtocolError as error:  # fewer bytes than the answer's head announced
+            raise ShrunkError(f"{self.path}: the file became shorter while it was sent") from error
 
 
 class BundleFiles:
-    """The served folder, and headers that announce what else the server has."""
+    """Serves the files of a folder, with headers that announce the server's other services."""
 
     def __init__(self, folder: Path, announced: Mapping[str, str]) -> None:
         self._root = folder.resolve()
@@ -81,7 +81,7 @@ class BundleFiles:
         return response
 
     def _find(self, name: str) -> tuple[Path, os.stat_result] | None:
-        """Return the file at a path; None: there is none inside the root."""
+        """Return the file at a path; None if the root contains no such file."""
         if "\0" in name:
             return None
         try:
@@ -91,12 +91,12 @@ class BundleFiles:
             if not path.is_relative_to(self._root) or not path.is_file():
                 return None
             return path, path.stat()
-        except (OSError, RuntimeError):  # too long a name, a folder without rights, a ring of links
+        except (OSError, RuntimeError):  # a long name, a forbidden folder, a circle of links
             return None
 
 
 def _compressed(path: Path) -> dict[str, tuple[Path, os.stat_result]]:
-    """Return the compressed files beside a file, by their encoding."""
+    """Return the compressed versions that lie beside a file, by encoding."""
     found = {}
     for encoding, suffix in _ENCODINGS.items():
         beside = path.with_name(path.name + suffix)
@@ -119,10 +119,11 @@ def accepted_encodings(header: str) -> set[str]:
 def parse_range(header: str, size: int) -> range | None:
     """Return the bytes that a Range header asks for, clipped to a file of `size` bytes.
 
-    An empty range can't be satisfied. None: ignore the header (it is malformed, in another unit, or
-    asks for several ranges, which a server may answer with the whole file).
+    An empty range can't be satisfied. None means that the header is to be ignored: it is malformed,
+    in another unit, or asks for several ranges, which a server may answer with the whole file.
 
-        parse_range("bytes=100-199", 150) == range(100, 150)
+    >>> parse_range("bytes=100-199", 150)
+    range(100, 150)
     """
     match = _RANGE.fullmatch(header.strip())
     if match is None or max(map(len, match.groups())) > _DIGITS:
@@ -138,7 +139,7 @@ def parse_range(header: str, size: int) -> range | None:
 
 
 def _plain_range(request: Request, size: int) -> None:
-    """Leave FileResponse one plain Range header, or none."""
+    """Replace the request's Range header by one that FileResponse understands, or remove it."""
     headers = [(key, value) for key, value in request.scope["headers"] if key != b"range"]
     asked = parse_range(request.headers.get("range", ""), size)
     if asked is not None:
@@ -150,7 +151,7 @@ def _plain_range(request: Request, size: int) -> None:
 def redirect(path: str) -> Response:
     """Return a redirect to a path of this server, which no cache stores.
 
-    Repeated slashes become one: a browser takes the part after a leading `//` for a host.
+    Repeated slashes become one, since a browser takes the part after a leading `//` for a host.
     """
-    place = quote(re.sub("/+", "/", f"/{path}"))  # ":" and backslashes are encoded
+    place = quote(re.sub("/+", "/", f"/{path}"))  # quote also encodes ":" and backslashes
     return Response(status_code=303, headers={"Location": place, "Cache-Control": "no-store"})

@@ -1,8 +1,8 @@
-"""The websocket's frames before they form a message: pings, fragments, ends.
+"""Limits on a websocket's frames before they form a message: pings, fragments and closing.
 
 uvicorn answers every ping and waits for ever for a message's last fragment; here both have limits.
-A closed client's connection ends soon after, also if the client reads nothing. When the server
-ends, it closes its clients with 1001, going away. serve/brick_session.py handles the messages.
+After a close frame the connection ends within _GONE_S, even if the client reads nothing. When the
+server ends, it closes its clients with 1001, going away. serve/brick_session.py handles messages.
 
 References: RFC 6455.
 """
@@ -28,11 +28,11 @@ from stereocell.serve.limits import (
     Bucket,
 )
 
-_GONE_S = 5.0  # from our close frame to the end of the connection, at the latest
+_GONE_S = 5.0  # s, longest time from our close frame to the end of the connection
 
 
 class _Handshake(ServerProtocol):
-    """websockets' own, with the headers that all answers have."""
+    """The protocol of the websockets library, with the protective headers that all answers have."""
 
     def send_response(self, response: Response) -> None:
         raw = [(k.lower().encode(), v.encode("latin-1")) for k, v in response.headers.raw_items()]
@@ -71,7 +71,9 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         if self._is_refused:
             return
         super().data_received(data)
-        if not self.handshake_initiated:  # uvicorn passes on a complete head
+        # uvicorn's HTTP passes a complete head to this class. If that starts no handshake, none
+        # will follow.
+        if not self.handshake_initiated:
             self.transport.abort()
         self._end_soon()
 
@@ -106,13 +108,13 @@ class GuardedSocket(WebSocketsSansIOProtocol):
     def handle_parser_exception(self) -> None:
         """Send the reason, and end our side only.
 
-        uvicorn closes at once. A system that closes a socket with unread bytes discards data that
-        its client hasn't read yet: the reason.
+        uvicorn closes at once. An operating system that closes a socket with unread bytes discards
+        data that the client hasn't read yet, and so would lose the reason.
         """
-        said = self.conn.close_sent
-        assert said is not None
+        closing = self.conn.close_sent
+        assert closing is not None
         self.queue.put_nowait(
-            {"type": "websocket.disconnect", "code": said.code, "reason": said.reason}
+            {"type": "websocket.disconnect", "code": closing.code, "reason": closing.reason}
         )
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = self._is_refused = True
@@ -121,7 +123,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self.transport.resume_reading()
             self.close_timer = self.loop.call_later(_GONE_S, self.transport.abort)
         else:
-            self.transport.close()  # TLS: waits for the client's part of the end
+            self.transport.close()  # a TLS transport waits for the client's close_notify
 
     def keepalive_timeout(self) -> None:
         super().keepalive_timeout()
@@ -137,8 +139,8 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         self._end_message()
         if not event.fin:
             self._fragments = 1
-            said = f"a message's last frame did not come within {FRAGMENTS_S:g} s"
-            self._unfinished = self.loop.call_later(FRAGMENTS_S, self._refuse, 1008, said)
+            reason = f"a message's last frame did not arrive within {FRAGMENTS_S:g} s"
+            self._unfinished = self.loop.call_later(FRAGMENTS_S, self._refuse, 1008, reason)
 
     def _end_message(self) -> None:
         if self._unfinished is not None:
@@ -146,7 +148,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
             self._unfinished = None
 
     def _refuse(self, code: int, reason: str) -> None:
-        """Close with a code; to the application the client has left."""
+        """Close with a code and a reason; the application sees that the client has left."""
         if not self.close_sent and not self.transport.is_closing():
             self._end_message()
             self.stop_keepalive()

@@ -29,7 +29,7 @@ _WHOLE = {".exr": check_exr, ".vdb": check_vdb, ".stl": check_stl}
 
 
 def check_tissue(out: Path) -> str:
-    """Check the files of `stereocell tissue`; the bundle needs none of them."""
+    """Check the files of `stereocell tissue`, which the bundle does not use."""
     files = read_whole(out / FOLDER)["files"]
     require_added(OutFolder(out).plan())
     return f"{RECORD} and {len(files)} files that it lists"
@@ -37,8 +37,8 @@ def check_tissue(out: Path) -> str:
 
 def check_units(out_folder: OutFolder) -> str:
     """Check the units' files against the hashes in unit.json, and the survey behind them."""
-    told = find_document_faults(out_folder, "units")
-    lists = [fault.removesuffix(f": {UNITS_AGAIN}") for fault in told]
+    faults = find_document_faults(out_folder, "units")
+    lists = [fault.removesuffix(f": {UNITS_AGAIN}") for fault in faults]
     problems, files = _damaged_survey(out_folder), 0
     index = find_sealed(out_folder.index_file, INDEX) or {}
     for name, key in index.items():
@@ -57,7 +57,7 @@ def check_units(out_folder: OutFolder) -> str:
 
 
 def _damaged_survey(out_folder: OutFolder) -> list[str]:
-    """Return the faults of the files of windows and levels that the survey names."""
+    """Return the faults of the survey's files, which hold windows and iso-values."""
     survey = find_sealed(out_folder.survey_file, SURVEY) or {"channels": {}}
     channels = survey["channels"].values()
     names = dict.fromkeys(channel["statistics_file"] for channel in channels)
@@ -79,7 +79,7 @@ def _fault_of(out_folder: OutFolder, file: Path) -> str:
 
 
 def check_stage_hashes(out_folder: OutFolder) -> str:
-    """Check every file that the build wrote against the stage's list; others are an artist's."""
+    """Check every file that the build wrote against the stage's list; ignore an artist's files."""
     for require in checks_of(out_folder, "stage"):
         require()
     listed = read_json(out_folder.stage_list, "units.schema.json#FileList", written_files.REMEDY)
@@ -87,27 +87,27 @@ def check_stage_hashes(out_folder: OutFolder) -> str:
         path = out_folder.stage_list
         raise CheckError(f"{path}: damaged, not the list that was written: {written_files.REMEDY}")
     problems = written_files.find_damage(out_folder.stage_dir, listed)
-    told = [f"stage/{path}: {fault}" for path, fault in problems.items()]
+    faults = [f"stage/{path}: {fault}" for path, fault in problems.items()]
     remedy = f"remove what is damaged and {written_files.REMEDY}"
     if {written_files.CHANGED, written_files.DOUBTFUL} & set(problems.values()):
         remedy += f"; {written_files.ADVICE}"
-    raise_on_all(told, remedy)
+    raise_on_all(faults, remedy)
     return f"{len(listed)} files"
 
 
 def check_stage(out: Path) -> str:
-    """Check the composed stage by USD's own validators and by our rules."""
+    """Check the composed stage by USD's validators and by StereoCell's own rules."""
     out_folder = OutFolder(out)
     out_folder.require_finished("stage")
     path = out_folder.stage_file
-    dependencies(path, path.parent)  # refuses files outside the stage
+    dependencies(path, path.parent)  # this raises if the stage uses files outside its folder
     findings = validate_stage(path)
     raise_on([str(finding) for finding in findings])
     return f"{path.name}: nothing found by UsdValidation and by our own rules"
 
 
 def check_usdz(path: Path) -> str:
-    """Check a .usdz by the validators of its format; a specimen without surfaces has none."""
+    """Check a .usdz by the validators of its format. A specimen without surfaces has no .usdz."""
     if not path.parent.is_dir():
         raise CheckError(f"{path.parent}: missing, run `stereocell stage OUT`")
     if not path.is_file():
@@ -118,8 +118,10 @@ def check_usdz(path: Path) -> str:
 
 
 def check_stage_files(out: Path) -> str:
-    """Check that volumes, lookup tables and closed copies are whole: USD checks only that the
-    first two exist."""
+    """Check that volumes, lookup tables and closed copies are whole.
+
+    USD checks only that volumes and lookup tables exist.
+    """
     folder = out / "stage"
     paths = sorted(path for path in folder.rglob("*") if path.suffix in _WHOLE)
     if not paths:
@@ -138,9 +140,9 @@ def check_stage_files(out: Path) -> str:
 
 
 def _lost_copies(out: Path) -> list[str]:
-    """Return the problems where the plan requests closed copies, and a surface has none."""
+    """Return a problem for each surface without the closed copy that the plan requests."""
     out_folder = OutFolder(out)
-    if not out_folder.plan_file.is_file():  # the line `plan` reports it
+    if not out_folder.plan_file.is_file():  # the check `plan` reports the missing file
         return []
     plan = out_folder.plan()
     if not plan.settings.surface.closed_tiles:

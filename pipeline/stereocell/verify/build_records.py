@@ -1,6 +1,6 @@
-"""Check the records of a build against their own hashes: the plan and the files beside it.
+"""Check the plan of a build, and the files beside it, against their own hashes.
 
-The files of units, stage and bundle are checked against lists of their own: see formats.py.
+The files of units, stage and bundle have lists of their own; see formats.py for these checks.
 """
 
 from stereocell.building.made_of import require_current
@@ -10,22 +10,22 @@ from stereocell.model.errors import CheckError, OutputError
 
 
 def check_plan(out_folder: OutFolder) -> str:
-    """Check plan.json: its hash, its schema, and the other rules of its reader."""
+    """Check the hash of plan.json, its schema, and further rules of its reader."""
     plan = out_folder.plan()
     return f"{out_folder.plan_file.name}: {len(plan.tiles)} tiles x {len(plan.channels)} channels"
 
 
 def check_records(out_folder: OutFolder) -> str:
-    """Check the files that a plan writes beside plan.json, and the record of the phases.
+    """Check the files that planning writes beside plan.json, and the record of the phases.
 
-    Also check that units, stage, bundle and report were made of each other.
+    Also check that each of units, stage, bundle and report was made from the one before.
     """
     settings, provenance = out_folder.settings_file, out_folder.provenance_file
     faults = find_document_faults(out_folder, "plan", "phases", "exports")
-    # the line `plan` says what is wrong with the plan itself
+    # The check `plan` reports faults of the plan itself.
     faults = [fault for fault in faults if not fault.startswith(str(out_folder.plan_file))]
     if not find_document_faults(out_folder, "plan", "phases", "units", "stage"):
-        # a damaged document would be told twice, with the remedy of what was made of it
+        # This is skipped for a damaged document, which would be reported again with another remedy.
         try:
             require_current(out_folder)
         except OutputError as fault:

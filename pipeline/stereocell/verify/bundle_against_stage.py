@@ -1,4 +1,4 @@
-"""Compare a bundle with the stage that it was exported from, by the decoded files of a tile.
+"""Compare a bundle with the stage that it was exported from, tile by tile, in decoded files.
 
 The comparisons are in bundle_manifest, bundle_surfaces and bundle_volumes.
 """
@@ -32,8 +32,8 @@ class BundleTask:
 class TileFinding:
     """The result of comparing one tile.
 
-    worst   largest distance of a vertex from its place, in lattice steps
-    edits   edits by hand, a line for each surface
+    worst   largest distance of a vertex from its position in the stage, in lattice steps
+    edits   a line for each surface that was edited by hand
     joints  each volume's joint histogram of value and gradient, packed, by channel
     """
 
@@ -56,7 +56,7 @@ def compare_tile(task: BundleTask) -> TileFinding:
     surfaces = 0
     worst = 0.0
     stage = open_stage(task.stage_file)
-    # channels that the manifest lacks are reported with the manifest
+    # The check of the manifest reports channels that the manifest lacks.
     appearances = [
         appearance for appearance in read_appearances(stage) if appearance.id in channels
     ]
@@ -66,8 +66,8 @@ def compare_tile(task: BundleTask) -> TileFinding:
         if listed is not None:
             low, high = find_bounds(tile, volumes)
             bounds = {"min": list(low), "max": list(high)}
-            told = {"representation": choice.representation, "bounds_um": bounds}
-            problems += find_differences(task.tile_id, listed, told)
+            expected = {"representation": choice.representation, "bounds_um": bounds}
+            problems += find_differences(task.tile_id, listed, expected)
         for appearance, composed in zip(appearances, volumes, strict=True):
             channel, name = channels[appearance.id], f"{task.tile_id}/{appearance.id}"
             shown = shown_lods(tile, appearance.id, choice.finest_lod)

@@ -1,4 +1,4 @@
-"""Check the JSON documents of a bundle: their schemas, and the rules that no schema states."""
+"""Check the JSON documents of a bundle: their schemas, and rules that schemas can't express."""
 
 import hashlib
 import struct
@@ -28,7 +28,7 @@ def check_json(path: Path, schema: str, remedy: str) -> str:
 
 
 def check_usdz_of_bundle(bundle: Path) -> str:
-    """Check specimen.usdz where the manifest names one; its hash is checked with all others."""
+    """Check specimen.usdz if the manifest names one; `check_hashes` compares its hash."""
     manifest = read_manifest(bundle)
     if manifest.get("usdz") is None:
         return f"no {USDZ_NAME}: {manifest.get('usdz_reason') or 'the manifest names none'}"
@@ -38,7 +38,7 @@ def check_usdz_of_bundle(bundle: Path) -> str:
 
 
 def check_volume_lists(bundle: Path) -> str:
-    """Check each volumes.json, and its hashes of the levels in the textures."""
+    """Check each volumes.json, and the hashes in it of the textures' mip levels."""
     problems = []
     volumes = 0
     for channel in channels_of(bundle):
@@ -51,13 +51,13 @@ def check_volume_lists(bundle: Path) -> str:
             if _levels_of(texture, len(listed)) != listed:
                 problems.append(f"{path}: the levels of {volume['file']['path']} lie elsewhere")
                 continue
-            problems += _spoilt_levels(texture, volume)
+            problems += _damaged_levels(texture, volume)
     raise_on(problems)
     return f"{volumes} volumes"
 
 
 def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
-    """Return offset and length in bytes of a KTX2 file's levels; empty for another number."""
+    """Return offset and length in bytes of a KTX2 file's levels; empty unless it has `count`."""
     try:
         with texture.open("rb") as file:
             head = file.read(80 + 24 * count)
@@ -68,8 +68,8 @@ def _levels_of(texture: Path, count: int) -> list[tuple[int, int]]:
     return [struct.unpack_from("<2Q", head, 80 + 24 * k) for k in range(count)]
 
 
-def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
-    """Return the levels that lie at the right place but don't match their hash."""
+def _damaged_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
+    """Return a problem for each level that doesn't match its hash."""
     problems = []
     try:
         with texture.open("rb") as file:
@@ -87,21 +87,21 @@ def _spoilt_levels(texture: Path, volume: dict[str, Any]) -> list[str]:
 
 
 def channels_of(bundle: Path) -> list[dict[str, Any]]:
-    """Return the channels of a bundle's manifest. Raises OutputError where it is invalid."""
+    """Return the channels of a bundle's manifest. Raises OutputError if it is invalid."""
     manifest = read_manifest(bundle)
     channels: list[dict[str, Any]] = manifest["channels"]
     return channels
 
 
 def transfer2d_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
-    """Return a channel's 2D transfer functions. Raises OutputError where they are invalid."""
+    """Return a channel's 2D transfer functions. Raises OutputError if they are invalid."""
     path = bundle / channel["transfer_functions_2d"]["file"]["path"]
     content: dict[str, Any] = read_json(path, "transfer2d.schema.json", REMEDY)
     return content
 
 
 def check_transfer2d(bundle: Path) -> str:
-    """Check each transfer2d.json: its names, and rules of its shapes beyond the schema."""
+    """Check the names in each transfer2d.json, and rules of its shapes beyond the schema."""
     problems = []
     count = 0
     for channel in channels_of(bundle):
@@ -124,7 +124,7 @@ def check_transfer2d(bundle: Path) -> str:
 
 
 def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the table of a channel that is a label map; None: it is an image's."""
+    """Return the table of a channel that is a label map; None for an image's channel."""
     if "objects" not in channel:
         return None
     path = bundle / channel["objects"]["path"]
@@ -133,7 +133,7 @@ def objects_of(bundle: Path, channel: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def check_objects(bundle: Path) -> str:
-    """Check each objects.json: that its files have a value a row, and its tiles rows there are."""
+    """Check that the files of each objects.json have a value for each row, and its rows exist."""
     problems = []
     objects = 0
     for channel in channels_of(bundle):

@@ -12,19 +12,19 @@ from stereocell.bundle.manifest import REMEDY
 from stereocell.model.errors import CheckError
 from stereocell.storage.json_files import read_json
 
-COLOR_STEP = 1 / 255 + 1e-6  # largest difference of a colour, 0..1: one step of 8 bits
+COLOR_STEP = 1 / 255 + 1e-6  # 0..1, largest difference of a colour: one step of 8 bits
 
 
 def read_transfer2d(bundle: Path, channel: dict[str, Any]) -> dict[str, Any]:
-    """Return a channel's 2D transfer functions. Raises OutputError where invalid."""
+    """Return a channel's 2D transfer functions. Raises OutputError if they are invalid."""
     path = bundle / channel["transfer_functions_2d"]["file"]["path"]
     return dict(read_json(path, "transfer2d.schema.json", REMEDY))
 
 
 def read_texels(file: Path) -> list[NDArray[np.uint8]]:
-    """Return the levels of a KTX2 file of ours, finest first, each uint8 (z, y, x, components).
+    """Return the mip levels of a bundle's KTX2 file, finest first, uint8 (z, y, x, components).
 
-    Raises CheckError where the file can't be read or decoded.
+    Raises CheckError if the file can't be read or decoded.
     """
     try:
         data = file.read_bytes()

@@ -1,4 +1,4 @@
-"""Check the tilesets of a bundle, and all its files and references against their hashes."""
+"""Check the tilesets of a bundle, and compare all its files and references with their hashes."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +23,7 @@ from stereocell.verify.site_files import find_site_faults
 
 
 def check_tilesets(bundle: Path) -> str:
-    """Check that each content of the channels' tilesets is there, with the hash that is stated."""
+    """Check that each content of the channels' tilesets exists and has the hash stated there."""
     contents = 0
     problems = []
     for channel in channels_of(bundle):
@@ -32,14 +32,14 @@ def check_tilesets(bundle: Path) -> str:
         try:
             for content in walk(bundle, bundle / channel["tileset"]["path"]):
                 contents += not content.is_tileset
-                problems += _spoilt_content(content)
+                problems += _content_problems(content)
         except StereoCellError as error:
             problems.append(str(error))
     raise_on(problems)
     return f"{contents} contents"
 
 
-def _spoilt_content(content: Content) -> list[str]:
+def _content_problems(content: Content) -> list[str]:
     """Return the problems of a file that a tileset names, and of the tileset's entry."""
     uri = content.named["uri"]
     name = f"{content.tileset}: {uri}"
@@ -51,7 +51,7 @@ def _spoilt_content(content: Content) -> list[str]:
     except (KeyError, TypeError):
         return [*problems, f"{name} has no hash, expected extras.{CONTENT_HASH}"]
     if not content.path.is_file():
-        if not content.is_tileset:  # the walk reports missing tilesets
+        if not content.is_tileset:  # `walk` has reported a missing tileset
             problems.append(f"{content.tileset}: no file at {uri}")
         return problems
     found = content_hash(measure(content.path)["sha256"])
@@ -63,7 +63,7 @@ def _spoilt_content(content: Content) -> list[str]:
 def check_hashes(bundle: Path, out_folder: OutFolder | None) -> str:
     """Compare every file and every reference with files.json, and report unlisted files.
 
-    out_folder  the OUT of the bundle, which has a hash of the manifest; None: a bundle by itself
+    out_folder  OUT of the bundle, which records a hash of the manifest; None if there is no OUT
     """
     manifest = read_manifest(bundle)
     listed = read_json(bundle / FILES, f"{SCHEMA}#FileIndex", REMEDY)

@@ -1,6 +1,6 @@
-"""Compare a bundle's manifest with the stage: what it says of specimen, tiles and channels.
+"""Compare a bundle's manifest with the stage: specimen, tiles and channels.
 
-Of each channel also its transfer functions: lookup tables, shapes, histograms.
+Each channel's transfer functions are compared, too: lookup tables, shapes and histograms.
 """
 
 import json
@@ -28,7 +28,10 @@ from stereocell.verify.bundle_files import (
 
 
 def compare_manifest(stage_file: Path, bundle: Path) -> list[str]:
-    """Return what the manifest says otherwise than the composed stage. Raises StereoCellError."""
+    """Return the differences between the manifest and the composed stage.
+
+    Raises StereoCellError if one of them can't be read.
+    """
     stage = open_stage(stage_file)
     manifest = read_manifest(bundle)
     specimen = {"name": specimen_name(stage), "modality": modality_of(stage)}
@@ -97,9 +100,9 @@ def _compare_channel(
 
 
 def compare_histograms(bundle: Path, joints: Sequence[Mapping[str, bytes]]) -> Iterator[str]:
-    """Yield which channel's histogram of value and gradient its volumes do not give.
+    """Yield a problem for each channel whose joint histogram differs from its volumes.
 
-    joints  each tile's, packed, by channel
+    joints  for each tile, packed joint histograms of value and gradient by channel
     """
     manifest = read_manifest(bundle)
     for channel in manifest["channels"]:

@@ -1,9 +1,9 @@
 """Compare a tile's surfaces in a bundle with those of the stage.
 
-Every vertex of a decoded .glb must lie within the lattice's half diagonal of a vertex of the
-composed mesh, and the other way round. Triangle by triangle, too; triangles must face the same way
-and have the same place in the maps. Colours must agree within 1/255, maps with a new encoding of
-the stage's images, boxes and errors of the tilesets with the surfaces and the stage.
+Every vertex of a decoded .glb must lie within half a lattice cell's diagonal of a vertex of the
+composed mesh, and vice versa. The same holds for the centres of triangles. Triangles must face the
+same way and have the same place in the maps. Colours must agree within 1/255, and maps with a new
+encoding of the stage's images. The tilesets' boxes and errors must agree with surfaces and stage.
 """
 
 import math
@@ -32,12 +32,12 @@ from stereocell.usd.read_textures import read_image
 from stereocell.verify.bundle_files import COLOR_STEP
 
 _UM_PER_METRE = 1e6
-_MAP_DIFFERENCE = 1.0  # largest mean difference of texels, 0..255: encoders differ
-_ODD_SHARE = 0.01  # share of a surface's area that may face away (slivers)
-_TURNED = math.radians(3)  # largest difference of normals: octahedral ones of 8 bits, twofold
-_UV_STEP = 1e-4  # share of a map's edge; the step of 16 bits is a sixth of it
-_ROUNDED = 1.001  # factor: four digits, rounded up
-_BOX_M = 2e-9  # m: whole nm, rounded outwards
+_MAP_DIFFERENCE = 1.0  # 0..255, largest mean difference of texels, since encoders may differ
+_ODD_SHARE = 0.01  # share of a surface's area that may differ (slivers)
+_TURNED = math.radians(3)  # rad, largest difference of normals: two steps of 8-bit octahedral ones
+_UV_STEP = 1e-4  # share of a map's edge; six steps of 16 bits
+_ROUNDED = 1.001  # factor, since errors are rounded up to four digits
+_BOX_M = 2e-9  # m, since boxes are rounded outwards to whole nm
 _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
     "normalTexture": ("normal", encode_normal_map),
     "occlusionTexture": ("occlusion", encode_occlusion_map),
@@ -46,7 +46,7 @@ _ENCODERS: dict[str, tuple[str, Callable[[NDArray[np.uint8]], bytes]]] = {
 
 
 def without_repeats(lods: Sequence[ComposedLod]) -> Iterator[tuple[int, ComposedLod]]:
-    """Yield the levels that a bundle has: the finest of each run of equal ones."""
+    """Yield the levels that a bundle contains: of successive equal levels only the finest."""
     last: ComposedLod | None = None
     for lod in lods:
         if last is None or not _are_alike(last, lod):
@@ -81,7 +81,10 @@ def surfaces_of(
 def compare_surfaces(
     contents: dict[int, Content], lods: dict[int, ComposedLod]
 ) -> tuple[float, list[str]]:
-    """Return the largest distance of a vertex from its place (lattice steps), and the problems."""
+    """Return the largest distance of a vertex from its stage position, and the problems.
+
+    The distance is in lattice steps.
+    """
     problems = [f"lod{level} is not in the stage" for level in contents if level not in lods]
     problems += [f"the bundle lacks lod{level}" for level in sorted(lods.keys() - contents.keys())]
     worst, error_m, corners = 0.0, 0.0, []
@@ -92,7 +95,8 @@ def compare_surfaces(
         apart, faults = _compare_surface(drawn, lod, is_last)
         worst = max(worst, apart)
         problems += [f"lod{level}: {fault}" for fault in faults]
-        # errors don't fall from fine to coarse; the finest level, the reference, states none
+        # Errors must not decrease from fine to coarse levels. The finest level is the reference and
+        # states no error.
         if level > min(contents):
             error_m = max(error_m, lod.largest_um / _UM_PER_METRE)
         if not error_m * (1 - 1e-6) <= content.error_m <= error_m * _ROUNDED:
@@ -108,12 +112,15 @@ def compare_surfaces(
 def _compare_boxes(
     contents: dict[int, Content], corners: Sequence[tuple[NDArray[Any], NDArray[Any]]]
 ) -> Iterator[str]:
-    """Yield the boxes of a tileset that don't fit its surfaces; `corners`: theirs (x, y, z), m."""
+    """Yield a problem for each box of a tileset that doesn't fit its surfaces.
+
+    corners  the lowest and highest corner (x, y, z) of each surface, m
+    """
     if not corners:
         return
     low = np.min([low for low, _ in corners], axis=0).astype(np.float64)
     high = np.max([high for _, high in corners], axis=0).astype(np.float64)
-    # meshes have y up, boxes z
+    # In meshes y points up, in boxes z.
     low, high = np.array([low[0], -high[2], low[1]]), np.array([high[0], -low[2], high[1]])
     slack = _BOX_M + 4e-7 * max(float(np.abs(low).max()), float(np.abs(high).max()))
     for level, content in contents.items():
@@ -130,9 +137,12 @@ def _compare_boxes(
 def _compare_surface(
     drawn: DecodedMesh, lod: ComposedLod, is_last: bool
 ) -> tuple[float, list[str]]:
-    """Return the largest distance of a vertex from its place (lattice steps), and the problems.
+    """Return the largest distance of a vertex from its stage position, and the problems.
 
-    is_last  whether it is the coarsest of several: without maps, its occlusion is at its vertices
+    is_last  whether this is the coarsest of several levels; without maps, it has its occlusion at
+             the vertices
+
+    The distance is in lattice steps.
     """
     problems = []
     if is_last and "occlusionTexture" not in drawn.maps:
@@ -142,12 +152,13 @@ def _compare_surface(
         return 0.0, [f"{len(drawn.triangles)} triangles, the stage has {len(triangles)}"]
     places = lod.mesh.positions.astype(np.float64) / _UM_PER_METRE
     decoded = drawn.positions_m.astype(np.float64)
-    # float32 metres of a viewer, beside half the diagonal of a lattice cell
+    # Half the diagonal of a lattice cell, plus the rounding of a viewer's float32 metres.
     limit_m = math.sqrt(3) / 2 * drawn.step_m + 4e-7 * float(np.abs(places).max())
     if (drawn.objects is None) != (lod.mesh.objects is None):
         return 0.0, ["its vertices are of no object" if drawn.objects is None else "it has objects"]
     if drawn.objects is not None and lod.mesh.objects is not None:
-        # objects touch: each is compared with itself, a row of them
+        # Objects touch each other. They are moved apart along x, so that each is compared with
+        # itself.
         length = 2 * float(np.ptp(places, axis=0).max())
         places[:, 0] += lod.mesh.objects * length
         decoded[:, 0] += drawn.objects * length
@@ -173,7 +184,7 @@ def _compare_surface(
     problems += _compare_vertex_colors(drawn, lod.mesh, places, decoded)
     problems += _compare_maps(drawn, lod, is_last)
     if (drawn.paint is None) != (lod.mesh.paint is None):
-        problems.append("what is painted on its objects is lost, or another mesh's")
+        problems.append("the colour painted on its objects is missing, or the stage has none")
     elif drawn.paint is not None and lod.mesh.paint is not None:
         _, nearest = cKDTree(decoded).query(places)
         off = np.abs(drawn.paint[np.asarray(nearest)] - np.clip(lod.mesh.paint, 0, 1))
@@ -235,8 +246,8 @@ def _compare_faces(
 def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64]:
     """Return the mean (m, 3) of each triangle's three unit normals.
 
-    It is as long as they agree: of a triangle over a sharp edge hardly at all, and its direction
-    would be that of their rounding.
+    The mean is not normalised: at a sharp edge, where the normals cancel each other, it is short,
+    and its direction depends on rounding.
     """
     units = normals.astype(np.float64)
     units /= np.maximum(np.linalg.norm(units, axis=1, keepdims=True), 1e-12)
@@ -244,7 +255,10 @@ def _means(normals: NDArray[Any], triangles: NDArray[Any]) -> NDArray[np.float64
 
 
 def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
-    """Return the factor (n, 3), 0..1, of each vertex's colour, or None: see gltf.py."""
+    """Return the factor (n, 3), 0..1, of each vertex's colour, or None if there is none.
+
+    The factor includes occlusion; see formats/gltf.py.
+    """
     if mesh.colors is None and mesh.openness is None:
         return None
     colors = np.ones((len(mesh.positions), 3))
@@ -257,7 +271,10 @@ def _dimmed(mesh: Mesh) -> NDArray[np.float64] | None:
 
 
 def _farthest(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the largest distance from a point (n, 3) of either set to the nearest of the other."""
+    """Return the largest distance from a point (n, 3) of one set to the nearest of the other set.
+
+    Both directions count.
+    """
     there, back = (np.asarray(cKDTree(c).query(d)[0]) for c, d in ((a, b), (b, a)))
     return float(max(there.max(), back.max()))
 
@@ -271,7 +288,7 @@ def _compare_vertex_colors(
         yield "the mesh's own colours are lost"
         return
     _, nearest = cKDTree(decoded).query(places)
-    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # dimmed by occlusion, or not at all
+    dimmed = np.asarray(drawn.colors[np.asarray(nearest)])  # occlusion may have dimmed the colours
     if float((dimmed - np.clip(mesh.colors, 0, 1)).max()) > 2 * COLOR_STEP:
         yield "the mesh's own colours are others"
 
@@ -283,13 +300,13 @@ def _compare_maps(drawn: DecodedMesh, lod: ComposedLod, is_last: bool) -> Iterat
         if path is None or (is_last and kind != "color" and name not in drawn.maps):
             if path is None and name in drawn.maps:
                 yield f"a map ({kind}) that the stage has not"
-            continue  # the coarsest level has none
+            continue  # the coarsest level needs no maps
         if name not in drawn.maps:
             yield f"the map {named} is missing"
             continue
-        anew = encode(read_image(path))
-        if anew == drawn.maps[name]:
+        again = encode(read_image(path))
+        if again == drawn.maps[name]:
             continue
-        found, wanted = (decode_map(map_).astype(np.float64) for map_ in (drawn.maps[name], anew))
+        found, wanted = (decode_map(map_).astype(np.float64) for map_ in (drawn.maps[name], again))
         if found.shape != wanted.shape or np.abs(found - wanted).mean() > _MAP_DIFFERENCE:
             yield f"the map {named} is another image in the stage"

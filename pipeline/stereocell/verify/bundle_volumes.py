@@ -1,4 +1,4 @@
-"""Compare a tile's volumes in a bundle with the stage's: voxels of every mip level, bricks."""
+"""Compare a tile's volumes in a bundle with the stage's: voxels of all mip levels, and bricks."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,7 +25,7 @@ def placement_of(volume: ComposedVolume) -> dict[str, Any]:
 
 
 def find_volume(bundle: Path, channel: dict[str, Any], tile_id: str) -> dict[str, Any] | None:
-    """Return the entry of a tile in a channel's volumes.json; None: it has none."""
+    """Return the entry of a tile in a channel's volumes.json; None if it has none."""
     content = read_json(bundle / channel["volumes"]["path"], "volumes.schema.json", REMEDY)
     return next((one for one in content["volumes"] if one["tile"] == tile_id), None)
 

@@ -1,4 +1,4 @@
-"""One line of a check, and the errors that several problems become."""
+"""One line of a check's result, and errors that combine several problems."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,10 @@ _MAX_SHOWN = 3  # problems printed in one line
 
 @dataclass(frozen=True, slots=True)
 class CheckLine:
-    """One line of the result. `detail`: the checked parts, or the problem."""
+    """One line of the result.
+
+    detail  the parts that were checked, or the problem
+    """
 
     name: str
     ok: bool

@@ -33,21 +33,21 @@ from stereocell.verify.stage_against_source import SourceTask, UnitFinding, comp
 def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator[CheckLine]:
     """Yield a line for each comparison.
 
-    stage  the layer that the bundle was exported from; None: OUT's own
+    stage  the layer that the bundle was exported from; None for OUT's own stage
 
-    A missing source gives one failed line; the bundle is compared with the stage all the same.
-    Raises OutputError where OUT is a bundle by itself or has no plan.
+    A missing source gives one failed line. The bundle is then still compared with the stage. Raises
+    OutputError if OUT is a bundle without its build, or has no plan.
     """
     out_folder = OutFolder(out)
     if not out_folder.plan_file.exists() and (out / MANIFEST).is_file():
         raise OutputError(
-            f"{out}: a bundle by itself, expected OUT, with its plan.json: there is the stage that "
-            "the bundle is held against"
+            f"{out}: found a bundle without its build; expected OUT with its plan.json, since "
+            "--deep compares a bundle with the stage that it was exported from"
         )
     if out.is_file():
         raise OutputError(
-            f"{out}: a scene in one file, expected OUT, with its plan.json: --deep compares a "
-            "bundle with the stage that it was exported from"
+            f"{out}: found a scene in one file; expected OUT with its plan.json, since --deep "
+            "compares a bundle with the stage that it was exported from"
         )
     plan = out_folder.plan()
     exported, bundle = stage or out_folder.stage_file, out_folder.bundle_dir
@@ -89,8 +89,8 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
 
 
 def _edit_lines(stage: Path, built: Path) -> Iterator[CheckLine]:
-    """Yield a line on each edit that no bundle takes over, which is no fault of the bundle."""
-    with suppress(StereoCellError), opened_stage(stage) as composed:  # other lines state the error
+    """Yield a line on each edit that bundles can't contain. Such a line is not a failure."""
+    with suppress(StereoCellError), opened_stage(stage) as composed:  # other lines show the error
         for note in list(composed.notes(built)):
             yield CheckLine("edits of the stage", True, note)
 
@@ -107,7 +107,7 @@ def _one_line(error: StereoCellError) -> str:
 
 
 def _tiles_in(path: Path) -> list[str]:
-    stage = open_stage(path)  # prims become invalid when it is freed
+    stage = open_stage(path)  # this reference keeps the stage alive, which its prims need
     return [str(prim.GetName()) for prim in tile_prims(stage)]
 
 
@@ -124,7 +124,7 @@ def _compare_tiles(out_folder: OutFolder, plan: Plan) -> str:
 def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
     """Yield the channels of the stage whose values differ from those found in the source.
 
-    The window is not compared, since an artist may set it; that of the volumes is.
+    The window is not compared, since an artist may set it. The volumes' window is compared.
     """
     stage = open_stage(out_folder.stage_file)
     survey = read_survey(out_folder)
@@ -140,8 +140,8 @@ def _odd_values(out_folder: OutFolder, plan: Plan) -> Iterator[str]:
             ("volumeWindow", appearance.volume_window, built.window),
         ):
             if found != tuple(None if value is None else shortest(value) for value in wanted):
-                told, here = (", ".join(map(str, one)) for one in (found, wanted))
-                yield f"{channel.id}: {name} is {told}; {here} was found"
+                stated, expected = (", ".join(map(str, one)) for one in (found, wanted))
+                yield f"{channel.id}: {name} is {stated}; {expected} was found"
 
 
 def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, SourceTask]]:
@@ -150,13 +150,14 @@ def _source_tasks(out_folder: OutFolder, plan: Plan) -> Iterator[tuple[str, Sour
     for name, unit in unit_steps(plan, read_survey(out_folder)).items():
         tile_id, channel_id = name.split("/")
         if tile_id not in there:
-            continue  # reported before
+            continue  # the comparison of tiles reports this
         tile = plan.tile(tile_id)
         yield (
             name,
             SourceTask(
                 unit,
-                out_folder.unit_dir(name, index[name]),  # as built, possibly by an earlier version
+                # This may be a unit that an earlier version has built.
+                out_folder.unit_dir(name, index[name]),
                 out_folder.stage_file,
                 tile_id,
                 channel_id,
@@ -179,7 +180,7 @@ def _channel_lines(
 ) -> Iterator[CheckLine]:
     """Yield a row for each level of a channel's surface, and one for its volumes and problems.
 
-    lifted  how many voxels noise lifts above the channel's level, by tile ID
+    lifted  estimated number of voxels that noise lifts above the iso-value, by tile ID
     """
     units = [unit for unit in findings if unit.name.split("/")[1] == channel.id]
     for level in range(max(len(unit.levels) for unit in units)):
@@ -187,7 +188,7 @@ def _channel_lines(
         stated, found, largest = (max(row[k] for row in rows) for k in range(3))
         yield CheckLine(
             f"{channel.name} lod{level} against source",
-            not any(told.startswith(f"lod{level}: ") for unit in units for told in unit.problems),
+            not any(line.startswith(f"lod{level}: ") for unit in units for line in unit.problems),
             f"{len(rows)} surfaces within {found:.4g} um, {stated:.4g} stated; at most "
             f"{largest:.4g}",
         )

@@ -1,7 +1,7 @@
-"""Compare a build's files with the rules of their formats: the body of `stereocell check`.
+"""Check a build's files against the rules of their formats, for `stereocell check`.
 
-Each check prints one line, and a failed check doesn't stop the others. Most of the work is done by
-standard validators: JSON Schema, UsdValidation, the Khronos glTF validator, ktx-parse.
+Each check prints one line, and a failed check doesn't stop the others. Standard validators do most
+of the work: JSON Schema, UsdValidation, the Khronos glTF validator and ktx-parse.
 """
 
 from collections.abc import Callable, Iterator
@@ -41,10 +41,9 @@ _Check = tuple[str, Callable[[], str]]
 
 
 def check(out: Path) -> Iterator[CheckLine]:
-    """Yield a line for each check of a build's folder (plan, stage and bundle), or of a bundle by
-    itself, as on a web host, or of a scene in one file.
+    """Yield a line for each check of a build, of a bundle alone, or of a scene in one file.
 
-    Raises OutputError, before any line, where there is neither.
+    Raises OutputError, before any line, if the folder holds none of these.
     """
     found = require_kind(out, (Kind.BUILD, Kind.BUNDLE, Kind.SITE, Kind.SCENE))
     if found.kind is Kind.SCENE:

@@ -1,6 +1,6 @@
-"""Run the validators of glTF and KTX2, which are node packages, over a bundle's files.
+"""Run the validators of glTF and KTX2, which are Node packages, on a bundle's files.
 
-Where node or a package is missing, the check fails and names the remedy.
+If Node or a package is missing, the check fails and names the remedy.
 """
 
 import json
@@ -13,7 +13,7 @@ from stereocell.storage.assets import find_asset
 from stereocell.verify.bundle_documents import channels_of
 from stereocell.verify.check_line import raise_on
 
-_NODE_TIMEOUT_S = 1200.0  # s for one script over all files
+_NODE_TIMEOUT_S = 1200.0  # s, longest time of one script for all files
 
 
 def check_meshes(bundle: Path) -> str:
@@ -25,12 +25,12 @@ def check_meshes(bundle: Path) -> str:
 
 
 def check_textures(bundle: Path) -> str:
-    """Check every KTX2 texture of a bundle, in files of its own and in .glb."""
+    """Check every KTX2 texture of a bundle, in its own file or inside a .glb."""
     return _run_node("check_ktx2.mjs", sorted([*bundle.rglob("*.ktx2"), *bundle.rglob("*.glb")]))
 
 
 def _run_node(script_name: str, paths: list[Path]) -> str:
-    """Run one script of viewer_gltf/tools over all files at once. Raises CheckError."""
+    """Run one script of viewer_gltf/tools on all files at once. Raises CheckError."""
     if not paths:
         raise CheckError("no file to check, expected some in the bundle")
     try:

@@ -1,11 +1,15 @@
-"""Compare the objects of a stage with their label map: voxels are counted anew, surfaces measured.
+"""Compare the objects of a stage with their label map, by counting voxels and measuring surfaces.
 
-Of each object its voxels' volume, box and centroid are found again, and the channels' means over
-it; the 95th percentile is one if as many voxels lie below it and above (not of those that are cut,
-of which too thin a piece may be left out). The table is joined again. All is held against the
-columns in the stage. The volume inside each level's surface may differ from the voxels' by what the
-units state. The area of whole objects' finest surfaces is measured again in the stage, and what is
-made of area and volume is made anew; so is that of their walls, and who shares one.
+The volume, box and centroid of each object are computed again from the label map, and the channels'
+means over it from the images. A 95th percentile is accepted if the right numbers of voxels lie
+below and above it. Objects that are cut are excluded from intensities, since thin pieces of them
+may be left out. The object table is joined again. All results are compared with the columns in the
+stage.
+
+The volume inside each level's surface may differ from the voxels' volume by as much as the units
+state. The area of whole objects' finest surfaces is measured again in the stage, and columns that
+derive from area and volume are computed again. The same holds for interfaces: their areas, and the
+pairs of objects that share one.
 """
 
 from collections.abc import Sequence
@@ -43,9 +47,9 @@ from stereocell.verify.shared_walls import (
     join_surfaces,
 )
 
-_CLOSE = 1e-4  # share by which a level's volume may exceed what is stated: float32
-_SHOWN = 5  # problems of a column
-_ROUGH = 0.02  # share of an area that simplifying a voxel's steps may change beside the distance
+_CLOSE = 1e-4  # share by which values may differ beyond the stated tolerance, due to float32
+_SHOWN = 5  # most objects that a problem of a column names
+_ROUGH = 0.02  # share by which simplifying may change an area in addition to the stated distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +57,7 @@ class _TileTask:
     stage_file: Path
     tile: str
     labels_id: str
-    beyond: NDArray[np.float32]  # boxes of other tiles' objects: see find_surfaces
+    beyond: NDArray[np.float32]  # boxes of other tiles' objects; see find_surfaces
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +65,12 @@ class _SumsTask:
     labels: Labels
     box: Box
     images: tuple[Image, ...]
-    names: NDArray[np.uint64]  # of whole objects, ascending
-    p95s: NDArray[np.float64]  # (n, images), which are held against their voxels
+    names: NDArray[np.uint64]  # labels of whole objects, ascending
+    p95s: NDArray[np.float64]  # (n, images), percentiles to compare with the objects' voxels
 
 
 def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: Engine) -> str:
-    """Return what was compared of a label map. Raises CheckError where something differs."""
+    """Compare a label map; return a line on the compared parts. Raises CheckError."""
     boxes = tile_boxes(TileGrid.of(plan, labels))
     steps = [
         (f"{tile}/{labels.name}", FindExtents(labels.voxels, box)) for tile, box in boxes.items()
@@ -93,13 +97,13 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
     problems += _odd_walls(labels, table, [tile[2:] for tile in found], cut)
     worst: list[float] = []
     for tile, (there, volumes, surfaces, largest_um) in zip(plan.tiles, found, strict=True):
-        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd(table, tile.id, there)]
+        problems += [f"{tile.id}/{labels.id}: {one}" for one in _odd(table, tile.id, there)]
         if there is None or problems:
             continue
         own = facts[tile.id]
         whole = ~np.isin(own.labels, cut)
         areas = surfaces.area_um2, largest_um
-        problems += [f"{tile.id}/{labels.id}: {told}" for told in _odd_areas(there, areas, whole)]
+        problems += [f"{tile.id}/{labels.id}: {one}" for one in _odd_areas(there, areas, whole)]
         voxels = own.voxels * float(np.prod(labels.spacing_um))
         for level, held in enumerate(volumes):
             bias = float(np.abs(held / voxels - 1).max(initial=0.0))
@@ -111,15 +115,15 @@ def compare_objects(out_folder: OutFolder, plan: Plan, labels: Labels, engine: E
                     f"voxels', {own.bias[level]:.2%} is stated"
                 )
     raise_on(problems)
-    told = ", ".join(f"{share:.2%}" for share in worst)
+    biases = ", ".join(f"{share:.2%}" for share in worst)
     return (
-        f"{len(table.labels)} objects, {len(table.columns)} columns as counted and joined anew; "
-        f"volumes of their surfaces by level within {told or 'nothing'}"
+        f"{len(table.labels)} objects, {len(table.columns)} columns equal to a new count and join; "
+        f"volumes of their surfaces by level within {biases or 'nothing'}"
     )
 
 
 def _boxes_beyond(table: ObjectTable, margin_um: float) -> dict[str, NDArray[np.float32]]:
-    """Return the boxes (n, 6) of all other tiles' objects, by tile, each with a margin."""
+    """Return, for each tile, the boxes (n, 6) around the other tiles' objects, with a margin."""
     boxes = {
         tile: np.concatenate(
             [
@@ -142,10 +146,11 @@ def _odd_walls(
     tiles: Sequence[tuple[Surfaces, float]],
     cut: NDArray[np.uint64],
 ) -> list[str]:
-    """Return which objects have other neighbours, or walls of other size, than their surfaces.
+    """Return problems of objects whose neighbours or interfaces differ from their surfaces.
 
-    tiles  their surfaces in the stage, and how far those lie from what was measured, um
-    cut    labels of objects of which the surfaces hold the planes that cut them, too
+    tiles  for each tile, the surfaces in the stage and their largest distance, um, from the
+           surfaces that were measured
+    cut    labels of objects that are cut, whose surfaces include the planes of the cut
     """
     shared, pairs = join_surfaces([surfaces for surfaces, _ in tiles])
     touching = dict(zip(*np.unique(pairs, return_counts=True), strict=True))
@@ -154,7 +159,7 @@ def _odd_walls(
     known = {column.id: column.values for column in table.columns}
     for (surfaces, largest_um), walls_um2 in zip(tiles, shared, strict=True):
         rows = np.array([row_of.get(label, -1) for label in surfaces.labels.tolist()], np.int64)
-        there = rows >= 0  # others are told of beside
+        there = rows >= 0  # `_odd` reports the other objects
         names, rows = surfaces.labels[there], rows[there]
         counts = np.array([touching.get(name, 0) for name in names])
         odd["neighbours"] += names[known["neighbours"][rows] != counts].tolist()
@@ -177,7 +182,7 @@ def _shown(names: Sequence[int]) -> str:
 def _odd_intensities(
     plan: Plan, labels: Labels, located: Located, table: ObjectTable, engine: Engine
 ) -> list[str]:
-    """Return which means and percentiles of a channel are others than those of objects' voxels."""
+    """Return problems of intensities that differ from the means and percentiles of the voxels."""
     images = images_of(plan)
     if not images:
         return []
@@ -198,7 +203,7 @@ def _odd_intensities(
         totals += found
     sums, below, up_to = totals
     expected = sums / np.maximum(voxels, 1)[:, np.newaxis]
-    # the percentile lies between the two voxels that are next to its place among all
+    # The percentile lies between the two voxels next to its rank.
     at = PERCENTILE / 100 * (voxels - 1)[:, np.newaxis]
     is_p95 = (below <= np.ceil(at)) & (up_to >= np.floor(at) + 1)
     problems = []
@@ -207,16 +212,18 @@ def _odd_intensities(
         same = np.isclose(values, expected[:, index], rtol=1e-4, atol=1e-6, equal_nan=True)
         for column, kind, right in ((mean, "mean", same), (p95, "p95", is_p95[:, index])):
             if not right.all():
-                told = _shown(names[~right].tolist())
+                shown = _shown(names[~right].tolist())
                 problems.append(
-                    f"{labels.id}: column {column.id} is not the voxels' {kind} of {told}"
+                    f"{labels.id}: column {column.id} is not the voxels' {kind} of {shown}"
                 )
     return problems
 
 
 def _sum_up(task: _SumsTask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the objects' voxels in a box (n,), and of each channel (3, n, images) the sum of
-    their intensities, how many are less than the object's p95, and how many are not more.
+    """Return counts and sums of objects' voxels in a box.
+
+    The first array (n,) has the number of each object's voxels. The second (3, n, images) has the
+    sum of intensities, the number below the object's p95, and the number not above it.
     """
     count = len(task.names)
     totals = np.zeros((3, count, len(task.images)))
@@ -225,11 +232,11 @@ def _sum_up(task: _SumsTask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     runs = Runs.of(task.labels.open().read(task.box))
     values = runs.values.astype(np.uint64)
     place = np.searchsorted(task.names, values).clip(0, count - 1)
-    place[task.names[place] != values] = count  # of no object that is looked at
+    place[task.names[place] != values] = count  # an extra place for objects that are not compared
     for index, image in enumerate(task.images):
         voxels = read_on_labels(task.labels, task.box, image).ravel().astype(np.float64)
         p95s = np.append(task.p95s[:, index], np.nan)[place]
-        near = np.abs(p95s) * _CLOSE  # float32
+        near = np.abs(p95s) * _CLOSE  # tolerance for the rounding to float32
         less = voxels < np.repeat(p95s - near, runs.lengths)
         not_more = voxels <= np.repeat(p95s + near, runs.lengths)
         for total, what in zip(totals, (voxels, less, not_more), strict=True):
@@ -240,7 +247,7 @@ def _sum_up(task: _SumsTask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 
 def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
-    """Return what differs between a tile's objects in the stage and the table."""
+    """Return the differences between a tile's objects in the stage and in the table."""
     own = table.of_tile(tile)
     if there is None:
         return [f"the stage has no objects, expected {len(own.labels)}"] if len(own.labels) else []
@@ -264,10 +271,13 @@ def _odd(table: ObjectTable, tile: str, there: TileObjects | None) -> list[str]:
 def _odd_areas(
     there: TileObjects, area: tuple[NDArray[np.float64], float], whole: NDArray[np.bool_]
 ) -> list[str]:
-    """Return which areas of whole objects are others than those of their surfaces.
+    """Return problems of areas that differ from those of whole objects' surfaces.
 
-    area  of each object's finest surface in the stage, um^2, and how far it lies, um, from the one
-          that was measured: a ball whose skin moves by d has 2 d / r more
+    area  area of each object's finest surface in the stage, um^2, and the surface's distance, um,
+          from the one that was measured
+
+    The tolerance follows from a ball: if its surface moves by d, its area changes by a share of
+    2 d / r.
     """
     measured, distance_um = area
     stated = there.values["area_um2"].astype(np.float64)
@@ -287,8 +297,11 @@ def _odd_areas(
 def _read_tile(
     task: _TileTask,
 ) -> tuple[TileObjects | None, list[NDArray[np.float64]], Surfaces, float]:
-    """Return a tile's objects in the stage, their volumes by level, um^3, their finest surfaces,
-    and how far those may lie, um, from what was measured."""
+    """Read a tile's objects in the stage.
+
+    Returns the objects, their volumes by level (um^3), their finest surfaces, and the largest
+    distance of those (um) from the surfaces that were measured.
+    """
     stage = open_stage(task.stage_file)
     described = read_columns(stage, task.labels_id)
     with loaded(stage, task.tile) as (tile, _):

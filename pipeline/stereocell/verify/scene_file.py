@@ -1,7 +1,7 @@
 """Check a scene in one file: its page, its blocks, and the bundle in them.
 
-The first damaged part ends the check, since all later parts depend on it. Of each block the hash is
-compared; the bundle in the blocks passes the same checks as a bundle on a web host.
+The first damaged part ends the check, since all later parts depend on it. The hash of each block is
+compared. The bundle in the blocks passes the same checks as a bundle on a web host.
 """
 
 import base64
@@ -18,10 +18,10 @@ from stereocell.bundle.scene_blocks import REMEDY, VIEW, SceneBlocks, read_block
 from stereocell.model.errors import CheckError, StereoCellError
 from stereocell.verify.check_line import CheckLine, raise_on
 
-_LIGHTS = "environments/"  # the viewer's own files among the bundle's, in no list
+_LIGHTS = "environments/"  # folder of the viewer's own files, which the bundle's list omits
 _TAGS = {"html", "head", "meta", "title", "link", "body", "div", "script"}
 _ADDRESS = {"src", "href", "srcset", "action", "data", "poster", "background", "formaction"}
-# sources of a policy that are no host: addresses that the page itself makes
+# Sources in a policy that are not hosts: contents and addresses that the page itself makes.
 _INNER = re.compile(r"'none'|data:|blob:|'unsafe-eval'|'sha256-[\w+/]+=*'")
 _PATH = re.compile(r"[^/\\:\0]+(/[^/\\:\0]+)*")
 _CODE = (re.compile(r"index-.*\.css"), re.compile(r"viewer-.*\.js"))
@@ -30,7 +30,7 @@ _CODE = (re.compile(r"index-.*\.css"), re.compile(r"viewer-.*\.js"))
 def check_scene(
     file: Path, checks_of_bundle: Callable[[Path], Sequence[tuple[str, Callable[[], str]]]]
 ) -> Iterator[CheckLine]:
-    """Yield a line for each check of a scene; a page or a block that is damaged ends them.
+    """Yield a line for each check of a scene; a damaged page or block ends the checks.
 
     checks_of_bundle  returns the names and functions of the checks of a bundle's folder
     """
@@ -53,8 +53,8 @@ def check_scene(
             try:
                 yield CheckLine(name, True, run())
             except StereoCellError as error:
-                told = str(error).replace(f"{bundle}/", f"{file}: ").replace(OF_BUNDLE, REMEDY)
-                yield CheckLine(name, False, told)
+                line = str(error).replace(f"{bundle}/", f"{file}: ").replace(OF_BUNDLE, REMEDY)
+                yield CheckLine(name, False, line)
 
 
 def _extract(content: SceneBlocks, bundle: Path) -> None:
@@ -66,7 +66,7 @@ def _extract(content: SceneBlocks, bundle: Path) -> None:
 
 
 def _read(file: Path) -> SceneBlocks:
-    """Return the content of a document. Raises CheckError where a part of it is missing."""
+    """Return the content of a document. Raises CheckError if a part of it is missing."""
     try:
         document = file.read_bytes().decode()
     except OSError as error:
@@ -79,9 +79,9 @@ def _read(file: Path) -> SceneBlocks:
 
 
 class _Page(HTMLParser):
-    """A parser that lists the scripts that a document runs and the addresses that it asks for.
+    """A parser that lists the scripts and the problems of a document without its data blocks.
 
-    The document comes without its blocks of data.
+    A problem is anything that would request an address or run code outside the one script.
     """
 
     def __init__(self, text: str) -> None:
@@ -96,7 +96,7 @@ class _Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         words = {name: value or "" for name, value in attrs}
         if tag not in _TAGS:
-            self.problems.append(f"it has an element <{tag}>")
+            self.problems.append(f"the page has an element <{tag}>")
         for name in _ADDRESS & words.keys():
             if not words[name].startswith("data:"):
                 self.problems.append(f"<{tag}> names the address {words[name]:.60}")
@@ -106,7 +106,7 @@ class _Page(HTMLParser):
                 self.problems.append("its policy stands behind a script")
             self.policies.append(words.get("content", ""))
         elif kind:
-            self.problems.append(f"it has <meta http-equiv={kind:.30}>")
+            self.problems.append(f"the page has <meta http-equiv={kind:.30}>")
         self._in_script = tag == "script"
         if self._in_script:
             self.scripts.append("")
@@ -122,13 +122,13 @@ class _Page(HTMLParser):
 
 
 def _check_page(content: SceneBlocks) -> str:
-    """Check that the document runs its own script alone, and can ask no host for anything."""
+    """Check that the document runs only its own script, and can't request anything from a host."""
     page = _Page(content.rest)
     problems = list(page.problems)
     if len(page.policies) != 1:
-        problems.append(f"it has {len(page.policies)} policies, expected one")
+        problems.append(f"the page has {len(page.policies)} policies, expected one")
     if len(page.scripts) != 1:
-        problems.append(f"it has {len(page.scripts)} scripts beside its blocks, expected one")
+        problems.append(f"the page has {len(page.scripts)} scripts beside its blocks, expected one")
     for policy in page.policies:
         problems += _problems_of(policy, page.scripts)
     if content.view and not VIEW.fullmatch(content.view):
@@ -157,7 +157,7 @@ def _is_within(path: str) -> bool:
 
 
 def _check_blocks(content: SceneBlocks) -> str:
-    """Check that the viewer's code and a bundle are there, at paths within their folder."""
+    """Check that the viewer's code and a bundle are present, at paths within their folder."""
     problems = [
         f"{path}: expected a path within the bundle"
         for path in content.files

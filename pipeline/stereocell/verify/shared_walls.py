@@ -1,7 +1,7 @@
-"""Find again which objects share walls, and how large those are: triangle by triangle.
+"""Find the interfaces that objects share, and their areas, triangle by triangle.
 
-Two neighbours have the same triangles at the finest level, to the bit, in whichever tile each of
-them is: so a triangle that is there twice is of a wall.
+At the finest level, two neighbours have identical triangles at their interface, to the last bit,
+even in different tiles. A triangle that occurs twice therefore belongs to an interface.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,13 @@ _ODD = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)  # odd facto
 class Surfaces:
     """The finest surfaces of a tile's n objects.
 
-    labels    uint64 (n,)
-    area_um2  float64 (n,), of each whole surface; `shared_um2` of that part which is a wall to
-              other objects of the tile
-    pairs     uint64 (m, 2), labels of two objects of the tile that share a wall, each pair once
-    keys      uint64 (k,), of triangles that may be of a wall to another tile's object; `of` int64
-              (k,) the object, `key_um2` float64 (k,) the area
+    labels      uint64 (n,)
+    area_um2    float64 (n,), area of each whole surface
+    shared_um2  float64 (n,), area of its interfaces with other objects of the tile
+    pairs       uint64 (m, 2), labels of two objects of the tile with an interface, each pair once
+    keys        uint64 (k,), keys of triangles that may be an interface with another tile's object
+    of          int64 (k,), index of the object of each such triangle
+    key_um2     float64 (k,), area of each such triangle
     """
 
     labels: NDArray[np.uint64]
@@ -50,17 +51,17 @@ NO_SURFACES = Surfaces(
 def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.float32]) -> Surfaces:
     """Return the surfaces of a tile's objects.
 
-    labels  uint64 (n,), by `mesh.objects`
-    beyond  float32 (tiles, 6), least and largest (x, y, z), um, of other tiles' objects
+    labels  uint64 (n,), labels in the order of `mesh.objects`
+    beyond  float32 (tiles, 6), smallest and largest (x, y, z), um, of other tiles' objects
     """
     if mesh.objects is None:
         return NO_SURFACES
-    corners = mesh.positions[mesh.triangles].astype(np.float32) + np.float32(0)  # -0 is 0
+    corners = mesh.positions[mesh.triangles].astype(np.float32) + np.float32(0)  # -0 becomes 0
     a, b, c = corners.astype(np.float64).transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     of = mesh.objects[mesh.triangles[:, 0]].astype(np.int64)
     keys = _keys(corners)
-    first, second = _twice(keys)
+    first, second = _find_pairs(keys)
     other = labels[of[first]] != labels[of[second]]
     first, second = first[other], second[other]
     walls = np.concatenate([first, second])
@@ -87,7 +88,7 @@ def find_surfaces(mesh: Mesh, labels: NDArray[np.uint64], beyond: NDArray[np.flo
 def join_surfaces(
     tiles: Sequence[Surfaces],
 ) -> tuple[list[NDArray[np.float64]], NDArray[np.uint64]]:
-    """Return the area of each object's walls, by tile, and all pairs that share one (m, 2)."""
+    """Return the area of each object's interfaces, by tile, and all pairs with one, (m, 2)."""
     shared = [one.shared_um2.copy() for one in tiles]
     if not tiles:
         return shared, np.zeros((0, 2), np.uint64)
@@ -95,7 +96,7 @@ def join_surfaces(
     tile = np.repeat(np.arange(len(tiles)), [len(one.keys) for one in tiles])
     of, area = (np.concatenate([getattr(one, name) for one in tiles]) for name in ("of", "key_um2"))
     names = np.concatenate([one.labels[one.of] for one in tiles])
-    first, second = _twice(keys)
+    first, second = _find_pairs(keys)
     other = names[first] != names[second]
     first, second = first[other], second[other]
     for found in (first, second):
@@ -107,7 +108,7 @@ def join_surfaces(
 
 
 def _keys(corners: NDArray[np.float32]) -> NDArray[np.uint64]:
-    """Return a number for each triangle (m, 3, 3), the same for the same corners in any order."""
+    """Return a key for each triangle (m, 3, 3); the order of its corners does not matter."""
     bits = np.ascontiguousarray(corners).view(np.uint32).astype(np.uint64)
     mixed = np.zeros(bits.shape[:2], np.uint64)
     for axis, odd in enumerate(_ODD):
@@ -116,8 +117,8 @@ def _keys(corners: NDArray[np.float32]) -> NDArray[np.uint64]:
     return mixed.sum(axis=1, dtype=np.uint64)
 
 
-def _twice(keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the places of each key that is there twice: the first, and the second."""
+def _find_pairs(keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and the second index of each key that occurs twice."""
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     return order[same], order[same + 1]

@@ -1,4 +1,4 @@
-"""Check the files that `stereocell publish` adds to a bundle: packed copies, and their list."""
+"""Check the files that `stereocell publish` adds to a bundle: compressed copies, and their list."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ _AGAIN = "run `stereocell publish OUT TARGET` again"
 def find_site_faults(found: Mapping[str, Path]) -> list[str]:
     """Compare a published page's files with the list of published files; return the faults.
 
-    found  all files of the page by their relative paths; files of the web host are in no list
+    found  all files of the page by relative path; the web host's own files are not in the list
     """
     try:
         listed = dict(json.loads(found[PUBLISHED].read_bytes())["files"])

@@ -1,11 +1,12 @@
 """Compare a stage with its source: recompute the surfaces and volumes of each unit from voxels.
 
-Surfaces: the reference is the iso-surface of the unit's own voxels, before levels of detail are
-made; of a coarse level, without the small bodies that it leaves out by rule
-(meshes/small_bodies.py). Two distances of each level to it, and back, are compared with the unit's
-record: the 99th percentile over both areas, by the same measure as a level's stated distance, and
-the largest of all, vertices included. Surfaces must face the same way; normals, occlusion, maps and
-UVs must be the unit's. Volumes: every voxel in 8 bits, and the stage's .vdb byte by byte.
+The reference for surfaces is the iso-surface of the unit's own voxels, before levels of detail are
+made. A coarse level leaves out small connected components by rule (meshes/small_bodies.py); its
+reference does so, too. Distances are measured from each level to the reference and back. Two of
+them are compared with the unit's record: the 99th percentile over both areas, by the same measure
+as a level's stated distance, and the largest one, vertices included. Surfaces must face the same
+way. Normals, occlusion, maps and UVs must equal the unit's. Every voxel of a volume is compared in
+8 bits, and the stage's .vdb byte by byte.
 """
 
 import tempfile
@@ -37,22 +38,22 @@ from stereocell.usd.read_levels import ComposedLod, read_lods
 from stereocell.usd.read_stage import loaded, open_stage
 from stereocell.usd.read_volume import ComposedVolume, read_volume
 
-# slack of a distance, as a share and in um: float32, and another order of the same triangles
+# Tolerance of a distance, as a share and in um, for float32 and another order of triangles.
 _SHARE, _HAIR_UM = 0.02, 1e-3
-_STEP = 1e-6  # largest difference of values 0..1
-_ALONG = 1 - 1e-6  # smallest cosine between two equal normals: 0.08 degrees
+_STEP = 1e-6  # largest difference of equal values, 0..1
+_ALONG = 1 - 1e-6  # smallest cosine between equal normals, which is 0.08 degrees
 
 
 @dataclass(frozen=True, slots=True)
 class SourceTask:
     """One unit, and the tile of the stage that holds it.
 
-    first_um   (z, y, x), um, centre of its first own voxel
-    own_shape  (z, y, x), its voxels without apron
-    placement  rows of a (4, 4) matrix for columns, um: from the voxels' world to the stage's tiles
-    samples    points spread over each surface
-    shares_volume  whether its volume is another channel's
-    has_vdb    whether the volumes are written for other programs, too
+    first_um       (z, y, x), um, centre of the unit's first voxel without the apron
+    own_shape      (z, y, x), voxels of the unit without the apron
+    placement      rows of a (4, 4) matrix for columns, um, from the voxels' world to the stage's
+    samples        number of points that are spread over each surface
+    shares_volume  whether the channel's volume is another channel's
+    has_vdb        whether the volumes are also written as .vdb, for other programs
     """
 
     unit: BuildUnit
@@ -70,15 +71,16 @@ class SourceTask:
 
     @property
     def inputs(self) -> list[Path]:
-        """The folder of the unit; that of the tile is fetched as its payload is loaded."""
+        """The folder of the unit. The tile's folder is fetched when its payload is loaded."""
         return [self.directory]
 
 
 @dataclass(frozen=True, slots=True)
 class UnitFinding:
-    """The result of one unit: problems, and (stated, found, largest) distance of each level, um.
+    """The result of one unit.
 
-    cover  of the source's voxels by its surface; None: the channel has no level
+    levels  (stated, found, largest) distance of each level, um
+    cover   the source's voxels that the surface covers; None without an iso-value
     """
 
     name: str
@@ -120,8 +122,9 @@ def _placed(mesh: Mesh, placement: Matrix) -> Mesh:
 
 
 class _Surfaces:
-    """The iso-surface of a unit, and what each level is compared with: it without the small bodies
-    that the level's rule leaves out.
+    """The iso-surface of a unit, and the reference of each level.
+
+    A level's reference is the iso-surface without the small components that the level leaves out.
     """
 
     def __init__(self, fine: Mesh, given: UnitInput, placement: Matrix, samples: int) -> None:
@@ -134,10 +137,12 @@ class _Surfaces:
         self._known: dict[int, Nearest] = {}
 
     def at(self, level: int) -> Nearest:
-        """Return the surface that a level shows."""
+        """Return the reference of a level."""
         error = self._errors[min(level, len(self._errors) - 1)] * self._spacing
         gone = self._bodies.find(error)
-        key = int(gone.sum())  # bodies go in one order
+        key = int(
+            gone.sum()
+        )  # components are left out in a fixed order, so the number identifies them
         if key not in self._known:
             left = self.triangles[~gone[self.triangles[:, 0]]]
             self._known[key] = Nearest(compact(self._placed, left), self.samples)
@@ -185,9 +190,9 @@ def _compare_lods(
 
 
 def _facing(mesh: Mesh, fine: Nearest) -> float:
-    """Return how well a mesh faces the same way as the finest surface near it, 1 (best) to -1.
+    """Return the agreement of a mesh's normals with the finest surface, from 1 (best) to -1.
 
-    It is the mean over the mesh's area of the cosine between its normal and the nearest triangle's.
+    This is the cosine between a triangle's normal and the nearest triangle's, averaged over area.
     """
     near = fine.nearest_triangles(mesh.positions.astype(np.float64)[mesh.triangles].mean(axis=1))
     own, other = (
@@ -205,7 +210,7 @@ def _facing(mesh: Mesh, fine: Nearest) -> float:
 def _compare_shading(
     lods: list[ComposedLod], built: tuple[Lod, ...], placement: Matrix
 ) -> list[str]:
-    """Return the normals, occlusion and maps of levels that differ from the unit's."""
+    """Return problems of normals, occlusion and maps that differ from the unit's."""
     odd = []
     for lod in lods:
         wanted = built[min(lod.level, len(built) - 1)]
@@ -219,7 +224,7 @@ def _odd_shading(lod: ComposedLod, wanted: Lod, placement: Matrix) -> Iterator[s
     if mesh.normals.shape != wanted.mesh.normals.shape:
         if maps.normal is not None and mesh.uvs is not None and wanted.mesh.uvs is not None:
             yield "UVs are"
-        return  # other vertices: their distances are compared elsewhere
+        return  # the vertices differ; their distances are compared elsewhere
     turned = wanted.mesh.normals.astype(np.float64) @ np.linalg.inv(np.array(placement)[:3, :3])
     if (_unit(mesh.normals) * _unit(turned)).sum(axis=1).min(initial=1) < _ALONG:
         yield "normals are"
@@ -249,7 +254,7 @@ def _is_like(found: NDArray[Any] | None, wanted: NDArray[Any] | None) -> bool:
 def _is_image(file: Path | None, wanted: NDArray[np.uint8]) -> bool:
     """Return whether a file is an image of these pixels, uint8 (y, x) or (y, x, 3).
 
-    Raises StereoCellError where it can't be read.
+    Raises StereoCellError if the file can't be read.
     """
     if file is None:
         return False
@@ -288,9 +293,9 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
         found, expected = (file or "none" for file in (composed.measured, wanted))
         problems.append(f"its measured voxels: found {found}, expected {expected}")
     with tempfile.TemporaryDirectory(prefix="stereocell-") as folder:
-        anew = Path(folder) / vdb.name
+        again = Path(folder) / vdb.name
         write_vdb(
-            anew,
+            again,
             own,
             first_um=task.first_um,
             spacing_um=task.spacing_um,
@@ -298,7 +303,7 @@ def _compare_volume(kept: NDArray[Any], composed: ComposedVolume, task: SourceTa
             apron=APRON,
         )
         try:
-            if vdb.read_bytes() != anew.read_bytes():
+            if vdb.read_bytes() != again.read_bytes():
                 problems.append(f"{vdb.name}: not the file that the source gives")
         except OSError as error:
             raise StereoCellError(f"{vdb}: {error.strerror}") from error
