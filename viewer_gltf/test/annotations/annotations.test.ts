@@ -145,7 +145,7 @@ describeInChromium("marks", () => {
     const points = await page.evaluate((p) => window.bench?.measureAt(p.x, p.y), at);
     expect(points).toEqual([]);
     expect(await page.evaluate(() => window.bench?.announced)).toContain(
-      "There is nothing to measure there",
+      "No point was set",
     );
   });
 
