@@ -47,7 +47,7 @@ export class InboxPage {
   private readonly noAnswer = element("p", {
     className: "no-answer",
     role: "alert",
-    textContent: "The server does not answer. This page goes on trying.",
+    textContent: "The server does not answer. This page keeps trying.",
     hidden: true,
   });
   private readonly aloud = element("p", { className: "aloud", role: "status" }, { aloud: "" });
@@ -108,7 +108,7 @@ export class InboxPage {
   private async take(dropped: Dropped): Promise<void> {
     try {
       const found = await dropped.files((count) =>
-        this.zone.say(`Looking at the files: ${count} so far.`),
+        this.zone.say(`Listing the files: ${count} so far.`),
       );
       await this.begin(found, await dropped.handles);
     } catch (error) {
@@ -152,13 +152,16 @@ export class InboxPage {
 
   /** Whether the server has taken it. */
   private async takeAddress(address: string): Promise<boolean> {
-    this.zone.say("Handing the address in.");
+    this.zone.say("Sending the address to the server.");
     try {
       await this.server.addAddress(address);
       this.zone.say("");
       return true;
     } catch (error) {
-      this.zone.say(faultOf(error, "The address can't be handed in."), true);
+      this.zone.say(
+        faultOf(error, "The address could not be sent to the server. Try again."),
+        true,
+      );
       return false;
     }
   }
@@ -179,8 +182,8 @@ export class InboxPage {
   private async look(item: Item): Promise<void> {
     const tab = open("about:blank", "_blank"); // later the browser would take it for a pop-up
     if (tab !== null) {
-      tab.document.title = "Look · StereoCell";
-      tab.document.body.textContent = "The first look is prepared.";
+      tab.document.title = "Preview · StereoCell";
+      tab.document.body.textContent = "The preview is being prepared.";
     }
     await this.busy(item, async () => {
       try {
@@ -263,8 +266,8 @@ export class InboxPage {
     setText(
       this.empty,
       state.mayUpload
-        ? "Nothing is here yet. What you drop shows up here."
-        : "Nothing can be looked at yet. Images show up here once somebody has handed them in.",
+        ? "There are no images yet. Images that you drop appear here."
+        : "There are no images yet. Images appear here once somebody has uploaded them.",
     );
     const newestFirst = state.items.toReversed();
     arrange(
@@ -311,7 +314,7 @@ export class InboxPage {
     try {
       memory.understood = await this.server.understood(item.id);
     } catch (error) {
-      if (!(error instanceof RefusedError)) throw error; // what failed to be read has no answer
+      if (!(error instanceof RefusedError)) throw error; // the server has no summary of an image that it could not read
     }
     this.render();
   }

@@ -54,7 +54,7 @@ describe("the words for a build", () => {
     [{ left_s: 9000 }, "Building surfaces: 1 of 10 tiles, about 3 h left"],
     [{ doing: "pausing" }, "Pausing after the running tasks."],
     [{ doing: "paused" }, "Paused: 1 of 10 tiles."],
-    [{ doing: "cancelled" }, "The build was cancelled. What is finished is kept."],
+    [{ doing: "cancelled" }, "The build was cancelled. Finished parts are kept."],
     [
       { doing: "failed", line: "a.tif: cut off" },
       "The build has stopped: a.tif: cut off. The picture stays.",

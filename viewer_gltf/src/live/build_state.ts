@@ -84,7 +84,7 @@ export function wordsOf(state: BuildState, isShown: boolean): string {
     case "failed":
       return `The build has stopped${state.line === "" ? "" : `: ${state.line}`}. The picture stays.`;
     case "cancelled":
-      return "The build was cancelled. What is finished is kept.";
+      return "The build was cancelled. Finished parts are kept.";
     case "deleted":
       return "It was deleted, or its time is over. The picture stays until this page is closed.";
     case "complete":

@@ -152,7 +152,7 @@ describe.skipIf(!hasPython)("without a bundle", () => {
       it("the host allows no other page", async () => {
         const text = await faultOf(`${other.address}/v04.ome.zarr`);
         const { origin } = new URL(stand.host.address);
-        expect(text).toContain("does not let other pages read its files: whoever runs it has to");
+        expect(text).toContain("does not let other pages read its files. Ask its operator to");
         expect(text).toContain(`Access-Control-Allow-Origin: ${origin}`);
       });
 
