@@ -83,7 +83,7 @@ function uploadActions({ upload, hasHandles, isMoving }: Situation): readonly Ac
   if (upload?.doing === "lost")
     return [{ name: "retry", label: "Try now", isPrimary: true }, cancel];
   if (upload !== null || isMoving) return [cancel];
-  const goOn: Action = { name: "go-on", label: "Go on", isPrimary: true };
+  const goOn: Action = { name: "go-on", label: "Continue the upload", isPrimary: true };
   return hasHandles ? [goOn, DELETE] : [DELETE];
 }
 

@@ -172,7 +172,7 @@ export class Card {
     this.keepRow.hidden = !builds || !item.hasUpload;
   }
 
-  /** A link where a page opens that is there already; else a button. */
+  /** Makes a link if the action opens an existing page, and a button otherwise. */
   private buttonOf({ name, label, isPrimary = false }: Action, item: Item): HTMLElement {
     let button = this.buttons.get(name);
     if (button === undefined) {
@@ -196,12 +196,12 @@ export class Card {
   }
 }
 
-/** The title of an item, which has none before it is understood. */
+/** Returns the title of an item; until the server has read it, the name of the dropped file. */
 export function titleOf({ title, doing }: Item, ownName: string): string {
   return title || ownName || (doing === "uploading" ? "An upload" : "A new image");
 }
 
-/** A key that no other control of the same form has. */
+/** Returns a key that identifies a control within its form. */
 function settingOf(control: Element | null): string | null {
   if (!(control instanceof HTMLElement)) return null;
   const { setting } = control.dataset;

@@ -78,7 +78,7 @@ export class PathSums {
       this.rested += share;
       this.turn = (this.turn + share) % 1;
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
-      if (isDue) this.noise.judge(renderer, this.gathered);
+      if (isDue) this.noise.measure(renderer, this.gathered);
     }
   }
 
