@@ -199,7 +199,7 @@ export class MeasureMark {
     this.keepLabelsApart(sight);
   }
 
-  /** Shifts labels that would overlap. Those of finished measurements make way for those of the newest one. */
+  /** Shifts labels that would overlap. The newest measurement's labels stay, and the others make way. */
   private keepLabelsApart(sight: Sight): void {
     const finished = this.finished.map(({ label }) => label);
     const labels = [this.newest.label, ...this.values, ...finished].filter(

@@ -99,7 +99,7 @@ function readItem(found: Found): Item | null {
     left_s: typeof found.left_s === "number" ? found.left_s : null,
     page: pageOf(found.page),
     asksSpacing: found.asks === "spacing_um",
-    hasUpload: found.has_upload === true && found.total !== 0, // of an address there is none
+    hasUpload: found.has_upload === true && found.total !== 0, // an address has no size
     keepsUpload: found.keep_upload === true,
   };
 }

@@ -27,9 +27,9 @@ const MOST_WAIT_MS = 30_000;
 const NEWEST_SHARE = 0.2;
 
 /**
- * Bytes of the stream from `start`, by reference. They are read once before they are sent, so that the files are open
- * by then, and a file that can't be read is told from a lost connection. (What is in memory travels ten times slower
- * in Chromium, as an array.)
+ * A piece of the stream from `start` to `end`. `content` refers to the bytes and does not copy them. The piece is read
+ * once before it is sent. A file that can't be read is thus noticed, and not mistaken for a lost connection. (Sending
+ * the bytes as an array in memory is ten times slower in Chromium.)
  */
 type Piece = Readonly<{ start: number; end: number; content: Blob; isReadable: Promise<boolean> }>;
 
@@ -68,7 +68,7 @@ export class Upload {
     return ["refused", "cancelled", "complete"].includes(this.state.doing);
   }
 
-  /** Stops sending. What has arrived stays on the server until the item is deleted. */
+  /** Stops sending. The bytes that have arrived stay on the server until the item is deleted. */
   cancel(): void {
     this.cancelled.abort();
     this.tell({ doing: "cancelled", left_s: null });

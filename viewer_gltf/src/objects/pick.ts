@@ -1,6 +1,6 @@
 /**
- * Finds the object that a ray hits, on the CPU. The ray is tested against the boxes of all shown objects, and then,
- * from the nearest box on, against the triangles of each object whose box may contain a nearer hit. The ray passes
+ * Finds the object that a ray hits, on the CPU. The ray is tested against the boxes of all shown objects. From the
+ * nearest box on, it is then tested against the triangles of each object that may contain a nearer hit. The ray passes
  * through hidden objects and through parts that are cut away. If a gap shrinks the objects, a ray that is enlarged
  * by the same factor is tested against each original object: see gap.ts.
  */

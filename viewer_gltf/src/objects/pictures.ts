@@ -49,8 +49,8 @@ const css = (colors: Uint8Array, byte: number) =>
   `rgb(${colors[4 * byte]} ${colors[4 * byte + 1]} ${colors[4 * byte + 2]})`;
 
 /**
- * Draws the histogram of a column of numbers: shown objects in their colours and hidden ones in grey, two lines at the
- * ends of the shown range, and the palette below.
+ * Draws the histogram of a column of numbers, with shown objects in their colours and hidden ones in grey. Two lines
+ * mark the ends of the shown range, and the palette is drawn below.
  */
 export function drawHistogram(
   context: Context,

@@ -67,7 +67,7 @@ export async function loadObjects(
   );
 }
 
-/** The neighbours of each row. Those of row i are rows[first[i]] to rows[first[i + 1] - 1]. */
+/** The neighbours of each row: row i has rows[first[i]] to rows[first[i + 1] - 1]. */
 type Neighbours = Readonly<{
   first: Uint32Array;
   rows: Uint32Array;

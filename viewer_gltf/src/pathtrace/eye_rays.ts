@@ -25,8 +25,8 @@ export function turnOf(matrix: Matrix4): Matrix3 {
 }
 
 /**
- * Use of earlier frames for the current view. `none`: their samples are useless. `same`: all samples can be kept.
- * `aside`: the view has moved a little, so samples are kept for pixels that show the same place.
+ * Use of earlier frames for the current view: `none` if their samples are useless, and `same` if all can be kept. With
+ * `aside` the view has moved a little, so samples are kept for pixels that show the same place.
  */
 export type History = "none" | "same" | "aside";
 

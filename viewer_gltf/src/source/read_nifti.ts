@@ -90,7 +90,7 @@ async function readFile(file: ByteSource, report: Report): Promise<FirstVolume> 
   return volume;
 }
 
-/** Reads the header at the start of a file, and allocates the voxels. Those that follow the header are copied. */
+/** Reads the header at the start of a file, allocates the voxels, and copies the first of them. */
 function begin(head: Uint8Array, name: string): FirstVolume {
   const header = parseNifti(head, name);
   const voxels = new Uint8Array(bytesOf(header, name));

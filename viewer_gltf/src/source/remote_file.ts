@@ -180,7 +180,7 @@ export class RemoteFolder implements FileStore {
     });
   }
 
-  /** What a job has read; undefined where there is no such file. */
+  /** Returns the result of a job; undefined if there is no such file. */
   private async noted<T>(job: () => Promise<T | null>): Promise<T | undefined> {
     try {
       const found = await job();

@@ -4,8 +4,8 @@ vec4 objectMiddle(sampler2D middles, float row) {
   return texelFetch(middles, ivec2(i & 255, i >> 8), 0);
 }
 
-// Moves a position in a mesh towards the centre of its object's box: see objects/gap.ts. `meshToRoom` rotates, moves
-// and scales uniformly, so the inverse of its 3x3 part is its transpose divided by the squared scale.
+// Moves a position in a mesh towards the centre of its object's box: see objects/gap.ts.
+// `meshToRoom` scales uniformly, so the inverse of its 3x3 part is its transpose divided by the squared scale.
 vec3 objectDrawnIn(vec3 place, mat4 meshToRoom, mat4 umToRoom, vec4 middle, float gap) {
   if (gap <= 0.0) return place;
   float gone = min(gap / middle.w, 0.8);

@@ -161,8 +161,8 @@ float openness(vec3 p, vec3 to, vec2 span) {
   return t < 0.0 ? 1.0 : smoothstep(0.0, uOcclusionReach, t);
 }
 
-// Returns the light of a path that begins with a scattering at `p`, and writes the openness around that point.
-// `face` is the normal of the cut face on which `p` lies, or 0.
+// Returns the light of a path that begins with a scattering at `p`, and writes the openness around that point. If `p`
+// lies on a cut face, `face` is its normal, and otherwise 0.
 vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
   vec3 sum = vec3(0.0);
   vec3 weight = vec3(1.0);
