@@ -57,9 +57,9 @@ describe("the words for a build", () => {
     [{ doing: "cancelled" }, "The build was cancelled. Finished parts are kept."],
     [
       { doing: "failed", line: "a.tif: cut off" },
-      "The build has stopped: a.tif: cut off. The picture stays.",
+      "The build has stopped: a.tif: cut off. The view stays as it is.",
     ],
-    [{ doing: "failed" }, "The build has stopped. The picture stays."],
+    [{ doing: "failed" }, "The build has stopped. The view stays as it is."],
     [{ doing: "complete" }, "Complete: all surfaces are built."],
     [{ doing: "unbuilt" }, ""],
     [{ doing: "queued", place: 3 }, "Waiting for other builds."],
