@@ -12,7 +12,7 @@ function room(width: number, height: number, power: number) {
   return { width, height, rgb };
 }
 
-/** Of the sphere's 4 pi, the part that each texel takes. */
+/** Returns the solid angle of each texel; they add up to 4 pi. */
 function solidAngles(width: number, height: number): number[] {
   return Array.from({ length: width * height }, (_, i) => {
     const at = (row: number) => Math.cos((Math.PI * row) / height);

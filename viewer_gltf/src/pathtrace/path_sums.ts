@@ -19,7 +19,7 @@ export type PathViews = Readonly<{
   begins: readonly TraceView[];
   /** The views from which the earlier paths begin. */
   anchors: readonly TraceView[];
-  /** Which samples of earlier frames can be kept. */
+  /** The use of earlier samples: see `History`. */
   history: History;
 }>;
 

@@ -32,8 +32,8 @@ export type Kind = Readonly<{ modality: "" | "CT" | "MR"; window: Window | Perce
 const [AIR_HU, AIR_SPREAD, AIR_SHARE, MAX_HU] = [-1000, 150, 0.02, 4000];
 
 /**
- * The kind of a volume that states none: as `choose_preset` and `recognise_modality` of the pipeline choose it, but PET
- * and SPECT, which the name of a file may tell, are not looked for.
+ * Returns the kind of a volume that states none, as `choose_preset` and `recognise_modality` of the pipeline choose it.
+ * PET and SPECT, which the pipeline may recognise by the name of a file, are not recognised here.
  *
  * @param sample values of the first channel, sorted
  */

@@ -160,8 +160,8 @@ describe.skipIf(!hasPython)("without a bundle", () => {
         other.headers = CORS;
         other.hasRanges = false;
         const text = await faultOf(`${other.address}/${name}`);
-        expect(text).toContain("sends no parts of files");
-        expect(text).toContain("whoever runs it has to turn on HTTP range requests");
+        expect(text).toContain("does not send parts of files");
+        expect(text).toContain("Ask its operator to turn on HTTP range requests");
       });
 
       it("a codec is unknown, a file is damaged, or there is no image", async () => {
