@@ -24,14 +24,14 @@ export function additionSections(
   return [{ id: "additions", label: "Added", rank: 30, items }];
 }
 
-const NO_ADDITIONS = "Nothing is added to this specimen.";
+const NO_ADDITIONS = "No objects were added to this specimen.";
 
 export const ADDITION_KEYS: readonly KeyGroup[] = [
   {
     name: "Added",
     rank: 75,
     keys: [
-      key("F7", "Hide what is added to the specimen, or show all of it", ({ state }) => {
+      key("F7", "Hide or show all objects that were added to the specimen", ({ state }) => {
         const { additions, hiddenAdditions } = state;
         if (additions.length === 0) return no(NO_ADDITIONS);
         return { type: "hide-additions", hidden: hiddenAdditions.length > 0 ? [] : additions };

@@ -38,7 +38,7 @@ export const ADDITION_SETTINGS: PartSettings = {
       }),
       name: "additions",
       spoken: ({ hiddenAdditions: { length } }) =>
-        length === 0 ? "What is added is shown" : "What is added is hidden",
+        length === 0 ? "All added objects are shown" : "Some added objects are hidden",
     },
   },
 };

@@ -1,6 +1,6 @@
 /**
- * All that is drawn on the specimen and is no part of it: handles of the clip and of the lamps,
- * measured points, scale bar, orientation, names. And what a ray means among them.
+ * Everything that is drawn over the specimen without being a part of it: the handles of the clip and of the lamps,
+ * measurements, scale bar, orientation axes and names. It also finds the handle that a ray points at.
  */
 import { Object3D } from "three";
 import type { Manifest } from "../bundle/generated/bundle";
@@ -35,9 +35,9 @@ import { Axes, OrientationMark } from "./orientation_axes";
 import { Ruler } from "./ruler";
 import { ScaleBarMark } from "./scale_bar";
 
-/** Why no point is set. */
-const NOTHING_MET = "There is nothing to measure there: no surface, no volume and no slice.";
-/** Largest move of a head at rest, m. */
+/** Notice if the measuring ray hits nothing. */
+const NOTHING_HIT = "No point was set, because there is no surface, volume or slice at that place.";
+/** Largest movement of the gaze of a head at rest, in metres of the scene. */
 const TREMBLE_M = 0.03;
 
 export type MarksOptions = Readonly<{
@@ -47,18 +47,18 @@ export type MarksOptions = Readonly<{
   /** Surfaces on screen now. */
   surfaces: () => readonly ShownSurface[];
   dispatch: (action: Action) => void;
-  /** Say why nothing has come of it. */
+  /** Shows a notice to the user. */
   announce: (text: string) => void;
-  /** The picture differs now. */
+  /** Called when the frame has to be drawn again. */
   onChange: () => void;
 }>;
 
 export class Marks {
-  /** Child of the specimen's group: um, world. */
+  /** Child of the specimen's group, in um. */
   readonly group = new Object3D();
   readonly handles = new ClipMark();
   readonly lamps = new LampMark();
-  /** The handles, for gaze and hands in stereo. */
+  /** The handles as a target of gaze and hands in stereo. */
   readonly target: HandleTarget;
   readonly measured: MeasureMark;
   readonly scaleBar = new ScaleBarMark();
@@ -66,17 +66,17 @@ export class Marks {
   readonly name = new NameMark();
   readonly ruler = new Ruler();
   readonly axes: Axes;
-  /** From where the last frame was seen. */
+  /** The eye of the last frame. */
   private sight = NO_SIGHT;
-  /** The lamp that the ray which drags it has lost over its rim. */
+  /** The dragged lamp, while the ray passes beside the sphere on which the lamp moves; otherwise null. */
   private beside: HandleId | null = null;
-  /** The clip that the page opens with. */
+  /** The clip with which the page opened. */
   private readonly opening: Clip;
-  /** Whether somebody has pointed at the picture. */
+  /** Whether the user has pointed at the frame since the page opened. */
   private isPointedAt = false;
-  /** The cut when stereo began; null: there is no stereo. */
+  /** The clip when stereo began; null on a flat screen. */
   private cutAtEntry: ViewerState["clip"] | null = null;
-  /** How many surfaces are on screen. */
+  /** Number of surfaces on screen in the last frame. */
   private surfaces = 0;
   private isDisposed = false;
 
@@ -97,12 +97,12 @@ export class Marks {
     this.follow(state);
   }
 
-  /** For the stage, over the canvas. */
+  /** Elements that the page places over the canvas. */
   get overlayElements(): readonly (HTMLElement | SVGElement)[] {
     return [this.scaleBar.root, this.orientation.root, this.name.root];
   }
 
-  /** What the pass for the depth has to leave out. */
+  /** Objects that the depth pass must leave out. */
   get overlays(): readonly Object3D[] {
     return [this.group];
   }
@@ -117,7 +117,7 @@ export class Marks {
     this.name.forget();
   }
 
-  /** Before every frame, drawn or not. */
+  /** Called for every frame, also if it is not drawn. */
   update(view: FrameView): void {
     this.sight = view.sight;
     this.target.specimen = view.specimen;
@@ -125,10 +125,10 @@ export class Marks {
     this.target.isCutAsleep = this.cutAtEntry === this.state.clip;
     const m_per_um = view.specimen.getMaxScaleOnAxis();
     const surfaces = this.options.surfaces().length;
-    if (surfaces !== this.surfaces) this.name.ask(); // they come and refine, too
+    if (surfaces !== this.surfaces) this.name.lookUpAgain(); // surfaces load and refine while the gaze rests
     this.surfaces = surfaces;
     this.name.follow(view.gaze, TREMBLE_M / m_per_um, view.dt_s, () => this.nameOf(view.gaze));
-    if (this.state.measured.length > 0) this.showMeasured(); // volumes come and refine
+    if (this.state.measured.length > 0) this.showMeasured(); // volumes load and refine, which changes the values
     if (view.screen === null) this.updateInRoom(view);
     else this.updateOnScreen(view, view.screen, m_per_um);
     this.handles.update(this.sight);
@@ -136,7 +136,7 @@ export class Marks {
     this.measured.update(this.sight);
   }
 
-  /** For each measured point the values of the shown channels that have come, as `DAPI 1210`. */
+  /** For each measured point, the loaded values of the shown channels, such as `DAPI 1210`. */
   get values(): readonly (readonly string[])[] {
     return this.state.measured.map((_, i) =>
       this.measured
@@ -146,18 +146,18 @@ export class Marks {
     );
   }
 
-  /** Read the values of the measured points once more. */
-  readAnew(): void {
-    this.measured.readAnew();
+  /** Reads the values of the measured points again. */
+  rereadValues(): void {
+    this.measured.rereadValues();
   }
 
-  /** The handle that a ray (um) means. */
+  /** Returns the handle that a ray in um points at. */
   pick(ray: Ray, pointing: Pointing): HandleId | null {
     this.showHandles();
     return pickHandle(ray, this.target.handles, this.sight.zoom * TOLERANCE_RAD[pointing]);
   }
 
-  /** Bring a handle to a ray (um). */
+  /** Drags a handle along with a ray in um. */
   drag(id: HandleId, ray: Ray): void {
     const { state } = this;
     if (!isLampHandle(id)) {
@@ -171,7 +171,7 @@ export class Marks {
     if (drag.action !== null) this.options.dispatch(drag.action);
   }
 
-  /** Light up what is pointed at, or held. */
+  /** Highlights the handle that is pointed at or held; null: none. */
   highlight(id: HandleId | null): void {
     if (!this.handles.highlight(id)) return;
     this.lamps.highlight(id);
@@ -179,15 +179,15 @@ export class Marks {
     this.options.onChange();
   }
 
-  /** Measure from or to what a ray (um) means: a point of the newest measurement, or of another. */
+  /** Adds the point that a ray in um hits to the newest measurement, or starts another one with it. */
   async measure(ray: Ray): Promise<void> {
     const found = await this.options.reading.probe(ray);
     if (this.isDisposed) return;
-    if (found === null) this.options.announce(NOTHING_MET);
+    if (found === null) this.options.announce(NOTHING_HIT);
     else this.options.dispatch({ type: "add-point", point: found.point });
   }
 
-  /** Shows the handles of the opening cut from the first time that somebody points: see `markedClip`. */
+  /** Shows the handles of the opening clip as soon as the user points at the frame: see `markedClip`. */
   private showHandles(): void {
     if (this.isPointedAt) return;
     this.isPointedAt = true;
@@ -196,7 +196,7 @@ export class Marks {
     this.options.onChange();
   }
 
-  /** Box of what is shown: the specimen, or the isolated tile. */
+  /** Box of the shown specimen or of the isolated tile, in um. */
   private get shown(): Box {
     return shownBox(this.options.manifest, this.state.isolated);
   }
@@ -243,7 +243,7 @@ export class Marks {
     if (probed === null) return null;
     const channel = this.state.channels.find(({ id }) => id === probed.channel);
     const { tiles } = this.state;
-    const tile = tiles.length > 1 ? tileName(probed.tile, tiles) : ""; // of a single one there is nothing to tell
+    const tile = tiles.length > 1 ? tileName(probed.tile, tiles) : ""; // a single tile needs no name
     const text = [tile, channel?.name ?? ""].filter((part) => part !== "").join(" · ");
     return text === "" ? null : { probed, text };
   }

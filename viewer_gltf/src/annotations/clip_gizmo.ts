@@ -1,4 +1,4 @@
-/** Clip box and plane in the scene: their outlines and the handles that drag them. um, world. */
+/** Outlines of the clip box and the clip plane, with handles that drag them. Children of the specimen, in um. */
 import {
   BoxGeometry,
   BufferAttribute,
@@ -25,10 +25,10 @@ import {
   DIM,
   disposeMarks,
   HANDLE_RADIUS,
+  HIGHLIGHT_SCALE,
   lengthAt,
   MARKS_ORDER,
   type MarkMesh,
-  MEANT,
   markLine,
   markMesh,
   PLANE,
@@ -49,7 +49,7 @@ export class ClipMark {
   private readonly rim = markLine(points(MAX_CORNERS), PLANE, { isLoop: true, opacity: 0.9 });
   private readonly sheet = markMesh(fan(this.rim.geometry), PLANE, 0.08);
   private readonly arm = markLine(points(2), PLANE);
-  private meant: HandleId | null = null;
+  private highlighted: HandleId | null = null;
 
   constructor() {
     const ball = new SphereGeometry(0.5, 20, 12);
@@ -62,13 +62,13 @@ export class ClipMark {
       this.handles.set(id, rimmed(markMesh(shapes[id], PLANE)));
     }
     this.sheet.material.side = DoubleSide;
-    this.sheet.renderOrder = MARKS_ORDER - 1; // never over a handle
-    this.sheet.clear(); // seen through the specimen it would only dull it
+    this.sheet.renderOrder = MARKS_ORDER - 1; // drawn before the handles
+    this.sheet.clear(); // without the ghost that would show the sheet through the specimen and dull it
     this.group.add(this.edges, this.rim, this.sheet, this.arm, ...this.handles.values());
     this.show({ box: null, plane: null }, { min: [0, 0, 0], max: [1, 1, 1] });
   }
 
-  /** `shown`: box of what is shown. */
+  /** @param shown box of the shown specimen or the isolated tile, um */
   show(clip: Clip, shown: Box): void {
     const { box, plane } = clip;
     this.edges.visible = box !== null;
@@ -90,15 +90,15 @@ export class ClipMark {
     if (plane !== null) this.showPlane(plane, shown);
   }
 
-  /** The sheet shows where a plane goes that is dragged; at rest it would lie behind what is cut. */
+  /** Whether the translucent sheet of the clip plane is drawn, which is only while its handle is used. */
   private get isSheetShown(): boolean {
-    return this.rim.visible && this.meant?.startsWith("plane") === true;
+    return this.rim.visible && this.highlighted?.startsWith("plane") === true;
   }
 
-  /** Which handle is pointed at, or held; whether it is another than before. */
+  /** Sets the handle that is pointed at or held. Returns whether it differs from before. */
   highlight(id: HandleId | null): boolean {
-    if (id === this.meant) return false;
-    this.meant = id;
+    if (id === this.highlighted) return false;
+    this.highlighted = id;
     this.sheet.visible = this.isSheetShown;
     for (const [each, { material }] of this.handles) {
       material.color.setHex(each === id ? BRIGHT : each.startsWith("plane") ? PLANE : ACCENT);
@@ -110,7 +110,7 @@ export class ClipMark {
     for (const [id, mesh] of this.handles) {
       if (!mesh.visible) continue;
       const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
-      mesh.scale.setScalar(id === this.meant ? MEANT * size : size);
+      mesh.scale.setScalar(id === this.highlighted ? HIGHLIGHT_SCALE * size : size);
     }
   }
 
@@ -138,7 +138,7 @@ function points(count: number): BufferGeometry {
   return new BufferGeometry().setAttribute("position", positions);
 }
 
-/** The area inside a convex rim; it shares the rim's points. */
+/** Triangles that fill a convex rim; they share its points. */
 function fan(rim: BufferGeometry): BufferGeometry {
   const corners = Array.from({ length: MAX_CORNERS - 2 }, (_, i) => [0, i + 1, i + 2]);
   return new BufferGeometry()

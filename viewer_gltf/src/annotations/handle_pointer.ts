@@ -1,18 +1,18 @@
-/** Handles under a mouse or a finger: they are dragged, and the camera stays where it is. */
+/** Drags handles with a mouse or a finger, without moving the camera. */
 import { Vector2 } from "three";
 import type { HandleId, Pointing } from "../marks/clip_handles";
 
 export type HandleTarget = Readonly<{
-  /** Place in -1..1 of the picture, y up. */
+  /** `point` is in -1..1 of the frame, y up. */
   pick: (point: Vector2, pointing: Pointing) => HandleId | null;
   drag: (id: HandleId, point: Vector2) => void;
-  /** The handle that is pointed at or held. */
+  /** Highlights the handle that is pointed at or held; null: none. */
   highlight: (id: HandleId | null) => void;
 }>;
 
 /**
- * Listens on the canvas's parent before the canvas itself hears of it, so that neither the camera
- * nor a click sees a drag that is the handle's.
+ * Listens on the parent of the canvas during the capture phase, before the canvas receives an event. The drag of a
+ * handle therefore reaches neither the camera nor the listener for clicks.
  */
 export function listenForHandles(
   stage: HTMLElement,
@@ -48,7 +48,7 @@ export function listenForHandles(
 
   listen("pointerdown", (event) => {
     if (held !== null) {
-      event.stopPropagation(); // a second finger is no pinch now
+      event.stopPropagation(); // a second finger must not start a pinch while a handle is held
       return;
     }
     if (event.button !== 0) return;

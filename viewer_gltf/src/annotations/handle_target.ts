@@ -1,4 +1,4 @@
-/** The handles as what a ray of the gaze or of a hand meets and carries in the room. */
+/** The handles as a target that a ray of the gaze or of a hand can hit and drag in stereo. */
 import { Matrix4, Vector3 } from "three";
 import type { Hit, SceneRay, Target } from "../interaction/ray_pointer";
 import { rayAlong } from "../interaction/rays";
@@ -9,19 +9,19 @@ import { isLampHandle } from "../marks/lamp_handles";
 const HANDLE = "handle:";
 
 export class HandleTarget implements Target {
-  /** Handles are seen through what lies before them. */
+  /** Handles also count if something lies in front of them, because they are drawn through it. */
   readonly isOnTop = true;
-  /** From um to the room. */
+  /** Matrix from um to the scene. */
   specimen = new Matrix4();
-  /** The cut is as it was when stereo began, so that a gaze that rests ahead takes none of its handles; a button does. */
+  /** Whether the clip has not changed since stereo began. A resting gaze then grabs none of its handles; a button does. */
   isCutAsleep = false;
-  /** All that there are, um. */
+  /** All handles, in um. */
   handles: readonly Handle[] = [];
-  /** What a ray has met or dragged since this was last taken. */
+  /** The handle that a ray has hit or dragged since the last call of `takeSeen`. */
   private seen: HandleId | null = null;
   private readonly toSpecimen = new Matrix4();
 
-  /** The handles and where they are: one that comes under a resting gaze was not looked for. */
+  /** Text that changes when a handle moves. A handle that moves under a resting gaze was not chosen by the user. */
   get layout(): string {
     const places = this.handles.map(({ id, position }) => `${id} ${position}`);
     return `handles ${places} ${placeText(this.specimen)}`;
@@ -47,17 +47,17 @@ export class HandleTarget implements Target {
   }
 
   choose(): void {
-    // it is dragged from now on, by the pointer that holds it
+    // the pointer that holds the handle calls `drag` from now on
   }
 
   drag(key: string, ray: SceneRay): void {
     const handle = this.handles.find(({ id }) => HANDLE + id === key);
-    if (handle === undefined) return; // the cut or the lamp was turned off meanwhile
+    if (handle === undefined) return; // the clip or the lamp was switched off meanwhile
     this.seen = handle.id;
     this.onDrag(handle.id, this.into(ray));
   }
 
-  /** What is to be lit up: asked for once a frame. */
+  /** Returns the handle to highlight in this frame, and forgets it; null: none. */
   takeSeen(): HandleId | null {
     const { seen } = this;
     this.seen = null;

@@ -1,7 +1,7 @@
 /**
- * The name of what is looked at: the tile, and the channel where a surface is met. It comes once the
- * gaze has rested: in stereo beside the point and not on it, on a flat screen in the picture's corner,
- * since the middle of the picture is what is looked at.
+ * The name of the tile that the user looks at, and of the channel if the gaze hits its surface. The name appears
+ * after the gaze has rested for a moment. In stereo it stands beside the point, and on a flat screen in a corner of
+ * the frame, so that it does not cover what the user looks at.
  */
 import { Object3D, Vector3 } from "three";
 import { element } from "../dom/element";
@@ -11,13 +11,13 @@ import type { Sight } from "../marks/style";
 import type { Ray } from "../math/vec3";
 import type { Probed } from "../probe/probe";
 
-/** Time for which the gaze rests before the name comes, s. */
+/** Time for which the gaze must rest before the name appears, in seconds. */
 export const NAME_S = 0.4;
 
 export type Named = Readonly<{ probed: Probed; text: string }>;
 
 export class NameMark {
-  /** um, world. */
+  /** Child of the specimen, in um. */
   readonly group = new Object3D();
   readonly root = element("div", { className: "name-mark", hidden: true });
   private readonly label = new Label("aside");
@@ -33,12 +33,12 @@ export class NameMark {
     return this.root.textContent ?? "";
   }
 
-  /** What is looked at may have got another name. */
-  ask(): void {
+  /** Looks the name up again in the next frame, because more surfaces may have loaded under a resting gaze. */
+  lookUpAgain(): void {
     this.isNamed = false;
   }
 
-  /** What is looked at may have changed: wait anew. */
+  /** Removes the name until the gaze has rested again, because the scene has changed. */
   forget(): void {
     this.rest = null;
     this.isNamed = false;
@@ -46,7 +46,10 @@ export class NameMark {
   }
 
   /**
-   * @param name called once, when the gaze has come to rest; null: nothing is there
+   * Shows the name once the gaze has rested for `NAME_S`.
+   *
+   * @param tremble_um largest movement of the ray that still counts as rest
+   * @param name called once for each rest; returns null if the gaze hits nothing that has a name
    */
   follow(ray: Ray, tremble_um: number, dt_s: number, name: () => Named | null): void {
     this.rest = advanceRest(this.rest, ray, tremble_um, dt_s);

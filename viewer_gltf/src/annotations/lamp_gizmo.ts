@@ -1,4 +1,4 @@
-/** The lamps of the path-traced picture in the scene, to be taken hold of. um, world. */
+/** The lamps of path tracing as balls in the scene that users can drag. Children of the specimen, in um. */
 import { Object3D, SphereGeometry, Vector3 } from "three";
 import type { HandleId } from "../marks/clip_handles";
 import { Label } from "../marks/label";
@@ -7,16 +7,16 @@ import {
   BRIGHT,
   disposeMarks,
   HANDLE_RADIUS,
+  HIGHLIGHT_SCALE,
   lengthAt,
   type MarkMesh,
-  MEANT,
   markMesh,
   rimmed,
   type Sight,
 } from "../marks/style";
 import { type Box, boxSpan } from "../math/box";
 
-/** Opacity of a lamp behind the specimen: paths of light leave no depth to be hidden by. */
+/** Opacity of a lamp behind the specimen, 0..1. A path-traced frame has no depth that could hide the lamp. */
 const BEHIND = 0.4;
 
 type Ball = Readonly<{ mesh: MarkMesh; label: Label }>;
@@ -24,7 +24,7 @@ type Ball = Readonly<{ mesh: MarkMesh; label: Label }>;
 export class LampMark {
   readonly group = new Object3D();
   private readonly balls = new Map<LampHandleId, Ball>();
-  private meant: HandleId | null = null;
+  private highlighted: HandleId | null = null;
   private specimen: Box = { min: [0, 0, 0], max: [0, 0, 0] };
   private readonly way = new Vector3();
 
@@ -38,7 +38,7 @@ export class LampMark {
     });
   }
 
-  /** @param specimen all of it, whatever is isolated: lamps are placed by it */
+  /** @param specimen box of the whole specimen, um; lamps are placed around it even if one tile is isolated */
   show(state: LitState, specimen: Box): void {
     this.specimen = specimen;
     const handles = new Map(lampHandles(state, specimen).map((each) => [each.id, each.position]));
@@ -50,14 +50,14 @@ export class LampMark {
       ball.mesh.visible = ball.label.sprite.visible = position !== undefined;
       if (position === undefined) return;
       ball.mesh.position.set(...position);
-      if (id === this.meant) ball.mesh.material.color.setHex(BRIGHT);
+      if (id === this.highlighted) ball.mesh.material.color.setHex(BRIGHT);
       else ball.mesh.material.color.setRGB(...state.trace.lamps[i].color);
     });
   }
 
-  /** Which handle is pointed at, or held: seen as that from the next `show` on. */
+  /** Sets the handle that is pointed at or held. The next `show` changes its colour. */
   highlight(id: HandleId | null): void {
-    this.meant = id;
+    this.highlighted = id;
   }
 
   update(sight: Sight): void {
@@ -65,7 +65,7 @@ export class LampMark {
     for (const [id, { mesh, label }] of this.balls) {
       if (!mesh.visible) continue;
       const size = lengthAt(mesh.position, sight, 2 * HANDLE_RADIUS);
-      mesh.scale.setScalar(id === this.meant ? MEANT * size : size);
+      mesh.scale.setScalar(id === this.highlighted ? HIGHLIGHT_SCALE * size : size);
       const direction = this.way.subVectors(mesh.position, eye_um).toArray();
       const ray = { origin: eye_um.toArray(), direction };
       mesh.material.opacity = boxSpan([0, 1], ray, this.specimen) === null ? 1 : BEHIND;

@@ -1,4 +1,4 @@
-/** Measurements in the scene: points, the stretches between them, what they come to, and the channels' values. */
+/** Measurements in the scene: their points, the segments between them, the result, and the channels' values. */
 import { CylinderGeometry, Object3D, SphereGeometry, Vector3 } from "three";
 import { keepApart } from "../marks/keep_apart";
 import { Label } from "../marks/label";
@@ -22,12 +22,12 @@ const UP = new Vector3(0, 1, 0);
 /** Colour of points and labels, as hex. */
 const COLOR = "#ffd24a";
 
-/** The marks of one measurement: as many as it has points now. */
-class Strand {
+/** The points, segments and label of one measurement. */
+class MeasurementLine {
   readonly group = new Object3D();
   readonly label = new Label("above", COLOR);
   private readonly points: MarkMesh[] = [];
-  private readonly stretches: MarkMesh[] = [];
+  private readonly segments: MarkMesh[] = [];
   private readonly middle = new Vector3();
   private count = 0;
 
@@ -42,22 +42,22 @@ class Strand {
       this.points.push(point);
       this.group.add(point);
     }
-    while (this.stretches.length < places.length - 1) {
+    while (this.segments.length < places.length - 1) {
       const line = markMesh(new CylinderGeometry(0.5, 0.5, 1, 8, 1, true), MEASURE);
-      this.stretches.push(line);
+      this.segments.push(line);
       this.group.add(line);
     }
     removeMarks(this.points.splice(places.length));
-    removeMarks(this.stretches.splice(Math.max(0, places.length - 1)));
+    removeMarks(this.segments.splice(Math.max(0, places.length - 1)));
     this.points.forEach((mesh, i) => {
       mesh.position.set(...places[i]);
     });
-    this.stretches.forEach((mesh, i) => {
-      stretch(mesh, places[i], places[i + 1]);
+    this.segments.forEach((mesh, i) => {
+      placeSegment(mesh, places[i], places[i + 1]);
     });
     this.label.write(places.length > 1 ? text : "");
     if (places.length < 2) return;
-    // of three points beside the second, else in the middle of the stretch halfway
+    // the label stands at the middle of the middle segment; with an odd number of points, near the middle point
     const half = (places.length - 1) / 2;
     const [a, b] = [places[Math.floor(half - 1e-9)], places[Math.floor(half - 1e-9) + 1]];
     this.middle.set(...a).lerp(new Vector3(...b), places.length % 2 === 0 ? 0.5 : 0.85);
@@ -67,7 +67,7 @@ class Strand {
     return this.count > 1;
   }
 
-  /** From one point to the next. */
+  /** Sets `out` to the vector from a point to the next one, um, and returns it. */
   along(index: number, out: Vector3): Vector3 {
     return out.subVectors(this.points[index + 1].position, this.points[index].position);
   }
@@ -80,7 +80,7 @@ class Strand {
     for (const mesh of this.points) {
       mesh.scale.setScalar(lengthAt(mesh.position, sight, 2 * POINT_RADIUS));
     }
-    for (const mesh of this.stretches) {
+    for (const mesh of this.segments) {
       const width = lengthAt(mesh.position, sight, 2 * LINE_RADIUS);
       mesh.scale.setX(width).setZ(width);
     }
@@ -94,7 +94,7 @@ class Strand {
   }
 }
 
-/** Remove marks from their group, and free what they hold. */
+/** Removes marks from their group, and frees their GPU resources. */
 function removeMarks(marks: readonly MarkMesh[]): void {
   for (const mark of marks) {
     mark.removeFromParent();
@@ -102,7 +102,7 @@ function removeMarks(marks: readonly MarkMesh[]): void {
   }
 }
 
-function stretch(mesh: MarkMesh, from: Vec3, to: Vec3): void {
+function placeSegment(mesh: MarkMesh, from: Vec3, to: Vec3): void {
   const a = new Vector3(...from);
   const along = new Vector3(...to).sub(a);
   mesh.position.copy(a).addScaledVector(along, 0.5);
@@ -112,12 +112,12 @@ function stretch(mesh: MarkMesh, from: Vec3, to: Vec3): void {
 
 export class MeasureMark {
   readonly group = new Object3D();
-  private readonly newest = new Strand();
-  private readonly kept: Strand[] = [];
-  /** The channels' values at the newest one's points. */
+  private readonly newest = new MeasurementLine();
+  private readonly finished: MeasurementLine[] = [];
+  /** Labels with the channels' values at the points of the newest measurement. */
   private readonly values: Label[] = [];
-  private readonly stretched = new Vector3();
-  /** Of the eye, on the labels. */
+  private readonly segment = new Vector3();
+  /** Direction from the eye to the labels; with `right` and `up`, the axes in which labels are kept apart. */
   private readonly ahead = new Vector3();
   private readonly right = new Vector3();
   private readonly up = new Vector3();
@@ -125,8 +125,8 @@ export class MeasureMark {
   private key = "";
 
   /**
-   * @param read what the channels are at a point, um, a line each
-   * @param onChange called when values have come
+   * @param read returns a line with the value of each channel at a point in um
+   * @param onChange called when values have loaded
    */
   constructor(
     private readonly read: (point: Vec3) => Promise<readonly string[]>,
@@ -136,26 +136,30 @@ export class MeasureMark {
     this.show([], "distance", "");
   }
 
-  /** What the newest one comes to. */
+  /** The label with the result of the newest measurement. */
   get distance(): Label {
     return this.newest.label;
   }
 
-  /** Those that are done, with their names. */
+  /** Shows the finished measurements with their names. */
   list(measurements: readonly Measurement[]): void {
-    while (this.kept.length < measurements.length) {
-      const strand = new Strand();
-      this.kept.push(strand);
-      this.group.add(strand.group);
+    while (this.finished.length < measurements.length) {
+      const line = new MeasurementLine();
+      this.finished.push(line);
+      this.group.add(line.group);
     }
-    for (const strand of this.kept.splice(measurements.length)) strand.dispose();
-    this.kept.forEach((strand, i) => {
+    for (const line of this.finished.splice(measurements.length)) line.dispose();
+    this.finished.forEach((line, i) => {
       const { name, kind, points } = measurements[i];
-      strand.show(points, `${name}\n${measurementText(kind, points)}`);
+      line.show(points, `${name}\n${measurementText(kind, points)}`);
     });
   }
 
-  /** `key` names what else the values depend on: they are read anew when it differs. */
+  /**
+   * Shows the newest measurement. The values at its points are read again when a point or `key` changes.
+   *
+   * @param key names the sources of the values
+   */
   show(points: readonly Vec3[], kind: MeasureKind, key: string): void {
     this.count = points.length;
     const isDone = missing(kind, points) === 0;
@@ -174,20 +178,20 @@ export class MeasureMark {
     });
   }
 
-  /** With the next `show`, whatever its key. */
-  readAnew(): void {
+  /** Makes the next `show` read the values again, even if its key has not changed. */
+  rereadValues(): void {
     this.key = "";
   }
 
   update(sight: Sight): void {
-    for (const { label } of [this.newest, ...this.kept]) label.shift(0);
+    for (const { label } of [this.newest, ...this.finished]) label.shift(0);
     this.newest.update(sight);
-    for (const strand of this.kept) strand.update(sight);
+    for (const line of this.finished) line.update(sight);
     for (let i = 0; i < this.count; i++) {
-      // away from the line, so that none lies on what it comes to
+      // the values stand on the side of the point that leads away from the line, so that they do not cover the result
       const before = i === 0 ? 0 : i - 1;
       const { isLine } = this.newest;
-      const leadsDown = isLine && this.newest.along(before, this.stretched).dot(sight.up) < 0;
+      const leadsDown = isLine && this.newest.along(before, this.segment).dot(sight.up) < 0;
       const isAbove = isLine && (i === 0) === leadsDown;
       this.values[i].turnTo(isAbove ? "above" : "below");
       this.values[i].place(this.newest.placeOf(i), sight);
@@ -195,10 +199,10 @@ export class MeasureMark {
     this.keepLabelsApart(sight);
   }
 
-  /** What the newest comes to and its values have their places, those that are done give way. */
+  /** Shifts labels that would overlap. The newest measurement's labels stay, and the others make way. */
   private keepLabelsApart(sight: Sight): void {
-    const kept = this.kept.map(({ label }) => label);
-    const labels = [this.newest.label, ...this.values, ...kept].filter(
+    const finished = this.finished.map(({ label }) => label);
+    const labels = [this.newest.label, ...this.values, ...finished].filter(
       ({ sprite }) => sprite.visible,
     );
     if (labels.length < 2) return;
@@ -214,7 +218,7 @@ export class MeasureMark {
     });
   }
 
-  /** The text at a point. */
+  /** The channels' values at a point, one line each; "": not loaded yet. */
   valuesAt(index: number): string {
     const label = this.values[index];
     return label?.sprite.visible ? label.text : "";
@@ -222,7 +226,7 @@ export class MeasureMark {
 
   private async readAt(index: number, point: Vec3, key: string): Promise<void> {
     const lines = await this.read(point);
-    if (key !== this.key || index >= this.count) return; // measured anew meanwhile
+    if (key !== this.key || index >= this.count) return; // the points have changed meanwhile
     this.values[index].write(lines.join("\n"));
     this.onChange();
   }
@@ -231,7 +235,7 @@ export class MeasureMark {
     this.key = "disposed";
     this.group.removeFromParent();
     this.newest.dispose();
-    for (const strand of this.kept) strand.dispose();
+    for (const line of this.finished) line.dispose();
     for (const label of this.values) label.dispose();
   }
 }

@@ -12,8 +12,8 @@ function expectNear(found: Vector3, expected: readonly number[]): void {
   });
 }
 
-describe("the axes that are seen", () => {
-  it("are x to the right, y up and z to the eye from the front", () => {
+describe("the axes in the eye's space", () => {
+  it("lead right, up and to the eye for x, y and z if seen from the front", () => {
     const head = new Matrix4().makeTranslation(0, 0, 3);
     const seen = axesSeen(head, scaled);
     expectNear(seen[0], [1, 0, 0]);
@@ -21,8 +21,8 @@ describe("the axes that are seen", () => {
     expectNear(seen[2], [0, 0, 1]);
   });
 
-  it("follow the eye and the specimen's own turn", () => {
-    // from the right side: what leads right comes to the eye, what leads to the front goes left
+  it("follow the eye and the specimen's rotation", () => {
+    // seen from the right, the axis to the right leads to the eye, and the axis to the front leads left
     const side = new Matrix4().makeRotationY(Math.PI / 2);
     const [x, y, z] = axesSeen(side, scaled);
     expectNear(x, [0, 0, 1]);
@@ -33,8 +33,8 @@ describe("the axes that are seen", () => {
   });
 });
 
-describe("um to a pixel", () => {
-  it("equals the projection of two points, at the depth of the focus", () => {
+describe("the size of a pixel in um", () => {
+  it("agrees with the projection of two points at the depth of the focus", () => {
     const camera = new PerspectiveCamera(40, 1.5, 0.01, 20);
     camera.position.set(0.3, -0.2, 2);
     camera.lookAt(0.1, 0.4, -0.5);
@@ -52,7 +52,7 @@ describe("um to a pixel", () => {
 });
 
 describe("the ruler", () => {
-  it("has a round length that is seen under a moderate angle, from any distance", () => {
+  it("has a round length that fills 6 to 16 degrees of the view at any distance", () => {
     for (const distance_um of [50, 1234, 9e5]) {
       const length = rulerLength(distance_um)?.length_um ?? 0;
       expect([1, 2, 5]).toContain(Number(length.toExponential(6).split("e")[0]));
@@ -71,7 +71,7 @@ describe("a patient's axes", () => {
       ...(back === null ? [] : [[back, ...direction.map((part) => -part)]]),
     ]);
 
-  it("are lettered at both ends, for each of the 48 ways to lie along the axes", () => {
+  it("have letters at both ends, for each of the 48 orientations along the axes", () => {
     const signs = [1, -1] as const;
     const unit = (axis: number, sign: number) => {
       const along: [number, number, number] = [0, 0, 0];
@@ -106,7 +106,7 @@ describe("a patient's axes", () => {
     expect(count).toBe(48);
   });
 
-  it("are the lattice's x, y and z where no side is known", () => {
+  it("are the x, y and z of the voxels if no side is known", () => {
     expect(letters()).toEqual([
       ["x", 1, 0, 0],
       ["y", 0, 1, 0],

@@ -1,7 +1,7 @@
 /**
- * How the specimen is turned, as three labelled axes: x to the right, y up, z to the viewer at the
- * start; of a patient whose sides are known the sides at both ends, L R, S I, A P. A small drawing over
- * a flat picture's lower right corner; in a headset an object beside the specimen.
+ * Three labelled axes that show how the specimen is turned. At the start x leads to the right, y up and z to the user.
+ * If the sides of a patient are known, the axes carry the letters of the sides at both ends: L R, S I, A P. On a flat
+ * screen the axes are a small drawing in the lower right corner, in a headset an object beside the specimen.
  */
 import { ConeGeometry, CylinderGeometry, type Matrix4, Object3D, Quaternion, Vector3 } from "three";
 import type { Sides } from "../bundle/generated/bundle";
@@ -19,14 +19,14 @@ import {
 import type { Box } from "../math/box";
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Half the drawing's edge, in its own units. */
+/** Half the drawing's edge, in its own units; so are the length of an axis and the distance of its letter. */
 const HALF = 40;
 const LENGTH = 26;
 const LETTER = 33;
-/** An axis that leads so far to the eye or away (of 1) has one letter: the other would lie under it. */
+/** Smallest component along the view, 0..1, at which an axis hides its far letter, which the near one would cover. */
 const END_ON = 0.9;
 
-/** One end of an axis: the line from the middle, and its letter. */
+/** One end of an axis: the line from the centre, and its letter. */
 class End {
   readonly whole: SVGElement;
   private readonly line: SVGElement;
@@ -47,7 +47,7 @@ class End {
     this.letter.textContent = text;
   }
 
-  /** @param seen the axis, as the eye sees it */
+  /** @param seen direction of the axis in the eye's space: x right, y up, z to the eye */
   place(seen: Vector3, hasOpposite: boolean): void {
     const [x, y, z] = seen.toArray().map((part) => this.sign * part);
     this.line.setAttribute("x2", (LENGTH * x).toFixed(2));
@@ -55,7 +55,7 @@ class End {
     this.letter.setAttribute("x", (LETTER * x).toFixed(2));
     this.letter.setAttribute("y", (-LETTER * y).toFixed(2));
     this.letter.setAttribute("visibility", hasOpposite && z < -END_ON ? "hidden" : "inherit");
-    this.whole.setAttribute("opacity", z < -0.1 ? "0.55" : "1"); // leads away
+    this.whole.setAttribute("opacity", z < -0.1 ? "0.55" : "1"); // an end that leads away is dim
   }
 }
 
@@ -89,7 +89,7 @@ export class OrientationMark {
     const order = [...this.ends].sort((a, b) => depth(a) - depth(b));
     const isDrawn = order.every(({ whole }, i) => this.root.children[i] === whole);
     if (!isDrawn) this.root.append(...order.map(({ whole }) => whole));
-    const [first, ...others] = this.axes.map(({ word }, i) => [word, whither(seen[i])]);
+    const [first, ...others] = this.axes.map(({ word }, i) => [word, directionName(seen[i])]);
     const rest = others.map(([word, where]) => `${word} ${where}`).join(", ");
     this.root.setAttribute("aria-label", `${first[0]} leads ${first[1]}, ${rest}`);
   }
@@ -99,8 +99,8 @@ export class OrientationMark {
   }
 }
 
-/** The nearest of the six directions, in words. */
-function whither(axis: Vector3): string {
+/** Returns the name of the nearest of the six directions. */
+function directionName(axis: Vector3): string {
   const parts = axis.toArray();
   const largest = parts.reduce((best, v, i) => (Math.abs(v) > Math.abs(parts[best]) ? i : best), 0);
   const [back, forth] = [
@@ -111,13 +111,13 @@ function whither(axis: Vector3): string {
   return parts[largest] > 0 ? forth : back;
 }
 
-/** The same as an object in the room. um, world. */
+/** The axes as an object in the scene, for a headset. It is a child of the specimen, in um. */
 export class Axes {
   readonly group = new Object3D();
   private readonly arrows: MarkMesh;
-  /** Where each arm leads, and its letter. */
+  /** The direction of each arm, and its letter. */
   private readonly arms: readonly { direction: Vector3; label: Label }[];
-  /** Arms lead both ways, so that the middle lies farther from the specimen. */
+  /** Whether arms lead both ways; the axes then stand farther from the specimen. */
   private readonly isCross: boolean;
   private readonly tip = new Vector3();
 
@@ -139,7 +139,7 @@ export class Axes {
     this.group.add(this.arrows, ...this.arms.map(({ label }) => label.sprite));
   }
 
-  /** Left of the front lower corner of what is shown. */
+  /** Places the axes to the left of the lower front corner of the shown box, in um. */
   update({ min, max }: Box, sight: Sight): void {
     const aside = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
     this.arrows.position.set(min[0] - aside, min[1] - aside / 2, max[2]);
@@ -162,7 +162,7 @@ export class Axes {
   }
 }
 
-/** Of length 1, from the middle. */
+/** Returns the shapes of an arm of length 1 from the centre; only arms with `hasHead` end in a cone. */
 function arrow({ direction, axis, hasHead }: Arm): readonly Piece[] {
   const color = AXIS_COLORS[axis];
   const turn = new Quaternion().setFromUnitVectors(UP, direction);
@@ -175,5 +175,7 @@ function arrow({ direction, axis, hasHead }: Arm): readonly Piece[] {
 type Arm = Readonly<{ direction: Vector3; axis: number; hasHead: boolean }>;
 
 const UP = new Vector3(0, 1, 0);
+/** Distance between specimen and axes, as a share of the specimen's longest edge. */
 const GAP = 0.12;
+/** Angle that an arm fills in the user's view, radians. */
 const ARROW_RAD = (3 * Math.PI) / 180;

@@ -1,4 +1,4 @@
-/** Handles, measurements, scale bar, orientation and names as a part of the viewer. */
+/** The part of the viewer for handles, measurements, scale bar, orientation axes and names. */
 import { fileName, saveFile } from "../dom/save_file";
 import type {
   FrameView,
@@ -65,7 +65,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
     this.marks.follow(state);
     const lamps = this.lampsOf(state);
     if (lamps.length > this.lampsOf(previous).length && !this.host.isInRoom) {
-      // they may be beside and behind the eye; in stereo the head finds them
+      // new lamps may lie beside or behind the camera; in stereo the user turns the head to find them
       this.host.viewpoint.stepBackFor(lamps.map(({ position }) => position));
     }
   }
@@ -78,7 +78,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
     this.marks.update(frame);
   }
 
-  /** Measures while that is the tool. */
+  /** Sets a measured point if measuring is the chosen tool. */
   tap({ ray }: Tap): TapAnswer {
     if (this.host.state.tool !== "measure") return null;
     void this.marks.measure(ray);
@@ -110,7 +110,7 @@ class AnnotationsPart implements Part, HandleLights, MeasuredPoints {
   }
 
   retryFailed(): void {
-    this.marks.readAnew();
+    this.marks.rereadValues();
   }
 
   dispose(): void {

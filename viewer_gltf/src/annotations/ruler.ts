@@ -1,6 +1,6 @@
 /**
- * The scale bar of a headset: a ruler of round length that lies under or over the specimen and turns and
- * grows with it. um, world.
+ * The scale bar of a headset: a ruler of round length below or above the specimen. It is a child of the specimen,
+ * in um, so it turns and grows with it.
  */
 import { BoxGeometry, Object3D, Vector3 } from "three";
 import { Label } from "../marks/label";
@@ -16,7 +16,7 @@ import {
 import type { Box } from "../math/box";
 import { chooseScaleBar, LONGEST_PX } from "../math/round_length";
 
-/** Angle under which the user sees the longest ruler, radians. */
+/** Largest angle that the ruler may fill in the user's view, radians. */
 const LONGEST_RAD = (16 * Math.PI) / 180;
 const THICKNESS_RAD = (0.25 * Math.PI) / 180;
 /** Gap between specimen and ruler, as a share of the specimen's longest edge. */
@@ -24,10 +24,10 @@ const GAP = 0.06;
 /** Parts of the ruler, every second one dark: five parts distinguish lengths of 1, 2 and 5. */
 const PARTS = 5;
 
-/** How wide the ticks at its ends are, as a share of the ruler. */
+/** Width of the ticks at the ruler's ends, as a share of its length. */
 const TICK = 0.012;
 
-/** A round length for a ruler at a distance, um. */
+/** Returns a round length for a ruler at a distance in um; null: no round length suits that distance. */
 export function rulerLength(distance_um: number): { length_um: number; label: string } | null {
   return chooseScaleBar((2 * distance_um * Math.tan(LONGEST_RAD / 2)) / LONGEST_PX);
 }
@@ -43,7 +43,11 @@ export class Ruler {
     this.group.add(this.bar, this.label.sprite);
   }
 
-  /** Under the front edge of the box of what is shown, or over it, where something hangs below. */
+  /**
+   * Places the ruler below the front edge of a box, or above it if something else hangs below.
+   *
+   * @param shown box of the shown specimen, um
+   */
   update(shown: Box, sight: Sight, isAbove = false): void {
     const { min, max } = shown;
     const gap = GAP * Math.max(max[0] - min[0], max[1] - min[1], max[2] - min[2]);
@@ -67,7 +71,7 @@ export class Ruler {
   }
 }
 
-/** A ruler of length 1 and thickness 1, about its middle. */
+/** The parts of a ruler with length and thickness 1, centred at the origin. */
 function parts(): readonly Piece[] {
   return Array.from({ length: PARTS }, (_, i) => {
     const geometry = new BoxGeometry(1 / PARTS, 1, 1).translate((i + 0.5) / PARTS - 0.5, 0, 0);

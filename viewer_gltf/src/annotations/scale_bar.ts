@@ -1,6 +1,6 @@
 /**
- * The scale bar of a flat screen, over the picture's lower left corner. It is true in the plane
- * through the point that is looked at: nearer things are larger, as a picture in perspective has it.
+ * The scale bar of a flat screen, in the lower left corner of the frame. In perspective, near things look larger
+ * than far ones. The bar is therefore exact only at the depth of the point that the camera orbits.
  */
 import { element } from "../dom/element";
 import { chooseScaleBar, type ScaleBar } from "../math/round_length";
@@ -11,7 +11,7 @@ export class ScaleBarMark {
   readonly root = element("div", { className: "scale-bar" }, { scale: "" }, this.bar, this.label);
   private before: ScaleBar | null = null;
 
-  /** null: there is none. */
+  /** @param um_per_px size of a pixel at the depth of the focus, um; null hides the bar */
   update(um_per_px: number | null): void {
     const bar = um_per_px === null ? null : chooseScaleBar(um_per_px);
     this.root.hidden = bar === null;

@@ -1,4 +1,4 @@
-/** The panel's section and the keys of measuring: what a tap does, the newest measurement, and the list. Pure. */
+/** The panel's section and the keys for measuring: the tool, the newest measurement, and the finished ones. Pure. */
 
 import { command, controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
@@ -12,7 +12,7 @@ import { REFUSED } from "../state/refusals";
 import type { ViewerState } from "../state/viewer_state";
 
 export const MEASURE_COMMANDS = [
-  /** The measurements as a file. */
+  /** Saves the measurements as a file. */
   "save-csv",
 ] as const;
 
@@ -24,14 +24,14 @@ const POINT_NAMES = ["First point", "Second point", "Third point"] as const;
 /** Most finished measurements that have a row in the panel; the CSV file lists all of them. */
 const MAX_LISTED = 12;
 
-/** Of the newest one, then of the list; null: there is none. */
+/** Clears the newest measurement or, if it has no points, the last finished one; null: there is none to clear. */
 function clearMeasured({ measured, measurements }: ViewerState): Action | null {
   if (measured.length > 0) return { type: "measure", points: [] };
   if (measurements.length === 0) return null;
   return { type: "set-measurements", measurements: measurements.slice(0, -1) };
 }
 
-/** @param values of each measured point: the channels' values there, as `DAPI 1210` */
+/** @param values for each measured point, the channels' values there, such as `DAPI 1210` */
 export function measureSections(
   state: ViewerState,
   values: readonly (readonly string[])[],
@@ -56,7 +56,7 @@ function measureItems(
     {
       kind: "button",
       id: "finish-measuring",
-      label: "Done: keep the measurement",
+      label: "Finish and keep the measurement",
       refusal: isOpen ? REFUSED.points : "",
       to: () => ({ type: "finish-measuring" }),
     },
@@ -114,7 +114,7 @@ export const MEASURE_KEYS: readonly KeyGroup[] = [
     rank: 75,
     keys: [
       ...MEASURE_PARAMETERS.flatMap(keysOf),
-      key("_", "The measurement is done: it goes to the list", ({ state }) => {
+      key("_", "Finish the measurement and add it to the list", ({ state }) => {
         if (state.measured.length === 0) return NOT_MEASURED;
         if (missing(state.measuredAs, state.measured) > 0) return no(REFUSED.points);
         return { type: "finish-measuring" };

@@ -1,4 +1,4 @@
-/** Pictures and videos as a part of the viewer, and the views that a video goes through. */
+/** The part of the viewer that saves pictures and videos, and keeps the views that a video passes through. */
 import { fileName, saveFile } from "../dom/save_file";
 import type { Part, PartDefinition, PartHost } from "../host/part";
 import type { PosterMaker } from "../host/services";
@@ -9,8 +9,8 @@ import { SAVE_COMMANDS, SAVE_KEYS, saveSections } from "./section";
 import { CAPTURE_SETTINGS } from "./settings";
 import { stageViews } from "./stage_views";
 
-const ON_THE_SCREEN = "Pictures and videos are of the flat screen: leave stereo to save them.";
-const NEXT_KEPT = "“Next kept view” goes through them.";
+const ON_THE_SCREEN = "Pictures and videos can only be saved on a flat screen. Leave stereo first.";
+const NEXT_KEPT = "“Next kept view” shows one after the other.";
 const ONLY_VIEW = "That is the only kept view.";
 
 /** A file that was made; null: the user has cancelled it. */
@@ -20,7 +20,7 @@ type Made = Readonly<{ suffix: string; content: Blob }> | null;
 function loadSaving() {
   return import("./save_picture").catch((cause) => {
     throw new DOMException(
-      `the part of the page for it could not be loaded (${cause})`,
+      `the part of the page that saves pictures and videos could not be loaded (${cause})`,
       "NetworkError",
     );
   });
@@ -78,7 +78,7 @@ class CapturePart implements Part, PosterMaker {
     };
   }
 
-  /** The view as large as is chosen. */
+  /** Makes a picture of the view in the chosen size. */
   private async makePicture(signal: AbortSignal): Promise<Made> {
     const { savePicture } = await loadSaving();
     const scale = Number(this.host.state.pictureSize);
@@ -87,7 +87,7 @@ class CapturePart implements Part, PosterMaker {
     return content && { suffix: "png", content };
   }
 
-  /** Through the kept views, or once round. */
+  /** Makes a video through the kept views, or once around the specimen. */
   private async makeVideo(signal: AbortSignal): Promise<Made> {
     const { saveVideo } = await loadSaving();
     const { viewpoint } = this.host;
@@ -100,7 +100,7 @@ class CapturePart implements Part, PosterMaker {
     }
   }
 
-  /** Makes a file and hands it to the user. Asked for once more while a file is made, it cancels that one. */
+  /** Makes a file and saves it for the user. A second call while a file is being made cancels that file. */
   private async save(
     what: "picture" | "video",
     make: (signal: AbortSignal) => Promise<Made>,
@@ -154,7 +154,9 @@ class CapturePart implements Part, PosterMaker {
     this.host.dispatch({ type: "keep-views", views });
     const { length } = this.host.state.keptViews;
     this.host.announce(
-      length === 0 ? "No view is kept any more." : `${length} views are kept: ${NEXT_KEPT}`,
+      length === 0
+        ? "All kept views were removed."
+        : `Number of kept views: ${length}. ${NEXT_KEPT}`,
     );
   }
 

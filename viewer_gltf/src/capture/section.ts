@@ -1,4 +1,4 @@
-/** The panel's section of pictures and videos, and its keys. Pure. */
+/** The panel's section for pictures and videos, and its keys. Pure. */
 
 import { command, controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
@@ -10,7 +10,7 @@ import { PICTURE_SIZE } from "./settings";
 function saveItems(state: ViewerState, isFilming: boolean, next: number): readonly Control[] {
   const { length } = state.keptViews;
   const name = length === 0 ? undefined : state.keptViews[next % length].name;
-  const path = length > 1 ? `through ${length} views` : "once round";
+  const path = length > 1 ? `through ${length} views` : "once around";
   const none = length === 0 ? REFUSED.views : "";
   return [
     ...controlsOf([PICTURE_SIZE], state),
@@ -21,14 +21,14 @@ function saveItems(state: ViewerState, isFilming: boolean, next: number): readon
       ...command("next-view", name === undefined ? "Next kept view" : `Next kept view: ${name}`),
       refusal: none,
     },
-    { ...command("forget-views", "Forget the kept views"), refusal: none },
+    { ...command("forget-views", "Remove the kept views"), refusal: none },
   ];
 }
 
 export const SAVE_COMMANDS = [
-  /** Saves the view as large as is chosen; once more: cancels it. */
+  /** Saves a picture of the view in the chosen size. A second use cancels. */
   "save-picture",
-  /** Saves a video: once round, or through the kept views; once more: cancels it. */
+  /** Saves a video once around the specimen, or through the kept views. A second use cancels. */
   "save-video",
   "keep-view",
   "next-view",
@@ -53,11 +53,11 @@ const NO_VIEW = no(REFUSED.views);
 
 const KEYS: readonly Key[] = [
   ...keysOf(PICTURE_SIZE),
-  key('"', "Save the picture; again: cancel", "save-picture"),
-  key(")", "Save a video: once round, or through the kept views; again: cancel", "save-video"),
+  key('"', "Save the picture, or cancel saving", "save-picture"),
+  key(")", "Save a video once around or through the kept views, or cancel it", "save-video"),
   key("'", "Keep this view for a video", "keep-view"),
   key("`", "Next kept view", ({ state }) => (state.keptViews.length === 0 ? NO_VIEW : "next-view")),
-  key("End", "Forget the kept views", ({ state }) =>
+  key("End", "Remove the kept views", ({ state }) =>
     state.keptViews.length === 0 ? NO_VIEW : "forget-views",
   ),
 ];

@@ -1,4 +1,4 @@
-/** The actions that a person may take on an item, by its state. Pure. */
+/** The actions that a user may take on an item, which depend on its state. Pure. */
 import type { Item } from "./inbox_state";
 import type { Progress } from "./upload";
 
@@ -16,24 +16,24 @@ export type ActionName =
 export type Action = Readonly<{
   name: ActionName;
   label: string;
-  /** The one that most people want next. */
+  /** Whether this is the action that most users want next. */
   isPrimary?: boolean;
 }>;
 
 export type Situation = Readonly<{
-  /** The upload that this page runs; null: it runs none. */
+  /** The upload of this item by this page; null: this page does not upload it. */
   upload: Progress | null;
   mayUpload: boolean;
   /** Whether the browser can read the files of an unfinished upload again. */
   hasHandles: boolean;
-  /** Whether bytes of this item arrive from another page. */
+  /** Whether another page is uploading this item. */
   isMoving: boolean;
-  /** Whether the server has understood it. */
+  /** Whether the server has made a summary of this item. */
   isUnderstood: boolean;
 }>;
 
 const DELETE: Action = { name: "delete", label: "Delete" };
-const LOOK: Action = { name: "look", label: "Look" };
+const LOOK: Action = { name: "look", label: "Preview" };
 const BUILD: Action = { name: "build", label: "Build", isPrimary: true };
 
 export function actionsOf(item: Item, situation: Situation): readonly Action[] {
@@ -47,7 +47,7 @@ export function actionsOf(item: Item, situation: Situation): readonly Action[] {
       return [LOOK, BUILD, DELETE];
     case "cancelled":
     case "failed":
-      // a spacing that is missing is asked for on the card
+      // the card asks for a missing voxel spacing
       return situation.isUnderstood && !item.asksSpacing
         ? [LOOK, { ...BUILD, label: "Build again" }, DELETE]
         : [DELETE];
@@ -83,19 +83,19 @@ function uploadActions({ upload, hasHandles, isMoving }: Situation): readonly Ac
   if (upload?.doing === "lost")
     return [{ name: "retry", label: "Try now", isPrimary: true }, cancel];
   if (upload !== null || isMoving) return [cancel];
-  const goOn: Action = { name: "go-on", label: "Go on", isPrimary: true };
+  const goOn: Action = { name: "go-on", label: "Continue the upload", isPrimary: true };
   return hasHandles ? [goOn, DELETE] : [DELETE];
 }
 
 const isBuilt = ({ doing }: Item) => doing === "built";
-const openLabel = (item: Item) => (isBuilt(item) ? "Open" : "Look");
+const openLabel = (item: Item) => (isBuilt(item) ? "Open" : "Preview");
 
-/** Whether the settings of an item can still be changed. */
+/** Returns whether the settings of an item can still be changed. */
 export function canChoose({ doing }: Item): boolean {
   return ["understanding", "understood", "failed", "cancelled"].includes(doing);
 }
 
-/** Whether the server has something to say on what an item is. */
+/** Returns whether the server has tried to read an item, and so has a summary or an error. */
 export function isRead({ doing }: Item): boolean {
   return !["uploading", "unpacking", "understanding"].includes(doing);
 }

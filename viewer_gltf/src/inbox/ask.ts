@@ -1,4 +1,4 @@
-/** Asks a person once more before something is lost. */
+/** Asks for confirmation before something is lost. */
 import { element } from "../dom/element";
 
 /** Resolves to whether the person agrees. The focus goes back to where it was. */

@@ -1,4 +1,4 @@
-/** One item on the page. The card stays while its item changes, so that focus and place stay. */
+/** The card of one item on the page. It is updated in place, so that the focus stays when the item changes. */
 import { arrange, element, setText } from "../dom/element";
 import { type Action, type ActionName, actionsOf, canChoose, type Situation } from "./actions";
 import { factsView, notesView, slicesView, summaryOf } from "./facts";
@@ -20,13 +20,13 @@ export type Shown = Readonly<{
   situation: Situation;
   understood: Understood | null;
   limits: Limits;
-  /** The name of what was dropped here: the server reports no name of a file; or empty. */
+  /** Name of the dropped file or folder, which the server does not report; empty: it was dropped elsewhere. */
   ownName: string;
-  /** Whether an action of the person is under way. */
+  /** Whether an action of the user is under way. */
   isBusy: boolean;
-  /** Why the last action was refused; or empty. */
+  /** Why the last action was refused; empty: it was not. */
   fault: string;
-  /** Raised with each new reading: images have the same addresses as before. */
+  /** Number of the reading, which makes the addresses of its images differ from those of earlier readings. */
   reading: number;
 }>;
 
@@ -105,10 +105,10 @@ export class Card {
     this.showActions(actionsOf(item, situation), shown);
   }
 
-  /** Asks for the voxel spacing where the files state none: nothing can be read without. */
+  /** A form for the voxel spacing, for files that state none, because they can't be read without it. */
   private spacingQuestion(): HTMLElement {
     const field = spacingField(`ask-${this.id}`, [], () => undefined);
-    const go = element("button", { type: "submit", className: "primary", textContent: "Go on" });
+    const go = element("button", { type: "submit", className: "primary", textContent: "Continue" });
     const form = element(
       "form",
       { className: "question", noValidate: true, ariaLabel: NAMES.spacing },
@@ -117,7 +117,7 @@ export class Card {
       element("div", { className: "buttons" }, {}, go),
     );
     form.onsubmit = (event) => {
-      event.preventDefault(); // the page's policy lets no form be sent
+      event.preventDefault(); // the page's security policy forbids sending forms
       const spacing_um = field.read();
       if (spacing_um === null) form.querySelector("input")?.focus();
       else if (this.shown !== null) this.calls.choose(this.shown.item, { spacing_um });
@@ -145,7 +145,7 @@ export class Card {
     arrange(this.what, [slices, this.form, about, notesView(understood)]);
   }
 
-  /** A form with other contents in the place of the one before, with the focus where it was. */
+  /** Makes a form with the new contents, and returns the focus to the same setting. */
   private newForm(understood: Understood): HTMLFormElement {
     const focused = document.activeElement;
     const at = this.form?.contains(focused) ? settingOf(focused) : null;
@@ -172,7 +172,7 @@ export class Card {
     this.keepRow.hidden = !builds || !item.hasUpload;
   }
 
-  /** A link where a page opens that is there already; else a button. */
+  /** Makes a link if the action opens an existing page, and a button otherwise. */
   private buttonOf({ name, label, isPrimary = false }: Action, item: Item): HTMLElement {
     let button = this.buttons.get(name);
     if (button === undefined) {
@@ -196,12 +196,12 @@ export class Card {
   }
 }
 
-/** The title of an item, which has none before it is understood. */
+/** Returns the title of an item; until the server has read it, the name of the dropped file. */
 export function titleOf({ title, doing }: Item, ownName: string): string {
   return title || ownName || (doing === "uploading" ? "An upload" : "A new image");
 }
 
-/** A key that no other control of the same form has. */
+/** Returns a key that identifies a control within its form. */
 function settingOf(control: Element | null): string | null {
   if (!(control instanceof HTMLElement)) return null;
   const { setting } = control.dataset;

@@ -1,4 +1,4 @@
-/** The place where images are handed in: dropped, chosen, or named by an address. */
+/** The area of the page where users drop images, choose them, or enter their address. */
 import { element, setText } from "../dom/element";
 import { chosenFiles, type Dropped, droppedFiles } from "./dropped_files";
 
@@ -18,7 +18,7 @@ export class DropZone {
   constructor(private readonly handIn: HandIn) {
     this.root = element(
       "section",
-      { className: "zone", ariaLabel: "Hand in an image" },
+      { className: "zone", ariaLabel: "Add an image" },
       {},
       element("h2", { textContent: "Drop an image here" }),
       element("p", {
@@ -33,19 +33,19 @@ export class DropZone {
     );
   }
 
-  /** @param isFault what is said went wrong */
+  /** @param isFault whether the text reports an error */
   say(text: string, isFault = false): void {
     this.status.classList.toggle("fault", isFault);
     setText(this.status, text);
   }
 
-  /** Takes drops wherever on the page they fall, while `isOpen` says so. */
+  /** Accepts drops anywhere on the page while `isOpen` returns true. */
   listen(isOpen: () => boolean): void {
-    let depth = 0; // each element under the pointer is entered and left by itself
+    let depth = 0; // the browser reports entering and leaving for each nested element
     const mark = () => {
       document.documentElement.dataset.over = String(depth > 0 && isOpen());
     };
-    addEventListener("dragover", (event) => event.preventDefault()); // else the browser opens the file itself
+    addEventListener("dragover", (event) => event.preventDefault()); // otherwise the browser would open the file itself
     addEventListener("dragenter", () => {
       depth++;
       mark();
@@ -66,13 +66,13 @@ export class DropZone {
     });
   }
 
-  /** For those who can't drag. */
+  /** Buttons for users who can't drag a file. */
   private choices(): HTMLElement {
     const input = (choose: string, properties: Partial<HTMLInputElement>) => {
       const made = element("input", { type: "file", hidden: true, ...properties }, { choose });
       made.onchange = () => {
         const files = chosenFiles(made.files ?? []);
-        made.value = ""; // the same files can be chosen again
+        made.value = ""; // so that choosing the same files again is reported
         this.handIn.files({ handles: Promise.resolve([]), files: async () => files });
       };
       return made;
@@ -109,7 +109,7 @@ export class DropZone {
     const add = element("button", { type: "submit", textContent: "Add" });
     const form = element("form", { className: "address", noValidate: true }, {}, label, field, add);
     form.onsubmit = async (event) => {
-      event.preventDefault(); // the page's policy lets no form be sent
+      event.preventDefault(); // the page's security policy forbids sending forms
       const address = field.value.trim();
       if (address === "") {
         this.say("Paste the address of an image first.", true);

@@ -35,12 +35,12 @@ export function factsView(understood: Understood): HTMLElement {
   return element("dl", { className: "facts" }, {}, ...rows);
 }
 
-/** Format and size in one line, for a card that shows no more. */
+/** Format and size in one line, for a card that is collapsed. */
 export function summaryOf({ format, sizeText }: Understood): string {
   return [format, sizeText].filter((part) => part !== "").join(" · ");
 }
 
-/** Labels and texts; what is not known is left out. */
+/** Returns labels with their texts. Unknown values are left out. */
 export function factsOf(understood: Understood): readonly (readonly [string, string])[] {
   const { format, modality, voxels, spacing_um, tiles, bytesEstimate } = understood;
   const built = [
@@ -57,7 +57,7 @@ export function factsOf(understood: Understood): readonly (readonly [string, str
   return rows.filter(([, text]) => text !== "");
 }
 
-/** In mm from a tenth on, as scanners state it; else in the unit that keeps it short. */
+/** Writes a voxel spacing in mm from 0.1 mm on, as scanners do, and in a shorter unit below. */
 export function spacingText(spacing_um: readonly number[]): string {
   if (spacing_um.length !== 3) return "";
   if (Math.max(...spacing_um) < 100) return sizeText(spacing_um);
@@ -65,7 +65,7 @@ export function spacingText(spacing_um: readonly number[]): string {
   return `${texts.join(" × ")} mm`;
 }
 
-/** Notes on contradictions and assumptions, the first few at once. */
+/** Notes on contradictions and assumptions. The first three are visible, and the others can be unfolded. */
 export function notesView({ notes }: Understood): HTMLElement {
   const listOf = (some: readonly string[]) =>
     element("ul", {}, {}, ...some.map((note) => element("li", { textContent: inPageWords(note) })));

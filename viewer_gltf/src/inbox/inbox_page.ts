@@ -1,4 +1,4 @@
-/** The page: items of the server, uploads of this page, and what a person does with them. */
+/** The page of the inbox: the items on the server, the uploads of this page, and the user's actions. */
 import { arrange, element, setText } from "../dom/element";
 import { type ActionName, isRead } from "./actions";
 import { ask } from "./ask";
@@ -13,10 +13,10 @@ import { Upload } from "./upload";
 import { type NamedFile, UploadFiles } from "./upload_files";
 import { deletionWords, refusalOf, stateName, wordsOf } from "./words";
 
-/** Time after which bytes that arrived count as an upload of another page no longer, ms. */
+/** Time without new bytes after which another page's upload counts as abandoned, ms. */
 const MOVING_MS = 4000;
 
-/** The facts on an item that the page keeps itself, since the server does not send them. */
+/** Facts on an item that this page remembers, because the server does not send them. */
 type Memory = {
   card: Card;
   understood: Understood | null;
@@ -25,10 +25,10 @@ type Memory = {
   asked: number;
   isBusy: boolean;
   fault: string;
-  /** The last state that was reported aloud. */
+  /** The last state that was reported to screen readers. */
   said: string;
   bytes: number;
-  /** When bytes last arrived, ms; 0: never while this page is open. */
+  /** Time at which bytes last arrived, ms; 0: none have since this page opened. */
   moved_ms: number;
 };
 
@@ -36,7 +36,7 @@ export class InboxPage {
   private state: InboxState | null = null;
   private readonly memories = new Map<string, Memory>();
   private readonly uploads = new Map<string, Upload>();
-  /** The name of what was dropped on this page, by item. */
+  /** Names of the files or folders that were dropped on this page, by item. */
   private readonly names = new Map<string, string>();
   private running: Promise<void> = Promise.resolve();
   private withHandles: ReadonlySet<string> = new Set();
@@ -47,7 +47,7 @@ export class InboxPage {
   private readonly noAnswer = element("p", {
     className: "no-answer",
     role: "alert",
-    textContent: "The server does not answer. This page goes on trying.",
+    textContent: "The server does not answer. This page keeps trying.",
     hidden: true,
   });
   private readonly aloud = element("p", { className: "aloud", role: "status" }, { aloud: "" });
@@ -103,12 +103,12 @@ export class InboxPage {
     for (const upload of this.uploads.values()) act(upload);
   }
 
-  // Files and addresses that people hand in
+  // Files and addresses that users add
 
   private async take(dropped: Dropped): Promise<void> {
     try {
       const found = await dropped.files((count) =>
-        this.zone.say(`Looking at the files: ${count} so far.`),
+        this.zone.say(`Listing the files: ${count} so far.`),
       );
       await this.begin(found, await dropped.handles);
     } catch (error) {
@@ -150,15 +150,18 @@ export class InboxPage {
     await this.learnHandles();
   }
 
-  /** Whether the server has taken it. */
+  /** Sends an address to the server. Returns whether the server has accepted it. */
   private async takeAddress(address: string): Promise<boolean> {
-    this.zone.say("Handing the address in.");
+    this.zone.say("Sending the address to the server.");
     try {
       await this.server.addAddress(address);
       this.zone.say("");
       return true;
     } catch (error) {
-      this.zone.say(faultOf(error, "The address can't be handed in."), true);
+      this.zone.say(
+        faultOf(error, "The address could not be sent to the server. Try again."),
+        true,
+      );
       return false;
     }
   }
@@ -175,12 +178,12 @@ export class InboxPage {
     else if (action !== "open") await this.busy(item, () => this.server.command(item.id, action));
   }
 
-  /** Opens the view in a tab of its own: uploads end with this page. */
+  /** Opens the view in another tab, because uploads end when this page is left. */
   private async look(item: Item): Promise<void> {
-    const tab = open("about:blank", "_blank"); // later the browser would take it for a pop-up
+    const tab = open("about:blank", "_blank"); // a tab that is opened later would be blocked as a pop-up
     if (tab !== null) {
-      tab.document.title = "Look · StereoCell";
-      tab.document.body.textContent = "The first look is prepared.";
+      tab.document.title = "Preview · StereoCell";
+      tab.document.body.textContent = "The preview is being prepared.";
     }
     await this.busy(item, async () => {
       try {
@@ -200,7 +203,7 @@ export class InboxPage {
     const isGone = await this.busy(item, () => this.server.remove(item.id));
     if (!isGone) return;
     await forgetHandles(item.id);
-    this.heading.focus(); // the card goes, and the focus with it
+    this.heading.focus(); // the focus would be lost with the deleted card
   }
 
   private async goOn(item: Item): Promise<void> {
@@ -220,7 +223,7 @@ export class InboxPage {
     this.render();
   }
 
-  /** Runs a request, while the buttons of the item rest. Returns whether it has succeeded. */
+  /** Runs a request while the buttons of the item are disabled. Returns whether the request has succeeded. */
   private async busy(item: Item, request: () => Promise<void>): Promise<boolean> {
     const memory = this.memoryOf(item);
     memory.isBusy = true;
@@ -263,8 +266,8 @@ export class InboxPage {
     setText(
       this.empty,
       state.mayUpload
-        ? "Nothing is here yet. What you drop shows up here."
-        : "Nothing can be looked at yet. Images show up here once somebody has handed them in.",
+        ? "There are no images yet. Images that you drop appear here."
+        : "There are no images yet. Images appear here once somebody has uploaded them.",
     );
     const newestFirst = state.items.toReversed();
     arrange(
@@ -305,18 +308,18 @@ export class InboxPage {
     return doing !== "uploading" || upload === undefined ? null : upload.progress;
   }
 
-  /** Fetches what was understood of an item. */
+  /** Fetches the summary of an item. */
   private async learn(item: Item, memory: Memory): Promise<void> {
     memory.asked = memory.reading;
     try {
       memory.understood = await this.server.understood(item.id);
     } catch (error) {
-      if (!(error instanceof RefusedError)) throw error; // what failed to be read has no answer
+      if (!(error instanceof RefusedError)) throw error; // the server has no summary of an image that it could not read
     }
     this.render();
   }
 
-  /** Reports a new state to screen readers, and no progress. */
+  /** Reports a new state to screen readers, but not each step of its progress. */
   private sayAloud(item: Item, memory: Memory, state: string, words: string): void {
     if (state === memory.said) return;
     const isFirst = memory.said === "";
@@ -325,7 +328,7 @@ export class InboxPage {
   }
 }
 
-/** The folder or file that was dropped; of several, the first and how many. */
+/** Returns the name of the dropped folder or file; if there are several, of the first one, and how many more there are. */
 function nameOf({ files }: UploadFiles): string {
   const tops = [...new Set(files.map(({ name }) => name.split("/")[0]))];
   return tops.length === 1 ? tops[0] : `${tops[0]} and ${tops.length - 1} more`;

@@ -5,32 +5,32 @@ import { inPageWords } from "./page_words";
 
 export type Doing = (typeof ITEM_STATES)[number];
 
-/** One specimen that was handed in: dropped files, or an address. */
+/** One image that was added to the inbox, as files or as an address. */
 export type Item = Readonly<{
   id: string;
   title: string;
   doing: Doing;
-  /** Why it has failed, or what is worth knowing; or empty. */
+  /** Reason of a failure, or another message of the server; empty: there is none. */
   line: string;
-  /** Bytes of the upload that have arrived, and all. */
+  /** Number of bytes that have arrived, and of all bytes of the upload. */
   bytes: number;
   total: number;
   /** Whether the server reads another item first. */
   waits: boolean;
-  /** From 1 in the queue of builds; 0: it is not in the queue. */
+  /** Position in the queue of builds, from 1; 0: the item is not in the queue. */
   place: number;
-  /** How much of the build is done, 0..1. */
+  /** Finished share of the build, 0..1. */
   share: number;
   /** The running part of the build, as `units`; or empty. */
   label: string;
   /** Tiles that have their surfaces, and all tiles. */
   tiles: number;
   allTiles: number;
-  /** s until the end of the build; null: not known. */
+  /** Time until the end of the build, s; null: not known. */
   left_s: number | null;
-  /** The folder below this page where it can be looked at; or empty. */
+  /** Folder of the item's view, below this page; empty: it has none. */
   page: string;
-  /** Whether the files state no voxel spacing, so that a person has to. */
+  /** Whether the files state no voxel spacing, so that the user has to enter it. */
   asksSpacing: boolean;
   hasUpload: boolean;
   keepsUpload: boolean;
@@ -56,7 +56,7 @@ export type InboxState = Readonly<{
 
 type Found = Readonly<Record<string, unknown>>;
 
-/** Reads a message of the server; null: it is none that this page knows. */
+/** Reads a message of the server; null: this page does not know such messages. */
 export function readInboxState(text: string): InboxState | null {
   let found: Found;
   try {
@@ -99,12 +99,12 @@ function readItem(found: Found): Item | null {
     left_s: typeof found.left_s === "number" ? found.left_s : null,
     page: pageOf(found.page),
     asksSpacing: found.asks === "spacing_um",
-    hasUpload: found.has_upload === true && found.total !== 0, // of an address there is none
+    hasUpload: found.has_upload === true && found.total !== 0, // an address has no size
     keepsUpload: found.keep_upload === true,
   };
 }
 
-/** A folder of an item's own; empty: the text leads elsewhere. */
+/** Returns the folder of an item; empty: the text leads to another place, and is ignored. */
 export function pageOf(found: unknown): string {
   const page = textOf(found);
   return /^items\/[\w-]+\/([\w-]+\/)*$/.test(page) ? page : "";

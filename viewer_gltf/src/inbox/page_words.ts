@@ -1,15 +1,15 @@
 /**
- * Lines of the readers in words of this page. Pure.
+ * Adapts messages of the readers to this page. Pure.
  *
- * A line may name a setting by its flag on the command line, as `--spacing-um z,y,x`. The page has fields for some of
- * them, and names these. A flag without a field is named with the command that takes it.
+ * A message may name a setting by its flag on the command line, such as `--spacing-um z,y,x`. If this page has a field
+ * for the setting, the field's name replaces the flag. Other flags are shown with the command that takes them.
  */
 import { BACKGROUNDS, NAMES, PRESETS } from "./setting_names";
 
-/** How a field and one of its values are named; `value` is empty where the flag stands by itself. */
+/** Returns the name of a field with one of its values; `value` is empty if the flag has none. */
 type Namer = (value: string) => string;
 
-/** A setting's name alone: a value in a line is a form for the command line, as `z,y,x`, or a placeholder. */
+/** Names a setting without its value, which only has a form for the command line, such as `z,y,x`. */
 const alone =
   (name: string): Namer =>
   () =>
@@ -31,7 +31,7 @@ const FIELDS: Readonly<Record<string, Namer>> = {
 const quoted = (name: string) => `"${name}"`;
 const isPlaceholder = (value: string) => value === "" || /^[A-Z]+$/.test(value);
 
-/** Values that stand after a flag in lines: lengths, numbers, axes, placeholders and a few words. */
+/** Values that may follow a flag in messages: lengths, numbers, axes, placeholders and a few words. */
 const VALUE = [
   "\\d+=[^\\s`;,)]+",
   "\\.(?= )",
@@ -42,7 +42,7 @@ const VALUE = [
   ...["list", "intensity", "hounsfield", ...Object.keys(PRESETS)],
 ].join("|");
 const FLAG = `--[a-z][a-z-]*(?: (?:${VALUE})(?![\\w-]))?`;
-/** Flags that follow each other, with the command or the quotes around them. */
+/** Flags that follow one another, with the command before them or the quotes around them. */
 const FLAGS = new RegExp(`(?<![\\w-])(stereocell [a-z]+ |\`)?(${FLAG}(?: ${FLAG})*)\`?`, "g");
 
 export function inPageWords(line: string): string {

@@ -1,11 +1,11 @@
-/** The server's side of the inbox: one function for each request. */
+/** The requests of the inbox to the server, one method for each. */
 
 import { pageOf, positive, textOf } from "./inbox_state";
 import { inPageWords } from "./page_words";
 import { readUnderstood, type Understood } from "./understood";
 import type { NamedFile, UploadFiles } from "./upload_files";
 
-/** The server has refused a request, and says why in one line. */
+/** Error of a request that the server has refused. Its message is the server's reason in one line. */
 export class RefusedError extends Error {
   override name = "RefusedError";
 
@@ -17,7 +17,7 @@ export class RefusedError extends Error {
   }
 }
 
-/** Settings that a person changes; the others stay as they are. */
+/** Settings that the user has changed. Absent settings stay as they are. */
 export type Choices = Readonly<
   Partial<{
     preset: string;
@@ -32,14 +32,14 @@ export type Choices = Readonly<
 
 export type Command = "pause" | "continue" | "cancel";
 
-/** How far an upload has come. */
+/** Progress of an upload. */
 export type Begun = Readonly<{ id: string; offset: number }>;
-/** The answer to a piece. `offset`: how far the server has got; null: it does not say. */
+/** The answer to a piece. `offset` is the number of bytes that have arrived; null: the server does not state it. */
 export type PieceAnswer = Readonly<{ status: number; offset: number | null; line: string }>;
 
-/** Characters of a line that is shown. */
+/** Largest length of a message of the server, characters. */
 const LONGEST = 600;
-/** Time after which a request that answers nothing counts as lost, ms. */
+/** Time after which a request without an answer counts as lost, ms. */
 const PATIENCE_MS = 30_000;
 
 export class Server {
@@ -49,7 +49,7 @@ export class Server {
     private readonly request: typeof fetch = (...given) => fetch(...given),
   ) {}
 
-  /** Begins an upload, or finds the unfinished one of the same files. */
+  /** Starts an upload, or finds the unfinished upload of the same files. */
   async begin(files: UploadFiles): Promise<Begun> {
     const content = { files: files.list, mark: await files.mark() };
     return begunOf(await this.json("POST", "items", content));
@@ -87,7 +87,7 @@ export class Server {
     await this.json("DELETE", `items/${id}`);
   }
 
-  /** Rejects where the connection is lost, or `signal` says so. */
+  /** Sends a piece. Rejects if the connection is lost or `signal` is aborted. */
   async sendPiece(
     id: string,
     offset: number,
@@ -101,7 +101,7 @@ export class Server {
     return this.ask(`items/${id}/bytes`, { method: "PATCH", headers, body: piece, signal });
   }
 
-  /** How far an upload has got. */
+  /** Asks for the number of bytes that have arrived. */
   async askOffset(id: string, signal: AbortSignal): Promise<PieceAnswer> {
     return this.ask(`items/${id}/bytes`, { method: "HEAD", signal });
   }
@@ -147,21 +147,21 @@ function begunOf(answer: unknown): Begun {
   return { id: textOf(id), offset: positive(offset, 0) };
 }
 
-/** Why the server has refused, by its own words or by the status alone. */
+/** Returns the server's reason for a refusal or, if it gives none, the HTTP status. */
 async function lineOf(answer: Response): Promise<string> {
   const text = await answer.text().catch(() => "");
   try {
     const { line } = JSON.parse(text) as { line?: unknown };
     if (typeof line === "string" && line !== "") return inPageWords(line);
   } catch {
-    // the server's lowest layer answers with a line of plain text, and a proxy with a page
+    // some errors are one line of plain text, and a proxy may answer with a web page
   }
   const type = answer.headers.get("Content-Type") ?? "";
   if (type.startsWith("text/plain") && text !== "") return text.slice(0, LONGEST);
   return `The server has refused this with status ${answer.status}.`;
 }
 
-/** The first of the files that can no longer be read: changed, moved or removed since it was dropped; or null. */
+/** Returns the first file that can't be read, because it was changed, moved or removed since it was dropped; or null. */
 export async function findUnreadable(files: readonly NamedFile[]): Promise<string | null> {
   for (const { name, file } of files) {
     try {

@@ -9,7 +9,7 @@ export const NAMES = {
   channels: "Channels",
 } as const;
 
-/** Presets in a person's words; the others stand under their own names. */
+/** Names of the presets that people know; other presets appear under their IDs. */
 export const PRESETS: Readonly<Record<string, string>> = {
   cycif: "Confocal or light sheet, thin sections",
   lightsheet: "Light sheet, cleared tissue",
@@ -22,7 +22,7 @@ export const PRESETS: Readonly<Record<string, string>> = {
   none: "Another kind",
 };
 
-/** The names of the ground around the structures of an image. */
+/** Names for the brightness of the background around the structures of an image. */
 export const BACKGROUNDS: Readonly<Record<string, string>> = {
   dark: "Dark",
   bright: "Bright",

@@ -1,4 +1,4 @@
-/** The few settings of an item that matter. Each change is handed on at once. */
+/** The form with the most important settings of an item. Each change is reported at once. */
 import { element } from "../dom/element";
 import type { Choices } from "./server";
 import { BACKGROUNDS, NAMES, PRESETS } from "./setting_names";
@@ -7,7 +7,7 @@ import type { Channel, Choice, Option, Understood } from "./understood";
 
 type OnChange = (choices: Choices) => void;
 
-/** @param name tells the controls of one item from those of another */
+/** @param name prefix of the controls' IDs, which differs between items */
 export function settingsForm(
   understood: Understood,
   name: string,
@@ -15,7 +15,7 @@ export function settingsForm(
 ): HTMLFormElement {
   const { preset, series, background } = understood;
   const form = element("form", { className: "settings", ariaLabel: "Settings" });
-  form.onsubmit = (event) => event.preventDefault(); // the page's policy lets no form be sent
+  form.onsubmit = (event) => event.preventDefault(); // the page's security policy forbids sending forms
   form.append(
     titleField(understood, name, onChange),
     ...select("preset", NAMES.preset, preset && named(preset, PRESETS), name, onChange),
@@ -33,7 +33,7 @@ export function settingsForm(
   return form;
 }
 
-/** Returns whether one form serves two summaries: the form then stays, with its focus and its place. */
+/** Returns whether two summaries need the same form, which then stays on the page with its focus. */
 export function isSameForm(a: Understood, b: Understood): boolean {
   const shape = ({ title, preset, series, background, ...rest }: Understood) =>
     JSON.stringify([
@@ -62,7 +62,7 @@ function titleField({ title }: Understood, name: string, onChange: OnChange): HT
   return field(NAMES.title, input);
 }
 
-/** Nothing where there is nothing to choose. */
+/** Returns a list of options; empty if there are fewer than two to choose from. */
 function select(
   setting: "preset" | "series" | "background",
   label: string,
@@ -106,7 +106,7 @@ function channelField(
   const change = (changed: HTMLInputElement) => {
     const chosen = boxes.filter(({ box }) => box.checked).map(({ box }) => box.value);
     if (chosen.length === 0)
-      changed.checked = true; // an image without a channel is none
+      changed.checked = true; // an image needs at least one channel
     else onChange({ channels: chosen });
   };
   for (const { box } of boxes) box.onchange = () => change(box);
@@ -121,7 +121,7 @@ function channelWords(name: string, channel: Channel | undefined): readonly HTML
   dot.style.setProperty("--color", channel?.color || "transparent");
   const words = [dot, element("span", { textContent: name })];
   if (channel !== undefined && !channel.hasSurface) {
-    words.push(element("small", { textContent: "volume alone" }));
+    words.push(element("small", { textContent: "volume only" }));
   }
   return words;
 }

@@ -1,10 +1,10 @@
-/** The summary of an item that the server makes before anything heavy runs. Pure. */
+/** The summary of an item, which the server makes before any long computation. Pure. */
 import { positive, textOf } from "./inbox_state";
 
 export type Channel = Readonly<{
   id: string;
   name: string;
-  /** #rrggbb; empty: none. */
+  /** Colour as #rrggbb; empty: none is known. */
   color: string;
   hasSurface: boolean;
 }>;
@@ -25,14 +25,14 @@ export type Understood = Readonly<{
   bytesEstimate: number;
   notes: readonly string[];
   channels: readonly Channel[];
-  /** The middle slices: across which axis, the plane's name, and the image below the item's folder. */
+  /** The middle slices: the axis across each, the plane's name, and the image's path in the item's folder. */
   slices: readonly Readonly<{ axis: string; name: string; image: string }>[];
   preset: Choice | null;
   series: Choice | null;
   background: Choice | null;
-  /** x, y, z; empty: it can't be changed. */
+  /** Spacing along x, y, z; empty: it can't be changed. */
   chosenSpacing_um: readonly number[];
-  /** Which channels are built. */
+  /** IDs of the channels that are built. */
   chosenChannels: readonly string[];
   channelOptions: readonly Option[];
 }>;
@@ -88,14 +88,14 @@ function readSlice({ axis, name, image }: Found): Understood["slices"] {
     : [];
 }
 
-/** null: there is nothing to choose. */
+/** Returns null if there is nothing to choose. */
 function readChoice(found: unknown): Choice | null {
   const { value, options } = foundOf(found);
   const read = optionsOf(options);
   return read.length === 0 ? null : { value: textOf(value), options: read };
 }
 
-/** Options are texts, or texts with an id. */
+/** Reads options, each of which is a text, or an object with an ID and a text. */
 function optionsOf(found: unknown): readonly Option[] {
   return listOf(found).map((each) => {
     if (typeof each === "string") return { id: each, text: each };

@@ -1,54 +1,54 @@
 /**
- * Sends the files of one item in pieces. After a lost connection the upload continues by itself where the server has
- * got to, after longer and longer waits.
+ * Sends the files of one item in pieces. After a lost connection the upload waits and then continues by itself from the
+ * bytes that have arrived. Each further wait is longer.
  */
 import { findUnreadable, type PieceAnswer, type Server } from "./server";
 import type { UploadFiles } from "./upload_files";
 
 export type Progress = Readonly<{
-  /** `waiting`: another upload goes first. `lost`: the connection is, and will be tried again. `refused`: for good. */
+  /** `waiting`: another upload is sent first. `lost`: the connection is lost and will be tried again. `refused`: final. */
   doing: "waiting" | "sending" | "lost" | "refused" | "cancelled" | "complete";
   sent: number;
   total: number;
-  /** s until the end; null: not known. */
+  /** Time until the end, s; null: not known. */
   left_s: number | null;
-  /** Why it is lost or refused; or empty. */
+  /** Why the upload is lost or refused; empty: it is neither. */
   line: string;
 }>;
 
-/** Time that a piece should take, s: so often does the progress change, and so little is sent twice. */
+/** Time that a piece should take, s. It is the interval of the progress, and limits what is sent again after a fault. */
 const PIECE_S = 1.5;
 const FIRST_BYTES = 2 ** 20;
 const LEAST_BYTES = 2 ** 16;
-/** Time after which a lost connection is tried again, ms: first, and at most. */
+/** Shortest and longest wait before a lost connection is tried again, ms. */
 const FIRST_WAIT_MS = 500;
 const MOST_WAIT_MS = 30_000;
-/** How much the last piece counts in the mean rate, 0..1. */
+/** Weight of the last piece in the mean rate, 0..1. */
 const NEWEST_SHARE = 0.2;
 
 /**
- * Bytes of the stream from `start`, by reference. They are read once before they are sent, so that the files are open
- * by then, and a file that can't be read is told from a lost connection. (What is in memory travels ten times slower
- * in Chromium, as an array.)
+ * A piece of the stream from `start` to `end`. `content` refers to the bytes and does not copy them. The piece is read
+ * once before it is sent. A file that can't be read is thus noticed, and not mistaken for a lost connection. (Sending
+ * the bytes as an array in memory is ten times slower in Chromium.)
  */
 type Piece = Readonly<{ start: number; end: number; content: Blob; isReadable: Promise<boolean> }>;
 
-/** Statuses that pass: the server is busy, full or starts again. */
+/** Returns whether a status is temporary: the server is busy, full or restarting. */
 const isPassing = (status: number) => status >= 500 || status === 408 || status === 429;
 
 export class Upload {
   private pieceBytes = FIRST_BYTES;
-  /** Mean bytes a second; null: nothing was sent yet. */
+  /** Mean rate in bytes per second; null: nothing was sent yet. */
   private rate: number | null = null;
-  /** The piece after the one that is being sent: a folder's many files take time to open. */
+  /** The next piece. It is prepared while the current one is sent, because many files take time to open. */
   private next: Piece | null = null;
   private wait_ms = FIRST_WAIT_MS;
   private readonly cancelled = new AbortController();
-  /** Ends the request or the wait that is under way; the upload goes on. */
+  /** Ends the current request or wait, without ending the upload. */
   private interruption = new AbortController();
   private state: Progress;
 
-  /** @param offset bytes that the server has already */
+  /** @param offset number of bytes that the server already has */
   constructor(
     readonly id: string,
     private readonly files: UploadFiles,
@@ -68,7 +68,7 @@ export class Upload {
     return ["refused", "cancelled", "complete"].includes(this.state.doing);
   }
 
-  /** Stops sending. What has arrived stays on the server until the item is deleted. */
+  /** Stops sending. The bytes that have arrived stay on the server until the item is deleted. */
   cancel(): void {
     this.cancelled.abort();
     this.tell({ doing: "cancelled", left_s: null });
@@ -79,12 +79,12 @@ export class Upload {
     if (this.state.doing === "lost") this.interruption.abort();
   }
 
-  /** The browser has no network any more: what is under way can't end. */
+  /** Treats the current request as lost, because the browser is offline. */
   loseConnection(): void {
     if (this.state.doing === "sending") this.interruption.abort();
   }
 
-  /** Resolves when all bytes have arrived, or when the upload has ended in another way. */
+  /** Resolves when all bytes have arrived, or when the upload was refused or cancelled. */
   async run(): Promise<void> {
     this.tell({ doing: "sending" });
     while (!this.isOver) {
@@ -136,7 +136,7 @@ export class Upload {
     return { start, end, content, isReadable };
   }
 
-  /** Waits, and asks where the server has got to. */
+  /** Waits, and then asks the server how many bytes have arrived. */
   private async recover(): Promise<void> {
     await this.wait(this.wait_ms);
     this.wait_ms = Math.min(MOST_WAIT_MS, 2 * this.wait_ms);
@@ -148,7 +148,7 @@ export class Upload {
     } else if (!isPassing(answer.status)) this.refuse(answer.line || "The upload was deleted.");
   }
 
-  /** The answer; null: the connection is lost. */
+  /** Returns the answer of the server; null: the connection is lost. */
   private async attempt(
     request: (signal: AbortSignal) => Promise<PieceAnswer>,
   ): Promise<PieceAnswer | null> {
@@ -176,7 +176,7 @@ export class Upload {
   private measure(bytes: number, took_s: number): void {
     const rate = bytes / Math.max(took_s, 1e-3);
     this.rate = this.rate === null ? rate : this.rate + NEWEST_SHARE * (rate - this.rate);
-    // it grows by at most twice: the first answer says little
+    // pieces grow to at most twice their size, because a single answer is a poor estimate of the rate
     const wanted = Math.min(rate * PIECE_S, 2 * this.pieceBytes);
     this.pieceBytes = Math.max(LEAST_BYTES, Math.round(wanted));
   }

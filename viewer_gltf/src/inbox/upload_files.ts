@@ -1,9 +1,9 @@
-/** The files of one upload: one stream of bytes, in the order of their names, and pieces of it. Pure. */
+/** The files of one upload, sorted by name, as one stream of bytes that is sent in pieces. Pure. */
 
-/** A file with its name in the upload: with folders, between slashes. */
+/** A file with its name in the upload, which contains its folders, separated by slashes. */
 export type NamedFile = Readonly<{ name: string; file: Blob }>;
 
-/** Files that operating systems leave in folders, and that belong to no image. */
+/** Files that operating systems leave in folders, and that are not parts of an image. */
 const LEFT_BY_SYSTEM = /^(\.DS_Store|Thumbs\.db|desktop\.ini|\._.*)$/i;
 
 function belongsToImage(name: string): boolean {
@@ -17,7 +17,7 @@ const MARKED_BYTES = 4096;
 
 export class UploadFiles {
   readonly files: readonly NamedFile[];
-  /** Where each file begins in the stream, and where the last one ends. */
+  /** Offset of each file in the stream, and the end of the last one. */
   private readonly starts: readonly number[];
 
   /** The order of `files` does not matter: browsers list a folder in any order. */
@@ -32,14 +32,14 @@ export class UploadFiles {
     return this.starts[this.files.length];
   }
 
-  /** Names and bytes, as the server takes them. */
+  /** Names and sizes of the files, in the form that the server expects. */
   get list(): readonly (readonly [string, number])[] {
     return this.files.map(({ name, file }) => [name, file.size]);
   }
 
   /**
-   * A hash of samples of the bytes, hexadecimal: files of the same names and sizes, as of two patients, must not be
-   * taken for one another when an upload goes on.
+   * Returns a hash of samples of the bytes, hexadecimal. Files of two patients may have the same names and sizes, and
+   * must not be confused when an upload continues.
    */
   async mark(): Promise<string> {
     const count = Math.min(MARKED_FILES, this.files.length);
@@ -53,14 +53,14 @@ export class UploadFiles {
   }
 
   /**
-   * The files that the bytes from `start` to `end` lie in, from the first to before the last. An empty file has no
-   * bytes, so it lies in no piece.
+   * Returns the files that contain the bytes from `start` up to, but not including, `end`. Empty files are never
+   * returned.
    */
   filesIn(start: number, end: number): readonly NamedFile[] {
     return this.partsIn(start, end).map(({ index }) => this.files[index]);
   }
 
-  /** The bytes from `start` to `end`, by reference: nothing is read yet. */
+  /** Returns the bytes from `start` to `end` by reference, without reading them. */
   piece(start: number, end: number): Blob {
     const parts = this.partsIn(start, end).map(({ index, from, to }) => {
       const { file } = this.files[index];
@@ -81,7 +81,7 @@ export class UploadFiles {
     return parts;
   }
 
-  /** The last file that begins at or before a byte, by bisection: a folder of OME-Zarr has 100 000 files. */
+  /** Returns the last file that begins at or before a byte. Bisection is fast enough for 100 000 files of OME-Zarr. */
   private fileAt(byte: number): number {
     let [low, high] = [0, this.files.length];
     while (low + 1 < high) {

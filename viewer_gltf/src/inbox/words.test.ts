@@ -29,11 +29,11 @@ describe("bytes", () => {
   ])("%d are %s", (bytes, text) => expect(bytesText(bytes)).toBe(text));
 });
 
-it("says that an image waits for the one before it", () => {
+it("shows that an image waits for the one before it", () => {
   const waiting = item({ doing: "understanding", waits: true });
   expect(stateName(waiting, null, false)).toBe("Waiting");
   expect(wordsOf(waiting, null, false, LIMITS)).toBe(
-    "It waits until the image before it has been read.",
+    "This image waits until the image before it has been read.",
   );
 });
 
@@ -41,10 +41,13 @@ describe("the words for an upload of this page", () => {
   it.each([
     [{}, "312 MB of 1.2 GB. Keep this page open."],
     [{ left_s: 41 }, "312 MB of 1.2 GB, about 45 s left. Keep this page open."],
-    [{ doing: "waiting" }, "It waits for the upload before it. 312 MB of 1.2 GB have arrived."],
+    [
+      { doing: "waiting" },
+      "This upload waits for the one before it. 312 MB of 1.2 GB have arrived.",
+    ],
     [
       { doing: "lost" },
-      "The connection is lost. 312 MB of 1.2 GB are safe; the page goes on by itself as soon as it can.",
+      "The connection is lost. 312 MB of 1.2 GB are safe. The page continues by itself as soon as it can.",
     ],
     [{ doing: "refused", line: "The disk is full." }, "The disk is full."],
   ] as const)("%o", (changes, words) => {
@@ -58,9 +61,9 @@ describe("the words for an item", () => {
       UPLOADING,
       "312 MB of 1.2 GB have arrived. Drop the same files again to go on. An unfinished upload is deleted after 24 hours.",
     ],
-    [item({ doing: "queued", place: 1 }), "It is built next."],
-    [item({ doing: "queued", place: 2 }), "It is built after 1 other."],
-    [item({ doing: "queued", place: 4 }), "It is built after 3 others."],
+    [item({ doing: "queued", place: 1 }), "This image is built next."],
+    [item({ doing: "queued", place: 2 }), "This image is built after 1 other."],
+    [item({ doing: "queued", place: 4 }), "This image is built after 3 others."],
     [
       item({ doing: "building", label: "units", tiles: 1, allTiles: 4, left_s: 400 }),
       "Building surfaces: 1 of 4 tiles, about 7 min left.",
@@ -69,15 +72,15 @@ describe("the words for an item", () => {
     [item({ doing: "building", label: "stage", tiles: 4, allTiles: 4 }), "Writing the stage."],
     [
       item({ doing: "paused", tiles: 1, allTiles: 4 }),
-      "Paused: 1 of 4 tiles. What is finished is kept.",
+      "Paused: 1 of 4 tiles. Finished parts are kept.",
     ],
     [item({ doing: "failed", line: "a.tif: cut off" }), "a.tif: cut off"],
-    [item({ doing: "failed" }), "This can't be read."],
+    [item({ doing: "failed" }), "This image can't be read."],
     [item({ doing: "built" }), "All surfaces are built. The upload is kept."],
     [item({ doing: "built", hasUpload: false }), "All surfaces are built."],
   ])("%o", (shown, words) => expect(wordsOf(shown, null, false, LIMITS)).toBe(words));
 
-  it("tell an upload of another page from one that was left", () => {
+  it("distinguish an upload by another page from an abandoned one", () => {
     expect(wordsOf(UPLOADING, null, true, LIMITS)).toBe(
       "312 MB of 1.2 GB have arrived from another page.",
     );
@@ -86,7 +89,7 @@ describe("the words for an item", () => {
     expect(stateName(UPLOADING, upload({ doing: "lost" }), false)).toBe("No connection");
   });
 
-  it("go with a share where something is measured", () => {
+  it("come with a finished share of the upload or the build", () => {
     expect(shareOf(UPLOADING, null)).toBeCloseTo(0.26);
     expect(shareOf(UPLOADING, upload({ sent: 600e6 }))).toBe(0.5);
     expect(shareOf(item({ doing: "building", share: 0.4 }), null)).toBe(0.4);
@@ -94,7 +97,7 @@ describe("the words for an item", () => {
   });
 });
 
-describe("what a person can do", () => {
+describe("the actions that a user is offered", () => {
   const can = (shown: Item, changes = {}): readonly ActionName[] =>
     actionsOf(shown, {
       ...{ upload: null, mayUpload: true, hasHandles: false, isMoving: false, isUnderstood: false },
@@ -112,7 +115,7 @@ describe("what a person can do", () => {
     [item({ doing: "built", page: VIEW }), ["open", "delete"]],
   ] as const)("%o", (shown, names) => expect(can(shown)).toEqual(names));
 
-  it("depends on what this page and this browser know", () => {
+  it("depend on the files that this page and this browser remember", () => {
     expect(can(UPLOADING)).toEqual(["delete"]);
     expect(can(UPLOADING, { hasHandles: true })).toEqual(["go-on", "delete"]);
     expect(can(UPLOADING, { hasHandles: true, isMoving: true })).toEqual(["delete"]);
@@ -125,7 +128,7 @@ describe("what a person can do", () => {
     }
   });
 
-  it("is to look, and no more, without the right to upload", () => {
+  it("is only to look at images without the right to upload", () => {
     for (const doing of ["understood", "building", "built"] as const) {
       expect(can(item({ doing }), { mayUpload: false })).toEqual([]);
       expect(can(item({ doing, page: VIEW }), { mayUpload: false })).toEqual(["open"]);
@@ -135,10 +138,10 @@ describe("what a person can do", () => {
 
 describe("before a deletion", () => {
   it.each([
-    [UPLOADING, "what has arrived of the upload"],
+    [UPLOADING, "the unfinished upload"],
     [item({ total: 1.2e9 }), "the upload (1.2 GB)"],
-    [item({ total: 1.2e9, page: VIEW }), "the upload (1.2 GB) and the look"],
-    [item({ doing: "building", page: VIEW, hasUpload: false }), "the build, which is stopped"],
+    [item({ total: 1.2e9, page: VIEW }), "the upload (1.2 GB) and the preview"],
+    [item({ doing: "building", page: VIEW, hasUpload: false }), "the unfinished build"],
     [
       item({ doing: "built", total: 1.2e9, page: VIEW }),
       "the upload (1.2 GB) and the built specimen, with its page",
@@ -146,22 +149,22 @@ describe("before a deletion", () => {
     [item({ doing: "failed", hasUpload: false }), "the entry in this list"],
   ])("%o", (shown, what) => {
     expect(deletionWords(shown)).toBe(
-      `This deletes ${what} from the server. Your own files stay as they are. It can't be undone.`,
+      `This deletes ${what} from the server and can't be undone. Your own files stay as they are.`,
     );
   });
 });
 
-describe("files that can't be handed in", () => {
+describe("files that can't be uploaded", () => {
   it.each([
-    [0, 0, /^There is no file in it/],
-    [1001, 10, /1001 files, and this server takes at most 1000/],
-    [3, 2.5e9, /2\.5 GB, and this server takes at most 2\.0 GB/],
+    [0, 0, /^No files were found/],
+    [1001, 10, /1001 files, but this server takes at most 1000/],
+    [3, 2.5e9, /2\.5 GB, but this server takes at most 2\.0 GB/],
   ])("%d files, %d bytes", (files, bytes, words) => {
     expect(refusalOf(files, bytes, LIMITS)).toMatch(words);
   });
 
-  it("are refused before the disk is full, and others are not", () => {
-    expect(refusalOf(1, 1e9, { ...LIMITS, freeBytes: 5e8 })).toMatch(/has 500 MB left/);
+  it("are refused if the disk lacks room, and accepted otherwise", () => {
+    expect(refusalOf(1, 1e9, { ...LIMITS, freeBytes: 5e8 })).toMatch(/has only 500 MB left/);
     expect(refusalOf(1000, 2e9, LIMITS)).toBeNull();
   });
 });

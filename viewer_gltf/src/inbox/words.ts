@@ -1,11 +1,11 @@
-/** States of an item in words. Pure. */
+/** Texts for the state of an item. Pure. */
 import { leftWords, partWords } from "../live/build_state";
 import type { Item, Limits } from "./inbox_state";
 import type { Progress } from "./upload";
 
 const UNITS = ["bytes", "kB", "MB", "GB", "TB"];
 
-/** Bytes for people, as `1.2 GB`. */
+/** Writes a number of bytes with a unit, such as `1.2 GB`. */
 export function bytesText(bytes: number): string {
   const power = bytes < 1000 ? 0 : Math.min(UNITS.length - 1, Math.floor(Math.log10(bytes) / 3));
   const value = bytes / 1000 ** power;
@@ -13,7 +13,7 @@ export function bytesText(bytes: number): string {
   return `${value.toFixed(digits)} ${UNITS[power]}`;
 }
 
-/** A word or two for the state, as a badge shows it. The arguments are those of `wordsOf`. */
+/** Returns the state in a few words, for a badge. The arguments are those of `wordsOf`. */
 export function stateName(
   { doing, place, waits }: Item,
   upload: Progress | null,
@@ -39,10 +39,10 @@ export function stateName(
 }
 
 /**
- * The state in a sentence.
+ * Returns the state in a sentence.
  *
- * @param upload the upload that this page runs; null: it runs none
- * @param isMoving whether bytes arrive from elsewhere
+ * @param upload the upload of this item by this page; null: this page does not upload it
+ * @param isMoving whether another page is uploading the item
  */
 export function wordsOf(
   item: Item,
@@ -50,7 +50,7 @@ export function wordsOf(
   isMoving: boolean,
   { hours }: Pick<Limits, "hours">,
 ): string {
-  if (item.waits) return "It waits until the image before it has been read.";
+  if (item.waits) return "This image waits until the image before it has been read.";
   switch (item.doing) {
     case "uploading":
       if (upload !== null) return uploadWords(upload);
@@ -64,17 +64,17 @@ export function wordsOf(
     case "understanding":
       return "The image is being read. This takes a few seconds.";
     case "understood":
-      return item.line || "Look at it now, or check the settings and build it.";
+      return item.line || "Open a preview, or check the settings and build the image.";
     case "failed":
-      return item.line || "This can't be read.";
+      return item.line || "This image can't be read.";
     case "queued":
       if (item.place > 1)
-        return `It is built after ${item.place - 1} other${plural(item.place - 1)}.`;
-      return "It is built next.";
+        return `This image is built after ${item.place - 1} other${plural(item.place - 1)}.`;
+      return "This image is built next.";
     case "building":
       return `${partWords(item.label)}${item.label === "units" ? tilesText(item) : ""}${leftWords(item.left_s)}.`;
     case "paused":
-      return `Paused${tilesText(item)}. What is finished is kept.`;
+      return `Paused${tilesText(item)}. Finished parts are kept.`;
     case "cancelled":
       return "The build was cancelled.";
     case "built":
@@ -100,9 +100,9 @@ function uploadWords({ doing, sent, total, left_s, line }: Progress): string {
   const arrived = arrivedText({ bytes: sent, total });
   switch (doing) {
     case "waiting":
-      return `It waits for the upload before it. ${arrived} have arrived.`;
+      return `This upload waits for the one before it. ${arrived} have arrived.`;
     case "lost":
-      return `${line || "The connection is lost."} ${arrived} are safe; the page goes on by itself as soon as it can.`;
+      return `${line || "The connection is lost."} ${arrived} are safe. The page continues by itself as soon as it can.`;
     case "refused":
       return line;
     case "cancelled":
@@ -114,41 +114,41 @@ function uploadWords({ doing, sent, total, left_s, line }: Progress): string {
   }
 }
 
-/** How much of the upload or the build is done, 0..1; null: nothing that can be measured is under way. */
+/** Returns the finished share of the upload or the build, 0..1; null: neither of them is under way. */
 export function shareOf(item: Item, upload: Progress | null): number | null {
   const { doing, bytes, total, share } = item;
   if (doing === "uploading") return total > 0 ? Math.max(bytes, upload?.sent ?? 0) / total : 0;
   return doing === "building" || doing === "paused" ? share : null;
 }
 
-/** What is lost if an item is deleted, as the question before says it. */
+/** Returns the text of the question before an item is deleted: it lists everything that would be lost. */
 export function deletionWords({ doing, hasUpload, total, page }: Item): string {
   const upload = total > 0 ? `the upload (${bytesText(total)})` : "the upload";
   const parts = [
-    ...(doing === "uploading" ? ["what has arrived of the upload"] : hasUpload ? [upload] : []),
+    ...(doing === "uploading" ? ["the unfinished upload"] : hasUpload ? [upload] : []),
     ...(doing === "built"
       ? ["the built specimen, with its page"]
       : doing === "building" || doing === "paused" || doing === "queued"
-        ? ["the build, which is stopped"]
+        ? ["the unfinished build"]
         : page === ""
           ? []
-          : ["the look"]),
+          : ["the preview"]),
   ];
   const what = parts.length === 0 ? "the entry in this list" : parts.join(" and ");
-  return `This deletes ${what} from the server. Your own files stay as they are. It can't be undone.`;
+  return `This deletes ${what} from the server and can't be undone. Your own files stay as they are.`;
 }
 
-/** Why these files can't be handed in; null: nothing speaks against it. */
+/** Returns why these files can't be uploaded; null: they can. */
 export function refusalOf(files: number, bytes: number, limits: Limits): string | null {
-  if (files === 0) return "There is no file in it. Drop the files or the folder of one image.";
+  if (files === 0) return "No files were found. Drop the files or the folder of one image.";
   if (files > limits.files) {
-    return `These are ${files} files, and this server takes at most ${limits.files} at once. Zip the folder, and drop that.`;
+    return `The image has ${files} files, but this server takes at most ${limits.files} at once. Zip the folder and drop the zip file.`;
   }
   if (bytes > limits.bytes) {
-    return `These are ${bytesText(bytes)}, and this server takes at most ${bytesText(limits.bytes)} at once.`;
+    return `The image has ${bytesText(bytes)}, but this server takes at most ${bytesText(limits.bytes)} at once.`;
   }
   if (bytes > limits.freeBytes) {
-    return `These are ${bytesText(bytes)}, and the server has ${bytesText(limits.freeBytes)} left. Delete what is no longer needed.`;
+    return `The image has ${bytesText(bytes)}, but the server has only ${bytesText(limits.freeBytes)} left. Delete images that are no longer needed.`;
   }
   return null;
 }

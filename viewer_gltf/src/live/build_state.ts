@@ -1,4 +1,4 @@
-/** What a server reports of the build behind the page. Pure. */
+/** The state of the build behind the page, as the server reports it. Pure. */
 
 import { BUILD_STATES } from "../bundle/generated/build_states";
 
@@ -58,7 +58,7 @@ export function readBuildState(text: string): BuildState | null {
   };
 }
 
-/** The parts of a build, in words of a person who looks on. */
+/** Names of the parts of a build, for users. */
 const PARTS: Readonly<Record<string, string>> = {
   windows: "Finding windows",
   evidence: "Looking for surfaces",
@@ -82,11 +82,11 @@ export function wordsOf(state: BuildState, isShown: boolean): string {
     case "queued":
       return `Waiting for ${state.place > 1 ? "other builds" : "its build to begin"}.`;
     case "failed":
-      return `The build has stopped${state.line === "" ? "" : `: ${state.line}`}. The picture stays.`;
+      return `The build has stopped${state.line === "" ? "" : `: ${state.line}`}. The view stays as it is.`;
     case "cancelled":
-      return "The build was cancelled. What is finished is kept.";
+      return "The build was cancelled. Finished parts are kept.";
     case "deleted":
-      return "It was deleted, or its time is over. The picture stays until this page is closed.";
+      return "This image was deleted, or its storage time is over. The view stays until this page is closed.";
     case "complete":
       return isShown ? "Complete: all surfaces are built." : "Built. Opening the surfaces.";
     case "paused":

@@ -1,9 +1,9 @@
-/** A slim line at the foot of the page: how far the build is, and buttons that pause and end it. */
+/** A slim line at the bottom of the page with the build's progress, and with buttons to pause and cancel it. */
 import { element, setText } from "../dom/element";
 import type { Command } from "./build_feed";
 import { type BuildState, wordsOf } from "./build_state";
 
-const GONE = "The server does not answer: the picture stays, and the page goes on trying.";
+const GONE = "The server does not answer. The view stays, and this page keeps trying.";
 
 export class ProgressLine {
   private readonly fill = element("div", { className: "fill" });
@@ -15,10 +15,10 @@ export class ProgressLine {
     { live: "dismiss" },
   );
   private readonly root: HTMLElement;
-  /** The state at which a person has put the line away; empty: nobody has. */
+  /** The state in which the user has dismissed the line; empty: the line is not dismissed. */
   private dismissed = "";
 
-  /** @param parent holds the line as long as there is something to report */
+  /** @param parent contains the line while there is something to report */
   constructor(
     private readonly parent: HTMLElement,
     onCommand: (command: Command) => void,

@@ -38,8 +38,8 @@ export const AXIS_COLORS = ["#e8743b", "#35b98c", "#6cb8f0"] as const;
 
 /** Radii of marks in a headset, radians. */
 export const HANDLE_RADIUS = 0.7 * RADIANS;
-/** Size of a handle that is meant or held, as a factor. */
-export const MEANT = 1.35;
+/** Factor by which a handle grows while it is pointed at or held. */
+export const HIGHLIGHT_SCALE = 1.35;
 export const POINT_RADIUS = 0.28 * RADIANS;
 export const LINE_RADIUS = 0.06 * RADIANS;
 /** Height of a label's line in a headset, radians. */

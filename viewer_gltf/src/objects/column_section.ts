@@ -1,4 +1,4 @@
-/** The part of a label map's section for one column: its picture, its range, and how it colours. */
+/** The controls for one column of a label map: its picture, the shown range, and the palette if it colours. */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import type { Control, Picture } from "../panel/controls";
 import { ALL_BYTES, type ObjectView, PALETTES, type PaletteName } from "../state/objects";
@@ -26,7 +26,7 @@ const PALETTE_NAMES: Readonly<Record<PaletteName, string>> = {
   diverging: "Blue–red",
 };
 
-/** View of a column that does not colour: grey. */
+/** Colours of the picture of a column that does not colour the objects: one light shade. */
 const GREY = { palette: "cividis", span: [254, 255], isLog: false } as const;
 
 const percent = (bytes: readonly [number, number]) =>
@@ -39,7 +39,11 @@ export class ColumnSection {
     private readonly controls: ObjectControls,
   ) {}
 
-  /** A column's picture, in which what shows is chosen. @param colors whether it is the one that colours */
+  /**
+   * Returns the controls of a column. Its picture also sets which objects are shown.
+   *
+   * @param colors whether this column colours the objects
+   */
   items(column: ObjectColumn, colors: boolean): readonly Control[] {
     const bytes = this.objects.table.bytes(column.id);
     if (bytes === null) return [this.controls.text(`wait-${column.id}`, column.name, "loading …")];
@@ -71,7 +75,7 @@ export class ColumnSection {
     const picture: Picture = {
       kind: "picture",
       id: this.controls.id(`column-${column.id}`),
-      label: `${column.name}: tap one to leave it out`,
+      label: `${column.name}: tap a category to hide its objects`,
       about: column.about,
       height: 0.12 * indices.length,
       version: `${version} ${without} ${page}`,
@@ -187,7 +191,7 @@ export class ColumnSection {
     return {
       kind: "toggle",
       id: this.controls.id("log"),
-      label: "Colours by the logarithm",
+      label: "Logarithmic colours",
       value: this.view.isLog ?? isUsual,
       to: (isLog) => this.controls.change({ isLog }),
     };

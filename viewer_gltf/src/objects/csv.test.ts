@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { objectsCsv } from "./csv";
 import { loadedTable, sampleTable } from "./sample_table";
 
-it("objects are a table with a line each, what is missing empty", async () => {
+it("has a line for each object, with empty fields for missing values", async () => {
   expect(objectsCsv(await loadedTable(), [0, 3, 1])).toBe(
     [
       "label,name,size (um3),type",
@@ -14,11 +14,11 @@ it("objects are a table with a line each, what is missing empty", async () => {
   );
 });
 
-it("no field is a formula", async () => {
+it("keeps a name that looks like a formula as text", async () => {
   expect(objectsCsv(await loadedTable(), [5])).toContain("105,'=1+1,4,");
 });
 
-it("columns that have not come are asked for", () => {
+it("requests the columns that have not loaded", () => {
   const table = sampleTable();
   expect(objectsCsv(table, [0])).toBeNull();
   expect(table.isLoading).toBe(true);

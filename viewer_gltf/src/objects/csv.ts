@@ -1,15 +1,18 @@
-/** Objects as a table for other programs. Pure. */
+/** Writes objects as CSV. Pure. */
 import type { ObjectTable } from "./table";
 
 type Known = Pick<ObjectTable, "columns" | "label" | "title" | "exact">;
 
-/** A field as RFC 4180 has it; one that a spreadsheet would compute stays text. */
+/** Quotes a field by RFC 4180. A text that a spreadsheet would run as a formula gets an apostrophe in front. */
 function field(text: string): string {
   const safe = /^[=+\-@\t\r]/.test(text) && Number.isNaN(Number(text)) ? `'${text}` : text;
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
 
-/** A line a row, in this order; null: a column has not come, and is asked for by that. */
+/**
+ * Returns CSV with a line for each of `rows`, in the given order. Null: a column is still loading; this call
+ * requests all columns that are missing.
+ */
 export function objectsCsv(table: Known, rows: readonly number[]): string | null {
   const columns = table.columns.map((column) => ({ ...column, values: table.exact(column.id) }));
   const head = ["label", "name", ...columns.map(({ id, unit }) => (unit ? `${id} (${unit})` : id))];

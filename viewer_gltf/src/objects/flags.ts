@@ -1,4 +1,4 @@
-/** Which objects show, and how: a byte a row, as the shader reads it. Pure. */
+/** Flags that say whether each object is shown, and how strongly it is lit: one byte for each row. Pure. */
 import { ALL_BYTES, type ObjectView } from "../state/objects";
 
 export const GONE = 0;
@@ -7,10 +7,10 @@ export const NEIGHBOUR = 2;
 export const SELECTED = 3;
 export const PICKED = 4;
 
-/** A column's bytes; null: they have not come. */
+/** Returns a column's bytes; null: they are still loading. */
 type BytesOf = (column: string) => Uint8Array | null;
 
-/** Columns of which a part is left out. */
+/** Returns the IDs of the columns whose filters may hide objects. */
 export function filtered({ ranges, without }: ObjectView): readonly string[] {
   const narrowed = Object.keys(ranges).filter((id) => !isWhole(ranges[id]));
   return [...narrowed, ...Object.keys(without).filter((id) => without[id].length > 0)];
@@ -20,7 +20,7 @@ function isWhole([low, high]: readonly [number, number]): boolean {
   return low <= ALL_BYTES[0] && high >= ALL_BYTES[1];
 }
 
-/** Write a flag a row into `flags`; return how many are left. */
+/** Writes the flag of each row into `flags`, and returns the number of shown objects. */
 export function flag(
   flags: Uint8Array,
   view: ObjectView,

@@ -3,15 +3,15 @@ import { grownFrom, middleOf } from "./gap";
 
 const BOXES = Float32Array.of(9, 9, 9, 9, 9, 9, 0, 10, 20, 4, 16, 30);
 
-it("the middle of a row's box, and its narrowest side", () => {
+it("returns the centre and the shortest edge of an object's box", () => {
   expect(middleOf(BOXES, 1)).toEqual([2, 13, 25, 4]);
 });
 
-it("a ray that meets a place of the object where the given one meets it drawn in", () => {
+it("returns a ray that hits the original object where the given ray hits the shrunk one", () => {
   const ray = { origin: [7, 1, 2], direction: [-1, 2, 3] } as const;
   for (const [gap_um, left] of [
     [0, 1],
-    [1, 0.75], // the narrowest side is shorter by it
+    [1, 0.75], // the box's shortest edge is shorter by the gap
     [2, 0.5],
     [99, 0.2],
   ]) {

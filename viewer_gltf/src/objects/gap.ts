@@ -1,22 +1,26 @@
 /**
- * The gap between objects. Each is drawn smaller towards the middle of its box, so that it keeps its form: moved
- * along its normals a surface folds over wherever it is narrower than the gap. Its narrowest side is shorter by
- * the gap, half of it at either end; two neighbours leave as much between them. One that is so bent that its box's
- * middle lies outside of it may be drawn across its own wall.
+ * The gap between objects. Each object is shrunk towards the centre of its bounding box until the box's shortest
+ * edge is shorter by the gap, half of it at each end. Two neighbours of similar size are then one gap apart.
+ * Shrinking keeps the object's shape. Moving the surface along its normals would fold it over wherever the object
+ * is narrower than the gap. An object that is bent around the centre of its box, such as a horseshoe, may be drawn
+ * across its own original surface.
  */
 import { along, type Ray, type Vec3 } from "../math/vec3";
 
-/** Least share of an object's size that a gap leaves, as in chunks/object_gap.glsl. */
+/** Smallest share of an object's size that is left by a wide gap. chunks/object_gap.glsl has the same limit. */
 const MIN_LEFT = 0.2;
 
-/** The middle of a row's box, and its narrowest side, um. */
+/** Returns the centre (x, y, z) of the box of a row's object, and the box's shortest edge, in um. */
 export function middleOf(boxes: Float32Array, row: number): [number, number, number, number] {
   const [x, y, z, ...high] = boxes.subarray(6 * row, 6 * row + 6);
   const narrowest = Math.min(high[0] - x, high[1] - y, high[2] - z);
   return [(x + high[0]) / 2, (y + high[1]) / 2, (z + high[2]) / 2, narrowest];
 }
 
-/** The ray that meets the object at its own size where the given one, as far along, meets it as it is drawn. */
+/**
+ * Returns a ray through the object at its original size. It hits that object at the same ray parameter at which
+ * the given ray hits the shrunk object that is drawn.
+ */
 export function grownFrom(ray: Ray, boxes: Float32Array, row: number, gap_um: number): Ray {
   const [x, y, z, narrowest] = middleOf(boxes, row);
   const growth = 1 / Math.max(MIN_LEFT, 1 - gap_um / narrowest);

@@ -1,11 +1,11 @@
-/** The keys and the panel's sections of label maps, until and while their tables are there. Pure. */
+/** The keys and the panel's sections of label maps, before and after their tables have loaded. Pure. */
 import type { PartSection, Section } from "../panel/controls";
 import { type KeyGroup, key } from "../panel/key";
 import { labelMapsOf, objectsSection } from "../panel/layout";
 import type { ViewerState } from "../state/viewer_state";
 
 export const OBJECT_COMMANDS = [
-  /** The objects of a label map that are selected, or that show, as a file. */
+  /** Saves the selected objects of each label map as a file, or all shown objects if none is selected. */
   "save-objects",
 ] as const;
 
@@ -13,12 +13,12 @@ declare module "../state/commands" {
   interface CommandNames extends Record<(typeof OBJECT_COMMANDS)[number], true> {}
 }
 
-/** A label map that is shown has its section from the start, so that no row moves when its table has come. */
+/** Contents of the section of a shown label map until its table has loaded, so that later rows do not move. */
 const LOADING: Section["items"] = [
   { kind: "text", id: "objects-loading", label: "Objects", value: "loading …" },
 ];
 
-/** @param made the controls of the label maps whose tables have come, by channel */
+/** @param made controls of the label maps whose tables have loaded, by channel ID */
 export function labelMapSections(
   state: ViewerState,
   made: ReadonlyMap<string, Section["items"]>,
@@ -37,7 +37,7 @@ export const OBJECT_KEYS: readonly KeyGroup[] = [
     name: "Tools",
     rank: 76,
     keys: [
-      key("Insert", "Save the objects that are selected, or that show, as CSV", "save-objects"),
+      key("Insert", "Save the selected objects, or all shown objects, as CSV", "save-objects"),
     ],
   },
 ];

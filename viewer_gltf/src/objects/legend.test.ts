@@ -6,8 +6,8 @@ const [SIZE, TYPE] = sampleContent().columns;
 const VIEW = { palette: "viridis", span: [1, 255], isLog: null } as const;
 const ALL = Uint8Array.of(1, 1, 1, 1);
 
-describe("what the colours of objects mean", () => {
-  it("is a row for each category that shows, and one for those without", () => {
+describe("the legend of objects' colours", () => {
+  it("has a row for each shown category, and one for objects without a category", () => {
     const legend = (flags: Uint8Array) =>
       colorLegend(TYPE, Uint8Array.of(1, 2, 1, 0), flags, VIEW).rows;
     const [tissue, vessel] = [
@@ -30,7 +30,7 @@ describe("what the colours of objects mean", () => {
     expect(rows[10]).toEqual({ colors: [], text: "and 107 more" });
   });
 
-  it("is the palette of numbers, with the values and the unit of its ends", () => {
+  it("has the palette of a column of numbers, with the values and the unit at its ends", () => {
     const bytes = Uint8Array.of(1, 64, 128, 255);
     const even = { ...VIEW, isLog: false };
     const [bar, ...others] = colorLegend(SIZE, bytes, ALL, even).rows;
@@ -38,7 +38,7 @@ describe("what the colours of objects mean", () => {
     expect([bar.colors[0], bar.colors.at(-1)]).toEqual(["#440154", "#fde725"]);
     expect(others).toEqual([]);
     const upper = colorLegend(SIZE, bytes, ALL, { ...VIEW, span: [128, 255] }).rows;
-    expect(upper[0].text).toBe("10 – 100 µm³, by the logarithm");
+    expect(upper[0].text).toBe("10 – 100 µm³, logarithmic");
     const missing = colorLegend(SIZE, Uint8Array.of(0, 1, 1, 1), ALL, even).rows;
     expect(missing[1].text).toBe("(none)");
   });

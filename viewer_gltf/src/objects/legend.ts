@@ -1,4 +1,4 @@
-/** What the colours of objects mean, for a picture that has no panel beside it. Pure. */
+/** The legend of the objects' colours, for saved images and other views without a panel. Pure. */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import type { ColorLegend } from "../host/services";
 import { toHex } from "../math/color";
@@ -6,10 +6,13 @@ import type { ObjectView } from "../state/objects";
 import { byteValue, categoryColor, colorAt, isLogarithmic, MISSING } from "./palettes";
 import { countBytes, NO_CATEGORY, numberText, ROWS_OF_LEGEND, unitText } from "./pictures";
 
-/** Colours that a palette is drawn by. */
+/** Number of colours in the legend's strip of a palette. */
 const PALETTE_COLORS = 17;
 
-/** Of the objects that show: the first categories, and how many more; or the palette, with its ends. */
+/**
+ * Returns the legend of a column for the shown objects. A column of categories lists the first ones and counts the
+ * rest; a column of numbers has its palette with the values at both ends.
+ */
 export function colorLegend(
   column: ObjectColumn,
   bytes: Uint8Array,
@@ -33,7 +36,7 @@ function categoryRows(column: ObjectColumn, left: Uint32Array): ColorLegend["row
   return more === 0 ? rows : [...rows, { colors: [], text: `and ${more} more` }];
 }
 
-/** @param missing how many have no value */
+/** @param missing number of shown objects without a value */
 function numberRows(
   column: ObjectColumn,
   missing: number,
@@ -47,6 +50,6 @@ function numberRows(
   const colors = Array.from({ length: PALETTE_COLORS }, (_, i) =>
     toHex(colorAt(view.palette, i / (PALETTE_COLORS - 1))),
   );
-  const text = isLogarithmic(column, view) ? `${ends}, by the logarithm` : ends;
+  const text = isLogarithmic(column, view) ? `${ends}, logarithmic` : ends;
   return [{ colors, text }, ...none];
 }

@@ -10,7 +10,7 @@ const write = (view: ObjectView, table = TABLE) => writeLinked(view, table).text
 const read = (text: string): ObjectView => ({ ...START_OBJECTS, ...readLinked(text, TABLE) });
 
 describe("objects in a link", () => {
-  it("come back as they went", () => {
+  it("are read back as they were written", () => {
     const view: ObjectView = {
       ...START_OBJECTS,
       colorBy: "size",
@@ -30,7 +30,7 @@ describe("objects in a link", () => {
     expect(read(write(view))).toEqual(view);
   });
 
-  it("go by what is in the table, not by where: another build has other rows and bytes", () => {
+  it("are found by number, value and name, because another build has other rows and bytes", () => {
     const view: ObjectView = {
       ...START_OBJECTS,
       ranges: { size: [64, 255] },
@@ -51,7 +51,7 @@ describe("objects in a link", () => {
     expect(found.picked).toBe(2);
     expect(found.without).toEqual({ type: [2] });
     const [low, high] = found.ranges?.size ?? [];
-    expect(high).toBe(255); // without an end then as now
+    expect(high).toBe(255); // an open end stays open
     const value = (range: ColumnRange | undefined, byte = 0) => range && byteValue(range, byte);
     expect(Math.log(value(others[0].range, low) ?? 0)).toBeCloseTo(
       Math.log(value(column.range, 64) ?? 0),
@@ -59,7 +59,7 @@ describe("objects in a link", () => {
     );
   });
 
-  it("are short where many follow one another, and left out where they are too many", () => {
+  it("are short if their numbers are consecutive, and left out if their list is too long", () => {
     const count = 100_000;
     const table = {
       ...{ count, first: "", column: () => null },
@@ -73,11 +73,11 @@ describe("objects in a link", () => {
     expect(writeLinked(odd, table)).toEqual({ text: "", leftOut: count / 2 });
   });
 
-  it("are nothing as they open, whatever is looked for", () => {
+  it("add no text to a link while the view is the opening one, even during a search", () => {
     expect(write({ ...START_OBJECTS, search: "liver", lasso: [[0, 0]] })).toBe("");
   });
 
-  it("are never more than this table has, whatever the link says", () => {
+  it("are ignored if this table does not have them", () => {
     const texts = [
       ...["", "{", "null", "3", "[]", '"x"'],
       JSON.stringify({

@@ -1,7 +1,7 @@
 /**
- * What a link says of a label map's objects, and what of it this table has: a link is somebody else's text. Objects
- * go by their numbers in the label map, values by the column's own unit, categories by their names: what was built
- * anew has other rows and bytes. Pure.
+ * Writes the view of a label map's objects into a link, and reads it from one. A later build of the same data may have
+ * other rows and bytes. Therefore a link names objects by their numbers in the label map, values in the column's unit
+ * and categories by name. A link is untrusted text: everything that this table does not have is ignored. Pure.
  */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import { ALL_BYTES, type ObjectView, PALETTES, START_OBJECTS } from "../state/objects";
@@ -10,18 +10,21 @@ import type { ObjectTable } from "./table";
 
 /** Widest gap, um, that a link may ask for; the panel's slider is shorter. */
 const WIDEST_UM = 1000;
-/** Longest text of a list of objects, characters: all of a link has 8000. */
+/** Largest length of the text of one list of objects, in characters; a whole link may have 8000. */
 const LONGEST = 2000;
 const LISTS = ["hidden", "only", "selected"] as const;
 
 type Known = Pick<ObjectTable, "count" | "column" | "first" | "label">;
 type Span = readonly [number, number];
-/** First and last of numbers that follow one another. */
+/** First and last of a run of consecutive numbers. */
 type Run = readonly [bigint, bigint];
 
 const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
 
-/** What differs from the start, as text; "": nothing. `leftOut`: objects whose lists are too long for a link. */
+/**
+ * Returns the differences from the opening view as text; "": there are none. `leftOut` counts the objects of lists
+ * that are too long for a link.
+ */
 export function writeLinked(
   view: ObjectView,
   table: Known,
@@ -55,7 +58,7 @@ export function writeLinked(
   return { text: Object.keys(parts).length === 0 ? "" : JSON.stringify(parts), leftOut };
 }
 
-/** Null: without an end there, as the first and last bytes are. */
+/** Returns the values of two bytes. Null stands for an open end, that is, for the first or the last byte. */
 function valuesOf({ range }: ObjectColumn, bytes: Span): readonly (number | null)[] {
   return bytes.map((byte, i) =>
     byte === ALL_BYTES[i] || range === undefined
@@ -64,7 +67,7 @@ function valuesOf({ range }: ObjectColumn, bytes: Span): readonly (number | null
   );
 }
 
-/** As `3-17.20`. */
+/** Writes numbers as runs, such as `3-17.20`. */
 function runs(numbers: bigint[]): string {
   const found: [bigint, bigint][] = [];
   for (const each of numbers.sort((one, other) => (one < other ? -1 : Number(one > other)))) {
@@ -83,7 +86,7 @@ function readRuns(text: unknown): readonly Run[] {
   });
 }
 
-/** The change that brings the view to a link's; what can't be read, or is not here, is left out. */
+/** Returns the change that applies a link's text to the view. Unreadable and unknown entries are ignored. */
 export function readLinked(text: string, table: Known): Partial<ObjectView> {
   const change: { -readonly [K in keyof ObjectView]?: ObjectView[K] } = { linked: "" };
   let given: Record<string, unknown>;

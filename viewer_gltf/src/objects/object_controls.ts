@@ -1,4 +1,4 @@
-/** Makers of the controls in a label map's section: each has an id of the channel, and changes its view of objects. */
+/** Makes the controls of a label map's section. Their IDs contain the channel's, and they change its object view. */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import type { Control, Request } from "../panel/controls";
 import type { ObjectView } from "../state/objects";

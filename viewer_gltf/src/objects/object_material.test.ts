@@ -2,8 +2,8 @@ import { BoxGeometry, SphereGeometry } from "three";
 import { expect, it } from "vitest";
 import { outwards } from "./object_material";
 
-it("a crease does not tear: all vertices in one place of an object go the same way", () => {
-  const box = new BoxGeometry(2, 2, 2); // each corner three times, with the normals of its sides
+it("moves all vertices of an object at one position the same way, so that no crease tears", () => {
+  const box = new BoxGeometry(2, 2, 2); // has each corner three times, once for each side's normal
   const { position } = box.attributes;
   const ways = outwards(box, new Float32Array(position.count));
   for (let i = 0; i < position.count; i++) {
@@ -13,13 +13,13 @@ it("a crease does not tear: all vertices in one place of an object go the same w
   }
 });
 
-it("two objects that touch go each its own way", () => {
+it("moves the vertices of two touching objects separately", () => {
   const box = new BoxGeometry(2, 2, 2);
   const rows = Float32Array.from({ length: 24 }, (_, i) => (i < 4 ? 0 : 1));
   expect([...outwards(box, rows).subarray(0, 3)]).toEqual([127, 0, 0]); // the first side alone
 });
 
-it("where nothing is creased it is the normal", () => {
+it("moves vertices along the normal if the surface has no crease", () => {
   const ball = new SphereGeometry(1, 12, 8);
   const { normal } = ball.attributes;
   const ways = outwards(ball, new Float32Array(normal.count));

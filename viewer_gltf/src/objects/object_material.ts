@@ -1,8 +1,8 @@
 /**
- * What the surfaces of a label map have beside all others: each object has the colour of its value, or is gone.
- * Colouring anew is one upload of a byte an object. Each object is drawn in a little from its walls: two
- * neighbours' common wall would else be two surfaces in one place where a cut looks into them. By a gap it is
- * drawn smaller as a whole, see gap.ts.
+ * The shader parts and textures that colour or hide each object of a label map. Colouring the objects by another
+ * column uploads one byte for each object. Each surface is moved a little into its object. Otherwise the surfaces
+ * of two neighbours would coincide at their interface, which shows where a cut opens them. A gap shrinks each
+ * object as a whole: see gap.ts.
  */
 import {
   BufferAttribute,
@@ -32,14 +32,14 @@ import objectPlace from "./part_chunks/vertex_place.glsl?raw";
 import objectFragment from "./shaders/object_surface.frag.glsl?raw";
 import objectVertex from "./shaders/object_surface.vert.glsl?raw";
 
-/** Vertex attributes, by their names in shaders/object_surface.vert.glsl: the row of its object, in place of the glb's number in the tile. */
+/** Vertex attribute: the object's row in the table. It replaces the glb's feature ID, which counts within a tile. */
 export const ROW = "object_row";
-/** Vertex attribute: the direction out of its object, the same for all vertices in one place. */
+/** Vertex attribute: the direction out of the object, the same for all of its vertices at one position. */
 const OUTWARDS = "object_outwards";
 const FEATURE = "_feature_id_0";
-/** Rows in a line of a texture. */
+/** Number of table rows in one line of a texture. */
 const LINE = 256;
-/** What three's loader makes metres of is um. */
+/** Factor between the metres of a glb and um. */
 const UM_PER_METRE = 1e6;
 
 const CHUNKS = {
@@ -51,8 +51,9 @@ const CHUNKS = {
 const include = (source: string) => includeChunks(source, CHUNKS);
 
 /**
- * Directions out of each object, as signed bytes. At a crease a vertex is there once for each side, with that
- * side's normal: moved along those the surface would tear. An object's vertices lie together.
+ * Returns the direction out of its object for each vertex: three signed bytes, where 127 is 1. At a crease a glb has
+ * one vertex for each side, each with that side's normal, and moving them along these would tear the surface open.
+ * Therefore the normals at one position are averaged. The vertices of one object must follow one another.
  */
 export function outwards({ attributes }: BufferGeometry, rows: Float32Array): Int8Array {
   const { position, normal } = attributes;
@@ -83,7 +84,7 @@ export function outwards({ attributes }: BufferGeometry, rows: Float32Array): In
   return found;
 }
 
-/** Texels of a texture with one a row. */
+/** Number of texels of a texture with one texel for each table row, in full lines. */
 const texelsOf = (count: number) => LINE * Math.max(1, Math.ceil(count / LINE));
 
 function bytesTexture(count: number): DataTexture {
@@ -112,9 +113,9 @@ export class ObjectMaterial {
   readonly part: SurfacePart;
 
   /**
-   * @param boxes six a row, um
-   * @param inset_um by which each object is always drawn in
-   * @param umToRoom as it is when a frame is drawn
+   * @param boxes six values for each row, in um: the smallest x, y, z and the largest
+   * @param inset_um distance by which each surface is moved into its object
+   * @param umToRoom matrix from um to the scene; the caller changes it in place
    */
   constructor(
     boxes: Float32Array,
@@ -151,7 +152,7 @@ export class ObjectMaterial {
     };
   }
 
-  /** Give a tile's mesh the rows of its vertices; whether it has objects. */
+  /** Gives the vertices of a tile's mesh the rows of their objects. Returns whether the mesh has objects. */
   adopt({ geometry, matrixWorld: _, scale }: Mesh, rowOf: (feature: number) => number): boolean {
     const features = geometry.getAttribute(FEATURE);
     if (features === undefined) return false;
@@ -160,7 +161,7 @@ export class ObjectMaterial {
     geometry.setAttribute(ROW, new Float32BufferAttribute(rows, 1));
     geometry.deleteAttribute(FEATURE);
     geometry.setAttribute(OUTWARDS, new BufferAttribute(outwards(geometry, rows), 3, true));
-    // the same in all files of a bundle
+    // all glb files of a bundle have the same scale
     this.uniforms.uInset.value = this.inset_um / (scale.x * UM_PER_METRE);
     return true;
   }
@@ -169,7 +170,7 @@ export class ObjectMaterial {
     this.uniforms.uGap.value = gap_um;
   }
 
-  /** @param color linear, of the stain that is painted on them; null: none is */
+  /** @param color linear colour of the stain that is painted on the objects; null: none is painted */
   setStain(color: Rgb | null): void {
     this.uniforms.uStained.value = color === null ? 0 : 1;
     if (color !== null) this.uniforms.uStain.value.setRGB(...color);
@@ -179,13 +180,13 @@ export class ObjectMaterial {
     write(this.flags, flags);
   }
 
-  /** @param bytes of the column that colours; null: objects have those of the stage */
+  /** @param bytes one for each row, of the column that colours; null: the objects keep the stage's colours */
   setColumn(bytes: Uint8Array | null): void {
     this.uniforms.uIsColored.value = bytes !== null;
     if (bytes !== null) write(this.column, bytes);
   }
 
-  /** @param table see palettes.ts */
+  /** @param table 256 sRGB colours with alpha: see `tableOf` in palettes.ts */
   setColors(table: Uint8Array): void {
     write(this.colors, table);
   }

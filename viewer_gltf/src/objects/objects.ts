@@ -1,4 +1,4 @@
-/** The objects of one label map: their table, how their surfaces look, and who is met by a ray. */
+/** The objects of one label map: their table, the colours and visibility of their surfaces, and picking by a ray. */
 import { Matrix4, Mesh, type Object3D } from "three";
 import type { FileRef, Manifest } from "../bundle/generated/bundle";
 import type { ColorLegend, Surfaces } from "../host/services";
@@ -15,11 +15,11 @@ import { colorLegend } from "./legend";
 import { readLinked, writeLinked } from "./linked";
 import { ObjectMaterial } from "./object_material";
 import { tableOf } from "./palettes";
-import { type MetObject, pickObject } from "./pick";
+import { type ObjectHit, pickObject } from "./pick";
 import { stageColors } from "./stage_colors";
 import { loadObjects, type ObjectTable } from "./table";
 
-/** By which each object is always drawn in, as a share of the specimen's longest edge. */
+/** Distance by which each surface is moved into its object, as a share of the specimen's longest edge. */
 const INSET = 4e-4;
 
 export type ObjectsOptions = Readonly<{
@@ -27,12 +27,12 @@ export type ObjectsOptions = Readonly<{
   manifest: Manifest;
   channel: string;
   file: FileRef;
-  /** null: no part draws surfaces. */
+  /** The drawn surfaces; null: the viewer has no part that draws surfaces. */
   surfaces: Surfaces | null;
-  /** What the surfaces' world is seen by: um to the room. */
+  /** Its matrix leads from um to the scene. */
   specimen: Object3D;
   dispatch: (change: ObjectChange, isStep?: boolean) => void;
-  /** An object is to be flown to, um; `isSeen`: whether nothing lies before it for an eye. */
+  /** Flies to the box of an object, in um. `isSeen` returns whether no other object hides it from an eye. */
   onAim: (box: Box, isSeen: (eye: Vec3) => boolean) => void;
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -40,16 +40,16 @@ export type ObjectsOptions = Readonly<{
 
 export class Objects {
   readonly flags: Uint8Array;
-  /** How many show. */
+  /** Number of shown objects. */
   left = 0;
   private readonly material: ObjectMaterial;
   private view: ObjectView = START_OBJECTS;
-  /** Whose intensity is painted on the objects. */
+  /** The channel whose intensity is painted on the objects. */
   private painter: Pick<ChannelState, "name" | "color"> | null = null;
   private clip: Clip = { box: null, plane: null };
   private isShown = false;
   private aimed: ObjectView["aim"] = null;
-  /** What the textures hold: of which column, coloured how, flagged by what. */
+  /** Keys of the column, colours and flags that the textures contain now. */
   private drawn: Readonly<Record<"column" | "colors" | "flags", string>> = {
     column: "",
     colors: "",
@@ -71,7 +71,7 @@ export class Objects {
     this.adoptAll();
   }
 
-  /** Throws BundleError. */
+  /** Loads the table of a label map. Throws BundleError. */
   static async load(options: ObjectsOptions): Promise<Objects> {
     let made: Objects | null = null;
     const onChange = () => {
@@ -87,17 +87,17 @@ export class Objects {
     return this.table.isLoading;
   }
 
-  /** ID of the column that colours; "": none. */
+  /** ID of the column that colours the objects; "": no column does. */
   get colorBy(): string {
     return this.view.colorBy ?? this.table.first;
   }
 
-  /** Changes with what shows, and how. */
+  /** A text that changes whenever other objects are shown or lit. */
   get version(): string {
     return `${this.drawn.flags} ${this.left}`;
   }
 
-  /** The name of what is painted on the objects; "": nothing is. */
+  /** Name of the channel that is painted on the objects; "": none is. */
   get stainName(): string {
     return this.painter?.name ?? this.table.painter;
   }
@@ -106,7 +106,7 @@ export class Objects {
     return this.painter?.color ?? [1, 1, 1];
   }
 
-  /** Half of a usual object's width. */
+  /** Widest gap that the slider offers, um: half of the median of the objects' shortest box edges. */
   get widestGap_um(): number {
     const { boxes, count } = this.table;
     const widths = Array.from({ length: Math.min(count, 1000) }, (_, i) => {
@@ -116,14 +116,14 @@ export class Objects {
     return Math.max(0.5 * (widths[widths.length >> 1] ?? 1), 1e-3);
   }
 
-  /** Rows that show. */
+  /** Rows of the shown objects. */
   get shown(): readonly number[] {
     const rows: number[] = [];
     for (let row = 0; row < this.flags.length; row++) if (this.flags[row] !== GONE) rows.push(row);
     return rows;
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     const { channel, dispatch } = this.options;
     this.clip = state.clip;
     this.isShown = state.channels.some(({ id, shown }) => id === channel && shown);
@@ -134,7 +134,7 @@ export class Objects {
         { type: "objects", channel, change: readLinked(this.view.linked, this.table) },
         false,
       );
-      return; // which has followed
+      return; // the dispatched change has called this method again
     }
     this.draw();
     const { aim } = this.view;
@@ -145,13 +145,14 @@ export class Objects {
     this.aimed = aim;
   }
 
-  /** The surfaces that are there already; those that come later are handed to `adopt`. */
+  /** Adopts the surfaces that have loaded already. The part calls `adopt` for each one that loads later. */
   private adoptAll(): void {
     for (const { scene, tile, blend } of this.options.surfaces?.of(this.options.channel) ?? []) {
       this.adopt(scene, tile, blend);
     }
   }
 
+  /** Gives the meshes of a tile the rows of their objects, and the material that colours them. */
   adopt(
     scene: Object3D,
     tile: string,
@@ -164,14 +165,14 @@ export class Objects {
     let hasObjects = false;
     scene.traverse((object) => {
       if (!(object instanceof Mesh) || done.has(object.geometry)) return;
-      done.add(object.geometry); // what writes depth alone shares it
+      done.add(object.geometry); // the mesh that only writes depth shares this geometry
       if (this.stageColors.length === 0) this.stageColors = stageColors(object.geometry);
       hasObjects = this.material.adopt(object, rowOf) || hasObjects;
     });
     if (hasObjects) blend.setPart(this.material.part);
   }
 
-  /** Bring the textures to the view. What has not come yet is drawn when it has. */
+  /** Updates the textures to the view. Columns that are still loading are drawn once they have loaded. */
   private draw(): void {
     const { table, view, material } = this;
     const column = table.column(this.colorBy);
@@ -209,8 +210,8 @@ export class Objects {
 
   private isFirst = true;
 
-  /** The object along a ray, um; null: none. */
-  meet(ray: Ray): MetObject | null {
+  /** Returns the nearest shown object along a ray in um; null: the ray hits none. */
+  hit(ray: Ray): ObjectHit | null {
     if (!this.isShown || this.isWaiting) return null;
     const { surfaces, specimen, channel } = this.options;
     const meshes = (surfaces?.meshes ?? []).filter((each) => each.channel === channel);
@@ -219,14 +220,20 @@ export class Objects {
     return pickObject(ray, world, meshes, boxes, this.view.gap_um, this.flags, this.clip);
   }
 
-  /** Also where nothing is met at all: what is beside the view is not on screen, and can't be asked. */
+  /**
+   * Returns whether no other object hides the object of a row from an eye. An eye that sees no object at all also
+   * counts: meshes outside the view may not be on screen, and only meshes on screen can be tested.
+   */
   private isSeen(row: number, middle: Vec3, eye: Vec3): boolean {
     const [x, y, z] = middle.map((v, i) => v - eye[i]);
-    const met = this.meet({ origin: eye, direction: [x, y, z] });
-    return met === null || met.row === row;
+    const found = this.hit({ origin: eye, direction: [x, y, z] });
+    return found === null || found.row === row;
   }
 
-  /** Open a row's card, or close it where it is open; a gaze that rests closes none, and is no step to undo. */
+  /**
+   * Opens the card of a row, or closes it if it is open. A resting gaze never closes a card, and a card that it
+   * opens is not a step that can be undone.
+   */
   pick(row: number, isByGaze: boolean): void {
     const { channel, dispatch } = this.options;
     if (isByGaze && this.view.picked === row) return;
@@ -239,20 +246,20 @@ export class Objects {
     return { min: [x, y, z], max: [high[0], high[1], high[2]] };
   }
 
-  /** The selected ones, or all that show, as text; null: not all of it has come. */
+  /** CSV of the selected objects, or of all shown objects if none is selected; null: values are still loading. */
   csv(): string | null {
     const { selected } = this.view;
     return objectsCsv(this.table, selected.length > 0 ? selected : this.shown);
   }
 
-  /** What the colours mean; null: no column colours, or it has not come. */
+  /** Legend of the colours; null: no column colours the objects, or it is still loading. */
   get legend(): ColorLegend | null {
     const column = this.table.column(this.colorBy);
     const bytes = column && this.table.bytes(column.id);
     return column && bytes && colorLegend(column, bytes, this.flags, this.view);
   }
 
-  /** Some of the objects' colours, in the legend's order; none: all have the channel's. */
+  /** Some of the objects' colours in the legend's order, for a swatch; empty: all have the channel's colour. */
   colorsBeside({ color, original }: Pick<ChannelState, "color" | "original">): readonly string[] {
     if (this.colorBy !== "") return this.legend?.rows.flatMap(({ colors }) => colors) ?? [];
     return color.every((v, i) => v === original[i]) ? this.stageColors : [];

@@ -15,20 +15,20 @@ function lightness([r, g, b]: readonly [number, number, number]): number {
 }
 
 describe("palettes", () => {
-  it("grow lighter all the way, so that they are read without hues", () => {
+  it("become lighter from end to end, so that they can be read without hues", () => {
     for (const name of PALETTES.filter((each) => each !== "diverging")) {
       const steps = Array.from({ length: 33 }, (_, i) => lightness(colorAt(name, i / 32)));
       for (let i = 1; i < 33; i++) expect(steps[i], `${name} ${i}`).toBeGreaterThan(steps[i - 1]);
     }
   });
 
-  it("of two hues are lightest in their middle", () => {
+  it("that have two hues are lightest in the middle", () => {
     const [low, middle, high] = [0, 0.5, 1].map((at) => lightness(colorAt("diverging", at)));
     expect(middle).toBeGreaterThan(low + 40);
     expect(middle).toBeGreaterThan(high + 40);
   });
 
-  it("end where they should", () => {
+  it("begin and end with their published colours", () => {
     expect([-1, 0, 1, 2].map((share) => toHex(colorAt("viridis", share)))).toEqual([
       ...["#440154", "#440154", "#fde725", "#fde725"],
     ]);
@@ -36,7 +36,7 @@ describe("palettes", () => {
 });
 
 describe("a column's table of colours", () => {
-  it("has the missing in grey, and the palette over the span", () => {
+  it("has grey for missing values, and spreads the palette over the span", () => {
     const table = tableOf(NUMBER, { ...VIEW, span: [65, 129] });
     expect(at(table, 0)).toEqual([101, 101, 105]);
     expect(at(table, 1)).toEqual([0x44, 0x01, 0x54]);
@@ -45,8 +45,8 @@ describe("a column's table of colours", () => {
     expect(at(table, 255)).toEqual([0xfd, 0xe7, 0x25]);
   });
 
-  it("is even in the logarithm or not, as it is asked for", () => {
-    // byte 128 is the middle of 1 to 100 by the logarithm: 10, which is 1/11 of the way
+  it("spreads the palette over the values or over their logarithm", () => {
+    // byte 128 is the logarithmic middle of 1 to 100, 10, which lies at 1/11 of the linear range
     expect(at(tableOf(NUMBER, VIEW), 128).join()).toBe(
       at(tableOf(NUMBER, { ...VIEW, isLog: true }), 128).join(),
     );
@@ -55,7 +55,7 @@ describe("a column's table of colours", () => {
     expect(Math.abs(linear[0] - expected)).toBeLessThanOrEqual(1);
   });
 
-  it("of categories has their own colours, or ones that are told apart", () => {
+  it("has the stated colours of categories, or distinct colours if none are stated", () => {
     expect(at(tableOf(CATEGORY, VIEW), 1)).toEqual([255, 0, 0]);
     expect(at(tableOf(CATEGORY, VIEW), 2)).toEqual([0, 0, 255]);
     const { colors: _, ...plain } = CATEGORY;
@@ -63,7 +63,7 @@ describe("a column's table of colours", () => {
   });
 });
 
-it("a byte is a value and back", () => {
+it("converts a byte to its value and back", () => {
   const { range } = NUMBER;
   if (range === undefined) throw new Error("the sample has a range");
   expect([1, 128, 255].map((byte) => Number(byteValue(range, byte).toFixed(6)))).toEqual([

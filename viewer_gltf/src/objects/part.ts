@@ -1,4 +1,4 @@
-/** The objects of label maps as a part of the viewer. Their code loads with the first bundle that has one. */
+/** The part of the viewer for the objects of label maps. Most of its code loads when a label map is first shown. */
 import { TemporaryError } from "../bundle/errors";
 import { fileName, saveFile } from "../dom/save_file";
 import type { Hit, Part, PartDefinition, PartHost, Tap, TapAnswer } from "../host/part";
@@ -12,9 +12,10 @@ import type { Objects } from "./objects";
 
 const NOT_LOADED =
   "The part of the page that shows objects could not be loaded. Check the connection and try again.";
-const BEHIND_OTHERS = "Other objects hide it from all sides: its card shows it alone.";
-const NO_OBJECTS = "No label map is shown, so there are no objects to save.";
-const STILL_LOADING = "The values of the objects are still loading: save them again in a moment.";
+const BEHIND_OTHERS =
+  "Other objects hide this object from all sides. Its card has a button that shows it alone.";
+const NO_OBJECTS = "There are no objects to save, because no label map is shown.";
+const STILL_LOADING = "The values of the objects are still loading. Save them again in a moment.";
 
 type MakeItems = (
   objects: Objects,
@@ -27,7 +28,7 @@ class ObjectsPart implements Part, ObjectMaps {
   readonly id = "objects";
   readonly services = { objects: this };
   readonly pageCommands = { "save-objects": () => this.save() };
-  /** By channel. */
+  /** The loaded label maps, by channel ID. */
   private readonly objects = new Map<string, Objects>();
   private readonly coming = new Set<string>();
   private readonly failed = new Set<string>();
@@ -44,9 +45,9 @@ class ObjectsPart implements Part, ObjectMaps {
   sync(state: ViewerState): void {
     for (const { id, shown } of state.channels) {
       const found = this.objects.get(id);
-      if (found !== undefined) found.follow(state);
+      if (found !== undefined) found.sync(state);
       else if (shown && !this.coming.has(id) && !this.failed.has(id)) void this.load(id);
-      if (this.host.state !== state) return; // the table has changed the state, and all have followed
+      if (this.host.state !== state) return; // this call changed the state, which has synced all label maps again
     }
   }
 
@@ -114,9 +115,9 @@ class ObjectsPart implements Part, ObjectMaps {
   pick(ray: Ray): Hit | null {
     const length_um = Math.hypot(...ray.direction);
     const hits = [...this.objects].flatMap(([channel, objects]): Hit[] => {
-      const met = objects.meet(ray);
-      if (met === null) return [];
-      const { row, tile, distance } = met;
+      const found = objects.hit(ray);
+      if (found === null) return [];
+      const { row, tile, distance } = found;
       const point = along(ray.origin, ray.direction, distance);
       const object = { row, name: objects.table.title(row), label: objects.table.label(row) };
       return [{ point, tile, channel, distance_um: distance * length_um, object }];
@@ -124,7 +125,7 @@ class ObjectsPart implements Part, ObjectMaps {
     return hits.toSorted((a, b) => a.distance_um - b.distance_um)[0] ?? null;
   }
 
-  /** Opens the card of the object along a ray, or closes it where it is open. */
+  /** Opens the card of the object along a ray, or closes it if it is open. */
   tap({ ray, by }: Tap): TapAnswer {
     const hit = this.pick(ray);
     const objects = this.objects.get(hit?.channel ?? "");
@@ -140,7 +141,7 @@ class ObjectsPart implements Part, ObjectMaps {
     return "met";
   }
 
-  /** Saves a table for each label map that is shown. */
+  /** Saves a CSV file for each shown label map. */
   private save(): void {
     const { shown, host } = this;
     if (shown.length === 0) host.announce(NO_OBJECTS);

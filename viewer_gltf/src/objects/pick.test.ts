@@ -16,7 +16,7 @@ import type { Ray } from "../math/vec3";
 import { ROW } from "./object_material";
 import { pickObject } from "./pick";
 
-/** Three balls of radius 1 along z, at 0, 4 and 8, as one mesh that stands turned, moved and scaled. */
+/** Three balls of radius 1 along z, at 0, 4 and 8, as one mesh that is rotated, moved and scaled. */
 function balls() {
   const ball = new SphereGeometry(1, 24, 16);
   const { position } = ball.attributes;
@@ -67,7 +67,7 @@ describe("a ray among objects", () => {
   const pick = (ray: Ray, flags = ALL, clip = WHOLE, gap_um = 0) =>
     pickObject(ray, world, surfaces, boxes, gap_um, flags, clip);
 
-  it("meets the nearest, at its surface, in lengths of its direction", () => {
+  it("hits the nearest object at its surface, with the distance in lengths of its direction", () => {
     const met = pick(ALONG);
     expect(met?.row).toBe(0);
     expect(met?.tile).toBe("r0_c0");
@@ -75,42 +75,42 @@ describe("a ray among objects", () => {
     expect(pick({ origin: [0.1, 0.1, 20], direction: [0, 0, -1] })?.row).toBe(2);
   });
 
-  it("goes through what is hidden", () => {
+  it("goes through hidden objects", () => {
     expect(pick(ALONG, Uint8Array.of(0, 1, 1))?.row).toBe(1);
     expect(pick(ALONG, Uint8Array.of(0, 0, 0))).toBeNull();
   });
 
-  it("goes through what is cut away, into what is cut open", () => {
+  it("goes through parts that are cut away, and hits the inside of an object that is cut open", () => {
     const plane = (z: number) => ({
       ...WHOLE,
       plane: { normal: [0, 0, -1] as const, offset_um: -z },
     });
     expect(pick(ALONG, ALL, plane(2))?.row).toBe(1);
-    const open = pick(ALONG, ALL, plane(4)); // its half behind is met from within
+    const open = pick(ALONG, ALL, plane(4)); // the ray hits its back half from inside
     expect(open?.row).toBe(1);
     expect(open?.distance).toBeCloseTo((14 + Math.sqrt(1 - 0.02)) / 2, 1);
   });
 
-  it("meets nothing in the corner of a box, beside the object itself", () => {
+  it("hits nothing in the corner of a box, beside the object itself", () => {
     expect(pick({ origin: [0.95, 0.95, -10], direction: [0, 0, 1] })).toBeNull();
     expect(pick({ origin: [5, 0, -10], direction: [0, 0, 1] })).toBeNull();
   });
 
-  it("meets an object where it is drawn, smaller by the gap", () => {
-    const gapped = (ray: Ray, clip = WHOLE) => pick(ray, ALL, clip, 0.8); // balls of 0.6
+  it("hits an object where it is drawn, shrunk by the gap", () => {
+    const gapped = (ray: Ray, clip = WHOLE) => pick(ray, ALL, clip, 0.8); // the balls are drawn with radius 0.6
     const met = gapped(ALONG);
     expect(met?.row).toBe(0);
     expect(met?.distance).toBeCloseTo((10 - Math.sqrt(0.36 - 0.02)) / 2, 1);
     const beside: Ray = { origin: [0.7, 0, -10], direction: [0, 0, 1] };
     expect(pick(beside)?.row).toBe(0);
     expect(gapped(beside)).toBeNull();
-    // a cut before what is drawn, through where it would be without a gap
+    // this cut passes in front of the drawn object, through its place without a gap
     const plane = { normal: [0, 0, -1] as const, offset_um: 0.7 };
     expect(gapped(ALONG, { ...WHOLE, plane })?.distance).toBeCloseTo(met?.distance ?? 0, 9);
-    expect(pick(ALONG, ALL, WHOLE, 99)?.row).toBe(0); // a fifth is left
+    expect(pick(ALONG, ALL, WHOLE, 99)?.row).toBe(0); // a fifth of its size is left
   });
 
-  it("meets what it begins inside of", () => {
+  it("hits the object in which it begins", () => {
     expect(pick({ origin: [0, 0, 4], direction: [1, 0, 0] })?.row).toBe(1);
   });
 });
@@ -129,7 +129,7 @@ describe("a ray among cells that touch at a concave corner", () => {
     return pickObject(ray, new Matrix4(), meshes, BOXES, gap_um, Uint8Array.of(1, 1), WHOLE);
   };
 
-  it("meets nothing in the gap, and each where it is drawn", () => {
+  it("hits nothing in the gap, and each object where it is drawn", () => {
     for (const [x, y] of WALL) {
       for (const [row, by] of [
         [0, -0.05],

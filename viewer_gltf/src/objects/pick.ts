@@ -1,7 +1,8 @@
 /**
- * The object that a ray meets: first the boxes of the objects that show, then the triangles of those few whose
- * box is nearer than what was met. What is hidden or cut away is not there. Where objects are drawn smaller, the
- * ray is held against each as large as it is, from as much farther away. No GPU is asked.
+ * Finds the object that a ray hits, on the CPU. The ray is tested against the boxes of all shown objects. From the
+ * nearest box on, it is then tested against the triangles of each object that may contain a nearer hit. The ray passes
+ * through hidden objects and through parts that are cut away. If a gap shrinks the objects, a ray that is enlarged
+ * by the same factor is tested against each original object: see gap.ts.
  */
 import { type BufferAttribute, type InterleavedBufferAttribute, Matrix4, Vector3 } from "three";
 import { type Clip, isKept } from "../math/clip";
@@ -11,16 +12,16 @@ import { GONE } from "./flags";
 import { grownFrom } from "./gap";
 import { ROW } from "./object_material";
 
-/** `distance`: in lengths of the ray's direction. */
-export type MetObject = Readonly<{ row: number; distance: number; tile: string }>;
+/** `distance` is in lengths of the ray's direction. */
+export type ObjectHit = Readonly<{ row: number; distance: number; tile: string }>;
 
 type Attribute = BufferAttribute | InterleavedBufferAttribute;
-/** By row: the first of its indices, and the one after its last. */
+/** For each row, the range of its triangles in the index buffer: the first index, and the one after the last. */
 type Ranges = ReadonlyMap<number, readonly [number, number]>;
 
 const made = new WeakMap<object, Ranges>();
 
-/** An object's triangles lie together. */
+/** Returns the ranges of a mesh's index buffer, in which the triangles of one object follow one another. */
 function rangesOf(index: BufferAttribute, rows: Attribute): Ranges {
   const found = made.get(index);
   if (found !== undefined) return found;
@@ -36,7 +37,7 @@ function rangesOf(index: BufferAttribute, rows: Attribute): Ranges {
   return ranges;
 }
 
-/** Where a ray enters a row's box, and where it leaves it; false: it misses it. */
+/** Returns where a ray enters the box of a row's object, in lengths of its direction; false if it misses the box. */
 function entry(boxes: Float32Array, row: number, { origin, direction }: Ray): number | false {
   let [from, to] = [0, Number.POSITIVE_INFINITY];
   for (let k = 0; k < 3; k++) {
@@ -59,12 +60,14 @@ const [start, way] = [new Vector3(), new Vector3()];
 const [a, ab, ac, n, off] = Array.from({ length: 5 }, () => new Vector3());
 
 /**
- * @param ray um, world
- * @param world of the space that the ray is in: the specimen's
- * @param surfaces the meshes on screen, of one channel
- * @param boxes six a row, um
- * @param gap_um by which objects are drawn smaller: see gap.ts
- * @param flags by row: see flags.ts
+ * Returns the nearest hit of a ray, or null if it hits no shown object.
+ *
+ * @param ray in um, in the specimen's space
+ * @param world matrix from the specimen's space to the scene
+ * @param surfaces meshes of one channel that are on screen
+ * @param boxes six values for each row, in um: the smallest x, y, z and the largest
+ * @param gap_um gap between the objects: see gap.ts
+ * @param flags one for each row: see flags.ts
  */
 export function pickObject(
   ray: Ray,
@@ -74,15 +77,15 @@ export function pickObject(
   gap_um: number,
   flags: Uint8Array,
   clip: Clip,
-): MetObject | null {
+): ObjectHit | null {
   const near: [row: number, from: number][] = [];
   for (let row = 0; row < flags.length; row++) {
     if (flags[row] === GONE) continue;
-    const from = entry(boxes, row, ray); // the box that is drawn lies within
+    const from = entry(boxes, row, ray); // the shrunk box that is drawn lies within this box
     if (from !== false) near.push([row, from]);
   }
   near.sort((one, other) => one[1] - other[1]);
-  let best: MetObject | null = null;
+  let best: ObjectHit | null = null;
   for (const [row, from] of near) {
     if (best !== null && from > best.distance) break;
     const { origin, direction } = gap_um > 0 ? grownFrom(ray, boxes, row, gap_um) : ray;
@@ -106,7 +109,10 @@ export function pickObject(
   return best;
 }
 
-/** Of the triangles that `start` and `way` meet, from either side. Möller and Trumbore 1997. */
+/**
+ * Returns the distance of the nearest triangle that the ray `start` + t `way` hits from either side, in lengths of
+ * `way`. Null: it hits none before `limit`. Method of Möller and Trumbore (1997), doi:10.1080/10867651.1997.10487468.
+ */
 function nearest(
   index: BufferAttribute,
   position: Attribute,

@@ -1,4 +1,4 @@
-/** What the panel draws of a table: a column's histogram, its categories, two columns against each other. */
+/** The panel's pictures of a table: the histogram of a column, its categories, and the scatter plot of two columns. */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import type { ObjectView } from "../state/objects";
 import { GONE, SELECTED } from "./flags";
@@ -8,17 +8,17 @@ import type { ObjectTable } from "./table";
 type Context = CanvasRenderingContext2D;
 
 const BINS = 64;
-/** The page's own: see panel/html/colors.css. */
+/** The page's colours, as in panel/html/colors.css. */
 const [INK, LINE, TEXT, DIM] = ["#0b0d12", "#3a4458", "#e6e9f0", "#a3adbd"];
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
-/** Most points of a scatter plot: more would be one on the other. */
+/** Largest number of points in a scatter plot; more would cover one another. */
 const MAX_POINTS = 20_000;
 
-/** Share of a picture's width at which a byte lies. */
+/** Returns the horizontal position of a byte, 1 to 255, as a share of a picture's width. */
 export const placeOf = (byte: number) => (byte - 1) / 254;
 export const byteAt = (place: number) => Math.round(1 + 254 * Math.min(1, Math.max(0, place)));
 
-/** Three digits, and units of their own for what is large: 12.3, 1 230, 4.5 M. */
+/** Writes a number with three digits, such as 12.3 or 1 230; very large and small ones as 4.50e6. */
 export function numberText(value: number): string {
   if (!Number.isFinite(value)) return "";
   const size = Math.abs(value);
@@ -31,7 +31,7 @@ export function unitText(unit: string): string {
   return unit.replace(/^um/, "µm").replace(/3$/, "³").replace(/2$/, "²");
 }
 
-/** How many rows have each of 256 bytes: all, and those that show. */
+/** Counts the rows for each of the 256 byte values: all rows, and the rows of shown objects. */
 export function countBytes(
   bytes: Uint8Array,
   flags: Uint8Array,
@@ -48,7 +48,10 @@ export function countBytes(
 const css = (colors: Uint8Array, byte: number) =>
   `rgb(${colors[4 * byte]} ${colors[4 * byte + 1]} ${colors[4 * byte + 2]})`;
 
-/** Numbers: what shows in its colour, what does not in grey; the brush's ends, and the palette under it. */
+/**
+ * Draws the histogram of a column of numbers, with shown objects in their colours and hidden ones in grey. Two lines
+ * mark the ends of the shown range, and the palette is drawn below.
+ */
 export function drawHistogram(
   context: Context,
   width: number,
@@ -102,12 +105,12 @@ export function drawHistogram(
   }
 }
 
-/** Rows of a legend that can be read at a time, on a plane before the eyes, too. */
+/** Largest number of legend rows that stays readable, also on the panel in a headset. */
 export const ROWS_OF_LEGEND = 10;
 /** Legend's text for objects without a category. */
 export const NO_CATEGORY = "(none)";
 
-/** A page of a legend: indices of categories, the last of all -1 where objects have none. */
+/** Returns one page of a legend: indices of categories, with -1 at the very end for objects without a category. */
 export function legendOf(
   { categories }: Readonly<{ categories?: readonly string[] }>,
   hasMissing: boolean,
@@ -115,12 +118,12 @@ export function legendOf(
 ): Readonly<{ indices: readonly number[]; page: number; pages: number; count: number }> {
   const all = [...(categories ?? []).keys(), ...(hasMissing ? [-1] : [])];
   const pages = Math.max(1, Math.ceil(all.length / ROWS_OF_LEGEND));
-  const page = Math.min(wanted, pages - 1); // of another column there may be fewer
+  const page = Math.min(wanted, pages - 1); // the column shown before may have had more pages
   const first = page * ROWS_OF_LEGEND;
   return { indices: all.slice(first, first + ROWS_OF_LEGEND), page, pages, count: all.length };
 }
 
-/** A row a category: its colour, name and number; what is left out is dim. */
+/** Draws a row for each category: its colour, name and count. Categories that are left out are dim. */
 export function drawCategories(
   context: Context,
   width: number,
@@ -151,13 +154,13 @@ export function drawCategories(
   });
 }
 
-/** Which of a picture's rows is so far down. */
+/** Returns the index of the category whose row lies at a share of the picture's height from the top. */
 export function categoryAt(indices: readonly number[], down: number): number {
   const i = Math.floor(down * indices.length);
   return indices[Math.min(indices.length - 1, Math.max(0, i))];
 }
 
-/** Objects as points, those that show; the selected ones light, with the lasso round them. */
+/** Draws a point for each shown object, with a light rim if it is selected, and the lasso. */
 export function drawScatter(
   context: Context,
   width: number,
@@ -198,7 +201,7 @@ export function drawScatter(
   context.stroke();
 }
 
-/** The rows that show whose points lie in the lasso. */
+/** Returns the rows of shown objects whose points lie in the lasso. */
 export function inLasso(
   lasso: ObjectView["lasso"],
   flags: Uint8Array,
@@ -212,7 +215,7 @@ export function inLasso(
   return rows;
 }
 
-/** Whether a point lies in a polygon: it has an odd number of edges to its right. */
+/** Returns whether a point lies in a polygon, which is the case if an odd number of edges lies to its right. */
 function isInside(corners: ObjectView["lasso"], x: number, y: number): boolean {
   let inside = false;
   corners.forEach(([ax, ay], i) => {

@@ -56,7 +56,7 @@ export function sampleContent(): ChannelObjects {
   };
 }
 
-/** @param changed is called once a file has come */
+/** @param changed called whenever a file has loaded */
 export function sampleTable(changed = () => {}, failed = (_: unknown) => {}): ObjectTable {
   const fetchOne = async ({ path }: FileRef) => {
     const [id, kind] = path.split(".");
@@ -75,7 +75,7 @@ export function sampleTable(changed = () => {}, failed = (_: unknown) => {}): Ob
   return new ObjectTable(sampleContent(), labels, boxes, next, fetchOne, changed, failed);
 }
 
-/** With all files here. */
+/** Returns the sample table after all its files have loaded. */
 export async function loadedTable(): Promise<ObjectTable> {
   const table = sampleTable();
   for (const { id } of table.columns) {

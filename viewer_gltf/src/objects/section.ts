@@ -1,6 +1,7 @@
 /**
- * The panel's section of a label map's objects: what colours them, which show, the card of one, two columns
- * against each other. It comes with the code of objects/. Pure but for what its pictures draw.
+ * The panel's section for the objects of a label map: the column that colours them, the filters, the card of the
+ * picked object, and a scatter plot of two columns. This file is loaded together with the code of objects/.
+ * Pure, except for the canvases that its pictures draw on.
  */
 import type { ObjectColumn } from "../bundle/generated/objects";
 import type { Control } from "../panel/controls";
@@ -15,11 +16,11 @@ import { tableOf } from "./palettes";
 import { drawScatter, inLasso, numberText, unitText } from "./pictures";
 import type { ObjectTable } from "./table";
 
-/** Most results of a search that have a row. */
+/** Largest number of search results that the panel lists. */
 const MAX_FOUND = 6;
-/** Least way of a lasso from one corner to the next, shares of the plot. */
+/** Smallest distance between two corners of a lasso, as a share of the plot's edge. */
 const LASSO_STEP = 0.012;
-/** The gap's slider: so much of a cell of this kind of table. */
+/** Number of steps of the slider for the gap. */
 const GAP_STEPS = 40;
 
 export function objectItems(
@@ -36,7 +37,7 @@ export function objectItems(
   return isLast ? [...items, SAVE] : items;
 }
 
-/** Once for all label maps. */
+/** One button saves the objects of all label maps, so only the last section has it. */
 const SAVE: Control = {
   kind: "button",
   id: "save-objects",
@@ -143,33 +144,33 @@ class ObjectSection {
     ];
   }
 
-  /** The acts on the picked object, and all its values: there may be many columns. */
+  /** The card of the picked object: its buttons first, because the list of its values may be long. */
   private card(): readonly Control[] {
     const { table, view } = this;
     const row = view.picked;
     if (row === null || row >= table.count) {
       return [
-        this.controls.text("card", "Object", "Tap an object, or look at it, to open its card."),
+        this.controls.text("card", "Object", "Tap an object or look at it to open its card."),
       ];
     }
     const title = table.title(row);
     const label = table.label(row);
     const others = [...table.neighbours(row)];
-    const wall = largestWall(table, row);
+    const largest = largestInterface(table, row);
     return [
       this.controls.text("card", "Object", title === label ? title : `${title} (${label})`),
-      this.controls.button("fly", "Go there", { aim: { row } }),
-      this.controls.button("only", "Only this object", { only: [row] }),
+      this.controls.button("fly", "Go to this object", { aim: { row } }),
+      this.controls.button("only", "Show only this object", { only: [row] }),
       ...(table.hasNeighbours
         ? [
-            this.controls.button("only-next", "Only it and its neighbours", {
+            this.controls.button("only-next", "Show only this object and its neighbours", {
               only: [row, ...others],
             }),
           ]
         : []),
       this.controls.button(
         "select",
-        view.selected.includes(row) ? "Take out of the selection" : "Add to the selection",
+        view.selected.includes(row) ? "Remove from the selection" : "Add to the selection",
         {
           selected: view.selected.includes(row)
             ? view.selected.filter((each) => each !== row)
@@ -187,11 +188,13 @@ class ObjectSection {
       ...(table.hasNeighbours
         ? [this.controls.text("card-next", "Neighbours", String(others.length))]
         : []),
-      ...(wall === "" ? [] : [this.controls.text("card-wall", "Largest interface, with", wall)]),
+      ...(largest === ""
+        ? []
+        : [this.controls.text("card-wall", "Neighbour with the largest interface", largest)]),
     ];
   }
 
-  /** The acts on the selected objects, or on all that show. */
+  /** Buttons that select, hide or show many objects at once. */
   private choiceOfMany(): readonly Control[] {
     const { view, objects } = this;
     const { selected } = view;
@@ -203,18 +206,23 @@ class ObjectSection {
         "Selected",
         selected.length === 0 ? "none" : `${selected.length} objects`,
       ),
-      this.controls.button("select-shown", "Select all shown", { selected: objects.shown }),
+      this.controls.button("select-shown", "Select all shown objects", { selected: objects.shown }),
       this.controls.button(
         "hide-selected",
-        "Hide the selected",
+        "Hide the selected objects",
         { hidden: [...view.hidden, ...selected], selected: [], lasso: [] },
         none,
       ),
-      this.controls.button("only-selected", "Only the selected", { only: selected }, none),
-      this.controls.button("unselect", "Select none", { selected: [], lasso: [] }, none),
+      this.controls.button(
+        "only-selected",
+        "Show only the selected objects",
+        { only: selected },
+        none,
+      ),
+      this.controls.button("unselect", "Clear the selection", { selected: [], lasso: [] }, none),
       this.controls.button(
         "all",
-        "Show all",
+        "Show all objects",
         { hidden: [], only: null, ranges: {}, without: {} },
         isWhole ? "All objects are shown." : "",
       ),
@@ -242,7 +250,7 @@ class ObjectSection {
     const axes = view.scatter.map(
       (id, i) => numbers.find((column) => column.id === id) ?? numbers[i],
     );
-    const choices = (["Across", "Up"] as const).map((label, i) => ({
+    const choices = (["Horizontal axis", "Vertical axis"] as const).map((label, i) => ({
       ...this.controls.columnChoice(`scatter-${i}`, label, axes[i].id, numbers, "", (id) => ({
         scatter: (i === 0 ? [id, axes[1].id] : [axes[0].id, id]) as [string, string],
         lasso: [],
@@ -266,7 +274,7 @@ class ObjectSection {
       {
         kind: "picture",
         id: this.controls.id("scatter"),
-        label: `Draw around points to select them: ${name(axes[0])} across, ${name(axes[1])} up`,
+        label: `${name(axes[1])} over ${name(axes[0])}: draw around points to select their objects`,
         height: 0.75,
         version: [
           objects.version,
@@ -298,12 +306,15 @@ function valueText(table: ObjectTable, column: ObjectColumn, row: number): strin
   return text === "" ? "none" : `${text} ${unitText(column.unit)}`.trim();
 }
 
-/** The neighbour that a row shares the most with, `liver, 120 µm²`; "": none, or not known. */
-export function largestWall(
-  table: Pick<ObjectTable, "neighbours" | "walls_um2" | "title">,
+/**
+ * Returns the neighbour with the largest interface to an object, and its area, such as `liver, 120 µm²`.
+ * The text is empty if the object has no neighbour or the areas are not known.
+ */
+export function largestInterface(
+  table: Pick<ObjectTable, "neighbours" | "interfaces_um2" | "title">,
   row: number,
 ): string {
-  const areas = [...(table.walls_um2(row) ?? [])];
+  const areas = [...(table.interfaces_um2(row) ?? [])];
   const largest = Math.max(...areas);
   if (!Number.isFinite(largest)) return "";
   const other = table.neighbours(row)[areas.indexOf(largest)];

@@ -2,7 +2,7 @@ import { BufferAttribute, BufferGeometry } from "three";
 import { expect, it } from "vitest";
 import { stageColors } from "./stage_colors";
 
-it("the colours of the stage's objects are told once each, in the surface's order", () => {
+it("returns each colour of the stage's objects once, in the order of the surface's vertices", () => {
   const geometry = new BufferGeometry();
   expect(stageColors(geometry)).toEqual([]);
   const [red, green, blue] = [

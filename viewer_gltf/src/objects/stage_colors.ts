@@ -1,11 +1,11 @@
-/** The colours that objects have from the stage, as far as a swatch has room for them. Pure but for three. */
+/** Sample of the colours that the stage gives to objects, for a swatch. Pure, except for the use of three. */
 import type { BufferGeometry } from "three";
 import { type Rgb, toHex } from "../math/color";
 
-/** Enough to say that objects have colours of their own. */
+/** Number of sampled vertices: enough to show that the objects have different colours. */
 const COUNT = 8;
 
-/** Of a surface with colours at its vertices, evenly through it; none: it has none. */
+/** Returns the different colours of evenly spaced vertices of a surface; empty if it has no vertex colours. */
 export function stageColors({ attributes: { color } }: BufferGeometry): readonly string[] {
   if (color === undefined) return [];
   const colors = Array.from({ length: COUNT }, (_, i): Rgb => {

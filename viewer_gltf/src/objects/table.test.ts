@@ -5,7 +5,7 @@ import { loadedTable, sampleContent, sampleTable } from "./sample_table";
 import { checkObjects, ObjectTable } from "./table";
 
 describe("the table of objects", () => {
-  it("knows the row of a tile's objects, also of those in two tiles", () => {
+  it("finds the rows of a tile's objects, also if an object lies in two tiles", () => {
     const table = sampleTable();
     const [first, second] = [table.rowOf("r0_c0"), table.rowOf("r0_c1")];
     expect([0, 1].map(first)).toEqual([0, 1]);
@@ -13,7 +13,7 @@ describe("the table of objects", () => {
     expect(table.rowOf("elsewhere")(0)).toBe(-1);
   });
 
-  it("fetches a column once it is asked for, and once only", async () => {
+  it("fetches a column when it is first read, and only once", async () => {
     const changed = vi.fn();
     const table = sampleTable(changed);
     expect(table.bytes("size")).toBeNull();
@@ -25,7 +25,7 @@ describe("the table of objects", () => {
     expect(table.isLoading).toBe(false);
   });
 
-  it("reads one value of a long column by the part that has it, of a short one by its file", async () => {
+  it("fetches only a part for one value of a long column, but the whole file of a short one", async () => {
     const count = 5000;
     const values = Float32Array.from({ length: count }, (_, row) => row / 2);
     const content = { ...sampleContent(), count };
@@ -62,7 +62,7 @@ describe("the table of objects", () => {
     expect(short.value("no such", 3)).toBeNull();
   });
 
-  it("reports a column that does not come, and fetches it again when it is told to", async () => {
+  it("reports a column that fails to load, and fetches it again on a retry", async () => {
     const failed = vi.fn();
     const ask = vi.fn(() => Promise.reject(new BundleError("gone")));
     const table = new ObjectTable(
@@ -83,7 +83,7 @@ describe("the table of objects", () => {
     expect(ask).toHaveBeenCalledTimes(2);
   });
 
-  it("finds objects by number and by part of a name, what begins with it first", async () => {
+  it("finds objects by number and by part of a name, matches at the beginning first", async () => {
     const table = await loadedTable();
     expect(table.find("KIDNEY", 5)).toEqual([2, 3]);
     expect(table.find("l", 2)).toEqual([0, 2]);
@@ -95,12 +95,12 @@ describe("the table of objects", () => {
     const table = sampleTable();
     expect([...table.neighbours(1)]).toEqual([0, 2]);
     expect([...table.neighbours(5)]).toEqual([]);
-    expect([...(table.walls_um2(1) ?? [])]).toEqual([2, 30.5]);
+    expect([...(table.interfaces_um2(1) ?? [])]).toEqual([2, 30.5]);
   });
 });
 
 describe("objects.json", () => {
-  it("is refused where a column or the boxes are too short, and where a tile names rows that are not there", () => {
+  it("is refused if a column or the boxes are too short, or if a tile names missing rows", () => {
     expect(checkObjects(sampleContent(), "o").count).toBe(6);
     const short = sampleContent();
     short.columns[0].exact.bytes -= 4;

@@ -1,4 +1,4 @@
-/** The table of a label map's objects: its rows, and its columns as they are asked for. */
+/** The table of a label map's objects. Its columns are fetched when they are first read. */
 
 import objectsSchema from "../../../schemas/objects.schema.json";
 import { BundleError } from "../bundle/errors";
@@ -7,10 +7,10 @@ import type { FileRef } from "../bundle/generated/bundle";
 import type { ChannelObjects, ObjectColumn } from "../bundle/generated/objects";
 import { checkSchema } from "../bundle/schema_check";
 
-/** Rows of a part of exact values. */
+/** Number of rows in one separately checked part of a column's exact values. */
 const PART_ROWS = 4096;
 
-/** Throws BundleError. */
+/** Checks the content of objects.json against its schema and against its own counts. Throws BundleError. */
 export function checkObjects(value: unknown, path: string): ChannelObjects {
   checkSchema(objectsSchema, value, path);
   const { count, boxes, columns, tiles } = value as ChannelObjects;
@@ -29,7 +29,7 @@ export function checkObjects(value: unknown, path: string): ChannelObjects {
   return value as ChannelObjects;
 }
 
-/** Load the list and what is always needed of the table: labels, boxes, neighbours. Throws BundleError. */
+/** Loads objects.json and the files that are always needed: labels, boxes and neighbours. Throws BundleError. */
 export async function loadObjects(
   base: string,
   file: FileRef,
@@ -67,11 +67,11 @@ export async function loadObjects(
   );
 }
 
-/** Whom each row shares a wall with: those of row i are rows[first[i]] to rows[first[i + 1] - 1]. */
-type Walls = Readonly<{
+/** The neighbours of each row: row i has rows[first[i]] to rows[first[i + 1] - 1]. */
+type Neighbours = Readonly<{
   first: Uint32Array;
   rows: Uint32Array;
-  /** um^2; null: not known. */
+  /** Area of the interface to each neighbour, um^2; null: not known. */
   area_um2: Float32Array | null;
 }>;
 
@@ -80,13 +80,13 @@ export class ObjectTable {
   private readonly files = new Map<string, ArrayBuffer>();
   private readonly asked = new Set<string>();
 
-  /** @param fetchOne the bytes of a file of the table, or of a part: the whole of it is as good */
+  /** @param fetchOne fetches a file of the table, or a part of it; for a part it may also return the whole file */
   constructor(
     private readonly content: ChannelObjects,
     private readonly labels: Uint32Array | BigUint64Array,
-    /** Six a row: least x, y, z and largest, um. */
+    /** Six values for each row, in um: the smallest x, y, z and the largest. */
     readonly boxes: Float32Array,
-    private readonly next: Walls | null,
+    private readonly next: Neighbours | null,
     private readonly fetchOne: (file: FileRef, part?: FilePart) => Promise<ArrayBuffer>,
     private readonly onChange: () => void,
     private readonly onError: (error: unknown) => void,
@@ -102,12 +102,12 @@ export class ObjectTable {
     return this.content.columns;
   }
 
-  /** ID of the column that colours first; "": none does. */
+  /** ID of the column that colours the objects at the start; "": no column does. */
   get first(): string {
     return this.byId.has(this.content.default) ? this.content.default : "";
   }
 
-  /** For people, by row; empty: there are none. */
+  /** Name of the object of each row; empty if the label map has no names. */
   get names(): readonly string[] {
     return this.content.names;
   }
@@ -133,7 +133,7 @@ export class ObjectTable {
     return String(this.labels[row]);
   }
 
-  /** Its name, or its number. */
+  /** Name of the object, or its number in the label map if it has no name. */
   title(row: number): string {
     return this.content.names[row] || this.label(row);
   }
@@ -144,32 +144,32 @@ export class ObjectTable {
     return rows.subarray(first[row], first[row + 1]);
   }
 
-  /** The areas of the walls to its neighbours, um^2; null: not known. */
-  walls_um2(row: number): Float32Array | null {
+  /** Areas of the interfaces to the neighbours of a row, um^2; null: not known. */
+  interfaces_um2(row: number): Float32Array | null {
     if (!this.next?.area_um2) return null;
     const { first, area_um2 } = this.next;
     return area_um2.subarray(first[row], first[row + 1]);
   }
 
-  /** The row of each feature ID of a tile. */
+  /** Returns a function from a tile's feature ID to the row; -1: the table has no row for it. */
   rowOf(tile: string): (feature: number) => number {
     const { first, count, more = [] } = this.content.tiles[tile] ?? { first: 0, count: 0 };
     return (feature) => (feature < count ? first + feature : (more[feature - count] ?? -1));
   }
 
-  /** A byte a row; null: it is on its way. */
+  /** One byte for each row; null: still loading. */
   bytes(id: string): Uint8Array | null {
     const file = this.file(this.byId.get(id)?.bytes);
     return file && new Uint8Array(file);
   }
 
-  /** A number a row; null: they are on their way. */
+  /** The exact value for each row; null: still loading. */
   exact(id: string): Float32Array | null {
     const file = this.file(this.byId.get(id)?.exact);
     return file && new Float32Array(file);
   }
 
-  /** One value, by a part of a long column; null: it is on its way. */
+  /** One exact value; null: still loading. Only the part of the column that contains it is fetched. */
   value(id: string, row: number): number | null {
     const column = this.byId.get(id);
     const sha256 = column?.parts?.[Math.floor(row / PART_ROWS)];
@@ -182,7 +182,7 @@ export class ObjectTable {
     return part && new Float32Array(part)[row - first];
   }
 
-  /** Rows whose name or number has these words in it, those that begin with them first. */
+  /** Returns rows whose name contains the text, or whose number begins with it. Names that begin with it come first. */
   find(words: string, most: number): readonly number[] {
     const wanted = words.trim().toLowerCase();
     if (wanted === "") return [];
@@ -205,7 +205,7 @@ export class ObjectTable {
     this.asked.add(key);
     this.fetchOne(ref, part)
       .then(
-        // a host that knows no parts has sent all
+        // a host without support for range requests sends the whole file
         (bytes) => this.files.set(bytes.byteLength === ref.bytes ? ref.path : key, bytes),
         (error) => {
           this.failed.add(key);

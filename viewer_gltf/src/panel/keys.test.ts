@@ -268,7 +268,7 @@ describe("the keys", () => {
         const isSaid =
           "value" in request && typeof request.value !== "number"
             ? text !== ""
-            : /: (it is at its limit|the only one)$|^Slices: in the middle/.test(text);
+            : /: (it is at its limit|the only one)$|^Slices: centred/.test(text);
         if (isSame && !isSaid) {
           silent.push(`${where} ${name}: ${text}`);
         }

@@ -43,7 +43,7 @@ const REMEDIES: Remedies = {
     to: [{ type: "set-clip", clip: { ...clip, plane: middlePlane(shown) } }],
   }),
   [REFUSED.objects]: ({ objects }) => ({
-    label: "Select all shown",
+    label: "Select all shown objects",
     to: [...objects].map(([channel, selected]) => ({
       ...{ type: "objects", channel, change: { selected } },
     })),

@@ -1,14 +1,14 @@
-/** One question to a worker that answers by number; nothing of it stays with the worker afterwards. */
+/** Sends a question to a worker and waits for the answer with the same ID. All listeners are removed afterwards. */
 
 /** The part of a worker that a question needs. */
 export type Answering = Pick<EventTarget, "addEventListener"> &
   Readonly<{ postMessage: (message: unknown, options: StructuredSerializeOptions) => void }>;
 
 /**
- * The answer to a question.
+ * Returns the answer to a question. Throws if the worker fails.
  *
- * @param transfer memory that goes to the worker with it
- * @param failure words before the worker's own fault
+ * @param transfer memory that is transferred to the worker
+ * @param failure text in front of the worker's own error message
  */
 export async function askWorker<Answer extends Readonly<{ id: number }>>(
   worker: Answering,

@@ -9,8 +9,8 @@ import { frameOf } from "./texel_frame";
 
 const volumeOf = ([x, y, z]: Size3) => x * y * z;
 
-describe("tiles in one block", () => {
-  it("make up the whole that they were cut out of", () => {
+describe("tiles that are assembled into one block", () => {
+  it("reproduce the volume from which they were cut", () => {
     // two tiles along x and two along y of one lattice, an apron of one each, two channels
     const whole: Size3 = [19, 15, 6];
     const random = seeded(1);
@@ -39,7 +39,7 @@ describe("tiles in one block", () => {
     expect(made.bricks).toHaveLength(2);
   });
 
-  it("of a coarser level: each texel is the nearest of the tile's", () => {
+  it("fill a coarser level with the nearest texel of the tile", () => {
     const finest: Size3 = [22, 10, 10];
     const size: Size3 = [11, 5, 5];
     const block = emptyBlock(size, 1);
@@ -48,7 +48,7 @@ describe("tiles in one block", () => {
     expect([...block.texels.slice(0, 11)]).toEqual([0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5]);
   });
 
-  it("leave what no tile covers empty", () => {
+  it("leave texels empty that no tile covers", () => {
     const block = emptyBlock([6, 3, 2], 1);
     const texels = new Uint8Array(12).fill(7);
     paste(block, [6, 3, 2], { at: [2, 1, 0], whole: [3, 2, 2], size: [3, 2, 2], texels });
@@ -118,7 +118,7 @@ describe("a block's frame", () => {
   const right = tile("right", [16, -20, 0], [32, 0, 8]);
   const below = tile("below", [16, -30, 2], [32, -20, 8]);
 
-  it("goes round all tiles of one lattice; rows run against y", () => {
+  it("contains all tiles of one lattice, with rows that run against y", () => {
     const frame = frameOf([left, right, below]);
     expect(frame.min).toEqual([0, -30, 0]);
     expect(frame.max).toEqual([32, 0, 8]);
@@ -131,7 +131,7 @@ describe("a block's frame", () => {
     ]);
   });
 
-  it("leaves out what an artist has moved, and what has voxels of its own", () => {
+  it("leaves out tiles that were moved separately, and tiles with another lattice", () => {
     const moved = IDENTITY.map((v, i) => (i === 12 ? 5 : v)) as unknown as TileVolume["matrix"];
     const aside = { ...right, tile: "aside", matrix: moved };
     const coarse = { ...right, tile: "coarse", size: [18, 23, 7] } as unknown as TileVolume;

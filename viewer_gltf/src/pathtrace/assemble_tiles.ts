@@ -126,7 +126,7 @@ export type AssembleRequest = Readonly<{
 export type Assembled = Readonly<{
   id: number;
   texels: Uint8Array<ArrayBuffer>;
-  /** Of each channel: see `brickRanges`. */
+  /** Ranges of the bricks of each channel: see `brickRanges`. */
   bricks: readonly Uint8Array<ArrayBuffer>[];
 }>;
 

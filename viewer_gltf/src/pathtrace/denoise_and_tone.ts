@@ -1,6 +1,6 @@
 /**
- * From what was gathered to the picture: its mean, denoised where few paths have been gathered, as
- * it is seen from where the eyes are by now, and what comes after the light.
+ * Turns the gathered sums into the finished frame. The mean is denoised where pixels have few samples, reprojected to
+ * the current eyes, and then exposed, sharpened and tone-mapped.
  */
 
 import {
@@ -22,24 +22,24 @@ import { areSame, type TraceView } from "./eye_rays";
 import type { LightProbe } from "./light_probe";
 import { TRACE_DENOISE, TRACE_MEAN, TRACE_SHOW, TRACE_WARP } from "./shaders/sources";
 
-/** Samples with which a pixel is left as it is: see denoise.frag.glsl. */
+/** Number of samples from which no pixel is denoised: `ENOUGH` of denoise.frag.glsl. */
 const DENOISED = 192;
 const DENOISE_GAPS = [1, 2, 4] as const;
 
-/** The marched picture in place of a traced one, and the samples that every pixel of that has. */
+/** The ray-marched frame that stands in for the traced one; `rounds`: samples that every traced pixel has. */
 export type StandIn = MarchedFrame & Readonly<{ rounds: number }>;
 
 export class DenoiseAndTone {
-  /** Encoded, premultiplied. */
+  /** The finished frame, sRGB-encoded with premultiplied alpha. */
   readonly picture = byteTarget();
-  /** Pixels of the picture to one of the frame buffer. */
+  /** Resolution of the finished frame relative to the frame buffer. */
   scale = 1;
-  /** Pixels of the mean light to one of the frame buffer. */
+  /** Resolution of the mean relative to the frame buffer. */
   private meanScale = 1;
   private readonly mean = floatTarget(2, HalfFloatType);
   private readonly spares = [floatTarget(1, HalfFloatType), floatTarget(1, HalfFloatType)];
   private color: Texture = this.mean.textures[0];
-  /** From where the paths of the mean began, and from where the picture is seen. */
+  /** The views from which the paths of the mean began, and the views of the finished frame. */
   private began: readonly TraceView[] = [];
   private shown: readonly TraceView[] = [];
   private readonly size = new Vector3(1, 1, 1);
@@ -78,19 +78,21 @@ export class DenoiseAndTone {
     uMarchedPart: { value: new Vector4() },
   });
 
-  /** @param probe what finds the light of the stand-in */
+  /** @param probe measures the light of the stand-in and of the traced frame */
   constructor(private readonly probe: LightProbe) {}
 
-  /** @param size um: what is gathered from now on is of another box */
+  /** Prepares for sums of another box. @param size edges of that box, um */
   expect(size: Vector3): void {
     this.size.copy(size);
     this.began = this.shown = [];
   }
 
   /**
-   * @param sums as path_trace.frag.glsl writes them
-   * @param samples most that a pixel has
-   * @param views from where its paths begin
+   * Computes the denoised mean of the sums.
+   *
+   * @param sums the textures that path_trace.frag.glsl writes
+   * @param samples largest number of samples of a pixel
+   * @param views views from which the paths begin
    */
   denoise(
     renderer: WebGLRenderer,
@@ -126,9 +128,9 @@ export class DenoiseAndTone {
   }
 
   /**
-   * Make the picture of what was developed, as these eyes see it; if that differs.
+   * Makes the finished frame for these eyes from the denoised mean, unless it would be the same as before.
    *
-   * @param standIn what is shown while pixels have few samples
+   * @param standIn the frame that is shown while pixels have few samples
    */
   show(
     renderer: WebGLRenderer,
@@ -188,7 +190,7 @@ export class DenoiseAndTone {
     return target.texture;
   }
 
-  /** The target that doesn't hold the colour. */
+  /** Returns the target that does not contain the current colour. */
   private spare(): WebGLRenderTarget {
     const [one, other] = this.spares;
     return this.color === one.texture ? other : one;

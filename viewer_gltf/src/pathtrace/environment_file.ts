@@ -1,4 +1,4 @@
-/** Light from all around, out of a file: a built-in one, or the user's .hdr or .exr. */
+/** Reads light from all directions from a file: a built-in one, one of the bundle, or the user's .hdr or .exr. */
 import { FloatType } from "three";
 import { BundleError } from "../bundle/errors";
 import { fetchFile, fileAddress, readBody, request } from "../bundle/fetch";
@@ -10,27 +10,27 @@ import {
   type Radiance,
 } from "./environment_sampling";
 
-/** Most columns of a room's light: a volume would not show finer ones. */
+/** Largest number of columns of an environment map. A finer map would make no visible difference on a volume. */
 const MAX_COLUMNS = 512;
-/** Most texels of a file: a larger one is refused. */
+/** Largest number of texels of a file; larger files are refused. */
 const MAX_TEXELS = 16384 * 8192;
 
-/** A built-in one, which lies beside the viewer. Throws BundleError. */
+/** Loads a built-in environment, which is hosted together with the viewer. Throws BundleError. */
 export async function loadEnvironment(base: string, name: string): Promise<EnvironmentTables> {
   const path = `environments/${name}.hdr`;
   const response = await request(fileAddress(base, path), path);
   return environmentTables(await parseHdr(await readBody(response, path), path));
 }
 
-/** The light of the stage's domes, a file of the bundle. Throws BundleError. */
+/** Loads the light of the stage's dome lights, which is a file of the bundle. Throws BundleError. */
 export async function loadStageRoom(base: string, file: FileRef): Promise<EnvironmentTables> {
   const bytes = await fetchFile(base, file);
   return environmentTables(await parseExr(bytes, file.path));
 }
 
 /**
- * A file of the user's, of whatever unit: in the mean it becomes as bright as a white room. Throws
- * BundleError.
+ * Reads a file of the user. Its unit does not matter, because it is scaled to the mean brightness of a white room.
+ * Throws BundleError.
  */
 export async function readEnvironment(file: File): Promise<EnvironmentTables> {
   const bytes = new Uint8Array(await file.arrayBuffer());
@@ -50,7 +50,7 @@ async function parseExr(bytes: Uint8Array<ArrayBuffer>, name: string): Promise<R
   const { EXRLoader } = await import("three/examples/jsm/loaders/EXRLoader.js");
   const loader = new EXRLoader();
   loader.type = FloatType;
-  return radianceOf(name, true, () => loader.parse(bytes.buffer)); // its rows come from below
+  return radianceOf(name, true, () => loader.parse(bytes.buffer)); // the loader returns the bottom row first
 }
 
 type Parsed = Readonly<{ width?: number; height?: number; data?: unknown }>;
@@ -61,19 +61,19 @@ function radianceOf(name: string, isFromBelow: boolean, parse: () => Parsed): Ra
     parsed = parse();
   } catch (error) {
     const reason = error instanceof Error ? error.message : String(error);
-    throw new BundleError(`${name}: expected a picture of light (.hdr or .exr): ${reason}`);
+    throw new BundleError(`${name}: expected an environment map (.hdr or .exr): ${reason}`);
   }
   const { width = 0, height = 0, data } = parsed;
   const parts = data instanceof Float32Array ? data.length / (width * height) : 0;
   if (!(data instanceof Float32Array) || width * height > MAX_TEXELS || parts < 3) {
     throw new BundleError(
-      `${name}: expected a colour picture of light, found ${width} x ${height}`,
+      `${name}: found ${width} x ${height} texels, expected an environment map in colour of at most 16384 x 8192.`,
     );
   }
   return reduced(data, width, height, parts, isFromBelow);
 }
 
-/** Rows from the top, RGB, averaged down to MAX_COLUMNS. */
+/** Returns the map as RGB, top row first, averaged over blocks to at most MAX_COLUMNS columns. */
 export function reduced(
   data: Float32Array,
   width: number,

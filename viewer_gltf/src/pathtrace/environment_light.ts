@@ -1,20 +1,21 @@
-/** The environment that lights what is traced: a built-in one or the user's, loaded when it is first wanted. */
+/** The environment that lights the traced volumes: a built-in one, the stage's or the user's. It loads on first use. */
 import { viewerAddress } from "../bundle/address";
 import { BundleError, TemporaryError } from "../bundle/errors";
 import type { FileRef } from "../bundle/generated/bundle";
 import type { EnvironmentTables } from "./environment_sampling";
 
-export const PATHS_NOT_LOADED = "The part of the page that follows light could not be had.";
-/** The name of an environment out of a file of the user's. */
+export const PATHS_NOT_LOADED =
+  "The part of the page for path tracing could not be loaded. Check the connection and try again.";
+/** Name of the environment that comes from a file of the user. */
 const OWN = "own";
-/** The name of the light of the stage's domes. */
+/** Name of the environment that comes from the stage's dome lights. */
 const STAGE = "stage";
 
 /** The bundle and the file that hold the image of a stage's domes. */
 export type StageRoom = Readonly<{ base: string; file: FileRef }>;
 
 export class EnvironmentLight {
-  /** The name of the environment that was asked for last; "": none. */
+  /** Name of the last requested environment; "": none. */
   private name = "";
   private hasFailed = false;
   isLoading = false;
@@ -27,12 +28,12 @@ export class EnvironmentLight {
     private readonly onError: (error: unknown) => void,
   ) {}
 
-  /** Light by a built-in environment, unless it is the present one. */
+  /** Lights the scene by an environment, unless it is the current one. */
   follow(name: string): void {
     if (name !== OWN && name !== this.name) void this.load(name);
   }
 
-  /** Light by a file of the user's. Throws BundleError. */
+  /** Lights the scene by a file of the user. Throws BundleError. */
   async lightBy(file: File): Promise<void> {
     const { readEnvironment } = await loadLightReader();
     this.onTables(await readEnvironment(file));
@@ -43,7 +44,7 @@ export class EnvironmentLight {
     if (this.hasFailed) this.forget();
   }
 
-  /** Load it again when it is wanted next. */
+  /** Makes the next request load the environment again. */
   forget(): void {
     this.name = "";
   }
@@ -71,7 +72,7 @@ export class EnvironmentLight {
   }
 }
 
-/** Fetch the code that reads files of light. Rejects with a TemporaryError. */
+/** Loads the code that reads environment maps. Rejects with a TemporaryError. */
 function loadLightReader() {
   return import("./environment_file").catch((cause) => {
     throw new TemporaryError(PATHS_NOT_LOADED, { cause });

@@ -12,7 +12,7 @@ function room(width: number, height: number, power: number) {
   return { width, height, rgb };
 }
 
-/** Of the sphere's 4 pi, the part that each texel takes. */
+/** Returns the solid angle of each texel; they add up to 4 pi. */
 function solidAngles(width: number, height: number): number[] {
   return Array.from({ length: width * height }, (_, i) => {
     const at = (row: number) => Math.cos((Math.PI * row) / height);
@@ -28,7 +28,7 @@ describe("light from all around", () => {
     [1, 1, 1],
     [64, 32, 30],
   ]) {
-    it(`is drawn in proportion to what comes: ${width} x ${height}, power ${power}`, () => {
+    it(`is sampled in proportion to its radiance: ${width} x ${height}, power ${power}`, () => {
       const given = room(width, height, power);
       const { aliases, light } = environmentTables(given);
       const count = width * height;
@@ -56,7 +56,7 @@ describe("light from all around", () => {
     });
   }
 
-  it("is none where there is none, and what is no light counts as none", () => {
+  it("is dark if the map is dark, and treats invalid values as dark", () => {
     const half = environmentTables({
       width: 2,
       height: 4,
@@ -73,7 +73,7 @@ describe("light from all around", () => {
     expect(light[3]).toBeCloseTo(1 / (2 * Math.PI), 5); // half of the sphere has it all
   });
 
-  it("is made as bright as another room, whatever its unit", () => {
+  it("can be scaled to the brightness of another environment", () => {
     const rgb = Float32Array.from({ length: 24 }, (_, i) => 4000 * (1 + (i % 7)));
     const tables = environmentTables({ width: 2, height: 4, rgb });
     const { light, mean } = asBrightAs(tables, 1);
@@ -87,15 +87,15 @@ describe("light from all around", () => {
     expect(asBrightAs(dark, 1)).toBe(dark);
   });
 
-  it("is refused where its numbers are too few", () => {
+  it("is refused if it has too few values", () => {
     const rgb = new Float32Array(9);
     expect(() => environmentTables({ width: 2, height: 2, rgb })).toThrow(/expected 12 .* found 9/);
     expect(() => environmentTables({ width: 0, height: 0, rgb: new Float32Array(0) })).toThrow();
   });
 });
 
-describe("the user's picture of light", () => {
-  it("stays as it is where it is small, its alpha left out", () => {
+describe("the user's environment map", () => {
+  it("keeps its size if it is small, without its alpha", () => {
     const data = Float32Array.from([1, 2, 3, 9, 4, 5, 6, 9]);
     expect(reduced(data, 2, 1, 4, false)).toEqual({
       width: 2,
@@ -104,12 +104,12 @@ describe("the user's picture of light", () => {
     });
   });
 
-  it("is turned over where its rows come from below", () => {
+  it("is flipped if its bottom row comes first", () => {
     const data = Float32Array.from([1, 1, 1, 2, 2, 2]);
     expect([...reduced(data, 1, 2, 3, true).rgb]).toEqual([2, 2, 2, 1, 1, 1]);
   });
 
-  it("is averaged down to few columns, its odd edges too", () => {
+  it("is averaged down to few columns, also at edges that blocks do not fill", () => {
     const [width, height] = [1027, 4]; // three by three texels in one, one column over
     const random = seeded(3);
     const data = Float32Array.from({ length: 3 * width * height }, () => random());

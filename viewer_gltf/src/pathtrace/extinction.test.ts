@@ -19,7 +19,7 @@ const extinctionOf = (table: Float32Array, i: number, channel = 0) =>
   table[4 * (256 * channel + i) + 3];
 
 describe("a medium's table", () => {
-  it("takes away light in a voxel by its opacity (Beer and Lambert)", () => {
+  it("absorbs the share of light in a voxel that its opacity states (Beer and Lambert)", () => {
     const voxel_um = 0.7;
     const made = mediumTable([{ color: WHITE, table: tableOf((i) => i) }], voxel_um, 1);
     for (const i of [0, 1, 100, 200, 254]) {
@@ -50,7 +50,7 @@ describe("a medium's table", () => {
     }
   });
 
-  it("is as many times as dense as asked for", () => {
+  it("multiplies the density by the given factor", () => {
     const look = { color: WHITE, table: tableOf((i) => i / 2) };
     const [one, three] = [1, 3].map((density) => mediumTable([look], 1, density));
     for (const i of [3, 90, 255]) {
@@ -58,7 +58,7 @@ describe("a medium's table", () => {
     }
   });
 
-  it("has each channel's colour, by the channel's own table", () => {
+  it("has the colour of each channel, from the channel's own table", () => {
     const appearances = [
       { color: [0.2, 0.4, 0.6], table: tableOf(() => 10) },
       { color: [1, 0.5, 0], table: tableOf(() => 20, [255, 51, 0]) },
@@ -129,7 +129,7 @@ describe("majorants", () => {
     expect(largest).toBeGreaterThan(0.5); // nor are they far too large
   });
 
-  it("are none where there is nothing", () => {
+  it("are zero in empty space", () => {
     const empty = { size, stride: 1, texels: new Uint8Array(size[0] * size[1] * size[2]) };
     const look = { color: WHITE, table: tableOf((i) => (i > 20 ? 99 : 0)) };
     const found = majorants(mediumTable([look], 1, 1), [brickRanges(empty, 0)]);

@@ -19,7 +19,7 @@ const views = (a: PerspectiveCamera, b: PerspectiveCamera, box: Matrix4) =>
   [a, b].map((camera) => [viewOf(camera, box)]);
 
 describe("a view", () => {
-  it("leads from the picture to the box and back", () => {
+  it("maps points of the frame to the box and back", () => {
     const box = new Matrix4().compose(
       new Vector3(3, -4, 5),
       new PerspectiveCamera().quaternion.setFromEuler(new Euler(0.4, 1, -2)),
@@ -48,7 +48,7 @@ describe("a view", () => {
     ["a roll", [0, 0, 0], [0, 0, 0.25], true],
     ["a large roll", [0, 0, 0], [0, 0, 0.4], false],
   ] as const)("is near the one before after %s, or not", (name, aside, turned, expected) => {
-    // whatever the box's own size and place
+    // for any size and place of the box
     for (const box of [IDENTITY, new Matrix4().makeScale(0.01, 0.01, 0.01).setPosition(1, 2, 3)]) {
       const [before, now] = views(eye(), eye(aside, turned), box);
       const middle = MIDDLE.clone().applyMatrix4(box.clone().invert());
@@ -57,7 +57,7 @@ describe("a view", () => {
     }
   });
 
-  it("is another for other eyes", () => {
+  it("differs between different eyes", () => {
     const one = viewOf(eye(), IDENTITY);
     expect(areNear([one], [one, one], MIDDLE)).toBe(false);
     expect(areSame([], [one])).toBe(false);
@@ -65,7 +65,7 @@ describe("a view", () => {
     expect(areNear([one, one], [one, far], MIDDLE)).toBe(false);
   });
 
-  it("turns directions without stretching them", () => {
+  it("rotates directions without stretching them", () => {
     const box = new Matrix4()
       .makeRotationZ(Math.PI / 2)
       .scale(new Vector3(5, 5, 5))

@@ -1,14 +1,14 @@
-/** From where paths start: an eye in the space of the box, and how it moved since. Pure. */
+/** The views from which paths start, in the space of the box, and how far they have moved since. Pure. */
 import { Matrix3, Matrix4, type PerspectiveCamera, Quaternion, Vector3 } from "three";
 
 export type TraceView = Readonly<{
-  /** From normalised device coordinates to um of the box, and back. */
+  /** Matrices from normalised device coordinates to um in the box's space, and back. */
   toBox: Matrix4;
   fromBox: Matrix4;
   eye: Vector3;
 }>;
 
-/** @param box from um of the box to the room */
+/** @param box matrix from um in the box's space to the scene */
 export function viewOf(camera: PerspectiveCamera, box: Matrix4): TraceView {
   const fromBox = camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).multiply(box);
   const eye = new Vector3()
@@ -17,7 +17,7 @@ export function viewOf(camera: PerspectiveCamera, box: Matrix4): TraceView {
   return { toBox: fromBox.clone().invert(), fromBox, eye };
 }
 
-/** The turn of a matrix, without its scale. */
+/** Returns the rotation of a matrix, without its scale. */
 export function turnOf(matrix: Matrix4): Matrix3 {
   const turn = new Quaternion();
   matrix.decompose(new Vector3(), turn, new Vector3());
@@ -25,8 +25,8 @@ export function turnOf(matrix: Matrix4): Matrix3 {
 }
 
 /**
- * What earlier frames are worth to paths that begin here: nothing; all; as far as they show the same
- * from aside.
+ * Use of earlier frames for the current view: `none` if their samples are useless, and `same` if all can be kept. With
+ * `aside` the view has moved a little, so samples are kept for pixels that show the same place.
  */
 export type History = "none" | "same" | "aside";
 
@@ -34,12 +34,12 @@ export function areSame(a: readonly TraceView[], b: readonly TraceView[]): boole
   return a.length === b.length && a.every(({ fromBox }, k) => fromBox.equals(b[k].fromBox));
 }
 
-/** Largest tremble of a head at rest, degrees. */
+/** Largest rotation of a head at rest, degrees. */
 const TREMBLE_DEG = 0.3;
-/** Largest move of a head at rest, as a share of the distance to the box's middle. */
+/** Largest movement of a head at rest, as a share of its distance to the box's centre. */
 const TREMBLE_SHARE = 0.006;
 
-/** Whether eyes have moved by no more than a head that rests. */
+/** Returns whether the eyes have moved no more than those of a head at rest. */
 export function areNear(
   before: readonly TraceView[],
   now: readonly TraceView[],
@@ -66,19 +66,19 @@ function isNear(before: TraceView, now: TraceView, middle: Vector3): boolean {
   );
 }
 
-/** Where the eyes were while earlier frames were gathered. */
+/** The views of earlier frames. */
 export type ViewsBefore = Readonly<{
-  /** From where the gathered paths begin. */
+  /** The views from which the gathered paths begin. */
   anchors: readonly TraceView[];
-  /** Where the eyes were in the frame before; none: that frame gathered too little. */
+  /** The views of the previous frame; empty: that frame gathered too few samples. */
   seen: readonly TraceView[];
-  /** The middle of the box, um. */
+  /** Centre of the box, um. */
   middle: Vector3;
-  /** Whether paths may begin where the eyes were, as long as they only tremble. */
+  /** Whether paths may keep beginning at the anchors while the eyes only tremble. */
   mayTremble: boolean;
 }>;
 
-/** Returns how much earlier frames are worth to paths from the present views. */
+/** Returns which samples of earlier frames can be kept for the current views. */
 export function historyOf(
   views: readonly TraceView[],
   { anchors, seen, middle, mayTremble }: ViewsBefore,
@@ -86,5 +86,5 @@ export function historyOf(
   if (anchors.length !== views.length) return "none";
   if (areSame(anchors, views)) return "same";
   if (areNear(anchors, views, middle)) return mayTremble ? "same" : "aside";
-  return areNear(seen, views, middle) ? "aside" : "none"; // eyes also sway, slowly
+  return areNear(seen, views, middle) ? "aside" : "none"; // slow drift stays near the last frame but leaves the anchors
 }

@@ -1,4 +1,4 @@
-/** The keys of the path-traced picture. Pure. */
+/** The keys of path tracing. Pure. */
 
 import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
 import { type NumberParameter, setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
@@ -28,7 +28,7 @@ function nextNumber(by: number): Key["to"] {
   };
 }
 
-function turn(steps: number): Key["to"] {
+function changeBy(steps: number): Key["to"] {
   return ({ state, view }) => {
     const row = NUMBERS.find(({ id }) => id === view.parameter) ?? NUMBERS[0];
     const at = shareOf(row, row.get(state)) + (2 * steps) / row.steps;
@@ -42,12 +42,12 @@ const KEYS: readonly Key[] = [
   key("G", "Path tracing on or off", ({ state }) =>
     setTo(MODE, isTraced(state) ? "all" : "traced"),
   ),
-  key("F", "Next number of the light, or of stereo: the two keys below mean it", nextNumber(1)),
-  key("X", "The number before", nextNumber(-1)),
-  key("[", "Less of it", turn(-1)),
-  key("]", "More of it", turn(1)),
+  key("F", "Choose the next setting of path tracing or stereo", nextNumber(1)),
+  key("X", "Choose the previous setting of path tracing or stereo", nextNumber(-1)),
+  key("[", "Decrease the chosen setting", changeBy(-1)),
+  key("]", "Increase the chosen setting", changeBy(1)),
   ...[...MEDIUM, ...ROOM].flatMap(keysOf),
-  key("U", "Light of a .hdr or .exr file", ({ state }) =>
+  key("U", "Light from a .hdr or .exr file", ({ state }) =>
     isTraced(state) ? "own-light" : no(TRACED_ALONE),
   ),
   key(LAMP_KEYS, "Lamp 1, 2 or 3 on or off", ({ state }, name) => {

@@ -1,7 +1,6 @@
 /**
- * A small traced picture of the view, which finds how bright and how coloured the traced light is. The marched
- * picture that stands in while the view moves is lit by it: whatever a lamp, a room or the medium does to the
- * light, both then look alike in the mean.
+ * Measures the mean brightness and colour of the traced light in a small traced frame of the view. The ray-marched frame
+ * that stands in while the view moves is scaled to that mean, so that both frames look alike.
  */
 import { FloatType, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Eyes } from "../gpu/eyes";
@@ -9,7 +8,7 @@ import { drawWhole, floatTarget, nothing } from "../gpu/float_targets";
 import { ScreenPass } from "../gpu/screen_pass";
 import { TRACE_PROBE } from "./shaders/sources";
 
-/** Pixels of the small picture, both eyes together. */
+/** Number of pixels of the small frame, both eyes together. */
 const PIXELS = 600;
 /** Samples of each after a change, and in a frame that only moves. */
 const FIRST_SAMPLES = 8;

@@ -14,20 +14,20 @@ const roomOf = (height: number, ...rows: readonly number[]) =>
     }),
   );
 
-describe("the light of the march that stands in for paths of light", () => {
-  it("has the room's mean radiance above and below", () => {
+describe("the light of the ray-marched frame that stands in for path tracing", () => {
+  it("has the environment's mean radiance above and below", () => {
     const { sky, ground } = roomOf(2, 4, 1);
     expect([...sky, ...ground]).toEqual([4, 2, 0, 1, 0.5, 0]);
   });
 
-  it("shares a row across the horizon between both halves, by solid angle", () => {
+  it("divides a row across the horizon between both halves by solid angle", () => {
     // the middle one of three rows reaches from 60 to 120 degrees: half of each half of the sphere
     const { sky, ground } = roomOf(3, 8, 2, 0);
     expect(sky[0]).toBeCloseTo(5, 5);
     expect(ground[0]).toBeCloseTo(1, 5);
   });
 
-  it("has the strongest lamp as the key, and the others as one lamp beside it, in the axes of the eye", () => {
+  it("has the strongest lamp as key light and the others as one second lamp, in the eye's axes", () => {
     const [lamp] = START_TRACE.lamps;
     const lamps = [
       { ...lamp, isOn: true, x: 0, y: 2, z: 0, strength: 1, color: [0, 1, 0] as const },
@@ -46,7 +46,7 @@ describe("the light of the march that stands in for paths of light", () => {
     expect(light.uGloss.value).toBeCloseTo(GLOSS, 6);
   });
 
-  it("is dark where no lamp is on", () => {
+  it("has no lamps if none is on", () => {
     const light = marchLight();
     const lamps = START_TRACE.lamps.map((lamp) => ({ ...lamp, isOn: false }));
     lightMarch(light, { ...START_TRACE, lamps }, roomOf(2, 1, 1), new Matrix4());

@@ -1,6 +1,6 @@
 /**
- * The lamps and the room's light of the traced picture, as the march has them that stands in for it. The march
- * knows two lamps without shadows, a sky and a ground; LightProbe then makes it as bright as the traced picture.
+ * Approximates the lamps and the environment of path tracing for the ray-marched frame that stands in for it. Ray
+ * marching supports two lamps without shadows, a sky and a ground. LightProbe then matches the brightness.
  */
 import type { Matrix4, Vector3 } from "three";
 import { asOneLamp, GLOSS } from "../gpu/room_light";
@@ -9,7 +9,7 @@ import { type Lamp, MEDIUM_NUMBERS, type TraceSettings } from "../state/path_tra
 import type { MarchLight } from "../voxels/march_frame";
 import type { EnvironmentTables } from "./environment_sampling";
 
-/** Mean radiance of the upper and of the lower half of the room. */
+/** Mean radiance of the upper and of the lower half of the environment. */
 export type Hemispheres = Readonly<{ sky: Rgb; ground: Rgb }>;
 
 export function hemispheresOf({ width, height, light }: EnvironmentTables): Hemispheres {
@@ -21,7 +21,7 @@ export function hemispheresOf({ width, height, light }: EnvironmentTables): Hemi
   for (let i = 0; i < width * height; i++) {
     const row = Math.floor(i / width);
     const [top, bottom] = [row, row + 1].map((v) => Math.cos((v / height) * Math.PI));
-    // of a row across the horizon, the part above it and the part below it
+    // a row of the map may cross the horizon; these are its parts above and below
     const parts = [Math.max(top, 0) - Math.max(bottom, 0), Math.min(top, 0) - Math.min(bottom, 0)];
     parts.forEach((part, half) => {
       weights[half] += part;
@@ -35,7 +35,7 @@ export function hemispheresOf({ width, height, light }: EnvironmentTables): Hemi
   return { sky: mean(0), ground: mean(1) };
 }
 
-/** @param toEye from the specimen's axes to those of the eye */
+/** @param toEye rotation from the specimen's axes to the eye's */
 export function lightMarch(
   march: MarchLight,
   { lamps, environmentLight, shine }: TraceSettings,

@@ -1,4 +1,4 @@
-/** Whether another appearance of the medium, or another light on it, makes the gathered light worthless. */
+/** Detects changes of the medium's appearance or light after which the gathered samples must be dropped. */
 import { needsNewPaths, type TraceSettings } from "../state/path_trace_settings";
 import type { Appearance } from "../voxels/march_tables";
 import type { TransferTable2d } from "../voxels/transfer_table_2d";
@@ -8,12 +8,12 @@ export class MediumChanges {
   private tables2d: readonly (TransferTable2d | null)[] = [];
   private settings: TraceSettings | null = null;
 
-  /** The medium itself is another one. */
+  /** Makes the next `since` report a change of appearance, because the texels have changed. */
   forget(): void {
     this.appearance = "";
   }
 
-  /** Return what has to be done since the last call: give the medium its appearance, gather again, or nothing. */
+  /** Returns the change since the last call: of the appearance, of the light alone, or none (null). */
   since(
     appearances: readonly Appearance[],
     settings: TraceSettings,

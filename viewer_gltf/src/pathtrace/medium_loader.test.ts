@@ -5,7 +5,7 @@ type Tiles = ChannelSources["tiles"];
 const ONE = new Map([["r0_c0", {}]]) as unknown as Tiles;
 
 describe("a path-traced medium", () => {
-  it("is made of the channels that have volumes of their own", () => {
+  it("consists of the channels that have volumes of their own", () => {
     const channels = [
       { id: "skin", tiles: ONE },
       { id: "bone", tiles: new Map() as Tiles },

@@ -1,6 +1,6 @@
 /**
- * The texels that paths go through: all tiles of up to four channels in one texture, a coarse level
- * first, then the finest that there is room for.
+ * Loads the texels for path tracing: all tiles of up to four channels in one texture. A coarse level is loaded first,
+ * and then the finest one that fits into the memory.
  */
 import type { Data3DTexture } from "three";
 import { decodeTexels } from "../bundle/decode";
@@ -19,10 +19,10 @@ export type MediumTexels = Readonly<{
   channels: readonly string[];
   frame: BlockFrame;
   level: number;
-  /** Texels of the block at this level; of bricks, at the finest. */
+  /** Size of the block in texels at this level; if bricks are streamed, at the finest level. */
   size: Size3;
   texture: Data3DTexture;
-  /** Where bricks are in the texture; null: it is the block itself. */
+  /** Positions of the bricks in the texture; null: the texture is the whole block. */
   index: Data3DTexture | null;
   /** Smallest and largest intensity of every brick of SKIP_BRICK^3 texels, of each channel, interleaved. */
   bricks: readonly Uint8Array[];
@@ -30,12 +30,12 @@ export type MediumTexels = Readonly<{
   release: () => void;
 }>;
 
-/** Where a channel's volumes come from, by tile. */
+/** The volumes of a channel, by tile ID. */
 export type ChannelSources = Readonly<{ id: string; tiles: ReadonlyMap<string, VolumeSource> }>;
 
 /**
- * The channels that have volumes of their own. A second surface of a channel has none, because it
- * shares the first one's. A list that could not be loaded (null) has been reported before.
+ * Returns the channels that have volumes of their own. A second surface of a channel shares the volumes of the first
+ * one and has none. Channels whose list could not be loaded (null) are left out; their error is already reported.
  */
 export const withVolumes = (
   channels: readonly Readonly<{ id: string; tiles: ChannelSources["tiles"] | null }>[],
@@ -48,10 +48,10 @@ export class MediumLoader {
   private last = 0;
 
   /**
-   * Load these channels of these tiles, coarse to fine, and hand over each level. Throws BundleError
-   * for a fault, AbortError once it is no longer wanted.
+   * Loads channels of tiles, from coarse to fine, and passes each level to `onLevel`. Throws BundleError if a file is
+   * damaged, and AbortError when `signal` is aborted.
    *
-   * @param limits bytes of the texture, and texels along an edge
+   * @param limits largest size of the texture in bytes, and along an edge in texels
    */
   async load(
     channels: readonly ChannelSources[],

@@ -1,4 +1,4 @@
-/** Path tracing as a part of the viewer: the volumes by paths of light. Its code loads when it is first asked for. */
+/** The part of the viewer that draws volumes by path tracing. Most of its code loads when path tracing first begins. */
 import { chooseFile } from "../dom/choose_file";
 import type { Form } from "../host/form";
 import type { Part, PartDefinition, PartHost } from "../host/part";
@@ -14,7 +14,7 @@ class PathTracePart implements Part, Form {
   readonly id = "pathtrace";
   readonly form = this;
   readonly pageCommands = { "own-light": () => void this.lightByFile() };
-  /** null: there are no volumes to trace. */
+  /** The traced volume; null: there are no volumes to trace. */
   private readonly volume: TracedVolume | null;
 
   constructor(private readonly host: PartHost) {
@@ -68,7 +68,7 @@ class PathTracePart implements Part, Form {
     this.volume?.forget();
   }
 
-  /** Bricks come without a fade. */
+  /** Shows newly loaded bricks, which appear at once and never fade in. */
   fade(fade_s: number): boolean {
     this.volume?.advance(fade_s);
     return false;
@@ -78,7 +78,7 @@ class PathTracePart implements Part, Form {
     this.volume?.retryFailed();
   }
 
-  /** Lights by a file of the user's. */
+  /** Lets the user choose a file, and lights the scene by it. */
   private async lightByFile(): Promise<void> {
     const file = await chooseFile(".hdr,.exr");
     if (file === null || this.volume === null) return;

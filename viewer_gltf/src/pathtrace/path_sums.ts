@@ -1,4 +1,4 @@
-/** The light that paths have brought to each pixel so far, as sums in float textures, and the pass that adds to it. */
+/** Sums of the light that paths have brought to each pixel, in float textures, and the pass that adds to them. */
 import { FloatType, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Eyes } from "../gpu/eyes";
 import { floatTarget } from "../gpu/float_targets";
@@ -9,35 +9,35 @@ import type { History, TraceView } from "./eye_rays";
 import { TileNoise } from "./tile_noise";
 import type { TraceUniforms } from "./uniforms";
 
-/** Samples between two looks at the noise of the tiles. */
+/** Number of samples between two measurements of the tiles' noise. */
 const NOISE_EVERY = 8;
 
-/** Where paths are seen from, and where they begin: eyes that only tremble see those from where the eyes were. */
+/** The views from which paths are seen, and from which they begin. Both differ while eyes tremble. */
 export type PathViews = Readonly<{
   eyes: Eyes;
   views: readonly TraceView[];
   begins: readonly TraceView[];
-  /** Where the paths that were gathered before begin. */
+  /** The views from which the earlier paths begin. */
   anchors: readonly TraceView[];
-  /** How much the sums before are worth to these paths. */
+  /** The use of earlier samples: see `History`. */
   history: History;
 }>;
 
 export class PathSums {
   private readonly sums = [floatTarget(2, FloatType), floatTarget(2, FloatType)];
   private readonly noise = new TileNoise();
-  /** Pictures of paths so far: their sums are drawn alternately into two targets. */
+  /** Number of passes so far; the sums are drawn alternately into two targets. */
   private drawn = 0;
   /** The number that seeds the random numbers of a pass. */
   private sample = 0;
-  /** Samples of a pixel since the picture began; tiles that rest have fewer. */
+  /** Number of samples of a pixel since the frame began. Tiles that are sampled less often have fewer. */
   samples = 0;
-  /** The samples among them whose paths are from the present view. */
+  /** Number of those samples whose paths belong to the current view. */
   rested = 0;
-  /** Where among the tiles the next turn begins, 0..1. */
+  /** Position among the tiles from which the next pass samples, 0..1. */
   private turn = 0;
 
-  /** @param calm standard error of the luminance at which a tile rests more often; 0: none does */
+  /** @param calm standard error of the luminance below which a tile is sampled less often; 0: all tiles always are */
   constructor(
     private readonly pass: ScreenPass<TraceUniforms>,
     private readonly calm: number,
@@ -48,22 +48,22 @@ export class PathSums {
     return this.sums[this.drawn % 2];
   }
 
-  /** Begin a picture of another view. */
+  /** Starts a frame of another view. */
   begin(): void {
     this.samples = this.rested = this.turn = 0;
   }
 
-  /** Keep at most so many samples of a view a little aside. */
+  /** Keeps a limited number of samples when the view has moved a little. */
   keepAside(most: number): void {
     this.samples = Math.min(this.samples, most);
     this.rested = 0;
   }
 
   /**
-   * Gather so many more samples of every pixel, or of a share of them, up to those that are enough.
+   * Gathers more samples of every pixel, or of a share of the pixels, up to `ENOUGH_SAMPLES`.
    *
-   * @param passes samples; below 1 the share of the pixels that get one
-   * @param scale pixels of the picture to one of the frame buffer
+   * @param passes number of samples; below 1, the share of the pixels that get one sample
+   * @param scale resolution relative to the frame buffer, 0..1
    */
   gather(renderer: WebGLRenderer, views: PathViews, passes: number, scale: number): void {
     const share = Math.min(1, passes);
@@ -78,7 +78,7 @@ export class PathSums {
       this.rested += share;
       this.turn = (this.turn + share) % 1;
       const isDue = Math.floor(before / NOISE_EVERY) < Math.floor(this.samples / NOISE_EVERY);
-      if (isDue) this.noise.judge(renderer, this.gathered);
+      if (isDue) this.noise.measure(renderer, this.gathered);
     }
   }
 
@@ -93,7 +93,7 @@ export class PathSums {
     this.draw(renderer, views, this.gathered, scale);
   }
 
-  /** Draw paths into a target, which may be one of another purpose. */
+  /** Draws paths into a target, which may also be the target of another user, such as LightProbe. */
   draw(
     renderer: WebGLRenderer,
     { eyes, views, begins, anchors, history }: PathViews,

@@ -1,7 +1,6 @@
 /**
- * Gathers light along paths, frame by frame, in float textures: for every pixel the sum of what its
- * paths brought. A view that stays gathers on, one that trembles carries it along, a new one begins
- * anew.
+ * Traces paths of light frame by frame, and sums up the light of each pixel's paths in float textures. While the view
+ * rests, the sums grow. If it trembles, they are carried over to the moved view, and a new view starts from zero.
  */
 import type { Matrix4, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import { SKIP_BRICK, STREAM_BRICK } from "../bundle/generated/constants";
@@ -32,31 +31,30 @@ import {
   traceUniforms,
 } from "./uniforms";
 
-/** Noise at which a tile is as good as done. */
+/** Standard error of a tile's mean luminance below which the tile is rarely sampled. */
 const CALM = 0.004;
-/** Most samples that are kept of a view a little aside. */
+/** Largest number of samples that are kept when the view has moved a little. */
 const MAX_ASIDE = 48;
 
-/** How a frame is gathered. */
+/** Settings for gathering the samples of one frame. */
 export type Gathering = Readonly<{
-  /** Pixels of the picture to one of the frame buffer, 0..1. */
+  /** Resolution of the traced frame relative to the frame buffer, 0..1. */
   scale: number;
-  /** Samples of every pixel, or of a share of them. */
+  /** Number of samples for every pixel; below 1, the share of pixels that get one sample. */
   passes: number;
   /**
-   * Eyes that hardly move see what was gathered, from where they are; else paths begin at the very
-   * eye.
+   * Whether eyes that only tremble still use the gathered paths, which then begin at the earlier eye positions.
    */
   mayTremble: boolean;
-  /** Paths are shorter: a picture that moves has to be quick. */
+  /** Whether paths are shorter, because a moving frame has to be quick. */
   isDraft: boolean;
-  /** What stands in for pixels that have few samples of this view; null: nothing can. */
+  /** Ray-marched frame that is shown for pixels with few samples; null: there is none. */
   standIn?: MarchedFrame | null;
 }>;
 
 type Drawing = Pick<Gathering, "scale" | "isDraft">;
 
-/** Samples with which nothing stands in for any pixel: see tone_map.frag.glsl. */
+/** Number of samples from which no pixel needs the ray-marched frame: see tone_map.frag.glsl. */
 const STOOD_IN = 5;
 
 export class Tracer {
@@ -65,23 +63,23 @@ export class Tracer {
   private roomLight: readonly [number, number, number] = [0, 0, 0];
   private hemispheres: Hemispheres = OWN_LIGHT;
   private texels: MediumTexels | null = null;
-  /** From where paths begin: where the eyes were, as long as they only tremble. */
+  /** The views from which paths begin. They stay fixed as long as the eyes only tremble. */
   private anchors: readonly TraceView[] = [];
-  /** Where the eyes were in the frame before. */
+  /** The views of the previous frame. */
   private seen: readonly TraceView[] = [];
   private shownWith: TraceSettings | null = null;
   private key = "";
   private matter = "";
   private drawing: Drawing = { scale: 1, isDraft: false };
-  /** Whether a marched picture stands in for pixels with few samples. */
+  /** Whether a ray-marched frame stands in for pixels with few samples. */
   isStoodIn = false;
   private readonly pathPass: ScreenPass<TraceUniforms>;
   private readonly sums: PathSums;
   private readonly textures: MediumTextures;
 
   /**
-   * @param brick texels along an edge of a brick of majorants: SKIP_BRICK or a multiple
-   * @param calm standard error of the luminance at which a tile rests more often; 0: none does
+   * @param brick edge of a brick of majorants in texels: SKIP_BRICK or a multiple of it
+   * @param calm standard error of the luminance below which a tile is sampled less often; 0: all tiles always are
    */
   constructor(sceneDepth: { value: Texture }, brick = 2 * SKIP_BRICK, calm = CALM) {
     this.pathPass = new ScreenPass(TRACE_FRAGMENT, traceUniforms(sceneDepth, MAX_ASIDE), {
@@ -92,22 +90,22 @@ export class Tracer {
     this.textures = new MediumTextures(this.pathPass, brick);
   }
 
-  /** The picture, encoded and premultiplied. */
+  /** The finished frame, sRGB-encoded with premultiplied alpha. */
   get picture(): WebGLRenderTarget {
     return this.denoiseAndTone.picture;
   }
 
-  /** Samples of a pixel since the picture began; tiles that rest have fewer. */
+  /** Number of samples of a pixel since the frame began. Tiles that are sampled less often have fewer. */
   get samples(): number {
     return this.sums.samples;
   }
 
-  /** The samples among them whose paths are from the present view. */
+  /** Number of those samples whose paths belong to the current view. */
   get rested(): number {
     return this.sums.rested;
   }
 
-  /** Pixels of the picture to one of the frame buffer. */
+  /** Resolution of the traced frame relative to the frame buffer, 0..1. */
   get scale(): number {
     return this.denoiseAndTone.scale;
   }
@@ -127,14 +125,14 @@ export class Tracer {
     this.begin();
   }
 
-  /** Begin a picture of another view. */
+  /** Starts a frame of another view. */
   private begin(): void {
     this.anchors = [];
     this.sums.begin();
     this.shownWith = null;
   }
 
-  /** What paths go through; takes over the texture. */
+  /** Sets the texels that paths go through, and takes ownership of their texture. */
   fill(texels: MediumTexels | null): void {
     if (this.texels !== texels) this.texels?.release();
     this.texels = texels;
@@ -147,14 +145,14 @@ export class Tracer {
     this.denoiseAndTone.expect(uniforms.uSize.value);
   }
 
-  /** @param appearances of the channels, in the order of the texture's */
+  /** @param appearances one for each channel, in the order of the texture's channels */
   setAppearances(appearances: readonly MediumAppearance[], settings: TraceSettings): void {
     if (this.texels === null) return;
     this.textures.setAppearances(this.texels, appearances, settings.density);
     this.restart();
   }
 
-  /** @param toEye from the specimen's axes to those of the eye */
+  /** @param toEye rotation from the specimen's axes to the eye's */
   lightMarch(march: MarchLight, settings: TraceSettings, toEye: Matrix4): void {
     lightMarch(march, settings, this.hemispheres, toEye);
   }
@@ -167,7 +165,7 @@ export class Tracer {
   }
 
   /**
-   * Whether what is gathered is worth anything to these eyes.
+   * Returns whether the gathered samples can be used for these eyes.
    *
    * @param mayTremble see `render`
    */
@@ -180,9 +178,9 @@ export class Tracer {
   }
 
   /**
-   * Make the picture of the stand-in alone: the view moves, and what was gathered is of another one.
+   * Makes the frame from the ray-marched one alone, and drops the samples, because the view is moving.
    *
-   * @param marched of this view
+   * @param marched the ray-marched frame of this view
    */
   standIn(
     renderer: WebGLRenderer,
@@ -201,8 +199,8 @@ export class Tracer {
   }
 
   /**
-   * Gather so many more samples of every pixel, or of a share of them, and make the picture, as soon
-   * as each pixel has one. A picture with enough of them only follows the eyes.
+   * Gathers more samples of every pixel, or of a share of the pixels. Makes the frame as soon as every pixel has one
+   * sample. A frame that has enough samples is only reprojected to the eyes.
    */
   render(
     renderer: WebGLRenderer,
@@ -227,8 +225,8 @@ export class Tracer {
     }
     const { denoiseAndTone } = this;
     this.isStoodIn = standIn !== null && this.samples < STOOD_IN;
-    // A part of the pixels alone is not shown: until all have their turn, the picture before stays, or
-    // the marched one that stands in.
+    // Samples of only some pixels are not shown. Until all pixels have one more, the previous frame or the
+    // ray-marched one stays.
     const isRound = Math.floor(this.samples) > Math.floor(started);
     const isAny = this.isStoodIn || this.samples >= 1;
     const isOther = isAny && (isRound || settings !== this.shownWith);
@@ -245,7 +243,7 @@ export class Tracer {
     denoiseAndTone.show(renderer, eyes, views, settings, isOther, marched);
   }
 
-  /** Follow the scene; what was gathered of another one is dropped. */
+  /** Passes the scene to the shader. Samples are dropped if the scene differs from before. */
   private prepare(eyes: Eyes, scene: TraceScene, settings: TraceSettings, drawing: Drawing): void {
     const { scale, isDraft } = drawing;
     if (this.texels === null) return;

@@ -1,24 +1,24 @@
-/** How large the path-traced picture is, to the frame buffer's pixels: small while the view moves. */
+/** Chooses the resolution of the path-traced frame, which is low while the view moves. */
 import type { Eyes } from "../gpu/eyes";
 
-/** Most pixels of a picture: more take more memory than a phone's browser gives. */
+/** Largest number of pixels of a frame. More would need more memory than a phone's browser grants. */
 const MAX_PIXELS = 2_000_000;
-/** Most pixels while the picture moves: the denoiser fills in the rest. */
+/** Largest number of pixels while the view moves; the denoiser hides the low resolution. */
 const MAX_MOVING_PIXELS = 160_000;
 
 export class PictureScale {
-  /** Whether the picture is the small one of a moving view. */
+  /** Whether the frame has the low resolution of a moving view. */
   isSmall = false;
   private moving = 1;
   private atRest = 1;
 
-  /** Take over the share of the pixels that the frame's budget allows, 0..1. */
+  /** Stores the resolution that the time for a frame allows, relative to the frame buffer, 0..1. */
   allow(resolution: number, isMoving: boolean, isOther: boolean): void {
     if (isOther) this.moving = resolution;
     if (!isMoving) this.atRest = resolution;
   }
 
-  /** Choose the scale of a picture that is small, or not. */
+  /** Returns the resolution relative to the frame buffer, of a low-resolution frame or of a full one. */
   choose({ width_px, height_px }: Eyes, isSmall: boolean): number {
     this.isSmall = isSmall;
     const most = isSmall ? MAX_MOVING_PIXELS : MAX_PIXELS;

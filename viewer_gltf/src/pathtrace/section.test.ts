@@ -27,8 +27,8 @@ function granted(state: ViewerState, wish: Request): ViewerState {
   return reduce(state, wish);
 }
 
-describe("the panel's light", () => {
-  it("begins path tracing by its first button, which alone is there in stereo before", () => {
+describe("the panel's section for path tracing", () => {
+  it("begins with the button that starts path tracing, the only control in stereo until then", () => {
     for (const isStereo of [false, true]) {
       const [button, ...others] = itemsOf(CLOSED, isStereo);
       expect(others.length > 0).toBe(!isStereo);
@@ -37,7 +37,7 @@ describe("the panel's light", () => {
     }
   });
 
-  it("has the same rows on a flat screen before and after path tracing begins, and says which do nothing", () => {
+  it("has the same rows on a flat screen before and during path tracing, and marks those without effect", () => {
     const rows = (state: ViewerState) => controlsOf(state).map(({ id }) => id);
     expect(rows(CLOSED)).toEqual(rows(TRACED));
     const [begin, ...settings] = controlsOf(CLOSED);
@@ -48,14 +48,14 @@ describe("the panel's light", () => {
     expect(set.filter(({ refusal }) => refusal)).toEqual([]);
   });
 
-  it("gives every control an id of its own, and a name", () => {
+  it("gives every control a unique ID and a name", () => {
     const controls = controlsOf(TRACED);
     const ids = controls.map(({ id }) => id);
     expect(new Set(ids).size).toBe(ids.length);
     expect(controls.filter(({ label }) => label === "")).toEqual([]);
   });
 
-  it("has a slider for every number, which sets it from end to end", () => {
+  it("has a slider for every number, which covers its whole range", () => {
     const sliders = controlsOf(TRACED).filter(({ kind }) => kind === "slider");
     expect(sliders.map(({ id }) => id)).toEqual(LIGHT_NUMBERS.map(({ id }) => id));
     for (const row of LIGHT_NUMBERS) {
@@ -77,7 +77,7 @@ describe("the panel's light", () => {
     expect(granted(shown, again.to(false))).toEqual(TRACED);
   });
 
-  it("has a card for each lamp, which changes that lamp alone", () => {
+  it("has a card for each lamp, which changes only that lamp", () => {
     const cards = itemsOf(TRACED).filter((item): item is Group => item.kind === "group");
     expect(cards.map(({ label }) => label)).toEqual(["Lamp 1", "Lamp 2", "Lamp 3"]);
     expect(cards).toHaveLength(LAMPS);
@@ -88,13 +88,13 @@ describe("the panel's light", () => {
     expect(red.slice(0, 2)).toEqual(TRACED.trace.lamps.slice(0, 2));
   });
 
-  it("offers a file of the user's where one can be chosen: not in stereo", () => {
+  it("offers a file of the user, except in stereo", () => {
     const own = (isStereo: boolean) =>
       controlsOf(TRACED, isStereo).some(({ label }) => label.includes(".hdr"));
     expect([own(false), own(true)]).toEqual([true, false]);
   });
 
-  it("has the same in the room, but for the file", () => {
+  it("has the same controls in stereo, except for the file", () => {
     const ids = (isStereo: boolean) => controlsOf(TRACED, isStereo).map(({ id }) => id);
     const [onScreen, inRoom] = [ids(false), ids(true)];
     expect(onScreen.filter((id) => !inRoom.includes(id))).toEqual(["trace", "own-light"]);

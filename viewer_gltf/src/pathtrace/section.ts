@@ -1,4 +1,4 @@
-/** The panel's section of the path-traced picture: its light, its medium, and what comes after. Pure. */
+/** The panel's section for path tracing: the medium, the light, and the adjustments of the finished frame. Pure. */
 
 import { command, controlOf, controlsOf, paletteOf } from "../panel/control_templates";
 import type { Button, Group, PanelView, PartSection, Section } from "../panel/controls";
@@ -34,8 +34,8 @@ function lampGroup(lamp: LampParameters, state: ViewerState, { picked }: PanelVi
 }
 
 /**
- * A flat screen always has the same rows, so that none moves when path tracing begins. In stereo a page of controls
- * that are refused would lead nowhere, and no file can be chosen.
+ * Returns the controls of path tracing. On a flat screen the rows are always the same, so that none moves when path
+ * tracing begins. In stereo the settings appear only during path tracing, and no file can be chosen.
  */
 export function lightItems(
   state: ViewerState,
@@ -52,7 +52,7 @@ export function lightItems(
   };
   if (isStereo) return isOn ? settingsOf(state, view) : [begin];
   const ownLight: Button = {
-    ...command("own-light", "Light of a .hdr or .exr file"),
+    ...command("own-light", "Light from a .hdr or .exr file"),
     refusal: isOn ? "" : TRACED_ALONE,
   };
   return [begin, ...settingsOf(state, view, ownLight)];

@@ -1,10 +1,10 @@
-/** Where a block of texels lies: its box in um, and how its texels follow from it. Pure. */
+/** The position of a block of texels: its box in um, and the map from that box to texels. Pure. */
 import type { TileVolume } from "../bundle/generated/volumes";
 import type { Size3 } from "../bundle/ktx2";
 
 type Vec3 = [number, number, number];
 
-/** What several tiles make up: all share a lattice and a matrix. */
+/** The block that several tiles form together. All of them share a lattice and a matrix. */
 export type BlockFrame = Readonly<{
   /** um, before `matrix`. */
   min: Vec3;
@@ -14,7 +14,7 @@ export type BlockFrame = Readonly<{
   /** Texels, with the apron. */
   size: Size3;
   apron: number;
-  /** Where each tile's first texel is. */
+  /** Position of each tile's first texel in the block, by tile ID. */
   places: ReadonlyMap<string, Size3>;
 }>;
 
@@ -24,8 +24,8 @@ function spacingOf({ bounds_um: { min, max }, size, apron }: TileVolume): Vec3 {
 }
 
 /**
- * The frame of the tiles that share the first one's lattice; those that an artist has moved by
- * themselves are not among its places.
+ * Returns the frame of all tiles that share the lattice and the matrix of the first one. Other tiles, such as those
+ * that an artist has moved separately, are left out of `places`.
  */
 export function frameOf(volumes: readonly TileVolume[]): BlockFrame {
   const [first] = volumes;

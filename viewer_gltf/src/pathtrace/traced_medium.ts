@@ -1,4 +1,4 @@
-/** The texels that paths go through: from a host that sends bricks by view, or from files. */
+/** Provides the texels for path tracing, from a host that sends bricks for the current view, or from files. */
 import type { ShownVolume } from "../state/on_screen";
 import type { BrickTile } from "../voxels/bricks/brick_atlas";
 import type { BrickService } from "../voxels/bricks/brick_service";
@@ -10,13 +10,13 @@ import { type VolumeSource, volumeOfBricks } from "../voxels/volume_source";
 import { type ChannelSources, MediumLoader, type MediumTexels, withVolumes } from "./medium_loader";
 import { frameOf } from "./texel_frame";
 
-/** The channels and tiles whose texels are wanted. */
+/** The channels and tiles whose texels are requested. */
 export type MediumRequest = Readonly<{ channels: readonly string[]; tiles: readonly string[] }>;
 
 export type MediumHandlers = Readonly<{
-  /** Other texels have come. */
+  /** Called when other texels have loaded. */
   onTexels: (texels: MediumTexels) => void;
-  /** The bricks of the tile can't be had, or lack what is to show: all is to be asked for again. */
+  /** Called when bricks can't be used, so that the caller has to request everything again, now from files. */
   onRefused: () => void;
   onChange: () => void;
   onError: (error: unknown) => void;
@@ -24,10 +24,10 @@ export type MediumHandlers = Readonly<{
 
 export class TracedMedium {
   private readonly loader = new MediumLoader();
-  /** The volumes of each channel that was asked for last, once they are known. */
+  /** The volumes of the channels of the last request; empty until they are known. */
   sources: readonly ChannelSources[] = [];
   private loading: AbortController | null = null;
-  /** Where texels come from as bricks; null: as files. */
+  /** The streamed tile; null: texels are loaded from files. */
   private brickTile: BrickTile | null = null;
   private packed: Packed | null = null;
 
@@ -44,9 +44,9 @@ export class TracedMedium {
   }
 
   /**
-   * The volumes that paths go through, for a caller that reads values at a point.
+   * Returns the traced volumes, for a caller that reads values at a point.
    *
-   * @param isolated the one tile that is shown; null: all are
+   * @param isolated ID of the only shown tile; null: all tiles are shown
    */
   shown(tableOf: (channel: string) => Uint8Array, isolated: string | null): readonly ShownVolume[] {
     return this.sources.flatMap(({ id, tiles }) => {
@@ -80,7 +80,7 @@ export class TracedMedium {
     }
   }
 
-  /** Ask for bricks by view of a single tile. Returns whether the host sends them. */
+  /** Requests bricks for the current view if there is a single tile. Returns whether the host sends bricks. */
   private streams(tiles: readonly string[], limits: VolumeLimits): boolean {
     const [tile] = tiles;
     const [first] = this.sources;
@@ -102,7 +102,7 @@ export class TracedMedium {
     return true;
   }
 
-  /** Hand on the bricks that have come, from time to time. */
+  /** Passes the bricks on that have loaded since the last call. */
   private takeBricks(): void {
     const { brickTile } = this;
     if (brickTile?.shown != null && brickTile.shown !== this.packed) {
@@ -111,19 +111,19 @@ export class TracedMedium {
       const [source] = brickTile.kept.values();
       const frame = frameOf([volumeOfBricks(source.volume)]);
       const { channels, level, texture, index, bricks } = shown;
-      const release = () => undefined; // the texture is the tile's own
+      const release = () => undefined; // the streamed tile owns the texture
       const { size } = frame;
       this.handlers.onTexels({ channels, frame, level, size, texture, index, bricks, release });
     }
     this.handlers.onChange();
   }
 
-  /** Whether the bricks lack what functions show. */
+  /** Returns whether the transfer functions show intensities that the streamed bricks leave out. */
   lacks(appearances: readonly Appearance[]): boolean {
     return this.brickTile !== null && showsBelow(this.brickTile, appearances);
   }
 
-  /** Take files from now on. */
+  /** Stops using bricks for this tile; files are loaded from now on. */
   refuseBricks(): void {
     if (this.brickTile === null) return;
     const [{ tile }] = [...this.brickTile.kept.values()].map(({ volume }) => volume);
@@ -131,12 +131,12 @@ export class TracedMedium {
     this.handlers.onRefused();
   }
 
-  /** Show more of the bricks that have come. Returns whether there is more. */
+  /** Shows more of the loaded bricks. Returns whether some are still hidden. */
   advance(dt_s: number): boolean {
     return this.brickTile?.advance(dt_s) ?? false;
   }
 
-  /** Stop what is under way. */
+  /** Cancels all loading, and releases the streamed tile. */
   drop(): void {
     this.loading?.abort();
     this.loading = null;

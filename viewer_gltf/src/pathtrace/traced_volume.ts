@@ -1,4 +1,4 @@
-/** The path-traced picture's subject: follows the state, loads what is missing, and is drawn. */
+/** The path-traced volumes: loads their texels, follows the viewer's state, and draws them. */
 import { Group, type Matrix4, type Texture, type WebGLRenderer } from "three";
 import { TemporaryError } from "../bundle/errors";
 import { LAST, Overlay } from "../gpu/composite_pass";
@@ -24,16 +24,16 @@ const FIRST_SAMPLES = 6;
 
 export class TracedVolume implements TracedVolumes {
   private readonly medium: TracedMedium;
-  /** What is drawn of it. */
+  /** Contains the overlay that shows the traced frame. */
   readonly group = new Group();
-  /** null: not asked for yet, or on its way. */
+  /** The path tracer; null: its code has not loaded. */
   private tracer: Tracer | null = null;
   private overlay: Overlay | null = null;
   private coming: Promise<Tracer> | null = null;
   private isDisposed = false;
   private state: ViewerState | null = null;
   private texels: MediumTexels | null = null;
-  /** What is on the GPU or on its way there: channels and tiles. */
+  /** Key of the channels and tiles that are on the GPU, or are being loaded. */
   private wanted = "";
   private hasFailed = false;
   private readonly changes = new MediumChanges();
@@ -67,17 +67,17 @@ export class TracedVolume implements TracedVolumes {
     return isPreparing || this.medium.isLoading || this.environment.isLoading;
   }
 
-  /** Whether there is anything to draw. */
+  /** Whether path tracing is on and has texels to draw. */
   get isShown(): boolean {
     return this.state !== null && isTraced(this.state) && this.tracer?.isReady === true;
   }
 
-  /** Whether a picture at rest still gathers. */
+  /** Whether a frame at rest still needs more samples. */
   get isGathering(): boolean {
     return this.isShown && this.samples < ENOUGH_SAMPLES;
   }
 
-  /** Whether its picture was shown alone: nothing was seen of the march. */
+  /** Whether the traced frame was shown without the ray-marched one that stands in for it. */
   get standsAlone(): boolean {
     return this.samples >= 1 && this.tracer?.isStoodIn === false;
   }
@@ -120,13 +120,13 @@ export class TracedVolume implements TracedVolumes {
     this.setAppearances();
   }
 
-  /** Light by a file of the user's; the state then has to hold "own". */
+  /** Lights the scene by a file of the user. The caller then has to set the environment in the state to "own". */
   async lightBy(file: File): Promise<void> {
     await this.prepare();
     await this.environment.lightBy(file);
   }
 
-  /** From the next `follow` on. */
+  /** Limits the texture's edge, in texels, from the next `follow` on. */
   limitEdge(edge: number): void {
     this.limits = { ...this.limits, edge };
     this.drop();
@@ -137,7 +137,7 @@ export class TracedVolume implements TracedVolumes {
     this.environment.retryFailed();
   }
 
-  /** What is on the GPU went with its context. */
+  /** Drops all references to GPU resources, because the WebGL context is lost. */
   forget(): void {
     this.drop();
     this.environment.forget();
@@ -147,15 +147,15 @@ export class TracedVolume implements TracedVolumes {
     const { resolution, isMoving, passes, standIn } = pace;
     const { tracer, overlay } = this;
     if (this.state === null || tracer === null || overlay === null) return;
-    const isWorn = eyes.all.length > 1; // by a head, which never rests
+    const isWorn = eyes.all.length > 1; // a headset moves a little all the time
     const isOther = isMoving && !tracer.goesOn(eyes, scene, isWorn);
-    // a view that moves is marched where it can be: sharp, and without a trace of the view before
+    // a moving view is ray-marched if possible, which is sharp and leaves no afterimage of the previous view
     if (isOther && !isWorn && standIn !== null) {
       tracer.standIn(renderer, eyes, scene, this.state.trace, standIn);
       overlay.show(eyes, tracer.scale);
       return;
     }
-    // what came to rest first clears up as it is, then is begun anew at its full size
+    // after a movement the small frame gathers a few samples, and then tracing begins again at full size
     const isClearing = this.scale.isSmall && tracer.rested < FIRST_SAMPLES && standIn === null;
     const isFirst = isOther || isClearing;
     this.scale.allow(resolution, isMoving, isOther);
@@ -171,9 +171,9 @@ export class TracedVolume implements TracedVolumes {
   }
 
   /**
-   * Light the march that stands in as paths of light do.
+   * Lights the ray-marched frame, which stands in for the traced one, in the same way.
    *
-   * @param specimen its pose in the room
+   * @param specimen pose of the specimen in the scene
    */
   lightMarch(march: MarchLight, specimen: Matrix4, head: Matrix4): void {
     if (this.state === null) return;
@@ -181,7 +181,7 @@ export class TracedVolume implements TracedVolumes {
     this.tracer?.lightMarch(march, this.state.trace, toEye);
   }
 
-  /** Show what has come of bricks; whether there is more. */
+  /** Shows more of the loaded bricks. Returns whether some are still hidden. */
   advance(dt_s: number): boolean {
     return this.medium.advance(dt_s);
   }
@@ -194,7 +194,7 @@ export class TracedVolume implements TracedVolumes {
     return this.overlay?.mesh.visible === true;
   }
 
-  /** What follows the paths: a part of the page that is fetched when it is first asked for. */
+  /** Loads the code of the path tracer when it is first needed. */
   private prepare(): Promise<Tracer> {
     this.coming ??= import("./path_tracer")
       .catch((cause) => {
@@ -244,7 +244,7 @@ export class TracedVolume implements TracedVolumes {
     this.onChange();
   }
 
-  /** The medium in the colours and functions of the state, if they differ. */
+  /** Updates the medium if the state's colours, transfer functions or light have changed. */
   private setAppearances(): void {
     const { state, texels } = this;
     if (state === null || texels === null) return;

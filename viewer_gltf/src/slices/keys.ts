@@ -1,14 +1,14 @@
-/** The keys of the slice planes: one chooses a number of them, two turn it. Pure. */
+/** The keys of the slices. One key chooses a setting, and two keys decrease and increase it. Pure. */
 
 import { type Key, type KeyGroup, key, keysOf, neighbour, no, refusalOf } from "../panel/key";
 import { setTo, shareOf, valueAtShare } from "../state/parameters/kinds";
 import { STRAIGHT } from "./section";
 import { isSliced, NO_SLICES, SLICE_NUMBERS, SLICES } from "./settings";
 
-/** Steps of a number's slider by one press. */
+/** Number of the slider's steps for each press of a key. */
 const STEPS = 2;
 
-function turn(steps: number): Key["to"] {
+function changeBy(steps: number): Key["to"] {
   return ({ state, view }) => {
     const row = SLICE_NUMBERS.find(({ id }) => id === view.parameter) ?? SLICE_NUMBERS[0];
     const at = shareOf(row, row.get(state)) + steps / row.steps;
@@ -20,14 +20,14 @@ function turn(steps: number): Key["to"] {
 
 const KEYS: readonly Key[] = [
   ...SLICES.flatMap(keysOf),
-  key("^", "Next setting of the slices: where they meet, how they are turned", ({ view }) => {
+  key("^", "Choose the next setting of the slices: position or rotation", ({ view }) => {
     const ids = SLICE_NUMBERS.map(({ id }) => id);
     const parameter = neighbour(ids, view.parameter ?? undefined, 1);
     return parameter === null ? no("There is no number.") : { panel: "parameter", parameter };
   }),
-  key("{", "Less of that setting", turn(-STEPS)),
-  key("}", "More of that setting", turn(STEPS)),
-  key("~", "Slices back to the middle, not turned", ({ state }) =>
+  key("{", "Decrease the chosen setting of the slices", changeBy(-STEPS)),
+  key("}", "Increase the chosen setting of the slices", changeBy(STEPS)),
+  key("~", "Centre and straighten the slices", ({ state }) =>
     isSliced(state) ? STRAIGHT : no(NO_SLICES),
   ),
 ];

@@ -1,4 +1,4 @@
-/** The letters at a slice's edges against its pixels: left and right confused would endanger a patient. */
+/** Compares the letters at a slice's edges with its pixels. Confusing left and right would endanger a patient. */
 import { Matrix4 } from "three";
 import { describe, expect, it } from "vitest";
 import type { TileVolume } from "../bundle/generated/volumes";
@@ -10,12 +10,12 @@ const FILE = { path: "x", bytes: 0, sha256: "" };
 const SIZE = [17, 15, 13] as const;
 const BOX = { min: [-30, 10, 5], max: [50, 70, 45] } as const;
 const MIDDLE: Vec3 = [10, 40, 25];
-/** How bright the phantom is at its left, its back and its top, 0..255; all else is dark. */
+/** Brightness of the phantom at its left, its back and its top, 0..255; the rest is dark. */
 const BRIGHT = { L: 200, P: 120, S: 60, R: 0, A: 0, I: 0 } as const;
 
 type Sides = Readonly<{ left: Vec3; posterior: Vec3; superior: Vec3 }>;
 
-/** All ways to lie along the axes, mirrored ones too. */
+/** All orientations along the axes, including mirrored ones. */
 const ORIENTATIONS: readonly Sides[] = AXES.flatMap((i) =>
   AXES.filter((j) => j !== i).flatMap((j) =>
     Array.from({ length: 8 }, (_, signs) => {
@@ -28,7 +28,7 @@ const ORIENTATIONS: readonly Sides[] = AXES.flatMap((i) =>
   ),
 );
 
-/** Patients of one body, each lying otherwise in the box. */
+/** The same body in each orientation in the box. */
 function phantom({ left, posterior, superior }: Sides): TexelBlock {
   const volume: TileVolume = {
     tile: "t",
@@ -64,7 +64,7 @@ function phantom({ left, posterior, superior }: Sides): TexelBlock {
 }
 
 describe("a slice's letters", () => {
-  it("stand at the sides that its pixels show, for each of the 48 ways to lie", () => {
+  it("stand at the sides that its pixels show, for each of the 48 orientations", () => {
     expect(new Set(ORIENTATIONS.map((sides) => JSON.stringify(sides))).size).toBe(48);
     for (const sides of ORIENTATIONS) {
       const block = phantom(sides);

@@ -1,4 +1,4 @@
-/** The slices as a part of the viewer. Their code loads when they are first shown. */
+/** The part of the viewer for slices. Most of its code loads when they are first shown. */
 import { Object3D } from "three";
 import { TemporaryError } from "../bundle/errors";
 import type { FrameView, Hit, Part, PartDefinition, PartHost, PartScene } from "../host/part";
@@ -10,7 +10,7 @@ import type { ViewerState } from "../state/viewer_state";
 import { SLICE_KEYS } from "./keys";
 import { sliceSections } from "./section";
 import { isSliced, SLICE_SETTINGS, SLICE_WAYS } from "./settings";
-import { meetSlices } from "./slice_frame";
+import { hitSlices } from "./slice_frame";
 import type { Slices } from "./slices";
 
 const NOT_LOADED =
@@ -23,14 +23,14 @@ class SlicesPart implements Part {
   private coming: Promise<void> | null = null;
   /** The newest state that shows slices, for when the code has loaded. */
   private wanted: ViewerState | null = null;
-  /** The code could not be loaded, and nobody has asked for it again. */
+  /** Whether the code could not be loaded, and no retry has been requested since. */
   private hasFailed = false;
   private isDisposed = false;
 
   constructor(private readonly host: PartHost) {}
 
   sync(state: ViewerState): void {
-    if (this.slices !== null) this.slices.follow(state);
+    if (this.slices !== null) this.slices.sync(state);
     else if (isSliced(state) && !this.hasFailed) {
       this.wanted = state;
       this.coming ??= this.load();
@@ -54,7 +54,7 @@ class SlicesPart implements Part {
         onError: (error) => this.host.report(error),
       });
       this.group.add(this.slices.planes.group);
-      this.slices.follow(this.wanted);
+      this.slices.sync(this.wanted);
       display.requestFrame();
     } catch (error) {
       this.hasFailed = true;
@@ -76,7 +76,7 @@ class SlicesPart implements Part {
     return { group, overlays: [marks], solid, isStanding: planes.group.visible };
   }
 
-  /** The corner before the planes, which would hide them. */
+  /** Returns the corner in front of the slices, which would hide them. */
   cutBefore(eye: Vec3): readonly ClipPlane[] | undefined {
     return this.slices?.planes.cornerTowards(eye);
   }
@@ -84,21 +84,21 @@ class SlicesPart implements Part {
   pick(ray: Ray): Hit | null {
     const { planes, images } = this.slices ?? {};
     if (planes?.group.visible !== true || images?.frames == null) return null;
-    const met = meetSlices(unitRay(ray), images.frames, images.box);
-    if (met === null) return null;
-    const { point, distance } = met;
+    const found = hitSlices(unitRay(ray), images.frames, images.box);
+    if (found === null) return null;
+    const { point, distance } = found;
     const tile = tileAt(this.host.bundle.manifest, point);
     return { point, tile, channel: null, distance_um: distance };
   }
 
-  /** For a patient on a flat screen the slices come first. */
+  /** The slices are the first section for a patient on a flat screen. */
   panel(): readonly PartSection[] {
     const { state, isInRoom, bundle } = this.host;
     const isFirst = bundle.manifest.specimen.sides !== undefined && !isInRoom;
     return sliceSections(state, this.values, isFirst);
   }
 
-  /** The channels' values where the slices meet, in the source's units; none: no slices show. */
+  /** The channels' values where the slices meet, in the source's units; empty if no slices are shown. */
   private get values(): readonly string[] {
     const images = this.slices?.images ?? null;
     return images === null || images.frames === null ? [] : images.valuesAt(images.point);

@@ -8,7 +8,7 @@ import { pointIn, sliceFrames } from "./slice_frame";
 const FILE = { path: "x", bytes: 0, sha256: "" };
 const SIZE = [14, 12, 10] as const;
 
-/** A tile whose texels are a linear function of where they lie, so that trilinear samples are exact. */
+/** A tile whose texels are a linear function of their position, so that trilinear samples are exact. */
 function ramp(min: Vec3, max: Vec3, matrix = new Matrix4()): TexelBlock {
   const volume: TileVolume = {
     tile: "t",
@@ -30,7 +30,7 @@ function ramp(min: Vec3, max: Vec3, matrix = new Matrix4()): TexelBlock {
   return { volume, level: { size: SIZE, texels } };
 }
 
-/** What the ramp is at a point of the tile's own space. */
+/** Value of the linear ramp at a point in the tile's own space. */
 function truth({ volume: { bounds_um } }: TexelBlock, point: Vec3): number | null {
   const { min, max } = bounds_um;
   const share = AXES.map((i) => (point[i] - min[i]) / (max[i] - min[i]));
@@ -47,7 +47,7 @@ const BOX = { min: [0, -40, 0], max: [100, 0, 30] } as const;
 const TILES = [ramp([0, -40, 0], [50, 0, 30]), ramp([50, -40, 0], [100, 0, 30])];
 
 describe("a resliced plane", () => {
-  it("has at each pixel the trilinear value there, in any plane, and none outside", () => {
+  it("has the trilinear value at each pixel in any plane, and none outside the tile", () => {
     for (const turn_deg of [
       [0, 0, 0],
       [17, -40, 65],
@@ -79,7 +79,7 @@ describe("a resliced plane", () => {
     }
   });
 
-  it("follows a tile that the stage has turned", () => {
+  it("follows a tile that the stage has rotated", () => {
     const matrix = new Matrix4().makeRotationZ(0.3).setPosition(5, -3, 2);
     const tile = ramp([0, -40, 0], [50, 0, 30], matrix);
     const [frame] = sliceFrames({ point: [25, -15, 14], turn_deg: [0, 0, 0] }, BOX, null);
@@ -91,7 +91,7 @@ describe("a resliced plane", () => {
     expect(values[8 * size.width + 20]).toBeCloseTo(truth(tile, own) ?? -1, 3);
   });
 
-  it("is coloured by the window, channels as lights that add up", () => {
+  it("is coloured by the window, and adds up the colours of the channels", () => {
     const pixels = new Uint8ClampedArray(4 * 4);
     const values = Float32Array.from([0, 61.2, 102, Number.NaN]);
     const look = { window: [0, 0.4], color: [1, 0, 0] } as const;

@@ -1,6 +1,6 @@
 /**
- * A plane cut through the volumes of the tiles, as a picture. The map from pixels to texels is affine, so
- * a row of pixels is a straight line through each texture, of which only the part inside is walked. Pure.
+ * Resamples the volumes of the tiles on a plane. The map from pixels to texels is affine, so a row of pixels is a
+ * straight line through each texture. Only the part of that line inside the texture is sampled. Pure.
  */
 import { Matrix4, Vector3 } from "three";
 import type { TileVolume } from "../bundle/generated/volumes";
@@ -12,17 +12,17 @@ import type { SliceFrame } from "./slice_frame";
 /** One tile's texels of a channel. */
 export type TexelBlock = Readonly<{ volume: TileVolume; level: VolumeLevel }>;
 
-/** Pixels of a picture's rows, and how many rows. */
+/** Size of an image in pixels. */
 export type Size = Readonly<{ width: number; height: number }>;
 
-/** So many pixels along the longer edge; the pixels are square. */
+/** Returns the size of an image with square pixels and `longest` pixels along its longer edge. */
 export function sizeOf({ half }: SliceFrame, longest: number): Size {
   const most = Math.max(half[0], half[1]);
   const along = (edge: number) => Math.max(1, Math.round((longest * edge) / most));
   return { width: along(half[0]), height: along(half[1]) };
 }
 
-/** Intensities 0..255 of one channel, row by row from the top; NaN: outside of all tiles. */
+/** Returns the intensities of one channel, 0..255, row by row from the top; NaN: the pixel lies in no tile. */
 export function reslice(
   blocks: readonly TexelBlock[],
   frame: SliceFrame,
@@ -43,7 +43,7 @@ export function reslice(
     const line = down.clone().applyMatrix4(toTexels.matrix).sub(origin0);
     for (let row = 0; row < height; row++) {
       const at = start.clone().addScaledVector(line, row);
-      walk(values, row * width, width, at, step, toTexels, level);
+      sampleRow(values, row * width, width, at, step, toTexels, level);
     }
   }
   return values;
@@ -51,7 +51,10 @@ export function reslice(
 
 type TexelSpace = Readonly<{ matrix: Matrix4; low: Vector3; high: Vector3 }>;
 
-/** From the world, um, to texels, 0 the centre of the first; the box of what is the tile's own. */
+/**
+ * Returns the matrix from um to texels, where 0 is the centre of the first texel, and the box of the tile in texels,
+ * without the apron.
+ */
 function texelMatrix(volume: TileVolume, { size }: VolumeLevel): TexelSpace {
   const { min, max } = volume.bounds_um;
   const { low, high } = textureCorners(volume);
@@ -72,10 +75,11 @@ function texelMatrix(volume: TileVolume, { size }: VolumeLevel): TexelSpace {
   return { matrix, low: from.clone().min(to), high: from.clone().max(to) };
 }
 
-/** Tolerance at a tile's rim, texels: neighbours share it, and rounding must leave no line between. */
+/** Tolerance at a tile's edge, texels. Neighbours share the edge, and rounding must not leave a gap between them. */
 const RIM = 1e-3;
 
-function walk(
+/** Samples one row of pixels trilinearly, from the texel position `at` on in steps of `step`. */
+function sampleRow(
   values: Float32Array,
   offset: number,
   width: number,
@@ -118,15 +122,15 @@ function walk(
   }
 }
 
-/** How a channel shows: the part of its intensities, 0..1, that goes from dark to bright; linear RGB. */
+/** Appearance of a channel: the intensities, 0..1, that are shown from dark to bright, and its colour, linear RGB. */
 export type SliceLook = Readonly<{ window: readonly [number, number]; color: Rgb }>;
 
-/** Grey, as a picture of one channel is read best. */
+/** Colour of a single channel: an image of one channel is easiest to read in grey. */
 export const GREY: Rgb = [1, 1, 1];
 
 /**
- * Channels added up as lights, as sRGB bytes; opaque where any of them has a value. One channel is as
- * bright as its values are, on the screen's own scale; so are several in their colours.
+ * Adds up the channels' colours into sRGB pixels, which are opaque where any channel has a value. The sum is taken
+ * over the encoded bytes, so that a pixel's brightness on screen is proportional to the intensity.
  */
 export function compose(
   layers: readonly Readonly<{ values: Float32Array; look: SliceLook }>[],
@@ -149,7 +153,7 @@ export function compose(
   }
 }
 
-/** IEC 61966-2-1. */
+/** Encodes a linear value as sRGB (IEC 61966-2-1). */
 function encoded(linear: number): number {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055;
 }

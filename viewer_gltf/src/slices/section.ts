@@ -1,11 +1,11 @@
-/** The panel's section of the slice planes. Pure. */
+/** The panel's section of the slices. Pure. */
 
 import { controlsOf } from "../panel/control_templates";
 import type { Control, PartSection } from "../panel/controls";
 import { hasVolumes, type ViewerState } from "../state/viewer_state";
 import { SLICES } from "./settings";
 
-/** Back to the middle, along the axes. */
+/** The action that centres the slices in the specimen and aligns them with its axes. */
 export const STRAIGHT = {
   type: "move-slices",
   at: [0.5, 0.5, 0.5],
@@ -18,13 +18,13 @@ function sliceItems(state: ViewerState, values: readonly string[]): readonly Con
     {
       kind: "button",
       id: "straight-slices",
-      label: "Back to the middle, not turned",
+      label: "Centre and straighten the slices",
       to: () => STRAIGHT,
     },
     {
       kind: "text",
       id: "slice-values",
-      label: "Where they meet",
+      label: "Values where the slices meet",
       value: values.join(" · ") || "–",
     },
   ];
@@ -32,7 +32,7 @@ function sliceItems(state: ViewerState, values: readonly string[]): readonly Con
 
 /**
  * @param values the channels' values where the slices meet
- * @param isFirst whether the slices come first in the panel, as for a patient on a flat screen
+ * @param isFirst whether the slices are the first section of the panel
  */
 export function sliceSections(
   state: ViewerState,

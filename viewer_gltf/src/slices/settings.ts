@@ -1,4 +1,4 @@
-/** The settings of the three slice planes: whether they show, where they meet, how they are turned. Pure. */
+/** The settings of the three slices: whether they are shown, where they meet, and how they are rotated. Pure. */
 
 import type { Vec3 } from "../math/vec3";
 import type { Remedies } from "../panel/remedies";
@@ -12,17 +12,17 @@ import {
 } from "../state/parameters/kinds";
 import type { PartSettings } from "../state/part_settings";
 
-/** The slices of a bundle that has just opened. */
+/** The slice settings of a bundle that has just opened. */
 export const START_SLICES = {
-  /** As pictures beside the specimen, on a flat screen. */
+  /** Whether the slices are shown as images beside the specimen, on a flat screen. */
   hasSlicePictures: false,
-  /** As planes in the specimen. */
+  /** Whether the slices are shown in the specimen. */
   hasSlicePlanes: false,
-  /** The point that all three go through: shares of the specimen's box along x, y, z. */
+  /** The point where the three slices meet, as shares of the specimen's box along x, y, z, 0..1. */
   sliceX: 0.5,
   sliceY: 0.5,
   sliceZ: 0.5,
-  /** The planes' turn from where they lie along the axes: about x, then y, then z, degrees. */
+  /** Rotation of the slices away from the axes, in degrees: Euler angles about x, y and z, in three's order XYZ. */
   sliceTurnX_deg: 0,
   sliceTurnY_deg: 0,
   sliceTurnZ_deg: 0,
@@ -30,7 +30,7 @@ export const START_SLICES = {
 
 export type SliceSettings = Readonly<typeof START_SLICES>;
 
-/** The point where the slices meet (shares of the specimen's box) and their turn; absent: as it is. */
+/** Moves the point where the slices meet (shares of the specimen's box) or rotates them. An absent field stays. */
 export type MoveSlices = Readonly<{ type: "move-slices"; at?: Vec3; turn_deg?: Vec3 }>;
 
 declare module "../state/parameters/settings" {
@@ -42,28 +42,30 @@ declare module "../state/actions" {
   }
 }
 
-export const NO_SLICES = "No slices are shown: switch pictures or planes on under Slices.";
+export const NO_SLICES =
+  "No slices are shown. Switch on “Images” or “In the specimen” under Slices.";
 
 const lens = lensesOf<SliceSettings>();
 
 export const SLICE_PICTURES: SwitchParameter<SliceSettings> = {
   kind: "switch",
   id: "slice-pictures",
-  label: "Pictures",
-  name: () => "Slices as pictures",
+  label: "Images",
+  name: () => "Slices as images",
   link: "slices",
   ...lens("hasSlicePictures"),
-  key: ["\\", "Slices as pictures: on or off"],
-  spoken: ({ hasSlicePictures }) => `Slices as pictures: ${hasSlicePictures ? "on" : "off"}`,
+  key: ["\\", "Show or hide the slices as images"],
+  spoken: ({ hasSlicePictures }) => `Slices as images: ${hasSlicePictures ? "on" : "off"}`,
 };
 
 export const SLICE_PLANES: SwitchParameter<SliceSettings> = {
   kind: "switch",
   id: "slice-planes",
-  label: "Planes in the specimen",
+  label: "In the specimen",
+  name: () => "Slices in the specimen",
   link: "planes",
   ...lens("hasSlicePlanes"),
-  key: ["|", "Slices as planes in the specimen: on or off"],
+  key: ["|", "Show or hide the slices in the specimen"],
   spoken: ({ hasSlicePlanes }) => `Slices in the specimen: ${hasSlicePlanes ? "on" : "off"}`,
 };
 
@@ -73,7 +75,7 @@ export const isSliced = ({ hasSlicePictures, hasSlicePlanes }: SliceSettings) =>
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const degrees = (angle: number) => `${Number(angle.toFixed(1))}°`;
 
-/** Where the planes meet. */
+/** The position where the slices meet. */
 export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
   [
     ["x", "sliceX"],
@@ -83,8 +85,8 @@ export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
 ).map(([axis, field]) => ({
   kind: "number",
   id: `slice-${axis}`,
-  label: `Along ${axis}`,
-  name: () => `Where the slices meet, along ${axis}`,
+  label: `Position along ${axis}`,
+  name: () => `Position of the slices along ${axis}`,
   link: `slice-${axis}`,
   ...lens(field),
   limits: [0, 1],
@@ -95,7 +97,7 @@ export const SLICE_AT: readonly NumberParameter<SliceSettings>[] = (
   spoken: (on) => `Slices: ${axis} ${percent(on[field])}`,
 }));
 
-/** How they are turned. */
+/** The rotation of the slices. */
 export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
   [
     ["x", "sliceTurnX_deg"],
@@ -105,8 +107,8 @@ export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
 ).map(([axis, field]) => ({
   kind: "number",
   id: `slice-turn-${axis}`,
-  label: `Turned about ${axis}`,
-  name: () => `Slices, turned about ${axis}`,
+  label: `Rotation about ${axis}`,
+  name: () => `Rotation of the slices about ${axis}`,
   link: `tilt-${axis}`,
   ...lens(field),
   limits: [-180, 180],
@@ -114,7 +116,7 @@ export const SLICE_TURN: readonly NumberParameter<SliceSettings>[] = (
   rounded: (angle) => Number(angle.toFixed(2)),
   text: degrees,
   refusal: (on) => (isSliced(on) ? "" : NO_SLICES),
-  spoken: (on) => `Slices: turned about ${axis} by ${degrees(on[field])}`,
+  spoken: (on) => `Slices: rotated about ${axis} by ${degrees(on[field])}`,
 }));
 
 export const SLICE_NUMBERS: readonly NumberParameter<SliceSettings>[] = [
@@ -122,7 +124,7 @@ export const SLICE_NUMBERS: readonly NumberParameter<SliceSettings>[] = [
   ...SLICE_TURN,
 ];
 
-/** In the panel's order. */
+/** All settings of the slices, in the panel's order. */
 export const SLICES: readonly Parameter<SliceSettings>[] = [
   SLICE_PICTURES,
   SLICE_PLANES,
@@ -140,7 +142,7 @@ export const SLICE_SETTINGS: PartSettings = {
       },
       name: "slices",
       isGradual: true,
-      spoken: () => "Slices: in the middle, not turned",
+      spoken: () => "Slices: centred and straight",
     },
   },
 };

@@ -8,7 +8,7 @@ const BOX = { min: [0, -20, 10], max: [40, 0, 20] } as const;
 const STRAIGHT: Vec3 = [0, 0, 0];
 
 describe("slices", () => {
-  it("leave out the corner that faces the eye, and stay at it while the eye is about to pass one", () => {
+  it("cut away the corner that faces the eye, and keep it while the eye is very near to a slice", () => {
     const frames = sliceFrames({ point: [20, -10, 15], turn_deg: STRAIGHT }, BOX, null);
     const clip = (eye: Vec3, before: ReturnType<typeof cornerTowards> = []) => ({
       box: null,
@@ -20,7 +20,7 @@ describe("slices", () => {
     );
     for (const eye of all) {
       expect(all.filter((p) => !isKept(p, clip(eye)))).toEqual([eye]);
-      expect(isKept([20, eye[1], eye[2]], clip(eye))).toBe(true); // on a plane
+      expect(isKept([20, eye[1], eye[2]], clip(eye))).toBe(true); // this point lies on a slice
     }
     const [nearly, past, far]: Vec3[] = [
       [20.1, -1, 19],

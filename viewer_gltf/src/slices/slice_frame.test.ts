@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { dot, type Vec3 } from "../math/vec3";
 import {
-  meetSlices,
+  hitSlices,
   outlineOf,
   placeIn,
   pointAt,
@@ -22,7 +22,7 @@ function expectNear(found: readonly number[], wanted: readonly number[]): void {
 }
 
 describe("the slice planes", () => {
-  it("go through one point at right angles, however they are turned", () => {
+  it("go through one point at right angles, at any rotation", () => {
     const point: Vec3 = [10, -5, 12];
     for (const turn_deg of [STRAIGHT, [20, -35, 110]] as const) {
       const frames = sliceFrames({ point, turn_deg }, BOX, null);
@@ -36,7 +36,7 @@ describe("the slice planes", () => {
     }
   });
 
-  it("of a patient are seen from the feet, the front and the left, lettered as radiologists do", () => {
+  it("show a patient from the feet, the front and the left, with the letters of radiologists", () => {
     const [axial, coronal, sagittal] = sliceFrames(
       { point: [20, -10, 15], turn_deg: STRAIGHT },
       BOX,
@@ -47,20 +47,20 @@ describe("the slice planes", () => {
       ["coronal", "R", "L", "S", "I"],
       ["sagittal", "A", "P", "S", "I"],
     ]);
-    // seen from the feet: the normal, to the eye, leads down
+    // the axial slice is seen from the feet, so its normal, which leads to the eye, points down
     expectNear(axial.normal, [0, -1, 0]);
     expectNear(coronal.normal, [0, 0, 1]);
     expectNear(sagittal.normal, [1, 0, 0]);
   });
 
-  it("that are oblique are lettered by all sides that they lead to, the nearest first", () => {
+  it("name all sides that an oblique slice leads to, the nearest first", () => {
     const [axial] = sliceFrames({ point: [20, -10, 15], turn_deg: [0, 30, 0] }, BOX, PATIENT);
     expect(axial.ends).toEqual(["RA", "LP", "AL", "PR"]);
     const [xy] = sliceFrames({ point: [20, -10, 15], turn_deg: [0, 0, 10] }, BOX, null);
     expect(xy.ends).toEqual(["−x", "+x", "+y", "−y"]);
   });
 
-  it("keep the specimen in place as the crosshair moves, and all of it in the picture", () => {
+  it("keep the whole specimen at one place in the image while the crosshair moves", () => {
     const [first, second] = [12, 18].map((z) =>
       sliceFrames({ point: [5, -3, z], turn_deg: [10, 20, 30] }, BOX, null),
     );
@@ -76,7 +76,7 @@ describe("the slice planes", () => {
     });
   });
 
-  it("map places to points and back, and shares of the box too", () => {
+  it("convert positions in an image and shares of the box to points and back", () => {
     const [frame] = sliceFrames({ point: [5, -3, 12], turn_deg: [10, 20, 30] }, BOX, null);
     const place = { x: 0.3, y: 0.8 };
     const back = placeIn(frame, pointIn(frame, place));
@@ -86,17 +86,17 @@ describe("the slice planes", () => {
     expectNear(sharesOf([99, -99, 15], BOX), [1, 0, 0.5]);
   });
 
-  it("are met by a ray where they lie in the box, the nearest first", () => {
+  it("are hit by a ray within the box, the nearest first", () => {
     const frames = sliceFrames({ point: [20, -10, 15], turn_deg: STRAIGHT }, BOX, null);
-    const met = meetSlices({ origin: [5, -5, 99], direction: [0, 0, -1] }, frames, BOX);
-    expect(met?.point).toEqual([5, -5, 15]); // the plane xy
-    expect(meetSlices({ origin: [50, -5, 99], direction: [0, 0, -1] }, frames, BOX)).toBeNull();
-    const side = meetSlices({ origin: [99, -5, 12], direction: [-1, 0, 0] }, frames, BOX);
+    const front = hitSlices({ origin: [5, -5, 99], direction: [0, 0, -1] }, frames, BOX);
+    expect(front?.point).toEqual([5, -5, 15]); // the plane xy
+    expect(hitSlices({ origin: [50, -5, 99], direction: [0, 0, -1] }, frames, BOX)).toBeNull();
+    const side = hitSlices({ origin: [99, -5, 12], direction: [-1, 0, 0] }, frames, BOX);
     expect(side?.point).toEqual([20, -5, 12]); // the plane yz
     expect(outlineOf(frames[0], BOX)).toHaveLength(4);
   });
 
-  it("turn about any direction, and back", () => {
+  it("rotate about any direction, and back", () => {
     const about: Vec3 = [0.6, 0, 0.8];
     const turned = turnedBy([10, 20, 30], about, 25);
     expectNear(turnedBy(turned, about, -25), [10, 20, 30]);

@@ -1,49 +1,49 @@
 /**
- * Three planes through one point, at right angles, and how each is looked at: which way is right, which
- * is up, what stands at the edges. A patient is shown as radiologists do, from the front and from the
- * feet, so that the patient's right is on the picture's left, and the nose to the left of a sagittal
- * picture (as `stereocell slices` has it). um, world. Pure.
+ * The geometry of the three slices: planes at right angles through one point, the directions that lead right and up in
+ * their images, and the letters at the edges. A patient is shown by the convention of radiologists, from the front or
+ * from the feet. The patient's right is on the left of the image, and the nose is on the left of a sagittal image, as
+ * in the images of `stereocell slices`. All lengths are in um. Pure.
  */
 import { Euler, Quaternion, Vector3 } from "three";
 import type { Box } from "../math/box";
 import { planeSection } from "../math/plane_box_section";
 import { AXES, dot, type Ray, type Vec3 } from "../math/vec3";
 
-/** Of the patient, as unit vectors; null: there is none, or nobody knows. */
+/** Directions to the sides of the patient, as unit vectors; null: there is no patient, or the sides are not known. */
 export type PatientSides = Readonly<{ left: Vec3; posterior: Vec3; superior: Vec3 }> | null;
 
 export type SliceFrame = Readonly<{
   name: string;
-  /** The point of the plane in the picture's middle. */
+  /** The point of the plane at the centre of the image. */
   origin: Vec3;
   /** Unit vectors; the eye looks against the normal. */
   right: Vec3;
   up: Vec3;
   normal: Vec3;
-  /** Half the picture's edges, um: they hold all of the box, wherever the plane is. */
+  /** Half the image's edges, um. The image is large enough for the whole box, wherever the plane lies. */
   half: readonly [number, number];
-  /** What stands at the left, right, upper and lower edge. */
+  /** Letters at the left, right, upper and lower edge. */
   ends: readonly [string, string, string, string];
 }>;
 
 export type SlicePlace = Readonly<{
-  /** Where the planes meet. */
+  /** The point where the planes meet. */
   point: Vec3;
-  /** About x, then y, then z. */
+  /** Rotation by Euler angles about x, y and z, in three's order XYZ. */
   turn_deg: Vec3;
 }>;
 
 const RADIANS = Math.PI / 180;
-/** A plane turned by less shows the sides of the patient that it showed before, degrees. */
+/** Cosine of the largest angle, 20 degrees, between an edge's direction and a side at which only that side is named. */
 const ALONG = Math.cos(20 * RADIANS);
 
-/** The point at shares of a box along x, y, z. */
+/** Returns the point at the given shares of a box along x, y, z, 0..1. */
 export function pointAt(shares: Vec3, { min, max }: Box): Vec3 {
   const at = (i: 0 | 1 | 2) => min[i] + shares[i] * (max[i] - min[i]);
   return [at(0), at(1), at(2)];
 }
 
-/** Its shares of a box, within it. */
+/** Returns the shares of a box at which a point lies, limited to 0..1. */
 export function sharesOf(point: Vec3, { min, max }: Box): Vec3 {
   const at = (i: 0 | 1 | 2) => {
     const edge = max[i] - min[i];
@@ -52,10 +52,9 @@ export function sharesOf(point: Vec3, { min, max }: Box): Vec3 {
   return [at(0), at(1), at(2)];
 }
 
-/** The other way. */
 export const negated = ([x, y, z]: Vec3): Vec3 => [-x, -y, -z];
 
-/** Name, right and up of each plane before it is turned. */
+/** Name, right and up of each plane before the rotation. */
 function straight(sides: PatientSides): readonly (readonly [string, Vec3, Vec3])[] {
   if (sides === null) {
     return [
@@ -111,8 +110,8 @@ export function sliceFrames(
 }
 
 /**
- * What lies there: of a patient the letter of the nearest side, of an oblique direction those of all that
- * it leads to, the nearest first; else an axis, with its sign.
+ * Returns the text at an edge of an image: the letter of the patient's side in that direction, or an axis with its sign.
+ * An oblique direction has the letters of all sides that it leads to, the nearest first.
  */
 function endOf(direction: Vector3, sides: PatientSides): string {
   const named: readonly (readonly [string, Vec3])[] =
@@ -144,7 +143,7 @@ function endOf(direction: Vector3, sides: PatientSides): string {
     .join(sides === null ? " " : "");
 }
 
-/** A place of a picture, 0..1 from its left and its top. */
+/** A position in an image, 0..1 from its left and its top. */
 export type PicturePlace = Readonly<{ x: number; y: number }>;
 
 export function pointIn({ origin, right, up, half }: SliceFrame, { x, y }: PicturePlace): Vec3 {
@@ -158,12 +157,12 @@ export function placeIn({ origin, right, up, half }: SliceFrame, point: Vec3): P
   return { x: (dot(from, right) / half[0] + 1) / 2, y: (1 - dot(from, up) / half[1]) / 2 };
 }
 
-/** The plane's polygon within a box, in order round its normal; fewer than three corners: it misses it. */
+/** Returns the polygon of a plane within a box, in order around the normal. It has no corners if the plane misses. */
 export function outlineOf({ origin, normal }: SliceFrame, box: Box): readonly Vec3[] {
   return planeSection({ normal, offset_um: dot(normal, origin) }, box);
 }
 
-/** The planes turned further, about a unit vector: as turns about x, y, z. */
+/** Returns the Euler angles, in degrees, of a rotation followed by another one about a unit vector. */
 export function turnedBy(turn_deg: Vec3, about: Vec3, by_deg: number): Vec3 {
   const [x, y, z] = turn_deg.map((angle) => angle * RADIANS);
   const turn = new Quaternion().setFromEuler(new Euler(x, y, z));
@@ -172,8 +171,8 @@ export function turnedBy(turn_deg: Vec3, about: Vec3, by_deg: number): Vec3 {
   return [euler.x / RADIANS, euler.y / RADIANS, euler.z / RADIANS];
 }
 
-/** Where a ray meets the nearest of the planes within the box, and how far away, in its direction's lengths. */
-export function meetSlices(
+/** Returns the nearest point, within the box, where a ray hits a plane, and its distance in lengths of the direction. */
+export function hitSlices(
   { origin, direction }: Ray,
   frames: readonly SliceFrame[],
   { min, max }: Box,

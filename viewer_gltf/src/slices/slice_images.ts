@@ -1,6 +1,6 @@
 /**
- * The pictures of the three slice planes: texels of the tiles that a plane cuts are fetched, coarse ones
- * first, resampled and coloured. Page and scene show the same canvases.
+ * The images of the three slices. The texels of the shown tiles are fetched, coarse ones first, then resampled and
+ * coloured. The page and the scene show the same canvases.
  */
 
 import type { Manifest } from "../bundle/generated/bundle";
@@ -17,46 +17,46 @@ import { compose, GREY, reslice, type Size, sizeOf, type TexelBlock } from "./re
 import { isSliced } from "./settings";
 import { outlineOf, pointAt, type SliceFrame, sliceFrames } from "./slice_frame";
 
-/** Pixels of a picture's longer edge. */
+/** Length of an image's longer edge, pixels. */
 const LONGEST_PX = 384;
-/** Most texels of all tiles and channels together that are looked up. */
+/** Largest number of texels that are fetched for all tiles and channels together. */
 const MAX_TEXELS = 40 * 1024 * 1024;
-/** Most texels of one tile that come before any other. */
+/** Largest number of texels of one tile in the first, coarse fetch. */
 const FIRST_TEXELS = 48 ** 3;
 
 export type SlicesOptions = Readonly<{
   manifest: Manifest;
   /** Address of the bundle's manifest. */
   base: string;
-  /** Voxels as they were measured; null: the host has none. */
+  /** The measured values of voxels; null: the host does not offer them. */
   values: ValuesHost | null;
   sourceOf: (tile: string, channel: string) => Promise<LevelSource | null>;
-  /** The pictures differ now. */
+  /** Called when the frame has to be drawn again. */
   onChange: () => void;
   onError: (error: unknown) => void;
-  /** Called with every new picture. */
+  /** Called after the images have been drawn again. */
   onPaint: () => void;
 }>;
 
 type Layer = Readonly<{ channel: ChannelState; blocks: readonly TexelBlock[] }>;
 
 export class SliceImages {
-  /** null: none are shown. */
+  /** Geometry of the slices; null: none are shown. */
   frames: readonly SliceFrame[] | null = null;
-  /** Where the planes meet. */
+  /** The point where the slices meet, um. */
   point: Vec3 = [0, 0, 0];
-  /** What they are cut from: the specimen, or the only tile. */
+  /** Box of the specimen, or of the isolated tile, um. */
   box: Box;
   readonly canvases = AXES.map(() => document.createElement("canvas"));
-  /** Changes with every picture. */
+  /** Number of times that the images have been drawn. */
   version = 0;
   isLoading = false;
-  /** Whether there is anything to cut: until then the pictures are black. */
+  /** Whether texels have loaded; until then the images are black. */
   hasCome = false;
   private readonly cache: TexelCache;
   private state: ViewerState | null = null;
   private layers: readonly Layer[] = [];
-  /** What has been loaded, and what has been resampled and drawn of it. */
+  /** Keys of the texels that are loaded, of the planes that are resampled, and of the colours that are drawn. */
   private loaded = "";
   private sampled = "";
   private drawn = "";
@@ -69,7 +69,7 @@ export class SliceImages {
     this.box = options.manifest.specimen.bounds_um;
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
     if (!isSliced(state)) {
       this.frames = null;
@@ -84,7 +84,7 @@ export class SliceImages {
     this.update();
   }
 
-  /** Names and values of the shown channels at a point, in the source's units. */
+  /** Names and values of the loaded channels at a point in um, in the source's units. */
   valuesAt(point: Vec3): readonly string[] {
     const { manifest, values } = this.options;
     const unit = unitOf(manifest);
@@ -104,7 +104,7 @@ export class SliceImages {
     });
   }
 
-  /** Resolves when `valuesAt` has what was measured at a point; null: the host has no such values. */
+  /** Resolves when `valuesAt` knows the measured values at a point; null: the host does not offer measured values. */
   measureAt(point: Vec3): Promise<unknown> | null {
     const { values } = this.options;
     if (values === null) return null;
@@ -114,15 +114,15 @@ export class SliceImages {
         return voxel === null ? [] : [values.ask(volume.tile, channel.id, voxel)];
       }),
     );
-    return Promise.allSettled(asked); // without an answer the value of 8 bits stays
+    return Promise.allSettled(asked); // a channel whose request fails keeps its value of 8 bits
   }
 
   retryFailed(): void {
     this.loaded = "";
-    if (this.state !== null) this.follow(this.state);
+    if (this.state !== null) this.sync(this.state);
   }
 
-  /** Draw by the end of this turn, whatever has changed until then. */
+  /** Draws and loads in the next task, once for all changes until then. */
   private update(): void {
     if (this.timer !== 0) return;
     this.timer = window.setTimeout(() => {
@@ -153,7 +153,7 @@ export class SliceImages {
             ).flatMap((block) => block ?? []),
           })),
         );
-        if (this.isDisposed || wanted !== this.loaded) return; // something else is wanted by now
+        if (this.isDisposed || wanted !== this.loaded) return; // other channels or tiles are shown by now
         this.layers = layers;
         this.hasCome = true;
         this.sampled = "";

@@ -1,4 +1,4 @@
-/** The slices in the scene: each plane's polygon within the specimen, with its picture, and their sides. */
+/** The slices in the scene: for each, a polygon within the specimen with its image, and the letters of the sides. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -26,13 +26,13 @@ import type { SliceImages } from "./slice_images";
 
 const LINE = 0xffd24a;
 const LETTER = "#ffd24a";
-/** Round each slice in the texture of all. */
+/** Border around each slice in their common texture, pixels. */
 const BORDER_PX = 1;
 
-/** All planes at once: a draw call costs as much as they do. */
+/** All slices as one mesh, because one draw call costs about as much as drawing their few triangles. */
 class Planes {
   readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
-  /** The slices side by side, each with its edges once more around it, for what is read between texels. */
+  /** The slices side by side. Each has a border that repeats its edge, so that filtering does not mix neighbours. */
   private readonly canvas = document.createElement("canvas");
   private readonly texture = new CanvasTexture(this.canvas);
 
@@ -55,14 +55,14 @@ class Planes {
       side: DoubleSide,
       toneMapped: false,
       fog: false,
-      // surfaces end at the planes: their last pixels would be as near as those of the picture
+      // surfaces are cut at the slices, and the pixels at their cut edges would have the same depth as the image
       polygonOffset: true,
       polygonOffsetFactor: -2,
       polygonOffsetUnits: -8,
     });
     this.mesh = new Mesh(geometry, material);
     this.mesh.frustumCulled = false;
-    keepUnclipped(this.mesh); // a cut lays it open
+    keepUnclipped(this.mesh); // the clip must not cut the slices
   }
 
   place(frames: readonly SliceFrame[], box: Box): void {
@@ -72,7 +72,7 @@ class Planes {
     this.slices.forEach((slice, plane) => {
       const outline = outlineOf(frames[plane], box);
       for (let i = 0; i < MAX_CORNERS; i++) {
-        // the triangles that are left over have no area
+        // unused corners repeat the last one, so that the remaining triangles have no area
         const corner = outline.length > 2 ? outline[Math.min(i, outline.length - 1)] : box.min;
         const { x, y } = placeIn(frames[plane], corner);
         const at = plane * MAX_CORNERS + i;
@@ -85,7 +85,7 @@ class Planes {
     uv.needsUpdate = true;
   }
 
-  /** The slices have other pictures. */
+  /** Copies the slices' new images into the texture. */
   refresh(): void {
     const sum = (widths: readonly number[]) => widths.reduce((all, width) => all + width, 0);
     this.canvas.width = sum(this.slices.map(({ width }) => width + 2 * BORDER_PX));
@@ -111,16 +111,16 @@ class Planes {
 }
 
 export class SlicePlanes {
-  /** Child of the specimen's group: um, world. */
+  /** Child of the specimen's group, in um. */
   readonly group = new Object3D();
-  /** Lines and letters, which no depth knows of. */
+  /** Lines and letters, which write no depth. */
   readonly marks = new Object3D();
   private readonly planes: Planes;
   private readonly lines: LineSegments<BufferGeometry, LineBasicMaterial>;
   private readonly letters = Array.from({ length: 6 }, () => new Label("above", LETTER));
   private readonly places = Array.from({ length: 6 }, () => new Vector3());
   private version = -1;
-  /** How often they were placed otherwise. */
+  /** Number of times that the slices have moved. */
   private placed = 0;
   private place = "";
   private corner: readonly ClipPlane[] = [];
@@ -140,7 +140,7 @@ export class SlicePlanes {
     this.group.visible = false;
   }
 
-  follow(areShown: boolean): void {
+  sync(areShown: boolean): void {
     const { frames, box, point, hasCome } = this.images;
     this.group.visible = areShown && hasCome && frames !== null;
     if (!this.group.visible || frames === null) return;
@@ -149,7 +149,7 @@ export class SlicePlanes {
     if (place !== this.place) this.placed++;
     this.place = place;
     const [first, second] = frames;
-    // the planes' lines in common: along the first's right and up, and along the second's up
+    // the lines where two slices meet: they run along the first slice's right, up and normal
     const arms: readonly (readonly [Vec3, string, string])[] = [
       [first.right, first.ends[1], first.ends[0]],
       [first.up, first.ends[2], first.ends[3]],
@@ -174,7 +174,7 @@ export class SlicePlanes {
     this.lines.geometry.attributes.position.needsUpdate = true;
   }
 
-  /** The corner before them, towards an eye (um, world), which hides them; none: they don't show. */
+  /** Returns the corner that hides the slices from an eye in um; undefined: no slices are shown. */
   cornerTowards(eye: Vec3): readonly ClipPlane[] | undefined {
     const { frames } = this.images;
     if (!this.group.visible || frames === null) return undefined;
@@ -182,7 +182,7 @@ export class SlicePlanes {
     return this.corner;
   }
 
-  /** Changes with what the planes hide: so many of them, however they lie; 0: none. */
+  /** A number that changes when the slices move and so hide other parts of the specimen; 0: they are not shown. */
   get solid(): number {
     return this.group.visible ? 1 + this.placed : 0;
   }
@@ -193,7 +193,7 @@ export class SlicePlanes {
     if (this.version !== version) {
       this.version = version;
       this.planes.refresh();
-      this.planes.place(frames, box); // its texture has another size
+      this.planes.place(frames, box); // the texture's size may have changed
     }
     this.letters.forEach((letter, i) => {
       letter.place(this.places[i], sight);

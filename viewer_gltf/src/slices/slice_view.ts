@@ -1,8 +1,8 @@
 /**
- * The slices as pictures in the page: crosshair, sides, values under the pointer. A drag moves the
- * crosshair, the wheel goes through the planes, a drag with Shift turns the other two about this one's
- * normal, the right button widens (to the right) and brightens (up) the window. By key: arrows, Page Up
- * and Page Down, Shift with the arrows.
+ * The slices as images in the page, with a crosshair, the sides, and the values under the pointer. A drag moves the
+ * crosshair, and the wheel moves the slice along its normal. A drag with Shift rotates the other two slices about
+ * this one's normal. A drag with the right button changes the window: to the right widens it, up brightens the image.
+ * The arrow keys, Page Up, Page Down and Shift with an arrow key do the same.
  */
 import { element, setText } from "../dom/element";
 import type { Vec3 } from "../math/vec3";
@@ -12,17 +12,17 @@ import type { SliceImages } from "./slice_images";
 export type SliceChanges = Readonly<{
   move: (point: Vec3) => void;
   turn: (about: Vec3, by_deg: number) => void;
-  /** Shares of all intensities by which the window becomes wider and goes up. */
+  /** `wider` widens the window, and `higher` lowers its limits, which brightens; both are shares of all intensities. */
   window: (wider: number, higher: number) => void;
 }>;
 
-/** One press of a key: a share of the picture's edge, and an angle. */
+/** Movement for each press of a key or notch of the wheel: a share of the image's edge, or an angle. */
 const KEY_STEP = 0.01;
 const KEY_TURN_DEG = 5;
 const WHEEL_STEP = 0.01;
 const EDGES = ["left", "right", "top", "bottom"] as const;
 
-/** One slice in the page: its image, and what is written around it. */
+/** One slice in the page: its image with the texts around it. */
 class SliceFigure {
   readonly root: HTMLElement;
   private readonly plane: HTMLElement;
@@ -32,11 +32,11 @@ class SliceFigure {
   private readonly name = element("figcaption");
   private readonly values = element("p", { className: "values" });
   private frame: SliceFrame | null = null;
-  /** Where the pointer is. */
+  /** The point under the pointer, um; null: the pointer is elsewhere. */
   private pointed: Vec3 | null = null;
-  /** For what was measured. */
+  /** Whether a request for the measured values is under way. */
   private isAsking = false;
-  /** As values. */
+  /** The text of the values that is shown now. */
   private written = "";
 
   constructor(
@@ -59,8 +59,8 @@ class SliceFigure {
       type: "button",
       className: "enlarge",
       textContent: "⤢",
-      ariaLabel: "This slice alone, or all three",
-      title: "This slice alone, or all three",
+      ariaLabel: "Show only this slice, or all three",
+      title: "Show only this slice, or all three",
       onclick: onEnlarge,
     });
     this.root = element("figure", {}, {}, this.plane, this.name, this.values, enlarge);
@@ -80,7 +80,7 @@ class SliceFigure {
     this.showValues();
   }
 
-  /** Those of 8 bits at once, then those that were measured: of the newest place alone. */
+  /** Shows the values of 8 bits at once, and the measured values when they arrive for the newest position. */
   private showValues(): void {
     this.writeValues();
     const at = this.place;
@@ -103,15 +103,15 @@ class SliceFigure {
     const values = this.images.valuesAt(at);
     const text = values.length > 0 || this.images.hasCome ? values.join(" · ") : "loading …";
     if (text !== this.written) {
-      // a line breaks between channels, never between a value and its name
+      // one span for each channel, so that no line breaks between a value and its name
       const parts = values.length > 0 ? values : [text];
       this.values.replaceChildren(...parts.map((textContent) => element("span", { textContent })));
     }
     this.written = text;
     const [left, right, top, bottom] = this.frame?.ends ?? [];
     this.plane.ariaLabel =
-      `Slice ${this.frame?.name}: ${left} on the left, ${right} on the right, ${top} up, ` +
-      `${bottom} down. ${text}`;
+      `Slice ${this.frame?.name}: ${left} on the left, ${right} on the right, ${top} at the top, ` +
+      `${bottom} at the bottom. ${text}`;
   }
 
   private placeOf({ clientX, clientY }: MouseEvent) {
@@ -156,7 +156,7 @@ class SliceFigure {
       "wheel",
       (event) => {
         event.preventDefault();
-        this.go(Math.sign(event.deltaY) * WHEEL_STEP);
+        this.moveThrough(Math.sign(event.deltaY) * WHEEL_STEP);
       },
       { passive: false },
     );
@@ -165,7 +165,7 @@ class SliceFigure {
     });
   }
 
-  /** Round the crosshair, as the pointer went. */
+  /** Rotates the other slices about the crosshair by the angle that the pointer has moved around it. */
   private turnBy(from: MouseEvent, to: MouseEvent): void {
     const { frame } = this;
     if (frame === null) return;
@@ -177,8 +177,8 @@ class SliceFigure {
     this.changes.turn(frame.normal, (by * 180) / Math.PI);
   }
 
-  /** Through the plane, towards the eye: a share of the picture's longer edge. */
-  private go(share: number): void {
+  /** Moves the slice along its normal, towards the eye, by a share of the image's longer edge. */
+  private moveThrough(share: number): void {
     const { frame } = this;
     if (frame === null) return;
     this.shift(frame.normal, 2 * share * Math.max(...frame.half));
@@ -202,8 +202,8 @@ class SliceFigure {
     else if (key === "ArrowRight") this.shift(frame.right, across);
     else if (key === "ArrowUp") this.shift(frame.up, along);
     else if (key === "ArrowDown") this.shift(frame.up, -along);
-    else if (key === "PageUp") this.go(KEY_STEP);
-    else if (key === "PageDown") this.go(-KEY_STEP);
+    else if (key === "PageUp") this.moveThrough(KEY_STEP);
+    else if (key === "PageDown") this.moveThrough(-KEY_STEP);
     else return false;
     return true;
   }
@@ -214,7 +214,7 @@ export class SliceView {
   private readonly figures: readonly SliceFigure[];
   private large: number | null = null;
 
-  /** @param view the part of the page with the stage, which makes room */
+  /** @param view the part of the page with the stage, which shrinks while slices are shown */
   constructor(
     private readonly view: HTMLElement,
     private readonly images: SliceImages,

@@ -1,4 +1,4 @@
-/** All of the slices: their pictures, in the page and as planes in the scene. A part of the code by itself. */
+/** The slices as images in the page and in the scene. This code is loaded separately, when slices are first shown. */
 import "./slices.css";
 import type { Sight } from "../marks/style";
 import type { Action } from "../state/actions";
@@ -10,7 +10,7 @@ import { SliceView } from "./slice_view";
 
 export type SlicesOptions = Omit<ImagesOptions, "onPaint"> &
   Readonly<{
-    /** The part of the page with the stage, which makes room. */
+    /** The part of the page with the stage, which shrinks while slices are shown. */
     view: HTMLElement;
     state: ViewerState;
     dispatch: (action: Action) => void;
@@ -38,14 +38,14 @@ export class Slices {
     });
   }
 
-  follow(state: ViewerState): void {
+  sync(state: ViewerState): void {
     this.state = state;
-    this.images.follow(state);
+    this.images.sync(state);
     this.show();
   }
 
   private show(): void {
-    this.planes.follow(this.state.hasSlicePlanes);
+    this.planes.sync(this.state.hasSlicePlanes);
     this.pictures.update(this.state.hasSlicePictures);
   }
 
@@ -53,7 +53,7 @@ export class Slices {
     this.planes.update(sight);
   }
 
-  /** Of the first channel that is shown. */
+  /** Changes the window of the first shown channel. */
   private shiftWindow(wider: number, higher: number): void {
     const channel = this.state.channels.find(({ shown }) => shown);
     if (channel === undefined) return;

@@ -195,7 +195,7 @@ describe.skipIf(!hasPython)("a source in the page, compared with the pipeline", 
     expect(coarse.image.shape).toEqual(fine.image.shape);
     expect(coarse.image.placement).toEqual(fine.image.placement);
     expect(coarse.image.notes).toContain(
-      "A coarse level is shown, 2 of 2 (1 is the finest): stereocell build shows all voxels.",
+      "Resolution level 2 of 2 is shown (1 is the finest). Use stereocell build to see all voxels.",
     );
     for (const axis of [0, 1, 2]) {
       const apart_um = Math.abs(coarse.middle[axis] - fine.middle[axis]);

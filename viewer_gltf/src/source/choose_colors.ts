@@ -2,20 +2,20 @@
  * The colours of channels: as the source states them, else by the kind of volume, else those of a palette. No two
  * channels have nearly the same colour.
  *
- * Follows `choose_colors` of pipeline/stereocell/planning/channel_colors.py. What differs: the names of dyes are not
- * looked for, nor those of autofluorescence.
+ * Follows `choose_colors` of pipeline/stereocell/planning/channel_colors.py. It does not look for
+ * the names of dyes or of autofluorescence.
  */
 import { fromHex, type Rgb } from "../math/color";
 import type { Kind } from "./find_window";
 
-/** As PALETTE of planning/channels.py. */
+/** The same colours as PALETTE of planning/channels.py. */
 const PALETTE: readonly Rgb[] = "#4f70f5 #f0cd3c #b4566e #92ecf6 #f6f0dc #a0562c #3f8ca0 #b4c078"
   .split(" ")
   .map(fromHex);
 const SKIN: Rgb = [0.72, 0.5, 0.37];
 const MR_GREY: Rgb = [0.92, 0.88, 0.82];
 const WARM_GREY: Rgb = [0.62, 0.58, 0.52];
-/** Of the only channel of stained cells. */
+/** Colour of a single channel of stained cells. */
 const STAIN = fromHex("#5cd6e8");
 /** Finest spacing up to which a volume of a microscope is taken for stained cells, um. */
 const STAINED_UM = 10;

@@ -11,7 +11,7 @@ export type Triple = readonly [number, number, number];
 
 /** Most voxels of all channels together: 8 MB of textures, and at most as many voxels are read of a pyramid. */
 export const SHOWN_VOXELS = 8_000_000;
-/** Of a source without a pyramid at most so many voxels are read for each that may be shown. */
+/** Largest number of voxels that are read for each shown voxel, for a source without a pyramid. */
 export const READ_FACTOR = 8;
 /** Approximate number of values on which a window is found. The pipeline takes 6 million. */
 const SAMPLED_VOXELS = 500_000;

@@ -1,7 +1,7 @@
-/** What a person drops on the page, as a source. */
+/** Turns files and folders that a user drops or chooses into sources. */
 import type { LocalSource } from "./open_source";
 
-/** The first file or folder of a drop; null: there is none. To be called within the event. */
+/** Returns the first file or folder of a drop; null: there is none. Must be called while the event is handled. */
 export function droppedSource({ items, files }: DataTransfer): LocalSource | null {
   const entry = [...items]
     .map((item) => item.webkitGetAsEntry?.() ?? null)
@@ -21,10 +21,10 @@ function folderOf(folder: FileSystemDirectoryEntry): LocalSource {
   return { kind: "folder", name: folder.name, find };
 }
 
-/** Opens each further source that is dropped on a picture, one at a time. */
+/** Opens each further source that is dropped on the viewer, one at a time. */
 export function acceptDrops(open: (source: LocalSource) => Promise<void>): void {
   let isBusy = false;
-  addEventListener("dragover", (event) => event.preventDefault()); // else the browser opens the file itself
+  addEventListener("dragover", (event) => event.preventDefault()); // otherwise the browser would open the file itself
   addEventListener("drop", (event) => {
     event.preventDefault();
     const source = event.dataTransfer && droppedSource(event.dataTransfer);
@@ -36,7 +36,7 @@ export function acceptDrops(open: (source: LocalSource) => Promise<void>): void 
   });
 }
 
-/** The folder of files that a person has chosen, each of which knows its path; null: there is none. */
+/** Returns the folder that a user has chosen, as a source; null: it has no files. */
 export function chosenFolder(files: FileList): LocalSource | null {
   const [first] = files;
   if (first === undefined) return null;

@@ -1,8 +1,8 @@
 /**
  * The window of a channel: the values that become 0 and 255, and the counts of voxels between them.
  *
- * Follows `find_statistics` of pipeline/stereocell/transfer/channel_statistics.py with the percentiles of the presets. What
- * differs: values are sampled more sparsely (see coarse_volume.ts), and no holder of a head is left out.
+ * Follows `find_statistics` of pipeline/stereocell/transfer/channel_statistics.py with the percentiles of the presets. Two
+ * things differ: values are sampled more sparsely (see coarse_volume.ts), and a head holder is not left out.
  */
 export type Window = readonly [number, number];
 
@@ -18,11 +18,11 @@ const OF_CT: Window = [-1024, 2000];
 
 /** Finest spacings above the first, up to the second, um, are those of light sheets: see preset_choice.py. */
 const OVERVIEW_UM = [1, 10];
-/** A finest spacing from here on, um, is that of a body and not of a microscope. */
+/** Smallest finest spacing of a scan of a body, um; microscopes have finer ones. */
 const BODY_UM = 100;
-/** Finest voxels of a patient's MR, um. */
+/** Smallest voxel spacing of a patient's MR, um. */
 const PATIENT_UM = 300;
-/** What is smaller across, um, is no patient. */
+/** Smallest extent of a patient, um. */
 const PART_UM = 20_000;
 
 /** The kind of a volume: a term of DICOM, empty where a microscope took it; and how its window is found. */
@@ -32,8 +32,8 @@ export type Kind = Readonly<{ modality: "" | "CT" | "MR"; window: Window | Perce
 const [AIR_HU, AIR_SPREAD, AIR_SHARE, MAX_HU] = [-1000, 150, 0.02, 4000];
 
 /**
- * The kind of a volume that states none: as `choose_preset` and `recognise_modality` of the pipeline choose it, but PET
- * and SPECT, which the name of a file may tell, are not looked for.
+ * Returns the kind of a volume that states none, as `choose_preset` and `recognise_modality` of the pipeline choose it.
+ * PET and SPECT, which the pipeline may recognise by the name of a file, are not recognised here.
  *
  * @param sample values of the first channel, sorted
  */

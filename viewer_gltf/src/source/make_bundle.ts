@@ -34,7 +34,7 @@ const SIDES = { left: [1, 0, 0], posterior: [0, 0, -1], superior: [0, 1, 0] } as
 const NO_SURFACE = "surfaces are made by a build: stereocell build";
 
 type Files = Map<string, Uint8Array<ArrayBuffer>>;
-/** What all channels share. */
+/** Properties that all channels share. */
 type Frame = Readonly<{
   places: readonly [Places, Places, Places];
   bounds: TileVolume["bounds_um"];
@@ -53,7 +53,7 @@ export async function makeBundle(image: OpenedImage, report: Report): Promise<Bu
     const onShare = (share: number) => report(`Reading ${what}: ${Math.round(100 * share)} %`);
     volumes.push(await channel.read(onShare));
   }
-  report("Preparing the picture");
+  report("Preparing the view");
   await new Promise((resolve) => setTimeout(resolve)); // lets the browser draw the words
   const files: Files = new Map();
   const frame = frameOf(image, volumes);

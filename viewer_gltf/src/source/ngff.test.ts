@@ -39,7 +39,7 @@ describe("the metadata of OME-Zarr", () => {
     const found = parseNgff(old, "x");
     expect(found.axes).toEqual(["t", "c", "z", "y", "x"]);
     expect(found.notes).toEqual([
-      "OME-Zarr 0.3 states no voxel spacing in a unit of length: 1 um is assumed.",
+      "OME-Zarr 0.3 states no voxel spacing with a unit, so 1 um is assumed. Lengths may be wrong.",
     ]);
     const older = { multiscales: [{ datasets: [{ path: "0" }] }] };
     expect(parseNgff(older, "x").axes).toEqual(["t", "c", "z", "y", "x"]);

@@ -91,7 +91,7 @@ export function parseNgff(attributes: unknown, where: string): NgffImage {
   const version = String(image.version ?? ome.version ?? "");
   const notes: string[] = [];
   if (images.length > 1) {
-    notes.push(`The source has ${images.length} images: the first is shown.`);
+    notes.push(`Only the first of ${images.length} images is shown.`);
   }
   const { axes, names } = axesOf(image, where);
   const levels = listOf(image.datasets).map((dataset) =>
@@ -102,7 +102,9 @@ export function parseNgff(attributes: unknown, where: string): NgffImage {
   }
   if (levels[0].scale_um === null) {
     const title = `OME-Zarr ${version}`.trim();
-    notes.push(`${title} states no voxel spacing in a unit of length: 1 um is assumed.`);
+    notes.push(
+      `${title} states no voxel spacing with a unit, so 1 um is assumed. Lengths may be wrong.`,
+    );
   }
   const oriented = SPATIAL.map((axis) => orientationOf(axes[names.indexOf(axis)]));
   return {
@@ -112,7 +114,7 @@ export function parseNgff(attributes: unknown, where: string): NgffImage {
   };
 }
 
-/** What a group without `multiscales` is, and what to open in its place. */
+/** Describes a group without `multiscales`, and names what to open instead. */
 function otherKind(ome: Table): string {
   if ("plate" in ome) return "found a plate, expected an image: name one of its fields, as A/1/0";
   if ("well" in ome) return "found a well, expected an image: name one of its fields, as 0";
@@ -123,7 +125,7 @@ function otherKind(ome: Table): string {
 }
 
 function axesOf(image: Table, where: string): { axes: readonly Table[]; names: readonly string[] } {
-  // 0.1 and 0.2 name no axes; 0.3 has names alone
+  // versions 0.1 and 0.2 do not name the axes, and 0.3 only names them
   const stated = image.axes === undefined ? ["t", "c", ...SPATIAL] : listOf(image.axes);
   const axes = stated.map((axis) => (typeof axis === "string" ? { name: axis } : tableOf(axis)));
   const names = axes.map(({ name }) => String(name).toLowerCase());
@@ -136,7 +138,7 @@ function axesOf(image: Table, where: string): { axes: readonly Table[]; names: r
   const missing = SPATIAL.find((axis) => !names.includes(axis));
   if (missing !== undefined) {
     throw new SourceError(
-      `${where}: found no axis ${missing}, expected a volume: StereoCell shows no single plane.`,
+      `${where}: found no axis ${missing}, expected a volume: StereoCell does not show single planes.`,
     );
   }
   return { axes, names };

@@ -118,7 +118,9 @@ describe("a header of NIfTI", () => {
     expect(parseNifti(header({ qform, sform: SFORM }), "x").affine).toEqual(LPS_OF_IDENTITY);
     const plain = parseNifti(header(), "x");
     expect(plain.hasSides).toBe(false);
-    expect(plain.notes).toEqual(["The file states no orientation: which side is left is a guess."]);
+    expect(plain.notes).toEqual([
+      "The file states no orientation, so left and right may be swapped.",
+    ]);
     expect(plain.affine.axes.map((axis) => Math.hypot(...axis))).toEqual([2, 3, 4]);
   });
 
@@ -128,12 +130,14 @@ describe("a header of NIfTI", () => {
     expect(affine.axes[2]).toEqual([0, 0, -4].map((v) => v + 0));
   });
 
-  it("passes over a form that has no three axes", () => {
+  it("ignores an orientation without three independent axes", () => {
     const flat = parseNifti(
       header({ sform: new Array(12).fill(0), qform: { quatern: [0, 0, 0], offset: [0, 0, 0] } }),
       "x",
     );
-    expect(flat.notes).toEqual(["sform of the file has no three axes: it is not used."]);
+    expect(flat.notes).toEqual([
+      "The sform of the file does not have three independent axes and is not used.",
+    ]);
     expect(flat.hasSides).toBe(true);
   });
 

@@ -117,7 +117,7 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   if (type === undefined) {
     const found = OTHERS[code] ?? `code ${code}`;
     throw new SourceError(
-      `${where}: datatype: found ${found}, expected whole numbers of up to 32 bits, or real ones.`,
+      `${where}: datatype: found ${found}, expected integers of up to 32 bits or floating-point numbers.`,
     );
   }
   const offset = version === 1 ? real(at.offset) : whole(at.offset);
@@ -137,7 +137,9 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   const sound = forms.filter(([, form]) => isSound(form));
   const notes = forms
     .filter(([, form]) => !isSound(form))
-    .map(([name]) => `${name} of the file has no three axes: it is not used.`);
+    .map(
+      ([name]) => `The ${name} of the file does not have three independent axes and is not used.`,
+    );
   const plain: Affine = {
     axes: [
       [dx, 0, 0],
@@ -148,13 +150,17 @@ export function parseNifti(bytes: Uint8Array, where: string): NiftiHeader {
   };
   const ras = sound.length > 0 ? sound[0][1] : plain;
   if (!isSound(ras)) {
-    throw new SourceError(`${where}: pixdim: found no three lengths, expected voxel spacings.`);
+    throw new SourceError(
+      `${where}: pixdim: found no valid lengths, expected three voxel spacings.`,
+    );
   }
   if (sound.length === 0) {
-    notes.push("The file states no orientation: which side is left is a guess.");
+    notes.push("The file states no orientation, so left and right may be swapped.");
   }
   if (skewOf(ras) > SKEW) {
-    notes.push("The axes of the file are skew: the volume is shown with right angles.");
+    notes.push(
+      "The axes of the file are not at right angles, but the volume is shown as if they were.",
+    );
   }
   if ((shape[3] ?? 1) > 1) {
     notes.push(`Only the first of ${shape[3]} time points is shown.`);

@@ -2,7 +2,8 @@
  * Transfer functions from intensity to opacity.
  *
  * Follows `make_transfer_functions` of pipeline/stereocell/transfer/opacity.py, where the reasons stand, and takes
- * the numbers from there. What differs is the level: a build looks for that of a surface, and here it is that of find_level.ts, or the skin's of a CT. There
+ * the numbers from there. Only the level differs: a build uses the level of a surface, and this page uses that of
+ * find_level.ts, or the level of the skin for a CT. There
  * are no functions at the adaptive threshold, by tissue of a CT, or of two dimensions but for that of grey_shapes.ts.
  */
 import {

@@ -7,7 +7,7 @@ const faultOf = (source: LocalSource) =>
     (error: Error) => error.message,
   );
 
-describe("what a person has dropped and the page can't read", () => {
+describe("dropped files that the page can't read", () => {
   it.each<[string, LocalSource]>([
     ["a folder of DICOM", { kind: "folder", name: "scan", find: async () => null }],
     ["a TIFF", { kind: "file", file: new File(["II*"], "cells.tif") }],

@@ -39,12 +39,12 @@ export async function openNifti(file: ByteSource, report: Report): Promise<Opene
   if (volumeOf(block) > 1) {
     const size = triple((i) => Math.floor(shape[i] / block[i]));
     notes.push(
-      `A coarser volume is shown, ${size[2]} x ${size[1]} x ${size[0]} of ${nx} x ${ny} x ${nz} voxels: stereocell ` +
-        "build shows all.",
+      `The volume is shown with ${size[2]} x ${size[1]} x ${size[0]} of its ${nx} x ${ny} x ${nz} voxels. Use ` +
+        "stereocell build to see all.",
     );
   }
   return {
-    // a file's name may identify a patient, and pictures and links of the page go to others
+    // the file's name is not shown: it may identify a patient, and images and links of the page are shared
     ...{ name: "NIfTI", shape, notes },
     spacing_um: canonical.spacing_um,
     placement: canonical.placement,
@@ -90,7 +90,7 @@ async function readFile(file: ByteSource, report: Report): Promise<FirstVolume> 
   return volume;
 }
 
-/** The header at the start of a file, and room for the voxels, of which the first may have come. */
+/** Reads the header at the start of a file, allocates the voxels, and copies the first of them. */
 function begin(head: Uint8Array, name: string): FirstVolume {
   const header = parseNifti(head, name);
   const voxels = new Uint8Array(bytesOf(header, name));
@@ -105,23 +105,23 @@ function joined(a: Uint8Array<ArrayBuffer>, b: Uint8Array<ArrayBuffer>): Uint8Ar
   return both;
 }
 
-/** Copies bytes to a place of the target, which may begin before the target, or end behind it. */
+/** Copies bytes to an offset of the target. Bytes before its start or after its end are dropped. */
 function copyInto(target: Uint8Array, bytes: Uint8Array, at: number): void {
   const from = Math.max(0, -at);
   const to = Math.min(bytes.length, target.length - at);
   if (to > from) target.set(bytes.subarray(from, to), at + from);
 }
 
-/** Bytes of the first volume. Throws SourceError where they are too many. */
+/** Returns the size of the first volume in bytes. Throws SourceError if it is too large for a page. */
 function bytesOf({ shape, bytesPerVoxel, offset }: NiftiHeader, name: string): number {
   const bytes = volumeOf(shape) * bytesPerVoxel;
   if (bytes <= MAX_BYTES && offset <= MAX_OFFSET) return bytes;
   throw new SourceError(
-    `${name}: found a volume of ${Math.round(bytes / 1e6)} MB, too large for a page: open it by: stereocell view`,
+    `${name}: found a volume of ${Math.round(bytes / 1e6)} MB, which is too large for a page. Open it with: stereocell view`,
   );
 }
 
-/** The file's bytes as they come, unpacked if its first ones are those of gzip. Throws SourceError. */
+/** Yields the file's bytes as they arrive, unpacked if the file is gzipped. Throws SourceError. */
 async function* unpackedParts(file: ByteSource): AsyncGenerator<Uint8Array<ArrayBuffer>> {
   const [forMark, whole] = (await file.stream()).tee();
   const reader = forMark.getReader();
@@ -132,7 +132,7 @@ async function* unpackedParts(file: ByteSource): AsyncGenerator<Uint8Array<Array
     yield* partsOf(isPacked ? whole.pipeThrough(new DecompressionStream("gzip")) : whole);
   } catch (error) {
     throw new SourceError(
-      `${file.name}: it can't be unpacked, or the connection broke: expected a whole .nii or .nii.gz.`,
+      `${file.name}: the file can't be unpacked, or the connection broke. Expected a complete .nii or .nii.gz.`,
       { cause: error },
     );
   }

@@ -57,7 +57,9 @@ export async function openZarr(
   const stored = gridOf(image, level, finest, array);
   const canonical = canonicalOfImage(image, stored);
   if (canonical === null && image.orientations.some((text) => text !== "")) {
-    notes.push("The stated orientations do not part a body: the sides are unknown.");
+    notes.push(
+      "The sides of the patient are not known, because the file does not state a valid orientation for all axes.",
+    );
   }
   const { shape, spacing_um, levelShape, place } =
     canonical === null ? stored : turnedGrid(stored, canonical);
@@ -135,7 +137,7 @@ function counted(files: FileStore, counts: { found: number; missing: number }): 
   };
 }
 
-/** The attributes of the group. Throws SourceError where there is no group. */
+/** Returns the attributes of the group. Throws SourceError if there is no group. */
 async function attributesOf(store: Store, name: string): Promise<unknown> {
   const node = await explained(name, () => zarr.open(store));
   if (node instanceof zarr.Array) {
@@ -157,12 +159,12 @@ function notesOn(
   const times = image.axes.includes("t") ? finest.shape[image.axes.indexOf("t")] : 1;
   if (times > 1) notes.push(`Only the first of ${times} time points is shown.`);
   if (chosen.length < total) {
-    notes.push(`${chosen.length} of ${total} channels are shown: a page reads no more.`);
+    notes.push(`Only ${chosen.length} of ${total} channels are shown, the most that a page reads.`);
   }
   const count = image.levels.length;
   if (level > 0) {
     notes.push(
-      `A coarse level is shown, ${level + 1} of ${count} (1 is the finest): stereocell build shows all voxels.`,
+      `Resolution level ${level + 1} of ${count} is shown (1 is the finest). Use stereocell build to see all voxels.`,
     );
   }
   return notes;

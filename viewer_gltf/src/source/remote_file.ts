@@ -36,32 +36,32 @@ async function ask(url: URL, options: RequestInit = {}): Promise<Response | null
     if (ok) return response;
     const message = `The host ${url.host} answers ${status} for ${url.pathname}`;
     if (status === BUSY || status >= FIRST_SERVER_FAULT) {
-      throw new TemporaryError(`${message}: try again later, or ask whoever runs it.`);
+      throw new TemporaryError(`${message}. Try again later, or ask its operator.`);
     }
-    throw new SourceError(`${message}: check the address, or ask whoever runs the host.`);
+    throw new SourceError(`${message}. Check the address, or ask the operator of the host.`);
   });
 }
 
-/** The reason why a page may not read an address, and who can change that. */
+/** Returns the reason why the page can't read an address, and the remedy. */
 async function refusalOf(url: URL, cause: unknown): Promise<SourceError> {
   const { host } = url;
   const isLocal = /^(localhost|127\.0\.0\.1|\[::1\])$/.test(url.hostname);
   if (globalThis.location?.protocol === "https:" && url.protocol === "http:" && !isLocal) {
     return new SourceError(
-      `A page of https may read nothing over http: whoever runs ${host} has to offer the files over https.`,
+      `This page was loaded over https and can't read files over http. Ask the operator of ${host} to offer https.`,
       { cause },
     );
   }
   try {
     await fetch(url, { ...OPTIONS, mode: "no-cors" });
   } catch {
-    const text = `The host ${host} can't be reached: check the address and the network.`;
+    const text = `The host ${host} can't be reached. Check the address and the network.`;
     return new SourceError(text, { cause });
   }
   const origin = globalThis.location?.origin ?? "*";
   return new RefusedError(
-    `The host ${host} does not let other pages read its files: whoever runs it has to answer with ` +
-      `Access-Control-Allow-Origin: ${origin} (or *), which is CORS.`,
+    `The host ${host} does not let other pages read its files. Ask its operator to answer with the CORS header ` +
+      `Access-Control-Allow-Origin: ${origin} (or *).`,
     { cause },
   );
 }
@@ -71,7 +71,7 @@ async function bodyOf(response: Response, url: URL): Promise<Uint8Array<ArrayBuf
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
     throw new SourceError(
-      `The connection to ${url.host} broke within ${url.pathname}: try again.`,
+      `The connection to ${url.host} broke while reading ${url.pathname}. Try again.`,
       { cause: error },
     );
   }
@@ -88,8 +88,8 @@ async function partOf(
   if (response.status !== PART) {
     await response.body?.cancel();
     throw new SourceError(
-      `The host ${url.host} sends no parts of files, by which a zip file or a sharded image is read: whoever runs it ` +
-        "has to turn on HTTP range requests, or to offer the image unpacked and without shards.",
+      `The host ${url.host} does not send parts of files, which a zip file or a sharded image needs. Ask its operator ` +
+        "to turn on HTTP range requests, or to offer the image unpacked and without shards.",
     );
   }
   const bytes = await bodyOf(response, url);
@@ -107,13 +107,13 @@ async function sizeOf(url: URL): Promise<number | null> {
   const size = Number(response.headers.get("Content-Length") ?? Number.NaN);
   if (Number.isFinite(size)) return size;
   throw new SourceError(
-    `The host ${url.host} states no Content-Length for ${url.pathname}: whoever runs it has to let pages read that header.`,
+    `The host ${url.host} states no Content-Length for ${url.pathname}. Ask its operator to let pages read that header.`,
   );
 }
 
 function missing(url: URL): SourceError {
   return new SourceError(
-    `${url.href}: not found: check the address, or ask whoever runs ${url.host} whether the file is public.`,
+    `${url.href} was not found. Check the address, or ask the operator of ${url.host} whether the file is public.`,
   );
 }
 
@@ -180,7 +180,7 @@ export class RemoteFolder implements FileStore {
     });
   }
 
-  /** What a job has read; undefined where there is no such file. */
+  /** Returns the result of a job; undefined if there is no such file. */
   private async noted<T>(job: () => Promise<T | null>): Promise<T | undefined> {
     try {
       const found = await job();

@@ -1,4 +1,4 @@
-/** The page of a viewer without a bundle: a source is dropped on it, chosen, or named by its address. */
+/** The page of a viewer without a bundle. The user drops a source on it, chooses one, or enters its address. */
 import "./start_page.css";
 import { BundleError } from "../bundle/errors";
 import { element, setText } from "../dom/element";
@@ -35,8 +35,8 @@ export function chooseSource(parent: HTMLElement): Promise<ShownSource> {
       element("h1", { textContent: "StereoCell" }),
       element("p", {
         textContent:
-          "Drop a NIfTI file, the folder of an OME-Zarr image or a zipped one (.ozx) here. This page reads it: nothing " +
-          "leaves this device.",
+          "Drop a NIfTI file, the folder of an OME-Zarr image or a zipped one (.ozx) here. The image is read in this " +
+          "page and does not leave this device.",
       }),
       element("div", { className: "choices" }, {}, ...choices(open)),
       addressForm(),
@@ -47,7 +47,7 @@ export function chooseSource(parent: HTMLElement): Promise<ShownSource> {
     addEventListener(
       "dragover",
       (event) => {
-        event.preventDefault(); // else the browser opens the file itself
+        event.preventDefault(); // otherwise the browser would open the file itself
         page.classList.add("over");
       },
       { signal },
@@ -64,7 +64,7 @@ export function chooseSource(parent: HTMLElement): Promise<ShownSource> {
   });
 }
 
-/** Buttons for those who can't drag. */
+/** Buttons for users who can't drag a file. */
 function choices(open: (source: LocalSource | null) => Promise<void>): readonly HTMLElement[] {
   const file = element(
     "input",
@@ -97,7 +97,10 @@ function choices(open: (source: LocalSource | null) => Promise<void>): readonly 
   ];
 }
 
-/** An address becomes a part of the page's own, so that it can be shared, and the page's policy lets it be read. */
+/**
+ * A form for the address of an image. The page is loaded again with that address in its own, so that the link can be
+ * shared and the page's security policy allows reading from the host.
+ */
 function addressForm(): HTMLElement {
   const field = element(
     "input",
@@ -112,7 +115,7 @@ function addressForm(): HTMLElement {
   const show = element("button", { type: "submit", textContent: "Show" });
   const form = element("form", {}, {}, field, show);
   form.onsubmit = (event) => {
-    event.preventDefault(); // the page's policy lets no form be sent
+    event.preventDefault(); // the page's security policy forbids sending forms
     const address = new URL(location.href);
     address.searchParams.set("source", field.value.trim());
     location.assign(address);

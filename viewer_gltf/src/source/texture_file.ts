@@ -7,9 +7,9 @@
 
 const IDENTIFIER = [0xab, 0x4b, 0x54, 0x58, 0x20, 0x32, 0x30, 0xbb, 0x0d, 0x0a, 0x1a, 0x0a];
 const HEADER_BYTES = 80;
-/** Of a level in the index: offset, length and unpacked length, uint64 each. */
+/** Bytes of a level's entry in the index: offset, length and unpacked length, uint64 each. */
 const LEVEL_BYTES = 24;
-/** Of the data format descriptor: its own size, the basic block, and each sample. */
+/** Bytes of the parts of the data format descriptor: its own size, the basic block, and each sample. */
 const [SIZE_BYTES, BLOCK_BYTES, SAMPLE_BYTES] = [4, 24, 16];
 /** R8_UNORM, R8G8_UNORM and R8G8B8A8_UNORM of Vulkan, by the number of components. */
 const VK_FORMATS = { 1: 9, 2: 16, 4: 37 } as const;

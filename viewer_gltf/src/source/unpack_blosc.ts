@@ -85,7 +85,7 @@ function unshuffled(values: Uint8Array, typeSize: number, flags: number): Uint8A
 /** The first bytes of all values lie side by side, then the second ones. */
 function unshuffleBytes(values: Uint8Array, typeSize: number): Uint8Array {
   const count = Math.floor(values.length / typeSize);
-  const out = values.slice(); // what is left at the end is not shuffled
+  const out = values.slice(); // the remaining bytes at the end are not shuffled
   for (let byte = 0; byte < typeSize; byte++) {
     const from = byte * count;
     for (let i = 0, to = byte; i < count; i++, to += typeSize) out[to] = values[from + i];

@@ -1,8 +1,8 @@
-/** Faults that zarrita finds, as sentences that say who has to do what. */
+/** Turns the errors of zarrita into sentences that name the remedy. */
 import * as zarr from "zarrita";
 import { SourceError } from "./source_error";
 
-/** The job's result. Each fault that zarrita finds becomes a sentence that says who has to do what. */
+/** Runs a job and returns its result. Throws SourceError, with the remedy, for each error of zarrita. */
 export async function explained<T>(where: string, job: () => Promise<T>): Promise<T> {
   try {
     return await job();
@@ -14,7 +14,7 @@ export async function explained<T>(where: string, job: () => Promise<T>): Promis
   }
 }
 
-/** Whether there is no Zarr at an address. */
+/** Returns whether an error means that there is no Zarr at an address. */
 export function isNothingFound(error: unknown): boolean {
   return error instanceof SourceError && zarr.isZarritaError(error.cause, "NotFoundError");
 }
@@ -22,8 +22,8 @@ export function isNothingFound(error: unknown): boolean {
 function faultOf(error: unknown): string | null {
   if (zarr.isZarritaError(error, "NotFoundError")) {
     return (
-      "found neither zarr.json nor the metadata of Zarr v2, expected an OME-Zarr image: check the address, or ask " +
-      "whoever runs the host whether the image is public."
+      "found neither zarr.json nor the metadata of Zarr v2, expected an OME-Zarr image. Check the address, or ask " +
+      "the operator of the host whether the image is public."
     );
   }
   if (zarr.isZarritaError(error, "UnknownCodecError")) {
@@ -39,7 +39,7 @@ function faultOf(error: unknown): string | null {
     return `${error.message}: whoever made the image has to correct its metadata.`;
   }
   if (error instanceof SyntaxError) {
-    return "its metadata are no JSON: whoever made the image has to correct them.";
+    return "its metadata are not valid JSON: whoever made the image has to correct them.";
   }
   return null;
 }

@@ -72,7 +72,7 @@ export async function chooseLevel(
   }
 }
 
-/** What an image has along z, y and x. */
+/** Returns the values for the axes z, y and x. */
 export const spatial = (axes: readonly string[], values: readonly number[]): Triple =>
   triple((i) => values[axes.indexOf("zyx"[i])]);
 

@@ -150,7 +150,7 @@ export async function* partsOf(
       yield value;
     }
   } finally {
-    await reader.cancel().catch(() => undefined); // it has failed, which was thrown
+    await reader.cancel().catch(() => undefined); // a stream that has failed can't be cancelled, and its error was thrown already
   }
 }
 

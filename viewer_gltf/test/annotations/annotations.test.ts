@@ -144,9 +144,7 @@ describeInChromium("marks", () => {
     const at = await project([500, -200, 100]); // between the balls, inside both boxes
     const points = await page.evaluate((p) => window.bench?.measureAt(p.x, p.y), at);
     expect(points).toEqual([]);
-    expect(await page.evaluate(() => window.bench?.announced)).toContain(
-      "There is nothing to measure there",
-    );
+    expect(await page.evaluate(() => window.bench?.announced)).toContain("No point was set");
   });
 
   it("show an angle, and a line with its name in the list", async () => {

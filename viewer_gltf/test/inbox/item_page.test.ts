@@ -1,4 +1,4 @@
-/** The page that *Look* has opened follows the build that is begun in the page of the inbox. */
+/** The page that *Preview* has opened follows the build that is started on the page of the inbox. */
 import { existsSync } from "node:fs";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";

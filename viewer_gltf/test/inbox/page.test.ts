@@ -147,7 +147,7 @@ describeInChromium("the inbox", () => {
     expect(server.items).toHaveLength(1);
     expect(hashOf(server.arrived.get(id) as Buffer)).toBe(await wholeHash());
     expect(server.lists.get(id)?.at(-1)).toEqual(["series/deep/last.dcm", BYTES]);
-    await expectWords(/Look at it now/);
+    await expectWords(/Open a preview/);
     expect(faults).toEqual([]);
   });
 

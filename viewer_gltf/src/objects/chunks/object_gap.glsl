@@ -1,11 +1,11 @@
-// The middle of the box of a row's object, um, and in w its narrowest side: 256 rows are a line of the texture.
+// Centre of the box of a row's object, in um, and in w the box's shortest edge. A line of the texture has 256 rows.
 vec4 objectMiddle(sampler2D middles, float row) {
   int i = int(row + 0.5);
   return texelFetch(middles, ivec2(i & 255, i >> 8), 0);
 }
 
-// A mesh's place, drawn in towards the middle of its object as objects/gap.ts says. `meshToRoom` turns and moves,
-// and scales the same every way: its transpose goes back.
+// Moves a position in a mesh towards the centre of its object's box: see objects/gap.ts.
+// `meshToRoom` scales uniformly, so the inverse of its 3x3 part is its transpose divided by the squared scale.
 vec3 objectDrawnIn(vec3 place, mat4 meshToRoom, mat4 umToRoom, vec4 middle, float gap) {
   if (gap <= 0.0) return place;
   float gone = min(gap / middle.w, 0.8);

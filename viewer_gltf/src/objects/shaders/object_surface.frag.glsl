@@ -11,7 +11,7 @@ uniform bool uIsColored;
 #include <chunks/object_light>
 #include <chunks/object_stain>
 
-// An object's colour, linear: of its value in the column, with the stain over it, lit as its flag says.
+// Linear colour of an object: that of its value in the column, mixed with the stain, lightened by its flag.
 vec3 objectColor(vec3 own) {
   vec3 color = own;
   if (uIsColored) color = texelFetch(uColors, ivec2(objectTexel(uColumn, vObject), 0), 0).rgb;

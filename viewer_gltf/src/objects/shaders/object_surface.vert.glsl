@@ -1,4 +1,4 @@
-// The places of a label map's surfaces, for the vertex shader of surfaces.
+// The vertex positions of a label map's surfaces, for the vertex shader of surfaces.
 attribute float object_row;  // the row of the object in its table
 attribute vec3 object_outwards;  // the direction out of the object, the same for all vertices in one place
 attribute float _paint;  // intensity of the painted stain; 0 where a mesh has none
@@ -12,7 +12,7 @@ uniform float uGap;
 #include <chunks/object_texel>
 #include <chunks/object_gap>
 
-// The place of a vertex, drawn in from its object's walls and by the gap.
+// Position of a vertex after the inset into its object and the shrinking by the gap.
 vec3 objectPlace(vec3 place) {
   vObject = object_row;
   vStain = _paint;
@@ -21,7 +21,7 @@ vec3 objectPlace(vec3 place) {
   return objectDrawnIn(inset, modelMatrix, uUmToRoom, middle, uGap);
 }
 
-// The place of a vertex of a hidden object: a triangle whose corners all lie there is none.
+// Moves the vertices of a hidden object to one point outside the view, where its triangles have no area.
 vec4 objectEnd(vec4 seen) {
   return objectTexel(uFlags, object_row) == 0 ? vec4(2.0, 2.0, 2.0, 1.0) : seen;
 }

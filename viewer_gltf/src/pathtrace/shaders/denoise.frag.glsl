@@ -1,27 +1,27 @@
-// One round of an edge-avoiding a-trous wavelet (Dammertz et al., HPG 2010): mix pixels that lie
-// `uGap` apart, as far as distance, coverage and brightness show that they are alike, each as
-// exactly as so few samples allow. The more a pixel has gathered, the more it keeps of its own.
+// One round of an edge-avoiding a-trous wavelet (Dammertz et al., HPG 2010). It mixes pixels that are `uGap` apart and
+// similar in distance, coverage and brightness. The tolerance follows from the noise that few samples have. The more
+// samples a pixel has, the more it keeps of its own colour.
 precision highp float;
 
 uniform sampler2D uColor;
 uniform sampler2D uGuide;
 uniform int uGap;
-uniform vec4 uPart;  // the eye's
+uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
 
 layout(location = 0) out vec4 oColor;
 
-// Samples: from so few on a pixel keeps a part, with so many all.
+// Numbers of samples from which a pixel keeps a part of its own colour, and all of it.
 const float FEW = 16.0;
 const float ENOUGH = 192.0;
-const float DEPTH_SLACK = 0.01;  // of the box's longest edge
+const float DEPTH_SLACK = 0.01;  // share of the box's longest edge
 
 float luminanceOf(vec3 c) {
   return dot(c, vec3(0.2126, 0.7152, 0.0722));
 }
 
-// What no neighbour is like is an outlier of so few samples: a pixel that meets something where all others
-// meet nothing, or the other way round, becomes as they are; one that is darker or brighter than all
-// others becomes as dark or as bright as they are.
+// Removes outliers, which are pixels that differ from all their neighbours. If a pixel alone shows something, or alone
+// shows nothing, it gets the neighbours' mean. If it is darker or brighter than all of them, its brightness is limited
+// to their range.
 vec4 withinNeighbours(vec4 here, vec4 guide, ivec2 at, ivec2 low, ivec2 high) {
   float least = 1e9;
   float most = 0.0;
@@ -41,7 +41,7 @@ vec4 withinNeighbours(vec4 here, vec4 guide, ivec2 at, ivec2 low, ivec2 high) {
     sum += there;
     total += 1.0;
   }
-  if (total < 8.0) return here;  // their turn is yet to come
+  if (total < 8.0) return here;  // some neighbours have no samples yet
   float certain = smoothstep(FEW, ENOUGH, guide.y);
   if (alike == 0) return mix(sum / total, here, certain);
   if (guide.x <= 0.0) return here;
@@ -70,7 +70,7 @@ void main() {
       ivec2 tap = clamp(at + uGap * ivec2(x, y), low, high);
       vec4 there = texelFetch(uColor, tap, 0);
       vec4 other = texelFetch(uGuide, tap, 0);
-      // as much may differ as the noise of so few samples explains
+      // the tolerance covers the differences that noise explains at this number of samples
       float noise = inversesqrt(max(min(guide.y, other.y), 1.0));
       float bright = 4.0 * max(guide.z, other.z)
         + 0.5 * noise * (luminanceOf(here.rgb) + luminanceOf(there.rgb)) + 1e-3;
@@ -78,7 +78,7 @@ void main() {
       if ((other.x > 0.0) != (guide.x > 0.0)) apart = 2.0;
       float unlike = abs(luminanceOf(there.rgb) - luminanceOf(here.rgb)) / bright;
       float weight = weights[abs(x)] * weights[abs(y)] * exp(-apart * apart - unlike);
-      if (other.y <= 0.0) weight = 0.0;  // it has not had its turn yet
+      if (other.y <= 0.0) weight = 0.0;  // the neighbour has no samples yet
       sum += weight * there;
       total += weight;
     }

@@ -1,5 +1,5 @@
 // Sums the light of a small traced picture, and of the marched picture of the same view, over all pixels,
-// into one texel. Earlier sums count less and less.
+// into one texel. The weight of earlier sums fades.
 precision highp float;
 
 uniform sampler2D uSums;  // as path_trace.frag.glsl writes them, of one sample
@@ -13,7 +13,7 @@ uniform float uOcclusion;  // see mean.frag.glsl
 layout(location = 0) out vec4 oTraced;
 layout(location = 1) out vec4 oMarched;
 
-// The marched picture is looked up at so many places along the edge of each traced pixel.
+// Number of samples of the ray-marched frame along each edge of a traced pixel.
 const int TAPS = 2;
 
 void main() {

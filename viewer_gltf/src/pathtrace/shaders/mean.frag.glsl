@@ -1,10 +1,10 @@
-// The picture that the sums stand for, and what its pixels are known by.
+// The mean colour of the sums, and the guide by which the denoiser compares pixels.
 precision highp float;
 
 uniform sampler2D uSums;
 uniform sampler2D uMoments;
-uniform float uEdge;  // um, longest of the box: half floats end at 65504
-uniform float uOcclusion;  // 0..1: by how much what is enclosed darkens further
+uniform float uEdge;  // um, the box's longest edge; distances are divided by it, because half floats end at 65504
+uniform float uOcclusion;  // 0..1: how much enclosed places are darkened
 
 layout(location = 0) out vec4 oColor;  // linear, premultiplied
 layout(location = 1) out vec4 oGuide;  // distance in edges, samples, standard error of the luminance, 0

@@ -1,6 +1,6 @@
-// One path through each pixel, added to what earlier frames have gathered. Physically based volume
-// scattering with a surface's reflection where the gradient is strong: Kroes, Post & Botha, "Exposure
-// Render", PLoS ONE 2012. Space of the paths: um from the box's low corner, y up.
+// Traces one path through each pixel, and adds its light to the sums of earlier frames. Physically based volume
+// scattering with a surface's reflection where the gradient is strong: Kroes, Post & Botha, "Exposure Render",
+// PLoS ONE 2012, doi:10.1371/journal.pone.0038586. Paths are in um from the box's low corner, y up.
 precision highp float;
 precision highp int;
 precision highp sampler3D;
@@ -10,15 +10,15 @@ uniform vec3 uSize;  // um
 uniform vec3 uTexLow;  // texture coordinates at the box's low corner
 uniform vec3 uTexPerUm;  // y falls
 uniform float uVoxel;  // um, finest spacing
-uniform vec3 uTexels;  // of the block that is gone through
+uniform vec3 uTexels;  // size of the traced block, texels
 uniform sampler3D uVolume;
 uniform usampler3D uIndex;  // with STREAM_BRICK
-uniform sampler3D uOldVolume;  // the same volume: nothing fades here
+uniform sampler3D uOldVolume;  // always equal to uVolume, because nothing fades in
 uniform float uFresh;
 uniform sampler2D uMedium;  // 256 x CHANNELS: albedo, extinction per um; TWO_D: 64 rows each, by gradient
 uniform sampler3D uMajorants;  // largest extinction per um in each brick
 uniform vec3 uBrick;  // texels along a brick's edges
-uniform float uStride;  // um, a step along a ray; 0: flights are as long as the medium has them
+uniform float uStride;  // um, step of a regular march along a ray; 0: free flights (delta tracking)
 uniform vec3 uClipLow;
 uniform vec3 uClipHigh;
 uniform vec4 uClipPlane;
@@ -26,8 +26,8 @@ uniform vec4 uCorner[3];
 
 uniform mat4 uToBox;  // from normalised device coordinates
 uniform vec3 uEyeAt;  // um, box
-uniform mat4 uSceneToBox;  // the same from where the eye is by now: it may have moved a little
-uniform mat3 uToRoom;  // turns directions of the box into the environment's
+uniform mat4 uSceneToBox;  // as uToBox, but of the current eye, which may have moved a little since
+uniform mat3 uToRoom;  // rotates directions from the box to the environment
 uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels ...
 uniform vec4 uEye;  // ... and of the picture
 uniform sampler2D uSceneDepth;
@@ -38,32 +38,32 @@ uniform float uEnvironmentLight;  // factor
 uniform int uLampCount;
 uniform vec4 uLamps[3];  // um, box: centre, radius
 uniform vec3 uLampLight[3];  // radiant intensity, um^2: irradiance is this by squared distance
-uniform int uScatters;  // a path is scattered so many times at most ...
-uniform vec3 uBeyond;  // ... and meets this radiance then
+uniform int uScatters;  // largest number of scatterings of a path ...
+uniform vec3 uBeyond;  // ... after which it receives this radiance
 uniform float uAnisotropy;  // Henyey-Greenstein g
 uniform float uSurface;  // 0..1: how readily a gradient makes a surface
 uniform vec4 uContrast;  // factor to the gradients of each channel
 uniform float uShine;  // 0..1: reflection of a surface seen straight on, in 8 % of it
 uniform float uGloss;  // exponent of its lobe
 uniform float uOcclusionReach;  // um
-uniform float uMostLight;  // of one path: rare bright ones would sparkle for long
+uniform float uMostLight;  // largest radiance of one path, because rare bright paths would sparkle for long
 
 uniform uint uSample;
-uniform int uHistory;  // 0: there is none; 1: this view's; 2: one a little aside
+uniform int uHistory;  // samples of earlier frames: 0: unusable; 1: of this view; 2: of a view slightly beside it
 uniform mat4 uToBefore;  // from the box to the device coordinates of the last frame
 uniform vec3 uEyeBefore;
-uniform float uMostHistory;  // samples that are kept of a view aside
+uniform float uMostHistory;  // largest number of samples that are kept from such a view
 uniform sampler2D uSums;  // premultiplied colour and coverage, summed
 uniform sampler2D uMoments;  // summed: squared luminance, samples, distance, openness
-uniform sampler2D uNoisiness;  // of tiles of NOISE_TILE pixels: standard error of the mean luminance
-uniform vec2 uTurn;  // which tiles take their turn: from x on, a share of y
-uniform float uCalm;  // the standard error at which a tile is as good as done; 0: no tile rests
+uniform sampler2D uNoisiness;  // standard error of the mean luminance of each tile of NOISE_TILE pixels
+uniform vec2 uTurn;  // the tiles that are sampled in this frame: from x on, a share of y
+uniform float uCalm;  // standard error below which a tile is sampled less often; 0: all tiles always are
 
-// The box that the chunks take for the one round all tiles: the paths' own.
+// The chunks use these as the box around all tiles. Here it is the box of the paths.
 #define uAllLow vec3(0.0)
 #define uAllHigh uSize
 
-// Finest voxel spacings behind a cut's face in which matter is lit as the face.
+// Depth behind a cut face within which matter is lit as a part of the face, in lengths of the finest voxel spacing.
 const float FACE_DEPTH = 2.0;
 
 layout(location = 0) out vec4 oSums;
@@ -87,7 +87,7 @@ layout(location = 1) out vec4 oMoments;
 #include <chunks/reproject_search>
 #include <chunks/temporal_history>
 
-// The part of a ray in what is left of the box.
+// Returns the part of a ray that lies in the box and is not cut away.
 vec2 spanOf(vec3 origin, vec3 dir) {
   vec3 invDir = 1.0 / dir;
   vec2 span = intersectBox(origin, invDir, vec3(0.0), uSize);
@@ -98,7 +98,7 @@ vec3 withoutZeros(vec3 dir) {
   return dir + 1e-7 * vec3(equal(dir, vec3(0.0)));
 }
 
-// Which way a path goes on; `weight` is the way's colour.
+// Chooses how a path continues: scattered in the medium, or reflected by a surface. `weight` is the colour of that event.
 Scatter chooseScatter(vec3 p, vec3 dir, vec3 albedo, out vec3 weight) {
   Scatter s = Scatter(PHASE, vec3(0.0), vec3(0.0));
   weight = albedo;
@@ -117,7 +117,7 @@ Scatter chooseScatter(vec3 p, vec3 dir, vec3 albedo, out vec3 weight) {
   return s;
 }
 
-// Light that reaches a point straight from a lamp or from the environment, one of them drawn.
+// Direct light at a point from one randomly chosen source: a lamp, or the environment.
 vec3 lightAt(vec3 p, vec3 from, Scatter s) {
   int sources = uLampCount + 1;
   int drawn = min(int(random() * float(sources)), sources - 1);
@@ -127,10 +127,10 @@ vec3 lightAt(vec3 p, vec3 from, Scatter s) {
   float reach = 1e30;
   if (drawn == uLampCount) {
     vec4 found;
-    to = sampleEnvironment(found) * uToRoom;  // the transposed turns back
+    to = sampleEnvironment(found) * uToRoom;  // the transpose rotates back
     if (found.a <= 0.0) return vec3(0.0);
     float density = scatterDensity(s, from, to);
-    // the balance heuristic (Veach 1997), as paths meet the environment by themselves, too
+    // the balance heuristic (Veach 1997), because scattered paths also reach the environment
     light = uEnvironmentLight * found.rgb * density / (share * found.a + density);
   } else {
     vec4 lamp = uLamps[drawn];
@@ -152,8 +152,8 @@ vec3 lightAt(vec3 p, vec3 from, Scatter s) {
   return span.y > span.x ? light * transmittance(p, to, span.x, span.y) : light;
 }
 
-// How open it is along a ray, as far as shade reaches; what is nearer than the softness of a surface
-// is the surface itself.
+// Openness along a ray, 0..1, from a free flight within the reach of the occlusion. The first 1.5 voxels are skipped,
+// because they belong to the soft surface itself.
 float openness(vec3 p, vec3 to, vec2 span) {
   span = vec2(max(span.x, 1.5 * uVoxel), min(span.y, uOcclusionReach));
   vec4 medium;
@@ -161,8 +161,8 @@ float openness(vec3 p, vec3 to, vec2 span) {
   return t < 0.0 ? 1.0 : smoothstep(0.0, uOcclusionReach, t);
 }
 
-// Colour of a path that begins at `p` (already scattered there), and how open it is beyond.
-// `face`: normal of the cut's face that `p` lies on; 0: it lies on none.
+// Returns the light of a path that begins with a scattering at `p`, and writes the openness around that point. If `p`
+// lies on a cut face, `face` is its normal, and otherwise 0.
 vec3 follow(vec3 p, vec3 dir, vec4 medium, vec3 face, out float open) {
   vec3 sum = vec3(0.0);
   vec3 weight = vec3(1.0);
@@ -217,13 +217,13 @@ void main() {
   oSums = before.sums;
   oMoments = before.moments + vec4(0.0, 1.0, 0.0, 0.0);
   if (span.y <= span.x) return;
-  // from where the ray comes in: far from the eye, floats would be too coarse
+  // distances are measured from the point of entry, because floats from a far eye would be too coarse
   vec3 start = uEyeAt + span.x * dir;
   vec4 medium;
   float t = track(start, dir, 0.0, span.y - span.x, medium);
   if (t < 0.0) return;
-  // What is cut through is lit as the face, as in the march: by itself, even matter has no side, and
-  // light that is scattered many times in it comes out dark.
+  // Matter at a cut is lit as a flat face, as in ray marching. Homogeneous matter has no gradient and so no normal, and
+  // light that is scattered many times in it becomes dark.
   vec3 face = span.x > 0.0 && t < FACE_DEPTH * uVoxel ? cutFace(start) : vec3(0.0);
   vec3 p = face == vec3(0.0) ? start + t * dir : start;
   float open;

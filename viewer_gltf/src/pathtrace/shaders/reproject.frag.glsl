@@ -1,16 +1,16 @@
-// The picture as it is seen from a little aside of where its paths began: each pixel looks for its
-// surface in it. What is gathered stays as sharp as it was; one look-up alone is between pixels.
+// Shows the frame from a view slightly beside the one from which its paths began: each pixel searches for its surface in
+// the earlier view. The sums stay sharp, because only this last step interpolates between pixels.
 precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
-uniform sampler2D uGuide;  // distance in edges; 0: nothing is met
+uniform sampler2D uGuide;  // distance in lengths of the box's longest edge; 0: the pixel shows nothing
 uniform float uEdge;  // um
-uniform vec4 uPart;  // the eye's
-uniform mat4 uToBox;  // where it is now: from normalised device coordinates to um of the box
+uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
+uniform mat4 uToBox;  // the current view: from normalised device coordinates to um of the box
 uniform vec3 uEyeAt;
-uniform mat4 uFromBox;  // where its paths began
+uniform mat4 uFromBox;  // the view from which the paths began
 uniform vec3 uEyeThere;
-uniform float uAway;  // um, to the middle of the box
+uniform float uAway;  // um, distance to the centre of the box
 
 out vec4 oColor;
 

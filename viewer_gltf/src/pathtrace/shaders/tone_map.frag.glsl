@@ -1,19 +1,18 @@
-// The picture as it is laid over the scene: exposed, sharpened, toned, encoded. Where a pixel has few samples
-// yet, the marched picture of the same view stands in, in the light that a small traced picture has found. It
-// gives way everywhere at once: a picture of both, tile by tile, would be a mosaic. What follows the light is
-// the same for both, so that they can't differ in it.
+// Makes the finished frame: exposed, sharpened, tone-mapped and sRGB-encoded. Pixels with few samples show the
+// ray-marched frame of the same view, whose brightness is matched to a small traced frame. It fades out at all pixels at
+// once, because a mixture of both frames, tile by tile, would look like a mosaic. All adjustments are the same for both.
 precision highp float;
 
 uniform sampler2D uColor;  // linear, premultiplied
 uniform float uExposure;  // factor
-uniform float uSharpness;  // 0: as it is
+uniform float uSharpness;  // 0: no sharpening
 uniform bool uIsFilmic;
 uniform vec3 uTone;  // turns of hue, factor to saturation, added lightness
-uniform vec4 uPart;  // the eye's
+uniform vec4 uPart;  // the eye's part of the target: x, y, width, height, pixels
 uniform sampler2D uGuide;  // samples
 uniform sampler2D uMarched;  // linear, premultiplied
 uniform float uRounds;  // samples that every pixel has
-uniform vec4 uMarchedPart;  // the eye's; no width: nothing stands in
+uniform vec4 uMarchedPart;  // the eye's part of uMarched; width 0: nothing stands in
 
 out vec4 oColor;  // encoded, premultiplied
 
@@ -21,17 +20,17 @@ out vec4 oColor;  // encoded, premultiplied
 #include <chunks/tone_map>
 #include <chunks/calibrated_light>
 
-// Samples with which a pixel is shown as it is traced.
+// Number of samples from which a pixel shows only the traced colour.
 const float SHOWN = 4.0;
 
-// The stand-in at a pixel of the picture.
+// Colour of the ray-marched frame at a pixel, in the light of the traced frame.
 vec4 standIn(ivec2 at) {
   vec2 there = (vec2(at) + 0.5 - uPart.xy) / uPart.zw * uMarchedPart.zw;
   vec4 light = texelFetch(uMarched, ivec2(uMarchedPart.xy + min(there, uMarchedPart.zw - 1.0)), 0);
   return vec4(calibrated(light), light.a);
 }
 
-// Linear and premultiplied.
+// Light at a pixel, linear and premultiplied: traced, ray-marched, or a mixture.
 vec4 lightAt(ivec2 at) {
   if (uMarchedPart.z <= 0.0) return texelFetch(uColor, at, 0);
   if (uRounds <= 0.0) return standIn(at);

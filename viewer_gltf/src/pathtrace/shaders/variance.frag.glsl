@@ -1,4 +1,4 @@
-// How noisy a tile of the picture is: the mean of its pixels' standard errors of the luminance.
+// Noise of a tile of the frame: the mean of its pixels' standard errors of the luminance.
 precision highp float;
 
 uniform sampler2D uSums;
@@ -6,7 +6,7 @@ uniform sampler2D uMoments;
 
 layout(location = 0) out vec4 oNoise;
 
-const float UNSURE = 1e3;  // too few samples to judge by
+const float UNSURE = 1e3;  // value for tiles with too few samples
 const float ENOUGH = 16.0;
 
 void main() {
