@@ -199,8 +199,13 @@ def test_a_phone_that_looks_on_can_not_stop_the_build(
     ("address", "is_on_this_machine"),
     [("127.0.0.1", True), ("::1", True), ("192.168.1.7", False), ("fe80::1", False), ("", False)],
 )
-def test_a_client_of_this_machine_is_known_by_its_address(address: str, is_on_this_machine: bool) -> None:
-    assert live_socket.is_on_this_machine({"type": "websocket", "client": (address, 50_000)}) is is_on_this_machine
+def test_a_client_of_this_machine_is_known_by_its_address(
+    address: str, is_on_this_machine: bool
+) -> None:
+    assert (
+        live_socket.is_on_this_machine({"type": "websocket", "client": (address, 50_000)})
+        is is_on_this_machine
+    )
 
 
 def test_without_a_build_there_is_no_websocket(live: Live) -> None:
