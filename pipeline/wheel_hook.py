@@ -28,7 +28,7 @@ class WheelHook(BuildHookInterface[Any]):
         missing = [part for part in (viewer / "dist/index.html", *parts) if not part.exists()]
         if missing:
             self.app.abort(
-                f"{self.target_name}: {missing[0].relative_to(self.root)} is missing; expected the "
+                f"{self.target_name}: {missing[0].relative_to(self.root)} is missing, expected the "
                 "built viewer. Run `make wheel`, which builds it first (Node 20.19 or newer)."
             )
         # The viewer contains these packages, and their licences must be distributed with it.

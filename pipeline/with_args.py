@@ -15,7 +15,7 @@ def main(command: list[str]) -> None:
     try:
         words = shlex.split(text)
     except ValueError as error:
-        sys.exit(f"make: ARGS is {text} ({error}); expected words as in a shell")
+        sys.exit(f"make: ARGS is {text} ({error}), expected words as in a shell")
     place = command.index("ARGS")
     os.execvp(command[0], [*command[:place], *words, *command[place + 1 :]])
 

@@ -76,7 +76,7 @@ def build(
 
     leave_if_importing_main()
     if not isinstance(workers, int) or workers < 0:
-        raise UsageError(f"workers is {workers!r}; expected a whole number, 0 or more")
+        raise UsageError(f"workers is {workers!r}, expected a whole number, 0 or more")
     path = (str, Path)
     kinds: tuple[tuple[str, Any, tuple[type, ...], str], ...] = (
         ("source", source, path, "a path or an address"),
@@ -87,10 +87,10 @@ def build(
     )
     for name, value, types, expected in kinds:
         if not isinstance(value, types):
-            raise UsageError(f"{name} is {value!r:.60}; expected {expected}")
+            raise UsageError(f"{name} is {value!r:.60}, expected {expected}")
     if not isinstance(settings, Mapping | None):
         raise UsageError(
-            f"settings is {settings!r:.60}; expected sections with keys, such as "
+            f"settings is {settings!r:.60}, expected sections with keys, such as "
             "{'plan': {'level': 1}}"
         )
     file = None if config is None else Path(config)

@@ -42,7 +42,7 @@ def test_a_page_is_short(page: Path) -> None:
 def test_sentences_are_short_on_average(page: Path) -> None:
     found = [
         len(sentence.split())
-        for _, text in prose.READERS[".md"](page.read_text("utf-8"))
+        for _, text in prose.markdown(page.read_text("utf-8"))
         for sentence in prose.sentences(text)
     ]
     assert sum(found) <= prose.MAX_AVERAGE_WORDS * len(found), sum(found) / len(found)

@@ -255,7 +255,7 @@ def test_a_command_without_certificates_is_refused_with_the_remedy(cluster: Join
     nothing = dict.fromkeys((f"distributed.comm.tls.{name}" for name in names), None)
     with (
         dask.config.set({**nothing, "distributed.comm.require-encryption": None}),
-        pytest.raises(ClusterError, match=r"this command has none; expected .* DASK_CONFIG"),
+        pytest.raises(ClusterError, match=r"this command has none, expected .* DASK_CONFIG"),
     ):
         join(cluster[0], None)
 

@@ -71,13 +71,13 @@ def test_xarray_s_units_are_lengths_and_its_channels_have_names(tmp_path):
 @pytest.mark.parametrize(
     ("array", "more", "message"),
     [
-        (np.zeros((4, 4)), {}, r"has 2 axes \(4 x 4\); expected \(z, y, x\) or \(c, z, y, x\)"),
-        (np.zeros((3, 9, 9)), {}, "3 x 9 x 9 voxels; expected at least 4 along z, y and x"),
+        (np.zeros((4, 4)), {}, r"has 2 axes \(4 x 4\), expected \(z, y, x\) or \(c, z, y, x\)"),
+        (np.zeros((3, 9, 9)), {}, "3 x 9 x 9 voxels, expected at least 4 along z, y and x"),
         (np.zeros((4, 4, 4), complex), {}, "type is complex128"),
         (np.zeros((4, 4, 4)), {"spacing_um": None}, "no voxel spacing; pass it as spacing_um="),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 0, 1)}, "each above 0"),
         (np.zeros((4, 4, 4)), {"spacing_um": (1, 1)}, "expected z, y, x in um"),
-        (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2; expected z, y, x in um"),
+        (np.zeros((4, 4, 4)), {"spacing_um": 2}, "spacing_um is 2, expected z, y, x in um"),
         (np.zeros((4, 4, 4)), {"spacing_um": "2,1,1"}, "expected z, y, x in um"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a"]}, "expected 2 different names"),
         (np.zeros((2, 4, 4, 4)), {"channels": ["a", "a"]}, "expected 2 different names"),

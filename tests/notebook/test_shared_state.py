@@ -25,9 +25,9 @@ def test_valid_values_are_returned_as_plain_numbers():
 @pytest.mark.parametrize(
     ("channels", "message"),
     [
-        ({"CD8": {}}, "there is no 'CD8'; expected CD31, DNA, a marker"),
-        ({"CD31": 5}, "CD31 is 5; expected a dict such as"),
-        ({"CD31": {"colour": "#ff8000"}}, "no 'colour'; expected visible, color"),
+        ({"CD8": {}}, "there is no 'CD8', expected CD31, DNA, a marker"),
+        ({"CD31": 5}, "CD31 is 5, expected a dict such as"),
+        ({"CD31": {"colour": "#ff8000"}}, "no 'colour', expected visible, color"),
         ({"CD31": {"visible": 1}}, "True or False"),
         ({"CD31": {"color": "red"}}, "a colour such as '#ff8000'"),
         ({"CD31": {"opacity": 1.5}}, "0 to 1"),
@@ -44,7 +44,7 @@ def test_looks_that_can_t_be_are_refused_in_a_line(channels, message):
 @pytest.mark.parametrize(
     ("check", "value", "message"),
     [
-        (check_view, {"eye": (0, 0, 0)}, "no 'eye'; expected eye_um and target_um"),
+        (check_view, {"eye": (0, 0, 0)}, "no 'eye', expected eye_um and target_um"),
         (check_view, {"eye_um": (0, 0)}, "expected x, y, z"),
         (
             check_view,

@@ -72,7 +72,7 @@ def test_no_path_of_this_machine_is_in_the_state(viewer, bundle):
 
 
 def test_values_that_are_set_are_checked_and_values_from_the_page_are_observed(viewer):
-    with pytest.raises(UsageError, match="there is no 'CD8'; expected CD31"):
+    with pytest.raises(UsageError, match="there is no 'CD8', expected CD31"):
         viewer.channels = {"CD8": {"visible": False}}
     assert viewer.channels == {}
     viewer.set_channel("CD31", opacity=0.5)
@@ -152,9 +152,9 @@ def test_a_bundle_by_itself_is_shown_as_the_view_asks_for(bundle):
 @pytest.mark.parametrize(
     ("source", "more", "message"),
     [
-        (5, {}, "source is 5; expected an array or a path"),
+        (5, {}, "source is 5, expected an array or a path"),
         ("missing.tif", {}, "missing.tif"),
-        ("missing.tif", {"quality": "best"}, "quality is 'best'; expected one of auto, full"),
+        ("missing.tif", {"quality": "best"}, "quality is 'best', expected one of auto, full"),
         ("missing.tif", {"zoom": 2}, "show has no argument 'zoom'"),
     ],
 )

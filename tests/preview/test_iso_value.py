@@ -246,18 +246,18 @@ def test_the_picture_is_named_after_channel_and_tile_by_default(
 @pytest.mark.parametrize(
     ("flags", "code", "message"),
     [
-        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31'; expected one of "),
+        (("--channel", "CD31", "--tile", "r0_c0"), 2, "--channel is 'CD31', expected one of "),
         (
             ("--channel", "0", "--tile", "r1_c0"),
             2,
-            "--tile is 'r1_c0'; expected a tile from r0_c0 to r0_c1",
+            "--tile is 'r1_c0', expected a tile from r0_c0 to r0_c1",
         ),
         (
             ("--channel", "1", "--tile", "r0_c0"),
             1,
             "all voxels are nearly equal, so there is no surface",
         ),
-        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg'; expected a file"),
+        (("--channel", "0", "--tile", "r0_c0", "-o", "a.jpg"), 2, "-o is 'a.jpg', expected a file"),
     ],
 )
 def test_errors_are_one_clear_line(

@@ -192,7 +192,7 @@ def test_out_inside_the_input_is_wrong_usage(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "v.ome.zarr").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "v.ome.zarr")
-    with pytest.raises(UsageError, match=r"OUT is .*, inside the input .*; expected a folder else"):
+    with pytest.raises(UsageError, match=r"OUT is .*, inside the input .*, expected a folder else"):
         require_apart(source, Path(out))
 
 

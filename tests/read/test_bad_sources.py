@@ -262,7 +262,7 @@ def test_a_compressed_file_is_refused_with_the_advice_to_unpack_it(
     path = Path(packed).rename(tmp_path / f"SCANS.{suffix.upper()}")
     line = refusal(path)
     assert "(unpack it)" in line or "(unzip it" in line or "(gunzip it)" in line
-    assert "; expected OME-Zarr" in line
+    assert ", expected OME-Zarr" in line
 
 
 @pytest.mark.parametrize("name", CASES)

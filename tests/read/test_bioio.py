@@ -108,11 +108,11 @@ def test_a_negative_voxel_size_is_noted(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_file_that_no_plugin_reads_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.dv").write_bytes(b"other")
     (tmp_path / "a.xyz").write_bytes(b"other")
-    with pytest.raises(SourceError, match="no DV at all; expected a file that a plugin"):
+    with pytest.raises(SourceError, match="no DV at all, expected a file that a plugin"):
         read.open(tmp_path / "a.dv")
     with pytest.raises(
         SourceError,
-        match=r"unknown format: found .*; expected .* or a file for an installed plugin of bioio",
+        match=r"unknown format: found .*, expected .* or a file for an installed plugin of bioio",
     ):
         read.open(tmp_path / "a.xyz")
 
@@ -121,6 +121,6 @@ def test_without_bioio_the_message_names_it(tmp_path: Path) -> None:
     (tmp_path / "a.dv").write_bytes(b"DV")
     with pytest.raises(
         SourceError,
-        match=r"unknown format: found .*; expected .* or a file for an installed plugin of bioio",
+        match=r"unknown format: found .*, expected .* or a file for an installed plugin of bioio",
     ):
         read.open(tmp_path / "a.dv")

@@ -71,7 +71,7 @@ def test_axes_are_assumed_with_a_note_or_given(tmp_path: Path) -> None:
         (BODY.astype(complex), "dtype of level 0: found complex128"),
         (BODY[0], "a volume needs at least 2 planes: found 2 dimensions"),
         (BOTH[None], "expected three, or give them with --axes"),
-        (BODY, "voxel size: not found with a unit of length; expected .* --spacing-um z,y,x"),
+        (BODY, "voxel size: not found with a unit of length, expected .* --spacing-um z,y,x"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:Stored array in format:UserWarning")

@@ -216,7 +216,7 @@ def test_voxels_beside_the_header_are_read_and_must_be_complete(
     (tmp_path / "b c.raw").unlink()
     os.mkfifo(tmp_path / "b c.raw")
     path.write_text(HEADS[suffix].format("b c.raw"))
-    assert "no regular file" in refusal(path)
+    assert "expected a regular file" in refusal(path)
 
 
 @pytest.mark.parametrize("suffix", [".mha", ".nrrd"])

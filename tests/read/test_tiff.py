@@ -434,7 +434,7 @@ def test_axes_are_those_that_the_user_names(tmp_path: Path) -> None:
     path = tmp_path / "x.tif"
     tifffile.imwrite(path, stored[:, 0], imagej=True, metadata={"axes": "TYX"})
     line = refusal(path, spacing_um=GIVEN)
-    assert "found 1 along z, and 5 time points; expected slices: --axes zyx reads" in line
+    assert "found 1 along z, and 5 time points, expected slices: --axes zyx reads" in line
     hold_voxels(read.open(path, axes="zyx", spacing_um=GIVEN), stored[:, 0], "ZYX")
     tifffile.imwrite(path, stored, photometric="minisblack")
     for axes in ("zcyx", "Z,C,Y,X"):

@@ -374,7 +374,7 @@ def test_a_missing_bundle_is_one_line_that_says_how_to_make_it(
     for command in ("view", "serve"):
         assert main([command, str(tmp_path), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert "manifest.json: not found; expected a built bundle" in line
+        assert "manifest.json: not found, expected a built bundle" in line
         assert f"`stereocell bundle {tmp_path}`" in line
 
 
@@ -384,7 +384,7 @@ def test_a_place_that_does_not_exist_is_one_line(
     for command in ("view", "serve"):
         assert main([command, str(tmp_path / "vizarr.io"), "--port", "0"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert "vizarr.io: not found; expected a build, a bundle, or a source" in line
+        assert "vizarr.io: not found, expected a build, a bundle, or a source" in line
 
 
 def test_a_bundle_is_served_by_its_own_folder_with_bricks_where_it_is_a_builds(

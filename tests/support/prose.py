@@ -99,7 +99,8 @@ def _matches(source: str, pattern: str, marks: str = "$^") -> Iterator[tuple[int
         yield source.count("\n", 0, found.start()) + 1, re.sub(marks, "", found[0])
 
 
-def _markdown(source: str) -> Iterator[tuple[int, str]]:
+def markdown(source: str) -> Iterator[tuple[int, str]]:
+    """Yield the paragraphs of a page, each with its line, without code, tables and headings."""
     code = r"(?ms)^```.*?^```|^\|.*?$|^#.*?$|<!--.*?-->|^---.*?^---"
     source = re.sub(code, lambda found: re.sub(r"[^\n]", "", found[0]), source)
     yield from _matches(re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", source), r"(?s)(?:(?!\n\s*\n).)+")
@@ -117,20 +118,21 @@ def _schema(source: str) -> Iterator[tuple[int, str]]:
 READERS = {
     (".py",): _python,
     (".ts", ".mjs", ".glsl", ".frag", ".vert", ".cs", ".hlsl", ".shader"): _typescript,
-    (".md",): _markdown,
+    (".md",): markdown,
     (".toml", ".yml", ".yaml", "Makefile", "Containerfile"): _hash_comments,
     (".schema.json",): _schema,
 }
 
 
-def _sentences(text: str) -> list[str]:
+def sentences(text: str) -> list[str]:
+    """Return the sentences of a text."""
     parts = ENDS.split(re.sub(r"`[^`]*`", "code", text))
     return [" ".join(part.split()) for part in parts if part and part.strip(" \n-*")]
 
 
 def hits(name: str, text: str) -> Iterator[str]:
     """Yield the rule and the sentence of each hit in one text of a file."""
-    for number, one in enumerate(_sentences(text)):
+    for number, one in enumerate(sentences(text)):
         if name in ALLOWED and one.startswith(ALLOWED[name]):
             continue
         if NO_SUBJECT.match(one):
@@ -154,7 +156,7 @@ def main(arguments: list[str]) -> int:
         for reader in (reader for ends, reader in READERS.items() if name.endswith(ends)):
             of_file = list(reader((ROOT / name).read_text("utf-8")))
             lines = [f"{name}:{line}: {hit}" for line, text in of_file for hit in hits(name, text)]
-            sizes = [len(one.split()) for _, text in of_file for one in _sentences(text)]
+            sizes = [len(one.split()) for _, text in of_file for one in sentences(text)]
             if name.endswith(".md") and sum(sizes) > MAX_AVERAGE_WORDS * len(sizes):
                 lines.append(f"{name}: {sum(sizes) / len(sizes):.1f} words a sentence on average")
             texts[room] += len(of_file)

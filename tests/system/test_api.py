@@ -44,13 +44,13 @@ def test_what_is_wrong_is_an_error_of_one_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ({"workers": "2"}, "workers is '2'; expected a whole number, 0 or more"),
-        ({"workers": 2.5}, "workers is 2.5; expected a whole number, 0 or more"),
-        ({"settings": [1]}, "settings is [1]; expected sections with keys, such as {'plan'"),
+        ({"workers": "2"}, "workers is '2', expected a whole number, 0 or more"),
+        ({"workers": 2.5}, "workers is 2.5, expected a whole number, 0 or more"),
+        ({"settings": [1]}, "settings is [1], expected sections with keys, such as {'plan'"),
         ({"settings": {"plan": {"grid": 3}}}, "settings: plan.grid is 3"),
-        ({"preset": 3}, "preset is 3; expected a preset's name or a TOML file"),
-        ({"config": 3}, "config is 3; expected a TOML file"),
-        ({"out": None}, "out is None; expected a path or an address"),
+        ({"preset": 3}, "preset is 3, expected a preset's name or a TOML file"),
+        ({"config": 3}, "config is 3, expected a TOML file"),
+        ({"out": None}, "out is None, expected a path or an address"),
     ],
 )
 def test_an_argument_of_another_kind_is_named(

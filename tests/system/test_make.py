@@ -205,7 +205,7 @@ def test_another_request_for_the_same_out_is_planned_anew(checkout: Path, make: 
 
 def test_what_can_not_be_is_told_in_a_line(checkout: Path, make: Make) -> None:
     for set_, told in (
-        ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x: No closing quotation, expected words'),
+        ({"INPUT": "a", "ARGS": 'say "x'}, 'ARGS is say "x (No closing quotation), expected words'),
         ({}, "INPUT is not set, expected INPUT=volume.ome.zarr OUT=folder"),
         ({"INPUT": "a", "OUT": ""}, "OUT is empty, expected OUT=folder"),
         ({"SAMPLE": "%"}, "SAMPLE is %, expected cycif, brain-cells, mri or cells"),

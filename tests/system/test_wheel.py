@@ -53,7 +53,7 @@ def test_without_the_viewer_there_is_no_wheel(tmp_path: Path) -> None:
     assert made.returncode == 1
     (line,) = made.stderr.splitlines() or made.stdout.splitlines()
     assert line == (
-        "wheel: viewer_gltf/dist/index.html is missing; expected the built viewer. "
+        "wheel: viewer_gltf/dist/index.html is missing, expected the built viewer. "
         "Run `make wheel`, which builds it first (Node 20.19 or newer)."
     )
     assert not list(tmp_path.glob("*.whl"))

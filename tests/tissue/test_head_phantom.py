@@ -128,9 +128,9 @@ def test_a_finer_grid_shows_the_same_head(clean: HeadPhantom) -> None:
 def test_errors_name_the_wrong_argument() -> None:
     for found, message in (
         ({"shape": (4, 96, 96)}, "shape is"),
-        ({"noise": -0.1}, "noise: found -0.1"),
-        ({"bias": 2.0}, "bias: found 2"),
-        ({"seed": -1}, "seed: found -1"),
+        ({"noise": -0.1}, "noise is -0.1, expected"),
+        ({"bias": 2.0}, "bias is 2"),
+        ({"seed": -1}, "seed is -1"),
     ):
         with pytest.raises(UsageError, match=message):
             make_head(**found)  # type: ignore[arg-type]

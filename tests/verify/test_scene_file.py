@@ -145,7 +145,7 @@ def test_a_deep_check_of_a_scene_names_what_it_needs(
 ) -> None:
     (tmp_path / "s.html").write_text(scene, "utf-8")
     assert main(["check", str(tmp_path / "s.html"), "--deep"]) == 1
-    assert "found a scene in one file; expected OUT with its plan.json" in capsys.readouterr().err
+    assert "found a scene in one file, expected OUT with its plan.json" in capsys.readouterr().err
 
 
 def test_each_block_has_the_hash_of_its_bytes(scene: str) -> None:

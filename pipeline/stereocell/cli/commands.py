@@ -193,7 +193,7 @@ def _workers_of(options: argparse.Namespace) -> "tuple[Path, Engine]":
     is_kept = isinstance(options.shown, str)  # OUT is on object storage, and workers open it
     if is_kept and edited:
         raise UsageError(
-            f"--stage is {edited}, but OUT is {options.shown}, on object storage; expected OUT in "
+            f"--stage is {edited}, but OUT is {options.shown}, on object storage, expected OUT in "
             "a folder: copy the build there"
         )
     out = options.out.absolute() if scheduler else options.out  # workers may run in another folder

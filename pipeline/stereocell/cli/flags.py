@@ -156,7 +156,7 @@ def _named(text: str) -> str:
     """Return a name unchanged, and refuse an empty one, which would mean the working folder."""
     if not text:
         raise argparse.ArgumentTypeError(
-            "is empty, perhaps because a variable is not set; expected a name (. is this folder)"
+            "is empty, perhaps because a variable is not set, expected a name (. is this folder)"
         )
     scheme, mark, place = text.partition("://")
     if mark and not (place if scheme == "file" else place.strip("/")):

@@ -46,7 +46,7 @@ def require_whole(
         )
     if features is not None and len(objects) and objects.max() >= len(features.labels):
         raise ValueError(
-            f"{name} has objects up to {objects.max()}, but {len(features.labels)} rows; expected "
+            f"{name} has objects up to {objects.max()}, but {len(features.labels)} rows, expected "
             "one row for each object"
         )
     owners = objects[triangles]

@@ -129,14 +129,14 @@ class ChannelLevels:
         if self.correlation < MIN_CORRELATION:
             return (
                 "neighbouring voxels are unrelated, as in noise: their correlation is "
-                f"{self.correlation:z.3f}; expected at least {MIN_CORRELATION:g}"
+                f"{self.correlation:z.3f}, expected at least {MIN_CORRELATION:g}"
             )
         first = next(iter(clear_of(self.all_levels)), None)
         # A straight edge of tissue is also a step along an axis, but it lies between two peaks.
         if self.light > MAX_LIGHT and first is not None and first.dip > DIP:
             return (
                 f"{self.light:.0%} of the variance lies along the axes alone and in no valley, as "
-                f"with uneven light; expected at most {MAX_LIGHT:.0%}"
+                f"with uneven light, expected at most {MAX_LIGHT:.0%}"
             )
         return ""
 

@@ -88,7 +88,7 @@ class FineTiles:
         if states is None or not states.changed():
             return ""
         return (
-            f"{self.plan.source}: changed since it was opened; expected a source that does not "
+            f"{self.plan.source}: changed since it was opened, expected a source that does not "
             "change while it is shown. End the command and run it again."
         )
 

@@ -70,26 +70,26 @@ def as_source(
     size = " x ".join(str(n) for n in shape)
     if len(shape) not in _AXES:
         raise UsageError(
-            f"the array has {len(shape)} axes ({size}); expected (z, y, x) or (c, z, y, x)"
+            f"the array has {len(shape)} axes ({size}), expected (z, y, x) or (c, z, y, x)"
         )
     axes = _AXES[len(shape)]
     dims = tuple(str(dim).lower() for dim in getattr(array, "dims", ()))
     if dims and dims != tuple(axes):
         raise UsageError(
-            f"the array's axes are {', '.join(dims)}; expected {', '.join(axes)}. Transpose it."
+            f"the array's axes are {', '.join(dims)}, expected {', '.join(axes)}. Transpose it."
         )
     if min(shape[-3:]) < _MIN_EDGE:
         raise UsageError(
-            f"the array has {size} voxels; expected at least {_MIN_EDGE} along z, y and x"
+            f"the array has {size} voxels, expected at least {_MIN_EDGE} along z, y and x"
         )
     if array.dtype.kind not in "buif":
         raise UsageError(
-            f"the array's type is {array.dtype}; expected integers, floating-point numbers or "
+            f"the array's type is {array.dtype}, expected integers, floating-point numbers or "
             "booleans"
         )
     if prod(shape) > _MAX_READ:
         raise UsageError(
-            f"the array has {prod(shape):,} voxels ({size}); expected at most {_MAX_READ:,} in a "
+            f"the array has {prod(shape):,} voxels ({size}), expected at most {_MAX_READ:,} in a "
             "notebook. Save it as OME-Zarr, run `stereocell build scan.ome.zarr -o out` and show "
             "out, or show a part of the array."
         )
@@ -103,7 +103,7 @@ def as_source(
     count = shape[0] if len(shape) == 4 else 1
     names = list(channels) if channels is not None else _names_of(array, count)
     if len(names) != count or len(set(names)) != count or not all(names):
-        raise UsageError(f"channels are {names!r:.80}; expected {count} different names")
+        raise UsageError(f"channels are {names!r:.80}, expected {count} different names")
     # The variable of an xarray.DataArray is used, since slicing the array would copy coordinates.
     data = getattr(array, "variable", array)
     return ArraySource(getattr(data, "data", data) if dims else data, spacing, tuple(names))
@@ -116,7 +116,7 @@ def check_spacing(given: Any) -> Triple:
     except (TypeError, ValueError):  # such as a single number, or a text
         z = y = x = 0.0
     if not all(isfinite(v) and v > 0 for v in (z, y, x)):
-        raise UsageError(f"spacing_um is {given!r:.60}; expected z, y, x in um, each above 0")
+        raise UsageError(f"spacing_um is {given!r:.60}, expected z, y, x in um, each above 0")
     return z, y, x
 
 

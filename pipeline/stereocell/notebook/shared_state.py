@@ -19,9 +19,9 @@ def check_link(link: str) -> str:
     """
     start, mark, view = link.partition("#")
     if (start and not mark) or (mark and not view.startswith("v=")):
-        raise UsageError(f"link is {link!r:.60}; expected a link to a view, such as #v=1&eye=...")
+        raise UsageError(f"link is {link!r:.60}, expected a link to a view, such as #v=1&eye=...")
     if len(view) > _LONGEST_LINK:
-        raise UsageError(f"link has {len(view)} characters; expected at most {_LONGEST_LINK}")
+        raise UsageError(f"link has {len(view)} characters, expected at most {_LONGEST_LINK}")
     return f"#{view}" if mark else ""
 
 
@@ -35,14 +35,14 @@ def check_channels(
     for name in channels:
         if name not in ids:
             known = ", ".join(ids)
-            raise UsageError(f"channels: there is no {name!r:.60}; expected {known}")
+            raise UsageError(f"channels: there is no {name!r:.60}, expected {known}")
     return {ids[name]: _check_appearance(name, one) for name, one in channels.items()}
 
 
 def _check_appearance(id_: str, appearance: Any) -> dict[str, Any]:
     if not isinstance(appearance, Mapping):
         raise UsageError(
-            f"channels: {id_} is {appearance!r:.60}; expected a dict such as {{'opacity': 0.5}}"
+            f"channels: {id_} is {appearance!r:.60}, expected a dict such as {{'opacity': 0.5}}"
         )
     checked: dict[str, Any] = {}
     for name, value in appearance.items():
@@ -66,7 +66,7 @@ def _check_appearance(id_: str, appearance: Any) -> dict[str, Any]:
             checked[name] = window
         else:
             raise UsageError(
-                f"channels: {id_} has no {name!r:.40}; expected visible, color, opacity or window"
+                f"channels: {id_} has no {name!r:.40}, expected visible, color, opacity or window"
             )
     return checked
 
@@ -75,10 +75,10 @@ def check_view(view: Mapping[str, Any]) -> dict[str, list[float]]:
     """Return the eye and target of a camera, as far as given. Raises UsageError."""
     for name in view:
         if name not in ("eye_um", "target_um"):
-            raise UsageError(f"view has no {name!r:.40}; expected eye_um and target_um")
+            raise UsageError(f"view has no {name!r:.40}, expected eye_um and target_um")
     checked = {name: _numbers(view[name], 3, f"view: {name}: expected x, y, z") for name in view}
     if len(checked) == 2 and checked["eye_um"] == checked["target_um"]:
-        raise UsageError("view: eye_um equals target_um; expected two different points")
+        raise UsageError("view: eye_um equals target_um, expected two different points")
     return checked
 
 
@@ -86,7 +86,7 @@ def check_picked(picked: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """Return a picked point, with its tile, channel and object if given. Raises UsageError."""
     if picked is None:
         return None
-    where = f"picked is {dict(picked)!r:.80}; expected {{'point_um': (x, y, z)}}"
+    where = f"picked is {dict(picked)!r:.80}, expected {{'point_um': (x, y, z)}}"
     if "point_um" not in picked or not set(picked) <= {"point_um", *_PICKED}:
         raise UsageError(where)
     for name in _PICKED:

@@ -70,13 +70,13 @@ def show(
     from stereocell.storage.overwriting import IN_PYTHON, forcing
 
     if quality not in _QUALITIES:
-        raise UsageError(f"quality is {quality!r:.40}; expected one of {', '.join(_QUALITIES)}")
+        raise UsageError(f"quality is {quality!r:.40}, expected one of {', '.join(_QUALITIES)}")
     if unknown := sorted(state.keys() - {"link", "channels", "view", "picked"}):
         raise UsageError(f"show has no argument {unknown[0]!r:.40}")
     find_page()  # raise before the build if the viewer is missing
     if not is_array(source):
         if not isinstance(source, str | Path):
-            raise UsageError(f"source is {source!r:.60}; expected an array or a path")
+            raise UsageError(f"source is {source!r:.60}, expected an array or a path")
         Location.of(source)  # this refuses an empty path, which would mean the current folder
         if spacing_um is None and channels is None and (found := _find_bundle(Path(source))):
             return _viewer(*found, height=height, state=state)
@@ -116,7 +116,7 @@ def _find_bundle(path: Path) -> tuple[Path, Path | None] | None:
         return path, None
     if (path / "plan.json").is_file():
         raise UsageError(
-            f"{path}: found a build without a bundle; expected {path / 'bundle' / _MANIFEST}. "
+            f"{path}: found a build without a bundle, expected {path / 'bundle' / _MANIFEST}. "
             f"Run `stereocell bundle {shlex.quote(str(path))}` first."
         )
     return None

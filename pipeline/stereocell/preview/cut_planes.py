@@ -61,7 +61,7 @@ def choose_view(views: Sequence[View], axis: int, plane: str, shown: str) -> Vie
         named = ", ".join(sorted(view.name for view in views))
         what = "no" if plane in PLANES[1:4] else "a"
         raise UsageError(
-            f"--plane is {plane}, but {shown} states {what} position in a patient; expected "
+            f"--plane is {plane}, but {shown} states {what} position in a patient, expected "
             f"{ACQUIRED}, {named}"
         )
     return found[0]

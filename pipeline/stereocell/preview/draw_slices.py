@@ -300,7 +300,7 @@ def find_font(size: int) -> ImageFont.FreeTypeFont:
     """Return a font from matplotlib's package that has a micro sign; `size` in pixels."""
     place = find_spec("matplotlib")  # finding the package avoids its import, which takes 0.2 s
     if place is None or place.origin is None:
-        raise ModuleNotFoundError("matplotlib is not installed; expected the font in its package")
+        raise ModuleNotFoundError("matplotlib is not installed, expected the font in its package")
     fonts = Path(place.origin).parent / "mpl-data" / "fonts" / "ttf"
     return ImageFont.truetype(fonts / "DejaVuSans.ttf", size)
 

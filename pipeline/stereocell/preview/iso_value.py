@@ -110,7 +110,7 @@ def preview(
     nearly equal, SourceError if the source can't be read.
     """
     if out is not None and out.suffix.lower() != ".png":
-        raise UsageError(f"-o is {str(out)!r}; expected a file name that ends in .png")
+        raise UsageError(f"-o is {str(out)!r}, expected a file name that ends in .png")
     plan = settle(source, settings)
     print_notes(plan)
     channel, tile = _find_channel(plan, channel_name), _find_tile(plan, tile_id)
@@ -172,7 +172,7 @@ def _mark(plan: Plan) -> PngInfo:
 def require_picture_or_nothing(path: Path) -> None:
     """Raise OutputError if a path holds anything but a picture of this command, of any source."""
     if path.is_dir():
-        raise OutputError(f"{path}: found a folder; expected a file name that ends in .png")
+        raise OutputError(f"{path}: found a folder, expected a file name that ends in .png")
     require_free(path, expected=_EXPECTED, is_ours=_source_of_picture(path) is not None)
 
 
@@ -229,7 +229,7 @@ def _find_channel(plan: Plan, name: str) -> Channel:
         if name in (channel.name, channel.id, str(channel.index)):
             return channel
     names = ", ".join(channel.name for channel in plan.channels)
-    raise UsageError(f"--channel is {name!r}; expected one of {names}")
+    raise UsageError(f"--channel is {name!r}, expected one of {names}")
 
 
 def _find_tile(plan: Plan, tile_id: str) -> Tile:
@@ -238,7 +238,7 @@ def _find_tile(plan: Plan, tile_id: str) -> Tile:
             return tile
     first, last = plan.tiles[0].id, plan.tiles[-1].id
     known = first if first == last else f"a tile from {first} to {last}"
-    raise UsageError(f"--tile is {tile_id!r}; expected {known}")
+    raise UsageError(f"--tile is {tile_id!r}, expected {known}")
 
 
 def _candidates(

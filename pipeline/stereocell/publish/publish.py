@@ -102,7 +102,7 @@ def publish(
     else's files in the bundle's place, or sends other bytes.
     """
     if url is not None and not url.startswith(("https://", "http://")):
-        raise UsageError(f"--url is {url}; expected an address such as https://me.example/mine")
+        raise UsageError(f"--url is {url}, expected an address such as https://me.example/mine")
     held = contents_of(out)
     bundle = out if held.kind in (Kind.BUNDLE, Kind.SITE) else out / "bundle"
     build = held.build if bundle == out else out
@@ -250,7 +250,7 @@ def _made(content: bytes) -> _File:
 
 def _require_apart(folder: Path, out: Path) -> None:
     if folder.resolve().is_relative_to(out.resolve()):
-        raise OutputError(f"TARGET is {folder}, inside OUT; expected a folder elsewhere")
+        raise OutputError(f"TARGET is {folder}, inside OUT, expected a folder elsewhere")
 
 
 def _specimen_of(bundle: Path, held: Contents) -> dict[str, str]:

@@ -145,7 +145,7 @@ def _require_space(where: str, axes: tuple[str, ...]) -> None:
     if angle:
         raise SourceError(
             f"{where}: found axes {', '.join(named)}: {angle:.40} is an angle, so these are "
-            "projections; expected the volume that was reconstructed from them"
+            "projections, expected the volume that was reconstructed from them"
         )
     if named and set(named) <= set(AXES) and len(set(named)) == len(named):
         asked = "".join("z" if n == ("t" if "t" in named else "c") else n for n in named)

@@ -52,7 +52,7 @@ def parse(text: str, where: str) -> ElementTree.Element:
     """
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         raise SourceError(
-            f"{where}: OME-XML: found none in the first plane's ImageDescription; expected a "
+            f"{where}: OME-XML: found none in the first plane's ImageDescription, expected a "
             "complete OME-TIFF file with its OME-XML"
         )
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -61,7 +61,7 @@ def parse(text: str, where: str) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         raise SourceError(
-            f"{where}: OME-XML: {error}; expected a complete OME-TIFF file with its OME-XML"
+            f"{where}: OME-XML: {error}, expected a complete OME-TIFF file with its OME-XML"
         ) from error
     if _local(root) != "OME":
         raise SourceError(f"{where}: OME-XML: found <{_local(root):.40}>, expected <OME>")

@@ -171,7 +171,7 @@ def _check_arrays(where: str, image: Image) -> None:
         raise SourceError(
             f"{where}: one plane (2D): a volume needs at least 2 planes: found "
             f"{finest.shape[0]} along z"
-            f"{_beside(finest)}; expected a stack, or a folder of planes (name the folder)"
+            f"{_beside(finest)}, expected a stack, or a folder of planes (name the folder)"
         )
 
 

@@ -145,7 +145,7 @@ def _unknown(location: Location) -> SourceError:
     if found.endswith(")"):
         formats = "OME-Zarr, TIFF, DICOM, NIfTI, HDF5 and others that are read"
     return SourceError(
-        f"{location.shown}: {found}; expected {formats}, or {known_formats()[OTHER].title}"
+        f"{location.shown}: {found}, expected {formats}, or {known_formats()[OTHER].title}"
     )
 
 

@@ -39,7 +39,7 @@ def require_apart(source: str | Path, out: Path) -> None:
     if outermost is not None and _is_in(out, outermost):
         raise UsageError(
             f"OUT is {out}, inside the input {outermost}, where it would be written into the "
-            "data; expected a folder elsewhere"
+            "data, expected a folder elsewhere"
         )
 
 

@@ -19,7 +19,7 @@ def write_brain_cells(path: Path) -> None:
     the path holds other content or can't be written.
     """
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
-        raise UsageError(f"{path}: the sample is an OME-TIFF; expected a name like NAME{SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-TIFF, expected a name like NAME{SUFFIX}")
     licence = path.with_name(path.name.removesuffix(SUFFIX) + ".LICENSE")
     contents = {
         licence: (_FOLDER / "LICENSE").read_bytes(),

@@ -85,7 +85,7 @@ def write_cells(path: Path, *, seed: int = 1, shape: tuple[int, int, int] = SHAP
     file lies at the sample's or the table's path, or they can't be written.
     """
     if not path.name.endswith(SUFFIX):
-        raise UsageError(f"{path}: the sample is an OME-Zarr; expected a name like NAME{SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-Zarr, expected a name like NAME{SUFFIX}")
     _require_free(path, seed, shape)
     tissue = make_tissue(shape, seed)
     files, table = _zarr_files(tissue, seed), _table(tissue).encode()

@@ -101,16 +101,16 @@ def _check(
     brightness_spread: float,
 ) -> None:
     if not path.name.endswith(SUFFIX) or path.name == SUFFIX:
-        raise UsageError(f"{path}: the sample is an OME-Zarr; expected a name like NAME{SUFFIX}")
+        raise UsageError(f"{path}: the sample is an OME-Zarr, expected a name like NAME{SUFFIX}")
     if min(grid) < 1:
-        raise UsageError(f"--grid is {grid[0]}x{grid[1]}; expected columns x rows, at least 1x1")
+        raise UsageError(f"--grid is {grid[0]}x{grid[1]}, expected columns x rows, at least 1x1")
     if min(tile_size) < 8:
         found = ",".join(map(str, tile_size))
-        raise UsageError(f"--tile-size is {found}; expected z,y,x of at least 8 voxels each")
+        raise UsageError(f"--tile-size is {found}, expected z,y,x of at least 8 voxels each")
     if seed < 0:
-        raise UsageError(f"--seed is {seed}; expected 0 or more")
+        raise UsageError(f"--seed is {seed}, expected 0 or more")
     if not (math.isfinite(brightness_spread) and 0.0 <= brightness_spread <= 20.0):
-        raise UsageError(f"--brightness-spread is {brightness_spread:g}; expected 0 to 20")
+        raise UsageError(f"--brightness-spread is {brightness_spread:g}, expected 0 to 20")
 
 
 def _is_there(path: Path, attributes: dict[str, Any]) -> bool:

@@ -145,12 +145,12 @@ def make_head(
 
 def _check(shape: tuple[int, int, int], noise: float, bias: float, seed: int) -> None:
     if len(shape) != 3 or not all(16 <= n <= 1024 for n in shape):
-        raise UsageError(f"shape is {shape}; expected z, y, x of 16 to 1024 voxels each")
+        raise UsageError(f"shape is {shape}, expected z, y, x of 16 to 1024 voxels each")
     for name, value in (("noise", noise), ("bias", bias)):
         if not 0 <= value <= 1:
-            raise UsageError(f"{name} is {value:g}; expected a share from 0 to 1")
+            raise UsageError(f"{name} is {value:g}, expected a share from 0 to 1")
     if seed < 0:
-        raise UsageError(f"seed is {seed}; expected 0 or more")
+        raise UsageError(f"seed is {seed}, expected 0 or more")
 
 
 def _reach(axis: Field, body: Body, k: int, width: float) -> slice:

@@ -59,7 +59,7 @@ def write_head(path: Path, *, seed: int = 0) -> None:
     written.
     """
     if seed < 0:
-        raise UsageError(f"--seed is {seed}; expected 0 or more")
+        raise UsageError(f"--seed is {seed}, expected 0 or more")
     _require_free(path, seed)
     write_dicom(path, make_head(seed=seed), seed=seed)
 

@@ -236,13 +236,13 @@ class BundleServer(Server):
         self._live = live
         if live is None and not out.exists():
             raise StereoCellError(
-                f"{out}: not found; expected a build, a bundle, or a source (a file, a folder, or "
+                f"{out}: not found, expected a build, a bundle, or a source (a file, a folder, or "
                 "an address that begins with https:// or s3://)"
             )
         for name in (MANIFEST, "index.html"):
             if live is None and not (bundle / name).is_file():
                 raise StereoCellError(
-                    f"{bundle / name}: not found; expected a built bundle. "
+                    f"{bundle / name}: not found, expected a built bundle. "
                     "Run `stereocell bundle OUT` to write it."
                 )
 

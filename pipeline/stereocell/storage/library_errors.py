@@ -105,7 +105,7 @@ def one_line(
             raise raised(
                 f"{where}: {damage_words(error)}, expected {expected}: {_AGAIN}"
             ) from error
-        raise raised(f"{where}: {_reason(error)}; expected {expected}") from error
+        raise raised(f"{where}: {_reason(error)}, expected {expected}") from error
 
 
 @contextmanager

@@ -69,7 +69,7 @@ def find_brain(smooth: NDArray[np.float32], head: Mask, spacing_um: Triple) -> M
     )
     brain &= head
     if not brain.any():
-        raise SourceError("no brain: the hull holds no voxel; expected a head in MR")
+        raise SourceError("no brain: the hull holds no voxel, expected a head in MR")
     return _add_fluid(brain, smooth, head, tissue_level, spacing_um)
 
 
@@ -80,7 +80,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     core = _within(tissue, -ERODED_UM, spacing_um)
     if not core.any():
         raise SourceError(
-            "no brain: bright tissue is nowhere 9 mm thick; expected a head in MR (or --everywhere)"
+            "no brain: bright tissue is nowhere 9 mm thick, expected a head in MR (or --everywhere)"
         )
     core = _within(_largest(core), ERODED_UM, spacing_um) & tissue
     mm = _mm(spacing_um)
@@ -93,7 +93,7 @@ def _find_hull(field: NDArray[np.float32], head: Mask, spacing_um: Triple) -> tu
     )
     brain = fill_hull(hull, _shape(field), spacing_mm=mm) & tissue
     if not brain.any():
-        raise SourceError("no brain: the hull holds no bright tissue; expected a head in MR")
+        raise SourceError("no brain: the hull holds no bright tissue, expected a head in MR")
     flat = field / _rough_bias(field, brain, spacing_um)
     return find_hull(
         flat, mm, center_mm=center, radius_mm=radius, levels=_levels(flat, head, brain)

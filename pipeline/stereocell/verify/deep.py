@@ -41,12 +41,12 @@ def check_deep(out: Path, engine: Engine, stage: Path | None = None) -> Iterator
     out_folder = OutFolder(out)
     if not out_folder.plan_file.exists() and (out / MANIFEST).is_file():
         raise OutputError(
-            f"{out}: found a bundle without its build; expected OUT with its plan.json, since "
+            f"{out}: found a bundle without its build, expected OUT with its plan.json, since "
             "--deep compares a bundle with the stage that it was exported from"
         )
     if out.is_file():
         raise OutputError(
-            f"{out}: found a scene in one file; expected OUT with its plan.json, since --deep "
+            f"{out}: found a scene in one file, expected OUT with its plan.json, since --deep "
             "compares a bundle with the stage that it was exported from"
         )
     plan = out_folder.plan()

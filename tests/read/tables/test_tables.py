@@ -268,7 +268,7 @@ def test_columns_are_chosen_by_name_and_limited_in_number(tmp_path: Path) -> Non
     ("text", "told"),
     [
         ("", "found no header"),
-        ("a,b\n1,2\n", "no column holds the objects' numbers: found a, b; expected CellID, label"),
+        ("a,b\n1,2\n", "no column holds the objects' numbers: found a, b, expected CellID, label"),
         ("label,a\n1,2\n1,3\n", "label: found 1 more than once (1 in all)"),
         ("label,a\n1.5,2\n", "label, row 1: found 1.5, expected an object's number"),
         ("label,a\n0,2\n", "label, row 1: found 0, expected"),

@@ -13,7 +13,7 @@ describe("colours", () => {
   });
 
   it("reject text that is not a colour", () => {
-    expect(() => fromHex("red")).toThrow("colour is red; expected #rrggbb");
+    expect(() => fromHex("red")).toThrow("colour is red, expected #rrggbb");
   });
 
   it("keep the artist's colour of a tile until the user recolours the channel", () => {

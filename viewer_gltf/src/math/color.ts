@@ -22,7 +22,7 @@ export function toHex(color: Rgb): string {
 
 /** Converts `#rrggbb` to a linear colour. Throws RangeError for other text. */
 export function fromHex(hex: string): Rgb {
-  if (!/^#[0-9a-f]{6}$/i.test(hex)) throw new RangeError(`colour is ${hex}; expected #rrggbb`);
+  if (!/^#[0-9a-f]{6}$/i.test(hex)) throw new RangeError(`colour is ${hex}, expected #rrggbb`);
   const part = (i: number) => decode(Number.parseInt(hex.slice(i, i + 2), 16) / 255);
   return [part(1), part(3), part(5)];
 }

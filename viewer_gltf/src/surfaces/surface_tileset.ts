@@ -261,7 +261,7 @@ export class SurfaceTileset {
       }
     });
     if (id === null) {
-      throw new BundleError(`${tile.content?.uri}: extras.tile is missing; expected the tile's id`);
+      throw new BundleError(`${tile.content?.uri}: extras.tile is missing, expected the tile's id`);
     }
     // Surfaces are open at the tile's border.
     for (const material of materials) material.side = DoubleSide;

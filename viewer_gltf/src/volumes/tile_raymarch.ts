@@ -230,7 +230,7 @@ export class TileMarch {
   show(shown: Packed, old: Packed | null, fresh: number, presence: number): void {
     if (shown.channels.length !== this.channelCount) {
       throw new RangeError(
-        `found ${shown.channels.length} channels; expected ${this.channelCount}`,
+        `found ${shown.channels.length} channels, expected ${this.channelCount}`,
       );
     }
     const { uniforms } = this.mesh.material;

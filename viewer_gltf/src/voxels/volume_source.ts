@@ -75,7 +75,7 @@ export class VolumeSource {
     const texture = readTexture(this.whole, file.path, "R8", size);
     const frame = compressedLevel(texture, file.path, index);
     if (frame === null) {
-      throw new BundleError(`${file.path}: supercompression is missing; expected zstd`);
+      throw new BundleError(`${file.path}: supercompression is missing, expected zstd`);
     }
     return frame;
   }

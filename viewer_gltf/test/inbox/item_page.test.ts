@@ -37,7 +37,7 @@ describeInChromium("an image that is looked at before it is built", () => {
     await server?.stop("SIGTERM");
     server = await serve(`--inbox=${await mkdtemp(join(folder, "box-"))}`);
     await page.goto(server.address);
-    await page.getByText("Nothing is here yet").waitFor();
+    await page.getByText("There are no images yet").waitFor();
     faults.length = 0;
   }
 

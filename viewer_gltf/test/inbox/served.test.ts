@@ -33,7 +33,7 @@ describe.skipIf(!IS_AVAILABLE)("with its server", () => {
       page.on("dialog", (dialog) => void dialog.accept()); // leaving the page ends an upload
       page.on("pageerror", ({ message }) => faults.push(message));
       await page.goto(server.address);
-      await page.getByText("Nothing is here yet").waitFor();
+      await page.getByText("There are no images yet").waitFor();
     });
 
     afterAll(async () => {

@@ -330,10 +330,12 @@ describeInChromium("the path-traced page", () => {
     },
   );
 
-  it("reports it where the page lacks what follows light, and asks for it again", async () => {
+  it("reports that the code of path tracing could not be loaded, and loads it when asked again", async () => {
     await page().route(/\/path_tracer-[^/]*\.js$/, (route) => route.abort());
     await open();
-    await expect.poll(notices, PATIENT).toEqual([expect.stringContaining("follows light")]);
+    await expect
+      .poll(notices, PATIENT)
+      .toEqual([expect.stringContaining("path tracing could not be loaded")]);
     await press("2", "1", "2"); // what changes the state does not ask again
     await stand.viewer.settled();
     expect(await notices()).toHaveLength(1);

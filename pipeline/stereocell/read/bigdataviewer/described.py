@@ -180,7 +180,7 @@ class Described:
         if not found:
             raise SourceError(
                 f"{where}: found no view of this image, since MissingViews of the XML lists all of "
-                "them; expected another --series"
+                "them, expected another --series"
             )
         return found
 

@@ -42,7 +42,7 @@ def _at_time(
     if not present:
         raise SourceError(
             f"{where}: time point {time}: found no view, since MissingViews of the XML lists "
-            f"{_named(missing)}; expected another --time"
+            f"{_named(missing)}, expected another --time"
         )
     if missing:
         channels = [setups.index(setup) for setup in present]

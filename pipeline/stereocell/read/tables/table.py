@@ -68,7 +68,7 @@ def choose_key(where: str, names: Sequence[str], key: str) -> str:
         if one.lower() in lower:
             return lower[one.lower()]
     raise SourceError(
-        f"{where}: no column holds the objects' numbers: found {shown(names)}; expected "
+        f"{where}: no column holds the objects' numbers: found {shown(names)}, expected "
         f"{', '.join(KEYS)}, or --table-key COLUMN"
     )
 

@@ -217,7 +217,7 @@ def test_files_without_images_are_named_by_their_kind(tmp_path: Path) -> None:
 
 
 def test_empty_folder_is_refused(tmp_path: Path) -> None:
-    assert "found an empty folder; expected slices" in refusal(tmp_path)
+    assert "found an empty folder, expected slices" in refusal(tmp_path)
 
 
 def test_several_frames_without_places_are_refused(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ export class ShadingMaker {
       this.made = { grid, through, open: openness(through, grid.size, radius) };
     }
     if (this.made === null)
-      throw new RangeError("the first shading request has no matter; expected grid and tiles");
+      throw new RangeError("the first shading request has no matter, expected grid and tiles");
     const { grid, through, open } = this.made;
     return asTexels(open, lampLight(through, grid.size, towards));
   }

@@ -54,12 +54,12 @@ export function parseTable(bytes: Uint8Array, name: string): Table {
   const count = view.getUint32(28, true);
   if (bytes[12] !== STREAM_BRICK || bytes[13] !== 1 || bytes[15] !== 1) {
     throw new BundleError(
-      `${name}: bricks have another format; expected ${STREAM_BRICK} texels with an apron of 1, zstd`,
+      `${name}: bricks have another format, expected ${STREAM_BRICK} texels with an apron of 1, zstd`,
     );
   }
   if (bytes.length !== HEADER + count * RECORD) {
     throw new BundleError(
-      `${name}: table has ${bytes.length} bytes; expected ${HEADER + count * RECORD}`,
+      `${name}: table has ${bytes.length} bytes, expected ${HEADER + count * RECORD}`,
     );
   }
   const nodes: Node[] = [];

@@ -117,16 +117,16 @@ describe("the code of a Cardboard viewer", () => {
     [toBase64(message({ extra: "07" })), "damaged or cut off"],
     [
       toBase64(message({ screen: "" })),
-      "distance from screen to lens is missing; expected 0.01 to 0.2 m",
+      "distance from screen to lens is missing, expected 0.01 to 0.2 m",
     ],
     [
       toBase64(message({ lenses: `25${floats(Number.NaN)}` })),
-      "distance between the lenses is NaN; expected 0.03 to 0.1 m",
+      "distance between the lenses is NaN, expected 0.03 to 0.1 m",
     ],
     [toBase64(message({ fov: `2a08${floats(40, 40)}` })), "field of view at the bottom"],
     [
       toBase64(message({ fov: `2a10${floats(40, 95, 40, 40)}` })),
-      "is 95.0; expected 5 to 85 degrees",
+      "is 95.0, expected 5 to 85 degrees",
     ],
     [toBase64(message({ distortion: `3a04${floats(-2)}` })), "distortion is -2.00"],
     [toBase64(message({ distortion: `3a04${floats(Number.NaN)}` })), "distortion is NaN"],

@@ -142,7 +142,7 @@ function readParams(base64: string): Profile {
   if (!isIncreasing(profile.distortion, corner)) {
     const found = profile.distortion.map((k) => k.toPrecision(3)).join(", ");
     throw new ProfileError(
-      `The viewer's code: distortion is ${found}; expected one without folds in the image.`,
+      `The viewer's code: distortion is ${found}, expected one without folds in the image.`,
     );
   }
   return profile;
@@ -159,7 +159,7 @@ function within(
   if (value !== undefined && value >= least && value <= most) return value;
   const found = value === undefined ? "missing" : value.toPrecision(3);
   throw new ProfileError(
-    `The viewer's code: ${name} is ${found}; expected ${least} to ${most} ${unit}.`,
+    `The viewer's code: ${name} is ${found}, expected ${least} to ${most} ${unit}.`,
   );
 }
 

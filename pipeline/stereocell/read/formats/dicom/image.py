@@ -87,7 +87,7 @@ def read_image(location: Location, *, series: int = 0) -> Image:
             raise _no_labels(stack, len(found.stacks), location.shown, stack.problem)
     if stack.layout is None:
         raise SourceError(
-            f"{location.shown}: {stack.problem}; expected parallel slices of one volume "
+            f"{location.shown}: {stack.problem}, expected parallel slices of one volume "
             "(`--series list` shows what is there)"
         )
     _require_parts(stack, location.shown)
@@ -266,7 +266,7 @@ def _find(location: Location) -> Found:
         many = f"{len(files)} file{'s' * (len(files) != 1)}: " if files and root.is_dir() else ""
         raise SourceError(
             f"{location.shown}: no DICOM image with a place in the patient: found "
-            f"{many}{held or 'an empty folder'}; expected slices of MR, CT or the like"
+            f"{many}{held or 'an empty folder'}, expected slices of MR, CT or the like"
             f"{'' if paths else ', or a volume of another format'}"
             f"{or_one_of(root, 'dicom')}{in_words(remedies)}"
         )

@@ -71,7 +71,7 @@ def _require_end(path: str, where: str) -> None:
     if begins == BEGIN and not ends.startswith(_END):
         raise SourceError(
             f"{where}: cut short at byte {os.path.getsize(path)}, or never closed: the map of "
-            "chunks at the end of an ND2 file is missing; expected a complete ND2 file: copy it "
+            "chunks at the end of an ND2 file is missing, expected a complete ND2 file: copy it "
             "again"
         )
 

@@ -133,7 +133,7 @@ def read_only_array(
     paths = [path for path, _ in found]
     likely = likely_image(paths)
     raise SeveralDatasetsError(
-        f"{location.shown}: no multiscales: found {listed}{more}; expected the attribute "
+        f"{location.shown}: no multiscales: found {listed}{more}, expected the attribute "
         f"`multiscales` of an image, or one array, such as {location.shown}/{likely}",
         [f"{location.source}/{path}" for path in paths],
         [f"{path} {node.shape}" for path, node in found],

@@ -171,7 +171,7 @@ def _read(
             if only is not None:
                 return only, None
         raise SourceError(
-            f"{where}: no multiscales: {describe_group(ome, series, tree)}; expected the "
+            f"{where}: no multiscales: {describe_group(ome, series, tree)}, expected the "
             "attribute `multiscales` of an image"
         )
     converted = converted_of(location)

@@ -255,7 +255,7 @@ def zarr_boundary(where: str, expected: str) -> Iterator[None]:
             yield
         except NodeNotFoundError as error:
             raise SourceError(
-                f"{where}: zarr.json, .zgroup or .zarray: not found, or not reachable; expected "
+                f"{where}: zarr.json, .zgroup or .zarray: not found, or not reachable, expected "
                 f"{expected}"
             ) from error
 

@@ -57,7 +57,7 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     if len(chosen) == 1 and len(listed) > 1 and not (series or pattern):
         raise SourceError(
             f"{where}: found {len(listed)} images whose names don't show a volume, such as "
-            f"{listed[0]!r:.100} and {listed[-1]!r:.100}; expected names with numbers or words "
+            f"{listed[0]!r:.100} and {listed[-1]!r:.100}, expected names with numbers or words "
             "for planes or channels; name one of the files, choose by --series (`--series list` "
             "shows them), or describe the names by --pattern"
         )
@@ -75,7 +75,7 @@ def read_image(location: Location, *, series: int = 0, pattern: str = "") -> Ima
     if first.pages == 1:
         raise SourceError(
             f"{where}: a volume needs at least 2 planes: found images of one plane, and no number "
-            f"in their names that counts planes, such as {chosen[0].path!r:.100}; expected such "
+            f"in their names that counts planes, such as {chosen[0].path!r:.100}, expected such "
             f"numbers, or --pattern with {{z}}{or_one_of(location.source, 'planes', 'tiff')}"
         )
     if len(volume.planes) > 1:

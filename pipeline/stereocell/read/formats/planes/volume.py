@@ -82,7 +82,7 @@ def volume_of(where: str, places: Sequence[Place]) -> Volume:
         raise SourceError(
             f"{where}: found {len(files)} of {len(files) + len(missing)} planes ("
             f"{len(channels)} channels, {len(planes)} planes, {len(times)} times in the names), "
-            f"missing {shown}; expected all of them, or --pattern if the names mean something "
+            f"missing {shown}, expected all of them, or --pattern if the names mean something "
             "else"
         )
     return Volume(places[0].group, tuple(times), tuple(channels), tuple(planes), files)

@@ -58,7 +58,7 @@ def open_tiff(location: Location, stack: ExitStack, **options: Any) -> TiffFile:
         try:
             return stack.enter_context(TiffFile(remote, **options))
         except TiffFileError as error:
-            raise SourceError(f"{where}: {error}; expected {_EXPECTED}") from error
+            raise SourceError(f"{where}: {error}, expected {_EXPECTED}") from error
 
 
 def _require_tiff(where: str, file: IO[bytes]) -> None:
