@@ -187,7 +187,7 @@ def decode_finest(data: bytes) -> NDArray[np.uint8]:
     components = _COMPONENTS.get(vk_format)
     if components is None or scheme != _ZSTD or layers or faces != 1:
         raise SourceError(
-            f"VK_FORMAT {vk_format}, scheme {scheme}, {layers} layers, {faces} faces; "
+            f"VK_FORMAT {vk_format}, scheme {scheme}, {layers} layers, {faces} faces, "
             "expected 8-bit UNORM, zstd, one layer, one face"
         )
     shape = (max(depth, 1), height, width, components)

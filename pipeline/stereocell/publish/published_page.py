@@ -85,7 +85,7 @@ def require_own(
     for path, entry in entries.items():
         if path in there and path not in before and not _is_same(target, path, entry, there):
             raise OutputError(
-                f"{target.shown}/{path}: this file exists and was not uploaded by this command; "
+                f"{target.shown}/{path}: this file exists and was not uploaded by this command, "
                 f"expected a place without other files: {or_force('choose another place')}"
             )
     others = [path for path in there if path not in entries and not _is_of_host(path)]

@@ -51,7 +51,7 @@ def target_of(text: str, *, is_public: bool) -> Target:
         return FolderTarget(Path(location.source))
     if urlsplit(text).scheme in ("http", "https"):
         raise OutputError(
-            f"{location.shown}: files can't be written over http; "
+            f"{location.shown}: files can't be written over http, "
             "expected a folder or an address such as s3://bucket/name"
         )
     return StoreTarget(location, is_public)

@@ -186,7 +186,7 @@ def _missing(grid: Grid) -> str:
     if not found:
         hint = f" ({grid.hint})" if grid.hint else ""
         return (
-            f"not found with a unit of length{hint}; "
+            f"not found with a unit of length{hint}, "
             "expected it in the metadata, or give it with --spacing-um z,y,x"
         )
     lacking = [a for a, value in zip("zyx", grid.partial_um, strict=True) if value is None]
@@ -196,7 +196,7 @@ def _missing(grid: Grid) -> str:
     )
     hint = f" ({grid.hint})" if grid.hint else ""
     return (
-        f"found {', '.join(found)}, but none along {' and '.join(lacking)}{hint}; "
+        f"found {', '.join(found)}, but none along {' and '.join(lacking)}{hint}, "
         f"expected all three, or give them with --spacing-um {form}"
     )
 

@@ -176,7 +176,7 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     await front.stop();
   });
 
-  test("the image is shown until the kernel answers", async () => {
+  test("a still image is shown until the kernel answers", async () => {
     const png =
       "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==";
     kernel.run(`import base64, time; viewer._picture = base64.b64decode("${png}")`);
@@ -189,7 +189,9 @@ describe.skipIf(!hasChromium() || !hasPython)("the widget in a notebook", () => 
     // load
     const opacity = await picture.evaluate((each) => Number(getComputedStyle(each).opacity));
     expect(opacity).toBeLessThan(1);
-    expect(await front.cell.locator(".stereocell p").textContent()).toContain("until the kernel");
+    expect(await front.cell.locator(".stereocell p").textContent()).toContain(
+      "when no cell is running",
+    );
     await front.viewer();
     await front.stop();
   });

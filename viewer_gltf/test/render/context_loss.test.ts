@@ -131,7 +131,9 @@ describeInChromium("a graphics driver", () => {
     await stand.open("&mode=all");
     await stand.viewer.settled();
     expect(await notices()).toEqual([
-      expect.stringMatching(/at most 64 voxels along an edge: those of \d+ are shown at a coarser/),
+      expect.stringMatching(
+        /at most 64 voxels along an edge. Volumes of \d+ voxels are shown at a coarser/,
+      ),
     ]);
     const { volumes } = await stand.viewer.snapshot();
     expect(volumes.length).toBeGreaterThan(0);

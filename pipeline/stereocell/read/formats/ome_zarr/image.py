@@ -273,7 +273,7 @@ def _levels(
     is_same = image.names_axes and dimension_names(arrays[0]) == image.names
     if axes and (is_same or not is_open):
         raise UsageError(
-            f"{where}: --axes {axes}: the image names its axes, {', '.join(image.names)}; "
+            f"{where}: --axes {axes}: the image names its axes, {', '.join(image.names)}, "
             "expected no --axes"
         )
     source = "`axes`" if image.names_axes else f"axes of {image.title} (or give --axes)"

@@ -60,7 +60,7 @@ def require_depth(where: str, finest: VoxelArray) -> None:
             lengths = {a: n for a, n in zip(finest.axes, finest.array.shape, strict=True) if n > 1}
             asked = "".join("z" if a == axis else a for a in lengths)
             raise SourceError(
-                f"{where}: a volume needs at least 2 planes: found 1 along z, and {count} {noun}; "
+                f"{where}: a volume needs at least 2 planes: found 1 along z, and {count} {noun}, "
                 f"expected slices: --axes {asked} reads the {noun} as slices"
             )
 
