@@ -13,7 +13,7 @@ _Types = Sdf.ValueTypeNames
 def define_surface(material: UsdShade.Material, color: Color | None) -> UsdShade.Shader:
     """Define a material's shader `surface`, and connect it to the material's output.
 
-    color  linear RGB; None: another opinion or the mesh's primvars give the colour
+    color  linear RGB; None: the shader gets no colour here, since the mesh's primvars feed it
     """
     path = material.GetPath().AppendChild("surface")
     surface = UsdShade.Shader.Define(material.GetPrim().GetStage(), path)

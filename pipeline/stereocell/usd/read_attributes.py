@@ -94,7 +94,7 @@ def point_of(prim: Usd.Prim, name: str) -> Point:
 
 
 def shortest(number: float) -> float:
-    """Return the number with the fewest digits that is the same as float32: 0.2, not 0.200000003."""
+    """Return the shortest decimal that is the same float32: 0.2, not 0.20000000298023224."""
     return float(str(np.float32(number)))
 
 

@@ -34,7 +34,7 @@ def display_color(mesh: Usd.Prim) -> Color | None:
 
 
 def _find_edited_color(mesh: Usd.Prim) -> UsdGeom.Primvar | None:
-    """Return the display colour of a mesh, its own or an inherited one, unless the build wrote it."""
+    """Return a mesh's own or inherited display colour, unless the build wrote it."""
     prim = mesh
     while prim and not prim.IsPseudoRoot():
         primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor")
