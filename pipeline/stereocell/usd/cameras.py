@@ -1,7 +1,7 @@
 """Frame a specimen with three cameras: `mono`, and `left` and `right` for a stereo pair.
 
-They frame the visible content and not the whole box: the surfaces of a head can fill a small part
-of a scan's box, even more so if the scanner's gantry was tilted. The viewer does the same.
+They frame the visible content and not the whole box. For example, the surfaces of a head can fill a
+small part of a scan's box if the scanner's gantry was tilted. The viewer does the same.
 
 The viewer scales the specimen to a longest edge of 1.2 m. The cameras use the same scale, so the
 distance between the eyes, 63 mm, is divided by it. Both eyes look straight ahead, in parallel.

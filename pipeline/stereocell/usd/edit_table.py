@@ -1,8 +1,8 @@
 """The edits of a stage that a bundle takes over: one table of places and names.
 
-The readers of a composed stage read these opinions and no others. `find_lost_edits` compares the
-opinions of an artist's layers with the table and reports those that are not in it. If you make a
-reader read a new name, add the name here. tests/bundle/test_edit_table.py tests each kind of row.
+The readers of a composed stage read only these opinions. `find_lost_edits` compares the opinions of
+an artist's layers with the table and reports those that are missing in it. If you make a reader
+read a new name, add the name here. tests/bundle/test_edit_table.py tests each kind of row.
 
 A name that begins with `@` is metadata of a prim; any other name is a property. `*` matches any
 text.

@@ -25,7 +25,7 @@ BROADCAST = Sdf.Path("/__class__").AppendChild(ROOT.name)
 OPENING_CUT = "stereocell:openingCut"
 # Attribute of /Specimen: scale of the specimen in display.usda, see usd/write_display.py
 DISPLAY_SCALE = "stereocell:displayScale"
-PAINTED_BY = "stereocell:paintedBy"  # of a channel: ID of the channel whose intensity it shows
+PAINTED_BY = "stereocell:paintedBy"  # on a channel: ID of the channel whose intensity it shows
 BUILT_COLOR = "stereocellBuiltColor"  # custom data of a surface's colour: its colour after a build
 CHANNELS = ROOT.AppendChild("Channels")
 # Parent of one prim per channel: its surfaces and volumes in all tiles inherit its visibility

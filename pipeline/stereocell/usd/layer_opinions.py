@@ -114,8 +114,8 @@ def load_payloads_of_users(stage: Usd.Stage) -> None:
 def defined_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     """Yield all active and defined prims, including those of instances and of users' payloads.
 
-    Prims below a PointInstancer are left out: prototypes have no place of their own. The payloads
-    of users stay loaded.
+    Prims below a PointInstancer are left out: prototypes have no place of their own. Payloads that
+    users add stay loaded.
     """
     load_payloads_of_users(stage)
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), _DEFINED))

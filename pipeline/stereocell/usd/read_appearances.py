@@ -63,8 +63,8 @@ def surface_of(prim: Usd.Prim) -> UsdShade.Shader:
 def material_of(surface: UsdShade.Shader) -> Material:
     """Return the glTF material for a UsdPreviewSurface.
 
-    It is white if an image or the mesh's own colours feed the colour. Raises StageError for values
-    of another type, or outside their range.
+    It is white if an image or the mesh's own colours feed the colour. Raises StageError for invalid
+    values.
     """
     color = WHITE
     if feeder(surface, "color") is None:

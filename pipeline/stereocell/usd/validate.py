@@ -183,8 +183,8 @@ def _check_selections(stage: Usd.Stage) -> Iterator[Finding]:
 def _select_variants(stage: Usd.Stage, turn: int) -> int:
     """Select variant number `turn` of every variant set, in the session layer.
 
-    A set with fewer variants keeps its last one. Of representations, `both` is always selected.
-    Returns the number of turns: the size of the largest set.
+    A set with fewer variants keeps its last one. The representation is always `both`. Returns the
+    number of turns: the size of the largest set.
     """
     session = stage.GetSessionLayer()
     chosen: list[tuple[Sdf.Path, str, str]] = []
