@@ -3,9 +3,9 @@
 All open edges lie in the planes between tiles. In each plane, they bound the cross-sections of the
 solid: polygons with holes, which are filled with triangles.
 
-At the line where two of these planes meet, polygons of both planes end in the same points. The
-line is inside the solid between the first and the second point, the third and the fourth, and so
-on, because both ends of the line are outside the solid.
+At the line where two of these planes meet, polygons of both planes end in the same points. Both
+ends of the line are outside the solid. So the line is inside the solid between the first and the
+second point, between the third and the fourth, and so on.
 """
 
 from collections.abc import Sequence

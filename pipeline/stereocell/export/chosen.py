@@ -123,8 +123,8 @@ class Chosen:
     def show_as_viewer(self) -> None:
         """Select only the channels that the viewer shows at opening, unless channels were named.
 
-        All channels together would hide each other, or show through each other in patches. If none
-        of the viewer's channels has a surface, all channels stay selected.
+        All channels together would hide each other, or show through each other in patches. If the
+        viewer's channels have no surface, all channels stay selected.
         """
         every, shown = self.channels, [one for one in self.channels if one.opens]
         if self.options.channels or not shown or len(shown) == len(every):

@@ -41,8 +41,8 @@ class Layout:
     first        first voxel (x, y, z) of the volume on the common lattice, whose (0, 0, 0) is the
                  first voxel of the first tile
     firsts       first voxel (x, y, z) of each tile on the common lattice, by tile ID
-    is_measured  whether values are those of the source; else the channel's window spans the range
-                 of the type
+    is_measured  whether values are those of the source; else the channel's window is scaled to the
+                 whole range of the type
     is_upright   whether y grows upwards and z away from the viewer, as in Unity
     """
 

@@ -64,7 +64,7 @@ class _Fate(Enum):
 class LostEdit:
     """An edit that no bundle takes over.
 
-    what    path of the prim, with the property or the metadata, as the message shows it
+    what    the prim with the property or the metadata, in the words of the message
     name    name of the property or the metadata; edits of one name and reason are similar
     reason  why the edit is lost
     """

@@ -172,7 +172,7 @@ def loaded(
 def _require_names(tile: Usd.Prim) -> None:
     """Raise StageError for a surface that readers can't find because a prim was renamed.
 
-    Surfaces are recognized by their API schema.
+    Surfaces are recognized by their API schema. Those of an inactive channel are no error.
     """
     stage = tile.GetStage()
     channels = specimen_of(stage).channels

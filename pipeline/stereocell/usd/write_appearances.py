@@ -14,8 +14,9 @@ The material has no volume output, since USD defines no volume shader that rende
 Volume prim is bound to its material so that programs find the channel's values (colour, opacity
 points, LUT). The binding alone does NOT make a renderer draw the volume. An artist has to connect
 `outputs:volume` to the renderer's own shader, in a layer over the stage, and `inputs:color` to the
-shader's colour. docs/stage-volumes.md has an example of this layer, and lists the shaders that were
-tried: USD's validators refuse all that renderers know. The bundle's viewer has its own ray caster.
+shader's colour. There is an example of this layer in docs/stage-volumes.md. The page also lists the
+shaders that were tried: USD's validators refuse all that renderers know. The bundle's viewer has
+its own ray caster.
 """
 
 from collections.abc import Mapping, Sequence

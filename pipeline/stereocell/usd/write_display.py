@@ -5,9 +5,9 @@ display.usda is in metres. It references stage.usda and enlarges it by a transfo
 itself stays in true size.
 
 Scenes reference display.usda, so its root prim has the specimen's name. Edits belong to /Specimen
-of stage.usda, which has the same name for all specimens: a layer then also fits the next build or
-another specimen. display.usda has its own cameras, since a transform moves a camera but does not
-scale its clipping range.
+of stage.usda, which has the same name for all specimens. So a layer with edits also fits the next
+build or another specimen. The file has its own cameras, since a transform moves a camera but does
+not scale its clipping range.
 """
 
 from pathlib import Path

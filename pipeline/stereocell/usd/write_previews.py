@@ -29,8 +29,8 @@ _THUMBNAIL = "thumbnail.png"
 _THUMBNAIL_WIDTH = 512  # pixels
 _CARD_EDGE = 512  # pixels, longer edge of a card
 
-# For each side of the box: the directions (x, y, z) that point right, up and to the viewer in an
-# upright image, and the counterclockwise quarter turns that USD's mapping of the card needs
+# Views of the six sides of the box: directions (x, y, z) that point right, up and to the viewer in
+# an upright image. The number of counterclockwise quarter turns fits the image to USD's card.
 _SIDES = {
     "XPos": ((0, 0, -1), (0, 1, 0), (1, 0, 0), 3),
     "XNeg": ((0, 0, 1), (0, 1, 0), (-1, 0, 0), 1),

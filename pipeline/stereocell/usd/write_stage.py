@@ -13,8 +13,8 @@ nvindex.usda                  the stage for NVIDIA IndeX: see usd/write_nvindex.
 In USD, a layer's own opinions are stronger than inherits, inherits are stronger than variants, and
 variants are stronger than references. All content of a build comes by a reference. So any opinion
 in a layer over the stage is stronger, even in a class that a channel inherits, or in a variant of
-/Specimen or of a prim above. /Specimen inherits the empty class /__class__/Specimen. If a scene
-edits this class, it edits every specimen that the scene references.
+/Specimen or of a prim above. The prim /Specimen inherits the empty class /__class__/Specimen. If a
+scene edits this class, it edits every specimen that the scene references.
 
 contents.usda repeats the variants that each tile selects, so that they are known before the tile is
 loaded.

@@ -1,10 +1,10 @@
 """Compare the files of a stage with files.json, which lists the files that the build wrote.
 
 A layer that differs from the list was either edited in place or damaged, and messages name both.
-(Edits belong in an artist's own layers, but people edit in place.) If USD can open the layer, it is
-used, and never replaced automatically. A binary layer of unchanged size is an exception and counts
-as damaged: a saved edit rarely has exactly the same size, and USD opens most layers with a flipped
-bit (34 of 40 trials gave a bundle).
+Edits belong in an artist's own layers, but some artists edit in place. If USD can open the layer,
+it is used, and never replaced automatically. A binary layer of unchanged size is an exception: it
+is not used, since a saved edit rarely has exactly the same size. USD can't find all damage: it
+opens most layers with a flipped bit (34 of 40 trials gave a bundle).
 
 Any other file that differs is damaged. Files that are not in the list belong to an artist.
 """
